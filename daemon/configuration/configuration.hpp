@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/settings.hpp"
+#include "drivers/assembler.hpp"
+#include "drivers/can_port.hpp"
+#include "drivers/gimbal.hpp"
+#include "drivers/shaker.hpp"
+#include "estimator/identification.hpp"
+
+namespace vibrig::configuration {
+
+/// "file:line:column: key: found X, expected Y"; several at once, one per line.
+class ConfigurationError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+struct Configuration {
+    estimator::Settings estimator;       ///< [site] [vibration] [platform] [accelerometer] [noise] [estimator]
+    campaign::Settings campaign;         ///< [campaign], [shaker.limits]
+    drivers::CanPortSettings can;        ///< [can]
+    std::string dbc;                     ///< [can] dbc: path, relative to the configuration; empty: the built-in rig.dbc
+    drivers::AssemblerSettings assembler;///< [can.signals], [can] sample_rate_hz, deadlines
+    drivers::GimbalSettings gimbal;      ///< [gimbal]
+    drivers::ShakerSettings shaker;      ///< [shaker], [shaker.registers]
+    enum class ClockKind : std::uint8_t { real, rig } clock = ClockKind::real;  ///< [clock] source
+    std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
+    std::string log_level = "info";      ///< [log] level
+    std::string log_file;                ///< [log] file; empty: standard error
+    std::string results;                 ///< [campaign] results: folder for result.json; empty: none written
+    int acquisition_priority = 60;       ///< [threads] SCHED_FIFO; 0: ordinary scheduling
+    int estimator_priority = 50;
+};
+
+/// One effective value as --check prints it.
+struct EffectiveValue {
+    std::string key, value, unit, origin, doc;  ///< origin: "default" or "file:line"
+};
+
+struct Loaded {
+    Configuration configuration;
+    std::vector<EffectiveValue> effective;
+};
+
+/// Throws ConfigurationError. Empty path: all defaults. `daemon`: also checks what only the daemon needs
+/// (a watchdog register, the rig clock only with a simulated bus and Modbus on loopback, shaker limits).
+[[nodiscard]] Loaded load(const std::string& path, bool daemon);
+[[nodiscard]] Loaded parse(const std::string& text, const std::string& name, bool daemon);
+/// The table of --check.
+[[nodiscard]] std::string format_effective(const Loaded& loaded);
+/// Every key with type, unit, default, bounds and doc, as --help and the manual show it.
+[[nodiscard]] std::string format_schema();
+
+}  // namespace vibrig::configuration

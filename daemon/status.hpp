@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/assembler.hpp"
+#include "drivers/can_port.hpp"
+#include "drivers/sample.hpp"
+#include "drivers/shaker.hpp"
+#include "estimator/identification.hpp"
+
+namespace vibrig {
+
+enum class CampaignState : std::uint8_t {
+    idle,        ///< measuring; shaker disarmed
+    armed,       ///< a named person armed it; nothing moves
+    waiting,     ///< for platform ready and steady temperature
+    slewing,
+    ramping,
+    settling,
+    recording,
+    resting,     ///< ramping down, waiting for rest
+    paused,      ///< at rest between positions, by command
+    finished,
+    aborted,
+    tripped,     ///< stopped by an interlock; latched until acknowledged
+};
+[[nodiscard]] const char* name_of(CampaignState state) noexcept;
+
+struct RingCounters {
+    std::uint64_t pushed = 0, popped = 0, dropped = 0;
+};
+
+/// The whole status at one instant. Filled by the daemon, read by the server; strings only here, not in real-time threads.
+struct StatusData {
+    std::string version;
+    std::string campaign_name;
+    std::string clock;               ///< "real" or "rig"
+    drivers::Time time = 0;          ///< of the daemon's clock, ns
+    std::int64_t utc_ns = 0;
+    drivers::Time uptime = 0;
+
+    CampaignState state = CampaignState::idle;
+    std::string reason;              ///< why it is aborted, tripped, waiting; else empty
+    std::string armed_by;
+    int run = 0, runs = 0, position = 0, positions = 0;  ///< from 1; 0: none
+    std::array<double, 3> position_deg{};
+    double progress = 0;             ///< 0 to 1
+    double remaining_s = 0;          ///< estimate
+
+    double command_table_g = 0;
+    double command_frequency_hz = 0;
+    drivers::ShakerReading shaker;
+    drivers::LinkState shaker_link = drivers::LinkState::absent;
+    drivers::ShakerCounters shaker_counters;
+
+    drivers::PortState can = drivers::PortState::absent;
+    drivers::CanPortCounters can_counters;
+    drivers::AssemblerCounters assembler;
+    RingCounters estimator_ring;
+    drivers::Sample sample;          ///< the newest
+    std::array<double, drivers::kChannels> channel_age_s{};
+    drivers::PlatformStatus platform;
+
+    estimator::Estimate estimate;
+    std::vector<estimator::DwellSummary> dwells;
+};
+
+enum class Severity : std::uint8_t { info, warning, alarm, trip };
+[[nodiscard]] const char* name_of(Severity severity) noexcept;
+
+struct EventRecord {
+    std::uint64_t id = 0;
+    std::int64_t utc_ns = 0;
+    drivers::Time time = 0;
+    Severity severity = Severity::info;
+    std::string source;   ///< "campaign", "can", "shaker", ...
+    std::string text;
+};
+
+struct CommandRequest {
+    enum class Kind : std::uint8_t { arm, start, pause, resume, abort, acknowledge } kind = Kind::abort;
+    std::string by;        ///< named person
+    std::string argument;  ///< what is acknowledged
+};
+struct CommandReply {
+    bool accepted = false;
+    std::string message;
+};
+
+/// What the status server asks the daemon for. Any thread; never touches the real-time threads.
+class StatusSource {
+  public:
+    virtual ~StatusSource() = default;
+    [[nodiscard]] virtual StatusData status() const = 0;
+    [[nodiscard]] virtual std::vector<EventRecord> events(std::uint64_t after_id, std::size_t at_most) const = 0;
+    /// Final or present result; empty while there is nothing.
+    [[nodiscard]] virtual estimator::Result result() const = 0;
+    [[nodiscard]] virtual std::string effective_configuration() const = 0;
+    virtual CommandReply command(const CommandRequest& request) = 0;
+};
+
+}  // namespace vibrig

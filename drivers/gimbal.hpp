@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "drivers/can_port.hpp"
+#include "drivers/sample.hpp"
+#include "proto/dbc.hpp"
+
+namespace vibrig::drivers {
+
+struct GimbalSettings {
+    std::string message = "GimbalCommand";  ///< signals Outer, Inner, Azimuth (deg), Mode, Counter
+    Time status_deadline = 500 * kMillisecond;  ///< status older than this is not believed
+    Time slew_timeout = 120 * kSecond;
+    Time repeat = 200 * kMillisecond;           ///< command sent again until its counter is echoed
+};
+
+enum class GimbalState : std::uint8_t { idle, commanding, slewing, in_position, timed_out, no_status };
+[[nodiscard]] const char* name_of(GimbalState state) noexcept;
+
+/// Sends gimbal commands and follows them to "in position". Control thread only.
+class Gimbal {
+  public:
+    Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& port);
+    /// Starts a slew to outer, inner, azimuth in deg, as the encoders count.
+    void slew_to(const std::array<double, 3>& position_deg, Time now) noexcept;
+    /// Lets the platform drift freely under its gyros: no torquing.
+    void release(Time now) noexcept;
+    /// Follows the platform's status; sends again what was not echoed. To be called at next_deadline() and on new status.
+    GimbalState update(const PlatformStatus& status, Time now) noexcept;
+    [[nodiscard]] Time next_deadline() const noexcept;
+    [[nodiscard]] GimbalState state() const noexcept { return state_; }
+
+  private:
+    enum class Mode : std::uint8_t { free_drift = 0, slew = 1 };
+    void send(Time now) noexcept;
+
+    const proto::Message* message_;
+    GimbalSettings settings_;
+    CanPort& port_;
+    std::array<double, 3> target_deg_{};
+    Mode mode_ = Mode::free_drift;
+    std::uint8_t counter_ = 0;
+    bool echoed_ = true;
+    Time commanded_at_ = 0;
+    Time sent_at_ = 0;
+    GimbalState state_ = GimbalState::idle;
+};
+
+}  // namespace vibrig::drivers

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "drivers/clock.hpp"
+#include "proto/register_map.hpp"
+
+namespace vibrig::drivers {
+
+struct ShakerSettings {
+    enum class Transport : std::uint8_t { tcp, rtu } transport = Transport::tcp;
+    std::string host = "127.0.0.1";  ///< numeric address or name
+    int port = 502;
+    std::string device;              ///< rtu: serial device
+    int baud = 19200;                ///< rtu: 8E1
+    int unit = 1;                    ///< Modbus unit (slave) id
+    Time response_timeout = 500 * kMillisecond;  ///< of one request, wall time
+    Time poll_period = 200 * kMillisecond;       ///< read-back
+    Time watchdog_period = 500 * kMillisecond;   ///< feed
+    Time backoff_min = 100 * kMillisecond;       ///< reconnect, doubled up to backoff_max
+    Time backoff_max = 5 * kSecond;
+    proto::ShakerRegisters registers;            ///< the register map of the configuration
+};
+
+/// What is asked of the shaker. Frequency may only change while the amplitude is zero (checked by the campaign).
+struct ShakerSetPoint {
+    double frequency_hz = 0;
+    double amplitude_g = 0;  ///< peak, at the table
+    double ramp_s = 0;       ///< from the present amplitude to this one
+};
+
+/// The newest read-back. Nothing of it is valid while `valid` is false.
+struct ShakerReading {
+    Time time = 0;
+    bool valid = false;
+    double frequency_hz = 0;          ///< set-point read back
+    double amplitude_g = 0;           ///< set-point read back, peak at the table
+    double measured_g = 0;            ///< measured, peak at the table
+    std::uint16_t state = 0;          ///< register value, named by the map: 0 idle, 1 ramping, 2 running, 3 stopping, 4 fault
+    std::uint16_t fault = 0;
+    bool running = false;             ///< the run register read back
+    bool emergency_stop_open = false;
+    [[nodiscard]] bool at_rest() const { return valid && !running && state == 0 && measured_g < 0.05; }
+};
+
+enum class LinkState : std::uint8_t { absent, connecting, running, degraded, fault };
+[[nodiscard]] const char* name_of(LinkState state) noexcept;
+
+struct ShakerCounters {
+    std::uint64_t requests = 0, replies = 0, timeouts = 0, exceptions = 0, reconnects = 0, set_points_discarded = 0,
+                  feeds = 0, stops_written = 0, read_back_mismatches = 0;
+};
+
+/// The shaker over Modbus, on a thread of its own behind a queue of at most one set-point.
+/// A stop outranks everything: it overtakes, never expires, is the first write after a reconnect, and until it is read
+/// back as done the watchdog is not fed.
+class Shaker {
+  public:
+    using StateHandler = std::function<void(LinkState, const char* text)>;
+
+    virtual ~Shaker() = default;
+    /// Starts the thread. `may_feed` is asked in that thread before each watchdog feed.
+    virtual void start(std::function<bool()> may_feed, StateHandler on_state) = 0;
+    /// Replaces a waiting set-point; false if a stop is pending or the link is not running (nothing is kept then).
+    [[nodiscard]] virtual bool request(const ShakerSetPoint& set_point) noexcept = 0;
+    /// Any thread; never blocks. Cuts off a request in flight.
+    virtual void stop_now() noexcept = 0;
+    [[nodiscard]] virtual bool stop_pending() const noexcept = 0;
+    /// True while a request() waits or is being written.
+    [[nodiscard]] virtual bool busy() const noexcept = 0;
+    [[nodiscard]] virtual ShakerReading reading() const noexcept = 0;
+    [[nodiscard]] virtual ShakerCounters counters() const noexcept = 0;
+    [[nodiscard]] virtual LinkState state() const noexcept = 0;
+    /// Called in the shaker's thread after every completed read-back, to wake whoever waits for one.
+    virtual void on_reading(std::function<void()> wake) = 0;
+    /// Ends the thread. Does not stop the shaker: call stop_now() and wait for stop_pending() to clear first.
+    virtual void shut_down() noexcept = 0;
+};
+
+[[nodiscard]] std::unique_ptr<Shaker> make_shaker(Clock& clock, const ShakerSettings& settings);
+
+}  // namespace vibrig::drivers
