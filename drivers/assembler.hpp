@@ -13,12 +13,13 @@ namespace vibrig::drivers {
 
 /// Which DBC signal carries what, as "Message.Signal"; empty: not bound. The defaults are those of proto/rig.dbc.
 struct SignalBindings {
-    std::string sync_count = "Sync.SyncCount";           ///< full counter; wraps at the signal's width
+    std::string sync_count = "Sync.SyncCount";  ///< full counter; wraps at the signal's width
     std::string outer = "Resolvers.Outer", inner = "Resolvers.Inner", azimuth = "ResolverAzimuth.Azimuth";  ///< deg
-    std::string outer_valid = "ResolverAzimuth.OuterValid", inner_valid = "ResolverAzimuth.InnerValid",
+    std::string outer_valid = "Resolvers.OuterValid", inner_valid = "Resolvers.InnerValid",
                 azimuth_valid = "ResolverAzimuth.AzimuthValid";
-    std::string accel_x = "Accelerometers.X", accel_y = "Accelerometers.Y", accel_z = "Accelerometers.Z";   ///< g
-    std::string accel_valid = "Accelerometers.Valid";
+    std::string accel_x = "AccelerometersXY.X", accel_y = "AccelerometersXY.Y", accel_z = "AccelerometerZ.Z";  ///< g
+    std::string accel_x_valid = "AccelerometersXY.XValid", accel_y_valid = "AccelerometersXY.YValid",
+                accel_z_valid = "AccelerometerZ.ZValid";
     std::string table_accel = "TableAccelerometer.Axial";  ///< g
     /// In any message with a channel: the low bits of the sync count it belongs to.
     std::string message_sync_signal = "SyncLow";
