@@ -1,0 +1,41 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <exception>
+#include <iostream>
+
+#include "daemon/tool/commands.hpp"
+
+namespace {
+
+constexpr int kBadUsage = 2;
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{"Vibrig: gyro error coefficients of an inertial platform on a vibration rig.",
+                 "vibrig"};
+    app.set_version_flag("--version", "vibrig " VIBRIG_VERSION);
+    app.require_subcommand(1);
+    app.footer(
+        "Example: vibrig identify recording.csv --config rig.toml\n"
+        "`vibrig COMMAND --help` explains a command.\n"
+        "Exit codes: 0 done, 1 the result says no, 2 bad usage or input.");
+    int exit_code = 0;
+#ifdef VIBRIG_WITH_IDENTIFY
+    vibrig::tool::add_identify(app, exit_code);
+#endif
+#ifdef VIBRIG_WITH_REMOTE
+    vibrig::tool::add_remote(app, exit_code);
+#endif
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        // CLI11 has codes of its own for each kind of bad usage; people and scripts get one.
+        return app.exit(error) == 0 ? 0 : kBadUsage;
+    } catch (const std::exception& error) {
+        std::cerr << "vibrig: " << error.what() << '\n';
+        return kBadUsage;
+    }
+    return exit_code;
+}
