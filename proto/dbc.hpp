@@ -41,6 +41,7 @@ struct Signal {
     bool is_multiplexor = false;
     std::optional<std::uint32_t> multiplex_value;  ///< present only when the multiplexor has this value
     std::map<std::int64_t, std::string> value_names;
+    std::optional<std::uint32_t> multiplex_last;  ///< end of a range (SG_MUL_VAL_); absent: one value
 };
 
 struct Message {

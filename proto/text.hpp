@@ -1,0 +1,26 @@
+#pragma once
+
+#include <charconv>
+#include <string>
+#include <string_view>
+
+namespace vibrig::proto {
+
+/// What is quoted in an error message: cut to a readable length, control and foreign bytes as \xNN.
+[[nodiscard]] std::string printable(std::string_view text);
+[[nodiscard]] std::string_view without_byte_order_mark(std::string_view text) noexcept;
+[[nodiscard]] bool is_utf8(std::string_view text) noexcept;
+[[nodiscard]] std::string utf8_from_latin1(std::string_view text);
+
+/// True if all of the text is one number that the type holds, without sign '+' or spaces.
+template <typename Number>
+[[nodiscard]] bool read_number(std::string_view text, Number& out) noexcept {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+    return error == std::errc() && end == text.data() + text.size();
+}
+
+/// The whole file, at most `limit` bytes. Throws std::runtime_error with the cause, without the
+/// path: the caller names it in its own error.
+[[nodiscard]] std::string read_whole_file(const std::string& path, std::size_t limit);
+
+}  // namespace vibrig::proto
