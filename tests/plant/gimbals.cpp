@@ -1,0 +1,33 @@
+#include "tests/plant/gimbals.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vibrig::plant {
+
+namespace {
+constexpr double kInPosition = 0.005;  ///< deg
+}
+
+void Gimbals::slew_to(const Vec3& encoder_deg) noexcept {
+    target_ = encoder_deg;
+    mode_ = GimbalMode::slew;
+    moving_ = true;
+}
+
+bool Gimbals::advance(double dt_s, Vec3& encoder_deg) noexcept {
+    if (!slewing()) return false;
+    double largest = 0;
+    double first = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double gap = std::remainder(target_[i] - encoder_deg[i], 360.0);
+        first = std::max(first, std::abs(gap));
+        const double step = std::clamp(gap, -rate_ * dt_s, rate_ * dt_s);
+        encoder_deg[i] += step;
+        largest = std::max(largest, std::abs(gap - step));
+    }
+    moving_ = largest > kInPosition;
+    return !moving_ && first > kInPosition;
+}
+
+}  // namespace vibrig::plant

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <complex>
+
+namespace vibrig::plant {
+
+/// Isolation pads under the platform: m X'' + k1 X' + k0 X = k1 Y' + k0 Y, driven by the table's
+/// acceleration. The acceleration of the platform answers that of the table with the same transfer
+/// function, so accelerations (g) go in and come out. For a sine of constant amplitude the
+/// discretisation is exact at every step length.
+class Isolator {
+  public:
+    /// The natural frequency is chosen such that |T| at `frequency_hz` equals `transmission`, above
+    /// the resonance. Throws PlantError if no such frequency exists.
+    Isolator(double transmission, double frequency_hz, double damping, double step_s);
+
+    [[nodiscard]] double natural_frequency_hz() const noexcept;
+    /// a0/a and phase at a frequency; Tang et al. 2009, eq. 3, and eq. 4 with its sign put right.
+    [[nodiscard]] std::complex<double> transfer(double frequency_hz) const noexcept;
+
+    /// Fundamental of the table in the following steps; the second harmonic is relative to it.
+    void set_drive(double frequency_hz, double second_harmonic) noexcept;
+    /// One step under a table acceleration of this amplitude (g), constant over the step.
+    void advance(double amplitude_g) noexcept;
+    /// The platform gets a push: its acceleration jumps by this much and then rings down.
+    void kick(double g) noexcept;
+
+    [[nodiscard]] double platform_g() const noexcept;                 ///< A1, along up
+    [[nodiscard]] double table_g(double amplitude_g) const noexcept;  ///< at the present phase
+    [[nodiscard]] bool at_rest() const noexcept;                      ///< below 1e-9 g
+
+  private:
+    using Complex = std::complex<double>;
+    struct Harmonic {
+        double relative = 0;
+        Complex phasor{1, 0};            ///< exp(i w t)
+        Complex turn{1, 0};              ///< exp(i w step)
+        std::array<Complex, 2> input{};  ///< of one step
+    };
+
+    double omega0_;
+    double damping_;
+    double step_s_;
+    std::array<std::array<double, 2>, 2> transition_{};
+    std::array<double, 2> state_{};  ///< acceleration = omega0^2 s0 + 2 zeta omega0 s1
+    std::array<Harmonic, 2> harmonics_{};
+};
+
+}  // namespace vibrig::plant

@@ -1,0 +1,53 @@
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <sstream>
+
+#include "tests/plant/commands.hpp"
+#include "tests/plant/judge.hpp"
+
+namespace vibrig::plant {
+
+void add_judge_command(CLI::App& app, int& exit_code) {
+    struct Options {
+        std::string result;
+        std::string truth;
+        double sigma = 4;
+    };
+    auto o = std::make_shared<Options>();
+    CLI::App* command =
+        app.add_subcommand("judge", "Compare an identification result with the truth");
+    command
+        ->add_option("result", o->result,
+                     "JSON result of vibrig identify or of a campaign, - for standard input")
+        ->required();
+    command->add_option("--truth", o->truth,
+                        "truth file (JSON); default: Table 2 of Tang et al. 2009");
+    command->add_option("--sigma", o->sigma, "largest error in standard deviations")
+        ->check(CLI::Range(0.1, 1000.0))
+        ->capture_default_str();
+    command->footer(
+        "Exit code 0 only if all 30 coefficients are there, observable, finite and within the "
+        "limit; 1 otherwise,\n"
+        "2 for bad input.\nExample:\n  vibrig-plant judge result.json --truth truth.json --sigma "
+        "4");
+    command->callback([o, &exit_code] {
+        std::ostringstream text;
+        if (o->result == "-") {
+            text << std::cin.rdbuf();
+        } else {
+            std::ifstream in(o->result, std::ios::binary);
+            if (!in)
+                throw PlantError(o->result +
+                                 ": cannot be read, expected an identification result (JSON)");
+            text << in.rdbuf();
+        }
+        const Truth truth = o->truth.empty() ? Truth{} : read_truth(o->truth);
+        const Verdict verdict = judge(text.str(), o->result, truth, o->sigma);
+        std::cout << table_of(verdict) << std::flush;
+        exit_code = verdict.passed ? 0 : 1;
+    });
+}
+
+}  // namespace vibrig::plant

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "tests/plant/truth.hpp"
+
+namespace vibrig::plant {
+
+/// A campaign to be simulated without any bus: one run per table amplitude, one dwell per position.
+struct CampaignPlan {
+    std::vector<Vec3> positions_deg = table1();  ///< outer, inner, azimuth, as the encoders count
+    std::vector<double> table_g{9, 7};           ///< peak at the table, 0 for a run at rest
+    double frequency_hz = 15;
+    double dwell_s = 100;
+    double ramp_s = 2;
+    double settle_s = 3;  ///< after the ramp, not recorded
+
+    /// Table 1 of Tang et al. 2009.
+    [[nodiscard]] static std::vector<Vec3> table1();
+};
+
+/// CSV with the columns alpha_deg, beta_deg, gamma_deg; "table1" is the built-in list. Throws
+/// PlantError naming the line.
+[[nodiscard]] std::vector<Vec3> read_positions(const std::string& name_or_path);
+
+/// Writes the recording as CSV (time_s, run, position, alpha_deg ... az_g). Returns the number of
+/// samples. `progress` hears of every finished dwell.
+std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
+                     const std::function<void(std::size_t done, std::size_t all)>& progress = {});
+
+}  // namespace vibrig::plant

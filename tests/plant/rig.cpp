@@ -1,0 +1,100 @@
+#include "tests/plant/rig.hpp"
+
+#include <cmath>
+#include <numbers>
+
+namespace vibrig::plant {
+namespace {
+
+constexpr double kTick = 1e-6 * kTickUs;
+constexpr double kDegPerRad = 180 / std::numbers::pi;
+
+}  // namespace
+
+Rig::Rig(const Truth& truth)
+    : truth_(truth),
+      platform_(truth),
+      gimbals_(truth.slew_deg_per_s),
+      isolator_(truth.transmission, truth.frequency_hz, truth.damping, kTick / (2 * kSteps)),
+      shaker_(truth.limit_g, truth.limit_mm),
+      sensors_(truth, truth.seed),
+      gyro_noise_(truth.seed, 0) {
+    read();
+}
+
+bool Rig::ready() const noexcept { return kTick * static_cast<double>(tick_) >= truth_.warm_up_s; }
+bool Rig::gyros_at_speed() const noexcept {
+    return kTick * static_cast<double>(tick_) >= 0.5 * truth_.warm_up_s;
+}
+
+Vec3 Rig::encoder_deg() const noexcept {
+    Vec3 encoder{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        encoder[i] = truth_.encoder_sign[i] * platform_.angles()[i] * kDegPerRad +
+                     truth_.encoder_zero_deg[i];
+    }
+    return encoder;
+}
+
+void Rig::advance() {
+    ++tick_;
+    vibrate();
+    move();
+    read();
+}
+
+void Rig::vibrate() {
+    const double begin = shaker_.amplitude_g();
+    shaker_.advance(kTick);
+    const double end = shaker_.amplitude_g();
+    if (shaker_.frequency_hz() != frequency_hz_) {
+        frequency_hz_ = shaker_.frequency_hz();
+        isolator_.set_drive(frequency_hz_, truth_.second_harmonic);
+    }
+    still_ = begin == 0 && end == 0 && isolator_.at_rest();
+    if (still_) {
+        a1_.fill(0);
+        return;
+    }
+    a1_[0] = isolator_.platform_g();
+    const double slope = (end - begin) / (2 * kSteps);
+    for (std::size_t i = 1; i < a1_.size(); ++i) {
+        isolator_.advance(begin + slope * (static_cast<double>(i) - 0.5));
+        a1_[i] = isolator_.platform_g();
+    }
+}
+
+void Rig::move() {
+    // White rate noise: over a tick its integral is a random walk of N deg per root hour, 60 N
+    // arcsec per root second.
+    const double rate_sigma = 60 * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(kTick);
+    const Vec3 noise{gyro_noise_.normal(), gyro_noise_.normal(), gyro_noise_.normal()};
+    if (gimbals_.mode() == GimbalMode::free_drift) {
+        const Vec3 extra = rate_sigma * noise + torque_;
+        if (still_) {
+            const std::array<double, 3> rest{};
+            platform_.advance(kTick, rest, extra);
+        } else {
+            platform_.advance(kTick / kSteps, a1_, extra);
+        }
+        return;
+    }
+    Vec3 encoder = encoder_deg();
+    if (!gimbals_.slewing()) return;
+    if (gimbals_.advance(kTick, encoder)) isolator_.kick(truth_.slew_kick_g);
+    Vec3 angles{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        angles[i] = truth_.encoder_sign[i] *
+                    std::remainder(encoder[i] - truth_.encoder_zero_deg[i], 360.0) / kDegPerRad;
+    }
+    platform_.set_angles(angles);
+}
+
+void Rig::read() {
+    const double a1 = isolator_.platform_g();
+    const Vec3 force = (1 + a1) * platform_.up_in_platform();
+    readings_ = sensors_.read(encoder_deg(), force, isolator_.table_g(shaker_.amplitude_g()),
+                              kTick * static_cast<double>(tick_));
+}
+
+}  // namespace vibrig::plant

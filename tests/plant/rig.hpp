@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "tests/plant/gimbals.hpp"
+#include "tests/plant/isolator.hpp"
+#include "tests/plant/platform_model.hpp"
+#include "tests/plant/sensors.hpp"
+#include "tests/plant/shaker_controller.hpp"
+
+namespace vibrig::plant {
+
+inline constexpr std::int64_t kTickUs = 25'000;  ///< 40 samples per second
+
+/// The whole rig: platform in its gimbals on isolators on a shaker. Knows no bus and no wall clock;
+/// deterministic for a seed. One thread at a time.
+class Rig {
+  public:
+    explicit Rig(const Truth& truth);
+
+    void slew_to(const Vec3& encoder_deg) noexcept { gimbals_.slew_to(encoder_deg); }
+    void release() noexcept { gimbals_.release(); }
+    void torque(const Vec3& deg_per_h) noexcept { torque_ = deg_per_h; }
+    [[nodiscard]] ShakerController& shaker() noexcept { return shaker_; }
+    [[nodiscard]] const ShakerController& shaker() const noexcept { return shaker_; }
+
+    /// Time goes on by one tick, then the instruments are read.
+    void advance();
+
+    [[nodiscard]] std::int64_t time_us() const noexcept { return tick_ * kTickUs; }
+    [[nodiscard]] std::int64_t tick() const noexcept { return tick_; }
+    [[nodiscard]] const Readings& readings() const noexcept { return readings_; }
+    [[nodiscard]] const Gimbals& gimbals() const noexcept { return gimbals_; }
+    [[nodiscard]] bool ready() const noexcept;
+    [[nodiscard]] bool gyros_at_speed() const noexcept;
+    [[nodiscard]] const Truth& truth() const noexcept { return truth_; }
+
+    // what only a simulation can know
+    [[nodiscard]] const PlatformModel& platform() const noexcept { return platform_; }
+    [[nodiscard]] double platform_vibration_g() const noexcept { return isolator_.platform_g(); }
+
+  private:
+    static constexpr int kSteps = 25;  ///< Runge-Kutta steps per tick, 1 ms
+
+    void vibrate();
+    void move();
+    void read();
+    [[nodiscard]] Vec3 encoder_deg() const noexcept;
+
+    Truth truth_;
+    PlatformModel platform_;
+    Gimbals gimbals_;
+    Isolator isolator_;
+    ShakerController shaker_;
+    Sensors sensors_;
+    Random gyro_noise_;
+    Vec3 torque_{};
+    double frequency_hz_ = 0;  ///< the isolator is set to
+    std::array<double, 2 * kSteps + 1> a1_{};
+    bool still_ = true;  ///< no vibration in this tick
+    std::int64_t tick_ = 0;
+    Readings readings_;
+};
+
+}  // namespace vibrig::plant

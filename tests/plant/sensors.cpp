@@ -1,0 +1,36 @@
+#include "tests/plant/sensors.hpp"
+
+#include <cmath>
+
+namespace vibrig::plant {
+
+double quantise_angle(double deg, int bits) noexcept {
+    const double count = std::ldexp(1.0, bits);
+    double step = std::fmod(std::floor(deg / 360 * count + 0.5), count);
+    if (step < 0) step += count;
+    return step * 360 / count;
+}
+
+Sensors::Sensors(const Truth& truth, std::uint64_t seed)
+    : truth_(truth),
+      platform_to_raw_(inverse(truth.matrix)),
+      resolver_noise_(seed, 1),
+      accelerometer_noise_(seed, 2),
+      table_noise_(seed, 3) {}
+
+Readings Sensors::read(const Vec3& angles_deg, const Vec3& force_g, double table_g, double time_s) {
+    Readings readings;
+    const Vec3 raw = platform_to_raw_ * force_g + truth_.zero_g;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double noise_deg = truth_.resolver_arcsec / 3600 * resolver_noise_.normal();
+        readings.encoder_deg[i] = quantise_angle(angles_deg[i] + noise_deg, truth_.resolver_bits);
+        readings.raw_g[i] = raw[i] + truth_.accelerometer_g * accelerometer_noise_.normal();
+    }
+    readings.table_g = table_g + truth_.table_accelerometer_g * table_noise_.normal();
+    readings.temperature_c =
+        truth_.steady_temperature_c + (truth_.start_temperature_c - truth_.steady_temperature_c) *
+                                          std::exp(-time_s / truth_.thermal_time_constant_s);
+    return readings;
+}
+
+}  // namespace vibrig::plant

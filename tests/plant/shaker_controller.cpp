@@ -1,0 +1,124 @@
+#include "tests/plant/shaker_controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "proto/register_map.hpp"
+
+namespace vibrig::plant {
+namespace {
+
+const proto::ShakerRegisters kMap;
+constexpr double kWatchdogStop = 0.5;    ///< s, the table comes down on a watchdog trip
+constexpr double kEmergencyStop = 0.05;  ///< s, power amplifier cut off
+constexpr double kMetrePerSecond2 = 9.80665;
+
+std::uint32_t joined(std::span<const std::uint16_t> words, std::size_t address) {
+    return (static_cast<std::uint32_t>(words[address]) << 16) | words[address + 1];
+}
+double value(std::span<const std::uint16_t> words, const proto::Register& reg) {
+    const std::uint32_t raw =
+        reg.type == proto::RegisterType::u32 ? joined(words, reg.address) : words[reg.address];
+    return raw * reg.scale;
+}
+void split(std::span<std::uint16_t> words, std::size_t address, double raw) {
+    const auto whole = static_cast<std::uint32_t>(std::llround(raw));
+    words[address] = static_cast<std::uint16_t>(whole >> 16);
+    words[address + 1] = static_cast<std::uint16_t>(whole & 0xffff);
+}
+
+}  // namespace
+
+double ShakerController::frequency_hz() const noexcept { return value(holding_, kMap.frequency); }
+double ShakerController::set_point_g() const noexcept { return value(holding_, kMap.amplitude); }
+double ShakerController::ramp_s() const noexcept { return value(holding_, kMap.ramp_time); }
+
+ShakerController::Answer ShakerController::write(std::size_t address,
+                                                 std::span<const std::uint16_t> values) noexcept {
+    if (values.empty() || address + values.size() > kHolding) return Answer::illegal_address;
+    std::array<std::uint16_t, kHolding> next = holding_;
+    std::copy(values.begin(), values.end(), next.begin() + static_cast<std::ptrdiff_t>(address));
+
+    const double frequency = value(next, kMap.frequency);
+    const double amplitude = value(next, kMap.amplitude);
+    const bool run = next[kMap.run.address] != 0;
+    const bool was_running = holding_[kMap.run.address] != 0;
+    const bool moving = state_ != ShakerState::idle || amplitude_g_ > 0;
+    if (frequency != frequency_hz() && (moving || frequency < 1 || frequency > 200))
+        return Answer::illegal_value;
+    if (amplitude > limit_g_) return Answer::illegal_value;
+    if (next[kMap.run.address] > 1) return Answer::illegal_value;
+    if (run && !was_running &&
+        (emergency_stop_open_ || state_ == ShakerState::fault || amplitude_g_ > 0)) {
+        return Answer::illegal_value;
+    }
+
+    if (next[kMap.watchdog->address] != holding_[kMap.watchdog->address]) since_feed_s_ = 0;
+    const double old_amplitude = set_point_g();
+    holding_ = next;
+    if (run && !was_running) {
+        since_feed_s_ = 0;
+        state_ = ShakerState::ramping;
+        ramp_to(amplitude, ramp_s());
+    } else if (!run && was_running) {
+        state_ = ShakerState::stopping;
+        ramp_to(0, ramp_s());
+    } else if (run && amplitude != old_amplitude && state_ != ShakerState::fault) {
+        state_ = ShakerState::ramping;
+        ramp_to(amplitude, ramp_s());
+    } else if (!run && state_ == ShakerState::fault && amplitude_g_ == 0 && !emergency_stop_open_ &&
+               address <= kMap.run.address && address + values.size() > kMap.run.address) {
+        state_ = ShakerState::idle;  // run = 0 written at rest acknowledges
+        faults_ = 0;
+    }
+    return Answer::accepted;
+}
+
+std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() const noexcept {
+    std::array<std::uint16_t, kInput> words{};
+    words[kMap.state.address] = static_cast<std::uint16_t>(state_);
+    words[kMap.fault.address] = faults_;
+    words[kMap.emergency_stop.address] = emergency_stop_open_ ? 1 : 0;
+    split(words, kMap.measured_amplitude.address, amplitude_g_ / kMap.measured_amplitude.scale);
+    return words;
+}
+
+void ShakerController::open_emergency_stop(bool open) noexcept {
+    emergency_stop_open_ = open;
+    if (open) trip(kFaultEmergencyStop, kEmergencyStop);
+}
+
+void ShakerController::ramp_to(double target_g, double time_s) noexcept {
+    target_g_ = target_g;
+    slope_g_per_s_ = std::abs(target_g - amplitude_g_) / std::max(time_s, 1e-3);
+}
+
+void ShakerController::trip(std::uint16_t fault, double stop_s) noexcept {
+    faults_ |= fault;
+    state_ = ShakerState::fault;
+    holding_[kMap.run.address] = 0;
+    ramp_to(0, stop_s);
+}
+
+void ShakerController::advance(double dt_s) noexcept {
+    const bool excited = state_ == ShakerState::ramping || state_ == ShakerState::running;
+    const double timeout = value(holding_, kMap.watchdog_timeout);
+    since_feed_s_ += dt_s;
+    if (excited && timeout > 0 && since_feed_s_ > timeout) trip(kFaultWatchdog, kWatchdogStop);
+
+    const double step = slope_g_per_s_ * dt_s;
+    const double gap = target_g_ - amplitude_g_;
+    // A rounding error must not cost a further tick.
+    amplitude_g_ =
+        std::abs(gap) <= step * (1 + 1e-9) ? target_g_ : amplitude_g_ + std::copysign(step, gap);
+    if (amplitude_g_ == target_g_) {
+        if (state_ == ShakerState::ramping) state_ = ShakerState::running;
+        if (state_ == ShakerState::stopping) state_ = ShakerState::idle;
+    }
+    const double omega = 2 * std::numbers::pi * frequency_hz();
+    const double peak_mm = 1e3 * amplitude_g_ * kMetrePerSecond2 / (omega * omega);
+    if (peak_mm > limit_mm_ && state_ != ShakerState::fault) trip(kFaultLimit, kWatchdogStop);
+}
+
+}  // namespace vibrig::plant

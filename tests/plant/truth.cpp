@@ -1,0 +1,280 @@
+#include "tests/plant/truth.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+namespace vibrig::plant {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
+                                                     "OO", "SS", "IO", "IS", "OS"};
+
+// The one list of keys, walked by the reader and by the writer. T is Truth or const Truth.
+template <class T, class Field>
+void for_each_field(T& t, Field&& field) {
+    field("site", "latitude_deg", t.latitude_deg, -89.0, 89.0);
+    field("site", "azimuth_deg", t.azimuth_deg, -360.0, 360.0);
+    field("platform", "up", t.up, 0, 0);
+    field("platform", "gyro_x_axes", t.gyro_axes[0], 0, 0);
+    field("platform", "gyro_y_axes", t.gyro_axes[1], 0, 0);
+    field("platform", "gyro_z_axes", t.gyro_axes[2], 0, 0);
+    field("platform", "drift_sign", t.drift_sign, -1, 1);
+    field("platform", "encoder_sign", t.encoder_sign, -1, 1);
+    field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
+    field("platform", "slew_deg_per_s", t.slew_deg_per_s, 0.01, 360.0);
+    field("platform", "warm_up_s", t.warm_up_s, 0.0, 1e6);
+    field("platform", "start_temperature_c", t.start_temperature_c, -60.0, 150.0);
+    field("platform", "steady_temperature_c", t.steady_temperature_c, -60.0, 150.0);
+    field("platform", "thermal_time_constant_s", t.thermal_time_constant_s, 1e-3, 1e6);
+    field("accelerometer", "zero_g", t.zero_g, -1.0, 1.0);
+    field("accelerometer", "matrix", t.matrix, -2.0, 2.0);
+    field("noise", "resolver_arcsec", t.resolver_arcsec, 0.0, 1e5);
+    field("noise", "resolver_bits", t.resolver_bits, 8, 24);
+    field("noise", "gyro_random_walk_deg_per_rt_h", t.gyro_random_walk_deg_per_rt_h, 0.0, 10.0);
+    field("noise", "accelerometer_g", t.accelerometer_g, 0.0, 1.0);
+    field("noise", "table_accelerometer_g", t.table_accelerometer_g, 0.0, 1.0);
+    field("isolator", "transmission", t.transmission, 0.05, 2.0);
+    field("isolator", "frequency_hz", t.frequency_hz, 0.5, 200.0);
+    field("isolator", "damping", t.damping, 0.01, 0.95);
+    field("isolator", "slew_kick_g", t.slew_kick_g, 0.0, 1.0);
+    field("shaker", "second_harmonic", t.second_harmonic, 0.0, 0.5);
+    field("shaker", "limit_g", t.limit_g, 0.1, 100.0);
+    field("shaker", "limit_mm", t.limit_mm, 0.1, 1000.0);
+}
+
+std::string text_of(const Json& json) {
+    std::string text = json.dump();
+    return text.size() > 60 ? text.substr(0, 57) + "..." : text;
+}
+
+struct Reader {
+    const Json& root;
+    const std::string& file;
+    std::map<std::string, std::set<std::string>> known{};
+
+    [[noreturn]] void fail(const std::string& key, const std::string& what) const {
+        throw PlantError(file + ": " + key + ": " + what);
+    }
+    void number(const std::string& key, const Json& json, double& value, double low,
+                double high) const {
+        if (!json.is_number() || !std::isfinite(json.get<double>()) || json.get<double>() < low ||
+            json.get<double>() > high) {
+            std::ostringstream range;
+            range << "a number from " << low << " to " << high;
+            fail(key, "found " + text_of(json) + ", expected " + range.str());
+        }
+        value = json.get<double>();
+    }
+    void value(const std::string& key, const Json& json, double& out, double low,
+               double high) const {
+        number(key, json, out, low, high);
+    }
+    void value(const std::string& key, const Json& json, int& out, int low, int high) const {
+        if (!json.is_number_integer() || json.get<double>() < low || json.get<double>() > high ||
+            (low == -1 && json.get<int>() == 0)) {
+            fail(key, "found " + text_of(json) + ", expected " +
+                          (low == -1 ? std::string("-1 or 1")
+                                     : "a whole number from " + std::to_string(low) + " to " +
+                                           std::to_string(high)));
+        }
+        out = json.get<int>();
+    }
+    void value(const std::string& key, const Json& json, Axis& out, int, int) const {
+        const std::string text = json.is_string() ? json.get<std::string>() : std::string();
+        if (text.size() != 2 || (text[0] != '+' && text[0] != '-') || text[1] < 'x' ||
+            text[1] > 'z') {
+            fail(key, "found " + text_of(json) + ", expected an axis such as \"+y\"");
+        }
+        out = {text[1] - 'x', text[0] == '+' ? 1 : -1};
+    }
+    template <class T, class Low>
+    void value(const std::string& key, const Json& json, std::array<T, 3>& out, Low low,
+               Low high) const {
+        if (!json.is_array() || json.size() != 3) {
+            fail(key, "found " + text_of(json) + ", expected a list of three");
+        }
+        for (std::size_t i = 0; i < 3; ++i) {
+            value(key + "[" + std::to_string(i) + "]", json[i], out[i], low, high);
+        }
+    }
+    template <class T, class Low>
+    void operator()(const char* section, const char* name, T& out, Low low, Low high) {
+        known[section].insert(name);
+        const auto group = root.find(section);
+        if (group == root.end()) return;
+        if (!group->is_object()) fail(section, "found " + text_of(*group) + ", expected an object");
+        const auto entry = group->find(name);
+        if (entry != group->end()) value(std::string(section) + "." + name, *entry, out, low, high);
+    }
+};
+
+struct Writer {
+    Json& root;
+
+    static Json json(double v) { return v; }
+    static Json json(int v) { return v; }
+    static Json json(const Axis& axis) {
+        return std::string(axis.sign > 0 ? "+" : "-") + static_cast<char>('x' + axis.index);
+    }
+    template <class T>
+    static Json json(const std::array<T, 3>& list) {
+        Json out = Json::array();
+        for (const T& entry : list) out.push_back(json(entry));
+        return out;
+    }
+    template <class T, class Low>
+    void operator()(const char* section, const char* name, const T& value, Low, Low) {
+        root[section][name] = json(value);
+    }
+};
+
+template <class Set>
+std::string joined(const Set& names) {
+    std::string text;
+    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+    return text;
+}
+
+void read_coefficients(const Json& root, const std::string& file, Truth& truth) {
+    const auto group = root.find("coefficients");
+    if (group == root.end() || !group->is_object()) {
+        throw PlantError(file + ": coefficients: missing, expected an object with D_Fx ... D_OSz");
+    }
+    std::set<std::string> names;
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        for (std::size_t term = 0; term < kTerms; ++term) {
+            const std::string name = coefficient_name(gyro, term);
+            names.insert(name);
+            const auto entry = group->find(name);
+            if (entry == group->end()) {
+                throw PlantError(file + ": coefficients." + name +
+                                 ": missing, expected a number in " +
+                                 std::string(coefficient_unit(term)));
+            }
+            if (!entry->is_number() || !(std::abs(entry->get<double>()) <= 1000)) {
+                throw PlantError(file + ": coefficients." + name + ": found " + text_of(*entry) +
+                                 ", expected a number from -1000 to 1000");
+            }
+            truth.coefficients[gyro][term] = entry->get<double>();
+        }
+    }
+    for (const auto& [key, value] : group->items()) {
+        if (!names.contains(key)) {
+            throw PlantError(file + ": coefficients." + key +
+                             ": unknown key, expected D_Fx ... D_OSz");
+        }
+    }
+}
+
+void check(const Truth& truth, const std::string& file) {
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        std::array<bool, 3> used{};
+        for (const Axis& axis : truth.gyro_axes[gyro])
+            used[static_cast<std::size_t>(axis.index)] = true;
+        if (!(used[0] && used[1] && used[2])) {
+            throw PlantError(file + ": platform.gyro_" +
+                             std::string(1, static_cast<char>('x' + gyro)) +
+                             "_axes: an axis is used twice, expected each of x, y, z once");
+        }
+    }
+    if (std::abs(determinant(truth.matrix)) < 0.1) {
+        throw PlantError(file +
+                         ": accelerometer.matrix: singular, expected three independent axes");
+    }
+}
+
+}  // namespace
+
+std::string coefficient_name(std::size_t gyro, std::size_t term) {
+    return std::string("D_") + kTermNames.at(term) + static_cast<char>('x' + gyro);
+}
+
+std::string_view coefficient_unit(std::size_t term) noexcept {
+    return term == kF ? "deg/h" : term <= kS ? "deg/h/g" : "deg/h/g^2";
+}
+
+std::array<GyroCoefficients, 3> Truth::table2() noexcept {
+    std::array<GyroCoefficients, 3> all{};
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        const double s = gyro == 1 ? -1 : 1;  // the signs alternate x, y, z
+        const double q = 0.03 * s;
+        //           F  I   O   S  II OO SS  IO IS  OS
+        all[gyro] = {s, -s, -s, s, q, q, -q, q, -q, -q};
+    }
+    return all;
+}
+
+Truth parse_truth(std::string_view text, const std::string& file) {
+    Json root;
+    try {
+        root = Json::parse(text);
+    } catch (const Json::exception& error) {
+        throw PlantError(file + ": not JSON: " + error.what());
+    }
+    if (!root.is_object())
+        throw PlantError(file + ": found " + text_of(root) + ", expected an object");
+    Truth truth;
+    read_coefficients(root, file, truth);
+    Reader reader{root, file};
+    for_each_field(truth, reader);
+    if (const auto seed = root.find("seed"); seed != root.end()) {
+        if (!seed->is_number_unsigned()) {
+            throw PlantError(file + ": seed: found " + text_of(*seed) +
+                             ", expected a whole number from 0");
+        }
+        truth.seed = seed->get<std::uint64_t>();
+    }
+    for (const auto& [section, group] : root.items()) {
+        if (section == "coefficients" || section == "seed") continue;
+        const auto known = reader.known.find(section);
+        if (known == reader.known.end()) {
+            throw PlantError(file + ": " + section +
+                             ": unknown key, expected coefficients, site, platform, accelerometer, "
+                             "noise, isolator, "
+                             "shaker or seed");
+        }
+        for (const auto& [key, value] : group.items()) {
+            if (!known->second.contains(key)) {
+                throw PlantError(file + ": " + section + "." + key +
+                                 ": unknown key, expected one of " + joined(known->second));
+            }
+        }
+    }
+    check(truth, file);
+    return truth;
+}
+
+Truth read_truth(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    if (!in) throw PlantError(path + ": cannot be read, expected a truth file (JSON)");
+    std::ostringstream text;
+    text << in.rdbuf();
+    return parse_truth(text.str(), path);
+}
+
+std::string to_json(const Truth& truth) {
+    Json root;
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        for (std::size_t term = 0; term < kTerms; ++term) {
+            root["coefficients"][coefficient_name(gyro, term)] = truth.coefficients[gyro][term];
+        }
+    }
+    for_each_field(truth, Writer{root});
+    root["seed"] = truth.seed;
+    return root.dump(2) + "\n";
+}
+
+void write_truth(const Truth& truth, const std::string& path) {
+    std::ofstream out(path, std::ios::binary);
+    out << to_json(truth);
+    out.flush();
+    if (!out) throw PlantError(path + ": cannot be written");
+}
+
+}  // namespace vibrig::plant
