@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+namespace vibrig::serve {
+
+/// The daemon cannot be asked; the message names the socket and the cause.
+class ClientError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+/// Nobody listens at the socket.
+class NotRunning : public ClientError {
+  public:
+    using ClientError::ClientError;
+};
+
+struct Reply {
+    int status = 0;  ///< of HTTP
+    std::string body;
+};
+
+/// Asks a running vibrigd over its Unix socket. Blocks up to the timeout; one thread.
+class Client {
+  public:
+    explicit Client(std::string path, std::chrono::milliseconds timeout = std::chrono::seconds(5));
+    ~Client();
+    Client(const Client&) = delete;
+    Client& operator=(const Client&) = delete;
+
+    /// Keeps the connection, and makes a new one when the daemon has closed it meanwhile. Throws
+    /// ClientError.
+    [[nodiscard]] Reply get(const std::string& target);
+    /// On a connection of its own and never sent twice. Throws ClientError.
+    [[nodiscard]] Reply post(const std::string& target, const std::string& json);
+    [[nodiscard]] const std::string& path() const noexcept;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vibrig::serve

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace vibrig::serve {
+
+/// A socket that cannot be had; the message names its path and the cause.
+class ServeError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// The file of a listening Unix socket, mode 0660. Takes over the file of a dead daemon, never that
+/// of a live one; removes its own at the end.
+class SocketFile {
+  public:
+    /// Throws ServeError.
+    explicit SocketFile(const std::string& path);
+    ~SocketFile();
+    SocketFile(const SocketFile&) = delete;
+    SocketFile& operator=(const SocketFile&) = delete;
+
+    /// The listening descriptor; the caller closes it from now on.
+    [[nodiscard]] int release() noexcept;
+
+  private:
+    std::string path_;
+    int descriptor_ = -1;
+    dev_t device_ = 0;
+    ino_t inode_ = 0;
+};
+
+}  // namespace vibrig::serve

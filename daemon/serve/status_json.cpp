@@ -1,0 +1,130 @@
+#include "daemon/serve/status_json.hpp"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "daemon/serve/status_message.hpp"
+#include "proto/vibrig.pb.h"
+
+namespace vibrig::serve {
+namespace {
+
+constexpr std::size_t kLongestName = 100;  // bytes
+constexpr std::size_t kLongestArgument = 200;
+
+std::string to_json(const google::protobuf::Message& message) {
+    google::protobuf::util::JsonPrintOptions options;
+    options.always_print_primitive_fields = true;
+    options.preserve_proto_field_names = true;
+    std::string text;
+    const auto done = google::protobuf::util::MessageToJsonString(message, &text, options);
+    if (!done.ok()) throw std::runtime_error(done.ToString());
+    return text;
+}
+
+/// What goes into the audit line must stay one readable line.
+void check_line(const std::string& field, const std::string& text, std::size_t longest) {
+    if (text.size() > longest) {
+        throw std::invalid_argument(field + ": " + std::to_string(text.size()) +
+                                    " bytes, expected " + std::to_string(longest) + " at most");
+    }
+    const auto control = [](unsigned char c) { return c < 0x20 || c == 0x7F; };
+    if (std::any_of(text.begin(), text.end(), control)) {
+        throw std::invalid_argument(field + ": contains a control character, expected one line");
+    }
+}
+
+CommandRequest::Kind kind_of(v1::Command::Kind kind) {
+    switch (kind) {
+        case v1::Command::arm:
+            return CommandRequest::Kind::arm;
+        case v1::Command::start:
+            return CommandRequest::Kind::start;
+        case v1::Command::pause:
+            return CommandRequest::Kind::pause;
+        case v1::Command::resume:
+            return CommandRequest::Kind::resume;
+        case v1::Command::abort:
+            return CommandRequest::Kind::abort;
+        case v1::Command::acknowledge:
+            return CommandRequest::Kind::acknowledge;
+        default:
+            break;
+    }
+    throw std::invalid_argument(
+        "kind: missing or unknown, expected arm, start, pause, resume, abort or acknowledge");
+}
+
+}  // namespace
+
+std::string status_json(const StatusData& status) {
+    v1::Status message;
+    fill(message, status);
+    return to_json(message);
+}
+
+std::string campaign_json(const StatusData& status) {
+    v1::Campaign message;
+    fill(message, status);
+    return to_json(message);
+}
+
+std::string parameters_json(const estimator::Result& result) {
+    v1::Parameters message;
+    fill(message, result);
+    return to_json(message);
+}
+
+std::string events_json(const std::string& instance, const std::vector<EventRecord>& events) {
+    v1::Events message;
+    message.set_instance(instance);
+    for (const EventRecord& event : events) fill(*message.add_events(), event);
+    return to_json(message);
+}
+
+std::string reply_json(const CommandReply& reply) {
+    v1::CommandReply message;
+    message.set_accepted(reply.accepted);
+    message.set_message(mend_utf8(reply.message));
+    return to_json(message);
+}
+
+std::string configuration_json(const std::string& text) {
+    v1::Configuration message;
+    message.set_text(mend_utf8(text));
+    return to_json(message);
+}
+
+std::string problem_json(int status, const std::string& title, const std::string& detail) {
+    v1::Problem message;
+    message.set_type("about:blank");
+    message.set_title(title);
+    message.set_status(status);
+    message.set_detail(mend_utf8(detail));
+    return to_json(message);
+}
+
+CommandRequest parse_command(const std::string& json) {
+    v1::Command message;
+    const auto parsed = google::protobuf::util::JsonStringToMessage(json, &message);
+    if (!parsed.ok()) {
+        throw std::invalid_argument("not a Command in JSON: " + std::string(parsed.message()));
+    }
+    CommandRequest request;
+    request.kind = kind_of(message.kind());
+    request.by = message.by();
+    request.argument = message.argument();
+    if (request.by.find_first_not_of(' ') == std::string::npos) {
+        throw std::invalid_argument("by: empty, expected the name of the person who commands");
+    }
+    check_line("by", request.by, kLongestName);
+    check_line("argument", request.argument, kLongestArgument);
+    if (request.kind == CommandRequest::Kind::acknowledge && request.argument.empty()) {
+        throw std::invalid_argument("argument: empty, expected what is acknowledged");
+    }
+    return request;
+}
+
+}  // namespace vibrig::serve

@@ -1,0 +1,308 @@
+#include "daemon/serve/status_message.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "proto/vibrig.pb.h"
+
+namespace vibrig::serve {
+namespace {
+
+// The schema's enums are the daemon's with "unspecified" put in front.
+template <typename Wire, typename Enum>
+Wire wire_enum(Enum value) {
+    const int number = static_cast<int>(value) + 1;
+    return static_cast<Wire>(number);
+}
+static_assert(static_cast<int>(CampaignState::tripped) + 1 == v1::Campaign::tripped);
+static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault);
+static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
+static_assert(static_cast<int>(drivers::Quality::unbound) + 1 == v1::Channel::unbound);
+static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);
+
+constexpr double kDegree = 180.0 / std::numbers::pi;
+constexpr std::array<const char*, drivers::kChannels> kChannelNames{
+    "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
+
+/// Sets an optional field only with a number that JSON can carry.
+template <typename Message>
+void set(Message& message, void (Message::*setter)(double), double value) {
+    if (std::isfinite(value)) (message.*setter)(value);
+}
+
+double finite(double value) { return std::isfinite(value) ? value : 0.0; }
+
+void set_time(google::protobuf::Timestamp& out, std::int64_t utc_ns) {
+    std::int64_t seconds = utc_ns / drivers::kSecond;
+    std::int64_t rest = utc_ns % drivers::kSecond;
+    if (rest < 0) {
+        rest += drivers::kSecond;
+        --seconds;
+    }
+    out.set_seconds(seconds);
+    out.set_nanos(static_cast<std::int32_t>(rest));
+}
+
+void fill(v1::Shaker& out, const StatusData& status) {
+    out.set_link(wire_enum<v1::Link::State>(status.shaker_link));
+    const drivers::ShakerReading& reading = status.shaker;
+    if (reading.valid) {
+        out.set_reading_time_s(drivers::to_seconds(reading.time));
+        set(out, &v1::Shaker::set_frequency_hz, reading.frequency_hz);
+        set(out, &v1::Shaker::set_amplitude_g, reading.amplitude_g);
+        set(out, &v1::Shaker::set_measured_g, reading.measured_g);
+        out.set_state(reading.state);
+        out.set_fault(reading.fault);
+        out.set_running(reading.running);
+        out.set_emergency_stop_open(reading.emergency_stop_open);
+    }
+    const drivers::ShakerCounters& counters = status.shaker_counters;
+    out.set_requests(counters.requests);
+    out.set_replies(counters.replies);
+    out.set_timeouts(counters.timeouts);
+    out.set_exceptions(counters.exceptions);
+    out.set_reconnects(counters.reconnects);
+    out.set_set_points_discarded(counters.set_points_discarded);
+    out.set_feeds(counters.feeds);
+    out.set_stops_written(counters.stops_written);
+    out.set_read_back_mismatches(counters.read_back_mismatches);
+}
+
+void fill(v1::Can& out, const StatusData& status) {
+    out.set_link(wire_enum<v1::Link::State>(status.can));
+    const drivers::CanPortCounters& counters = status.can_counters;
+    out.set_received(counters.received);
+    out.set_delivered(counters.delivered);
+    out.set_own(counters.own);
+    out.set_error_frames(counters.error_frames);
+    out.set_malformed(counters.malformed);
+    out.set_kernel_dropped(counters.kernel_dropped);
+    out.set_sent(counters.sent);
+    out.set_send_failed(counters.send_failed);
+    out.set_transitions(counters.transitions);
+}
+
+void fill(v1::Assembler& out, const drivers::AssemblerCounters& counters) {
+    out.set_received(counters.received);
+    out.set_used(counters.used);
+    out.set_unknown(counters.unknown);
+    out.set_duplicate(counters.duplicate);
+    out.set_late(counters.late);
+    out.set_wrong_length(counters.wrong_length);
+    out.set_samples(counters.samples);
+    out.set_incomplete(counters.incomplete);
+    out.set_gaps(counters.gaps);
+    out.set_resyncs(counters.resyncs);
+}
+
+double channel_value(const drivers::Sample& sample, std::size_t channel) {
+    if (channel < 3) return sample.angle[channel] * kDegree;
+    if (channel < 6) return sample.force[channel - 3];
+    return sample.table_accel;
+}
+
+void fill(v1::Sample& out, const StatusData& status) {
+    const drivers::Sample& sample = status.sample;
+    out.set_time_s(drivers::to_seconds(sample.time));
+    out.set_sequence(sample.sequence);
+    out.set_dropped_before(sample.dropped_before);
+    for (std::size_t i = 0; i < drivers::kChannels; ++i) {
+        v1::Channel& channel = *out.add_channels();
+        channel.set_name(kChannelNames[i]);
+        channel.set_quality(wire_enum<v1::Channel::Quality>(sample.quality[i]));
+        if (sample.quality[i] == drivers::Quality::good) {
+            set(channel, &v1::Channel::set_value, channel_value(sample, i));
+        }
+        channel.set_unit(i < 3 ? "deg" : "g");
+        if (status.channel_age_s[i] >= 0) {
+            set(channel, &v1::Channel::set_age_s, status.channel_age_s[i]);
+        }
+    }
+}
+
+void fill(v1::Platform& out, const drivers::PlatformStatus& platform) {
+    if (platform.time != 0) {
+        out.set_time_s(drivers::to_seconds(platform.time));
+        out.set_ready(platform.ready);
+        out.set_loop_closed(platform.loop_closed);
+        out.set_gyros_at_speed(platform.gyros_at_speed);
+        out.set_fault(platform.fault);
+        set(out, &v1::Platform::set_temperature_c, platform.temperature_c);
+    }
+    if (platform.gimbal_time != 0) {
+        out.set_gimbal_time_s(drivers::to_seconds(platform.gimbal_time));
+        out.set_in_position(platform.in_position);
+        out.set_slewing(platform.slewing);
+        out.set_gimbal_command_echo(platform.gimbal_command_echo);
+    }
+}
+
+void fill_parameter(v1::Parameter& out, std::size_t index, double value, double sigma,
+                    bool observable) {
+    out.set_name(estimator::parameter_names()[index]);
+    out.set_unit(estimator::parameter_unit(index));
+    out.set_observable(observable);
+    if (!observable) return;
+    set(out, &v1::Parameter::set_value, value);
+    set(out, &v1::Parameter::set_sigma, sigma);
+}
+
+void fill(v1::Estimate& out, const estimator::Estimate& estimate) {
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        fill_parameter(*out.add_parameters(), i, estimate.value[i], estimate.sigma[i],
+                       estimate.observable[i]);
+    }
+    set(out, &v1::Estimate::set_amplitude_g, estimate.amplitude_g);
+    set(out, &v1::Estimate::set_frequency_hz, estimate.frequency_hz);
+    set(out, &v1::Estimate::set_kappa, estimate.kappa);
+    out.set_samples(estimate.samples);
+    out.set_used(estimate.used);
+    out.set_rejected(estimate.rejected);
+    set(out, &v1::Estimate::set_nis_per_dof, estimate.nis_per_dof);
+    v1::Innovation& innovation = *out.mutable_innovation();
+    set(innovation, &v1::Innovation::set_x_arcsec, estimate.innovation_arcsec[0]);
+    set(innovation, &v1::Innovation::set_y_arcsec, estimate.innovation_arcsec[1]);
+    set(innovation, &v1::Innovation::set_z_arcsec, estimate.innovation_arcsec[2]);
+    out.set_dwells(estimate.dwells);
+}
+
+void fill(v1::Dwell& out, const estimator::DwellSummary& dwell) {
+    out.set_run(dwell.run);
+    out.set_position(dwell.position);
+    out.set_samples(dwell.samples);
+    out.set_used(dwell.used);
+    out.set_rejected(dwell.rejected);
+    out.set_reinitialised(dwell.reinitialised);
+    set(out, &v1::Dwell::set_kappa, dwell.kappa);
+    set(out, &v1::Dwell::set_amplitude_g, dwell.amplitude_g);
+    set(out, &v1::Dwell::set_frequency_hz, dwell.frequency_hz);
+    set(out, &v1::Dwell::set_mean_force_g, dwell.mean_force_g);
+    set(out, &v1::Dwell::set_nis_per_dof, dwell.nis_per_dof);
+    out.set_flagged(dwell.flagged);
+    if (dwell.reason != nullptr) out.set_reason(mend_utf8(dwell.reason));
+}
+
+}  // namespace
+
+void fill(v1::Campaign& out, const StatusData& status) {
+    out.set_name(mend_utf8(status.campaign_name));
+    out.set_state(wire_enum<v1::Campaign::State>(status.state));
+    out.set_reason(mend_utf8(status.reason));
+    out.set_armed_by(mend_utf8(status.armed_by));
+    out.set_run(status.run);
+    out.set_runs(status.runs);
+    out.set_position(status.position);
+    out.set_positions(status.positions);
+    v1::Angles& angles = *out.mutable_position_angles();
+    if (status.position > 0) {
+        set(angles, &v1::Angles::set_outer_deg, status.position_deg[0]);
+        set(angles, &v1::Angles::set_inner_deg, status.position_deg[1]);
+        set(angles, &v1::Angles::set_azimuth_deg, status.position_deg[2]);
+    }
+    set(out, &v1::Campaign::set_progress, status.progress);
+    set(out, &v1::Campaign::set_remaining_s, status.remaining_s);
+    set(out, &v1::Campaign::set_command_table_g, status.command_table_g);
+    set(out, &v1::Campaign::set_command_frequency_hz, status.command_frequency_hz);
+    for (const estimator::DwellSummary& dwell : status.dwells) fill(*out.add_dwells(), dwell);
+}
+
+void fill(v1::Status& out, const StatusData& status) {
+    out.set_version(mend_utf8(status.version));
+    out.set_clock(mend_utf8(status.clock));
+    set_time(*out.mutable_utc(), status.utc_ns);
+    out.set_time_s(drivers::to_seconds(status.time));
+    out.set_uptime_s(drivers::to_seconds(status.uptime));
+    fill(*out.mutable_campaign(), status);
+    fill(*out.mutable_shaker(), status);
+    fill(*out.mutable_can(), status);
+    fill(*out.mutable_assembler(), status.assembler);
+    out.mutable_estimator_ring()->set_pushed(status.estimator_ring.pushed);
+    out.mutable_estimator_ring()->set_popped(status.estimator_ring.popped);
+    out.mutable_estimator_ring()->set_dropped(status.estimator_ring.dropped);
+    fill(*out.mutable_sample(), status);
+    fill(*out.mutable_platform(), status.platform);
+    fill(*out.mutable_estimate(), status.estimate);
+}
+
+void fill(v1::Parameters& out, const estimator::Result& result) {
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        fill_parameter(*out.add_parameters(), i, result.value[i], result.sigma[i],
+                       result.observable[i]);
+        google::protobuf::ListValue& row = *out.add_covariance();
+        for (std::size_t j = 0; j < estimator::kParameters; ++j) {
+            const double value =
+                result.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+            google::protobuf::Value& cell = *row.add_values();
+            if (result.observable[i] && result.observable[j] && std::isfinite(value)) {
+                cell.set_number_value(value);
+            } else {
+                cell.set_null_value(google::protobuf::NULL_VALUE);
+            }
+        }
+    }
+    for (const estimator::RunAmplitude& run : result.amplitudes) {
+        v1::RunAmplitude& amplitude = *out.add_amplitudes();
+        amplitude.set_run(run.run);
+        set(amplitude, &v1::RunAmplitude::set_amplitude_g, run.amplitude_g);
+        set(amplitude, &v1::RunAmplitude::set_kappa, run.kappa);
+        set(amplitude, &v1::RunAmplitude::set_sigma_g, run.sigma_g);
+        set(amplitude, &v1::RunAmplitude::set_frequency_hz, run.frequency_hz);
+    }
+    for (const estimator::Combination& determined : result.combinations) {
+        v1::Combination& combination = *out.add_combinations();
+        for (const auto& [name, weight] : determined.weights) {
+            (*combination.mutable_weights())[mend_utf8(name)] = finite(weight);
+        }
+        set(combination, &v1::Combination::set_value, determined.value);
+        set(combination, &v1::Combination::set_sigma, determined.sigma);
+    }
+    set(out, &v1::Parameters::set_nis, result.nis_per_dof);
+    out.set_samples(result.samples);
+    out.set_rejected(result.rejected);
+    for (const std::string& warning : result.warnings) out.add_warnings(mend_utf8(warning));
+}
+
+void fill(v1::Event& out, const EventRecord& event) {
+    out.set_id(event.id);
+    set_time(*out.mutable_utc(), event.utc_ns);
+    out.set_time_s(drivers::to_seconds(event.time));
+    out.set_severity(wire_enum<v1::Event::Severity>(event.severity));
+    out.set_source(mend_utf8(event.source));
+    out.set_text(mend_utf8(event.text));
+}
+
+std::string mend_utf8(std::string_view text) {
+    std::string out;
+    out.reserve(text.size());
+    for (std::size_t i = 0; i < text.size();) {
+        const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[i + k]); };
+        const unsigned lead = byte(0);
+        std::size_t length = 0;
+        if (lead < 0x80)
+            length = 1;
+        else if (lead >= 0xC2 && lead <= 0xDF)
+            length = 2;
+        else if (lead >= 0xE0 && lead <= 0xEF)
+            length = 3;
+        else if (lead >= 0xF0 && lead <= 0xF4)
+            length = 4;
+        bool good = length > 0 && i + length <= text.size();
+        for (std::size_t k = 1; good && k < length; ++k) good = (byte(k) & 0xC0) == 0x80;
+        // Overlong forms, surrogates, and what lies beyond U+10FFFF (RFC 3629, section 4).
+        if (good && lead == 0xE0) good = byte(1) >= 0xA0;
+        if (good && lead == 0xED) good = byte(1) <= 0x9F;
+        if (good && lead == 0xF0) good = byte(1) >= 0x90;
+        if (good && lead == 0xF4) good = byte(1) <= 0x8F;
+        if (good) {
+            out.append(text.substr(i, length));
+            i += length;
+        } else {
+            out.push_back('?');
+            ++i;
+        }
+    }
+    return out;
+}
+
+}  // namespace vibrig::serve

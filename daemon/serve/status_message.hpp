@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/status.hpp"
+
+namespace vibrig::v1 {
+class Campaign;
+class Event;
+class Parameters;
+class Status;
+}  // namespace vibrig::v1
+
+/// The daemon's structs carried into the messages of proto/vibrig.proto: SI and rad become the
+/// units of the edge.
+namespace vibrig::serve {
+
+void fill(v1::Status& out, const StatusData& status);
+void fill(v1::Campaign& out, const StatusData& status);
+void fill(v1::Parameters& out, const estimator::Result& result);
+void fill(v1::Event& out, const EventRecord& event);
+
+/// Bytes that are not UTF-8 become '?': a text from a device or a file must not spoil a whole
+/// answer.
+[[nodiscard]] std::string mend_utf8(std::string_view text);
+
+}  // namespace vibrig::serve
