@@ -1,0 +1,45 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace vibrig::proto {
+
+/// One sample of a recording: what `vibrig identify` reads and the simulated rig writes.
+struct RecordingRow {
+    double time_s = 0;                  ///< grows within a run and position
+    int run = 0;                        ///< from 1
+    int position = 0;                   ///< from 1
+    std::array<double, 3> angle_deg{};  ///< outer alpha, inner beta, azimuth gamma
+    std::array<double, 3> force_g{};    ///< specific force, platform axes
+    std::size_t line = 0;               ///< where the row stands in its file, from 1
+};
+
+/// A recording that cannot be read or written: "file:line: column X: found Y, expected Z".
+class RecordingError : public std::runtime_error {
+  public:
+    /// Line 0: the file as a whole. Empty column: the line as a whole.
+    RecordingError(const std::string& file, std::size_t line, const std::string& column,
+                   const std::string& what);
+    [[nodiscard]] std::size_t line() const noexcept { return line_; }
+    [[nodiscard]] const std::string& column() const noexcept { return column_; }
+
+  private:
+    std::size_t line_;
+    std::string column_;
+};
+
+/// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
+/// ax_g, ay_g, az_g in any order; others are ignored. A (run, position) pair that comes back after
+/// another one continues its dwell, so its time must go on growing. Throws RecordingError.
+[[nodiscard]] std::vector<RecordingRow> read_recording(const std::string& path);
+
+/// Writes what read_recording() reads, every number with the digits that give it back exactly.
+/// Throws RecordingError.
+void write_recording(const std::string& path, std::span<const RecordingRow> rows);
+
+}  // namespace vibrig::proto

@@ -1,0 +1,234 @@
+#include "proto/recording_csv.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+namespace vibrig::proto {
+namespace {
+
+constexpr const char* kHeader = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
+
+class Recording : public testing::Test {
+  protected:
+    Recording() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-csv-XXXXXX").string();
+        folder_ = ::mkdtemp(name.data());
+    }
+    ~Recording() override { std::filesystem::remove_all(folder_); }
+    Recording(const Recording&) = delete;
+    Recording& operator=(const Recording&) = delete;
+
+    [[nodiscard]] std::string path() const { return (folder_ / "recording.csv").string(); }
+    [[nodiscard]] std::string write(const std::string& text) const {
+        std::ofstream(path(), std::ios::binary) << text;
+        return path();
+    }
+    [[nodiscard]] std::vector<RecordingRow> read(const std::string& text) const {
+        return read_recording(write(text));
+    }
+    /// The error without the path in front.
+    [[nodiscard]] std::string error(const std::string& text) const {
+        try {
+            (void)read_recording(write(text));
+        } catch (const RecordingError& failure) {
+            const std::string what = failure.what();
+            EXPECT_TRUE(what.starts_with(path())) << what;
+            return what.substr(std::min(path().size(), what.size()));
+        }
+        return "no error";
+    }
+    [[nodiscard]] std::string row_error(const std::string& row) const {
+        return error(std::string(kHeader) + "0,1,1,0,0,0,0,0,0\n" + row + "\n");
+    }
+
+  private:
+    std::filesystem::path folder_;
+};
+
+TEST_F(Recording, GivesRowsInOrderWithTheirLines) {
+    const auto rows =
+        read(std::string(kHeader) + "0.025,1,2,10,20,30,0.1,-1,2e-3\n\n0.05,1,2,1,2,3,4,5,6");
+    ASSERT_EQ(rows.size(), 2U);
+    EXPECT_EQ(rows[0].time_s, 0.025);
+    EXPECT_EQ(rows[0].run, 1);
+    EXPECT_EQ(rows[0].position, 2);
+    EXPECT_EQ(rows[0].angle_deg, (std::array<double, 3>{10, 20, 30}));
+    EXPECT_EQ(rows[0].force_g, (std::array<double, 3>{0.1, -1, 2e-3}));
+    EXPECT_EQ(rows[0].line, 2U);
+    EXPECT_EQ(rows[1].line, 4U);
+}
+
+TEST_F(Recording, ToleratesAnyOrderExtraColumnsMarkQuotesBlanksAndCrLf) {
+    const auto rows = read(
+        "\xef\xbb\xbf\"az_g\", note ,ay_g,ax_g,gamma_deg,beta_deg,alpha_deg,position,run,time_s\r\n"
+        " 1.5 ,\"warm, \"\"humming\"\"\",\"2\",3,4,5,6,7.0,8,+9\r\n");
+    ASSERT_EQ(rows.size(), 1U);
+    EXPECT_EQ(rows[0].force_g, (std::array<double, 3>{3, 2, 1.5}));
+    EXPECT_EQ(rows[0].angle_deg, (std::array<double, 3>{6, 5, 4}));
+    EXPECT_EQ(rows[0].position, 7);
+    EXPECT_EQ(rows[0].run, 8);
+    EXPECT_EQ(rows[0].time_s, 9);
+}
+
+TEST_F(Recording, IsGivenBackExactlyAfterWriting) {
+    // GIVEN rows of arbitrary doubles
+    const unsigned seed = 20260117;
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> angle(-360, 360);
+    std::uniform_real_distribution<double> force(-10, 10);
+    std::vector<RecordingRow> rows(3000);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        rows[i].time_s = static_cast<double>(i) / 40;
+        rows[i].run = 1 + static_cast<int>(i / 1500);
+        rows[i].position = 1 + static_cast<int>(i / 100 % 14);
+        for (double& a : rows[i].angle_deg) a = angle(random);
+        for (double& f : rows[i].force_g) f = force(random);
+    }
+    // WHEN they are written and read
+    write_recording(path(), rows);
+    const auto back = read_recording(path());
+    // THEN no bit has changed
+    ASSERT_EQ(back.size(), rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        ASSERT_EQ(back[i].time_s, rows[i].time_s);
+        ASSERT_EQ(back[i].run, rows[i].run);
+        ASSERT_EQ(back[i].position, rows[i].position);
+        ASSERT_EQ(back[i].angle_deg, rows[i].angle_deg);
+        ASSERT_EQ(back[i].force_g, rows[i].force_g);
+        ASSERT_EQ(back[i].line, i + 2);
+    }
+}
+
+TEST_F(Recording, ThatIsNotThereIsNamed) {
+    try {
+        (void)read_recording(path());
+        FAIL() << "no error";
+    } catch (const RecordingError& failure) {
+        EXPECT_EQ(failure.what(), path() + ": cannot be opened: No such file or directory");
+        EXPECT_EQ(failure.line(), 0U);
+    }
+    EXPECT_THROW((void)read_recording("/"), RecordingError);
+}
+
+TEST_F(Recording, ThatCannotBeWrittenIsNamed) {
+    EXPECT_THROW(write_recording(path() + "/no/such/folder", {}), RecordingError);
+    if (std::filesystem::exists("/dev/full")) {
+        const std::vector<RecordingRow> rows(3);
+        EXPECT_THROW(write_recording("/dev/full", rows), RecordingError);
+    }
+}
+
+TEST_F(Recording, WithoutRowsIsRefused) {
+    EXPECT_EQ(error(""), ": found an empty file, expected a header row");
+    EXPECT_EQ(error(kHeader), ": found no row after the header, expected samples");
+}
+
+TEST_F(Recording, NamesAllMissingColumns) {
+    EXPECT_EQ(error("time_s,run,alpha_deg,beta_deg,gamma_deg,ax_g,ay\n1,1,1,1,1,1,1\n"),
+              ":1: found the header 'time_s,run,alpha_deg,beta_deg,gamma_deg,...', expected also "
+              "the column(s) position, ay_g, az_g");
+}
+
+TEST_F(Recording, RefusesAColumnGivenTwice) {
+    EXPECT_EQ(error("time_s,run,run,position\n"),
+              ":1: column run: found twice in the header, expected once");
+}
+
+TEST_F(Recording, RefusesRowsWithTooFewOrTooManyFields) {
+    EXPECT_EQ(row_error("1,1,1,0,0,0,0,0"), ":3: found 8 fields, expected 9 as in the header");
+    EXPECT_EQ(row_error("1,1,1,0,0,0,0,0,0,5"), ":3: found 10 fields, expected 9 as in the header");
+    EXPECT_EQ(read(std::string(kHeader) + "1,1,1,0,0,0,0,0,0,\n").size(), 1U);
+}
+
+TEST_F(Recording, NamesLineColumnAndValueOfWhatIsNoNumber) {
+    EXPECT_EQ(row_error("1,1,1,0,0,0,0,0,abc"),
+              ":3: column az_g: found 'abc', expected a finite number");
+    EXPECT_EQ(row_error("1,1,1,0,0,0,0,nan,0"),
+              ":3: column ay_g: found 'nan', expected a finite number");
+    EXPECT_EQ(row_error("inf,1,1,0,0,0,0,0,0"),
+              ":3: column time_s: found 'inf', expected a finite number");
+    EXPECT_EQ(row_error("1,1,1,,0,0,0,0,0"),
+              ":3: column alpha_deg: found nothing, expected a finite number");
+    EXPECT_EQ(row_error("1,1,1,0,1e999,0,0,0,0"),
+              ":3: column beta_deg: found '1e999', expected a finite number");
+    EXPECT_EQ(row_error("1,1,1,0,0,1.5x,0,0,0"),
+              ":3: column gamma_deg: found '1.5x', expected a finite number");
+    EXPECT_EQ(row_error("1,1,1,0,0,+-1,0,0,0"),
+              ":3: column gamma_deg: found '+-1', expected a finite number");
+}
+
+TEST_F(Recording, RefusesAbsurdValues) {
+    EXPECT_EQ(row_error("1,1,1,10001,0,0,0,0,0"),
+              ":3: column alpha_deg: found '10001', expected at most 10000 deg either way");
+    EXPECT_EQ(row_error("1,1,1,0,0,0,0,0,-1001"),
+              ":3: column az_g: found '-1001', expected at most 1000 g either way");
+}
+
+TEST_F(Recording, RefusesRunsAndPositionsThatAreNoPositiveIntegers) {
+    for (const std::string value : {"0", "-1", "1.5", "x", "", "3000000000", "nan", "1e300"}) {
+        const std::string found = value.empty() ? "nothing" : "'" + value + "'";
+        EXPECT_EQ(row_error("1," + value + ",1,0,0,0,0,0,0"),
+                  ":3: column run: found " + found + ", expected a whole number from 1");
+        EXPECT_EQ(row_error("1,1," + value + ",0,0,0,0,0,0"),
+                  ":3: column position: found " + found + ", expected a whole number from 1");
+    }
+}
+
+TEST_F(Recording, RefusesTimeThatDoesNotGrowWithinADwell) {
+    const std::string expected = ", expected more than 0, the time before it in run 1, position 1";
+    EXPECT_EQ(row_error("0,1,1,0,0,0,0,0,0"), ":3: column time_s: found '0'" + expected);
+    EXPECT_EQ(row_error("-5,1,1,0,0,0,0,0,0"), ":3: column time_s: found '-5'" + expected);
+}
+
+TEST_F(Recording, MayStartTimeAnewInANewDwell) {
+    EXPECT_EQ(
+        read(std::string(kHeader) + "5,1,1,0,0,0,0,0,0\n0,1,2,0,0,0,0,0,0\n0,2,1,0,0,0,0,0,0\n")
+            .size(),
+        3U);
+}
+
+TEST_F(Recording, ContinuesADwellThatComesBackIfItsTimeGoesOn) {
+    const std::string text = std::string(kHeader) + "5,1,1,0,0,0,0,0,0\n6,1,2,0,0,0,0,0,0\n";
+    EXPECT_EQ(read(text + "7,1,1,0,0,0,0,0,0\n").size(), 3U);
+    EXPECT_EQ(error(text + "4,1,1,0,0,0,0,0,0\n"),
+              ":4: column time_s: found '4', expected more than 5, the time before it in run 1, "
+              "position 1");
+}
+
+TEST_F(Recording, RefusesWhatIsNoText) {
+    EXPECT_EQ(row_error(std::string("1,1,1,0,0,0,0,0,\0", 17)),
+              ":3: found a NUL byte, expected text in UTF-8");
+    EXPECT_EQ(row_error(std::string((std::size_t{1} << 20) + 1, '1')),
+              ":3: found a line of more than 1048576 bytes, expected a shorter one");
+    EXPECT_EQ(row_error(std::string(std::size_t{5} << 20, '1')),
+              ":3: found a line of more than 1048576 bytes, expected a shorter one");
+    EXPECT_EQ(row_error("\"1,1,1,0,0,0,0,0,0"),
+              ":3: found an opening quote only, expected a closing one on the same line");
+    EXPECT_EQ(row_error("\"1\"2,1,1,0,0,0,0,0,0"),
+              ":3: found '2,1,1,0,0,0,0,0,0' after a closing quote, expected ','");
+    EXPECT_EQ(row_error("1,1,1,0,0,0,0,0,\xff\x1b[2J"),
+              ":3: column az_g: found '\\xff\\x1b[2J', expected a finite number");
+}
+
+TEST_F(Recording, ReadsLinesAcrossItsBufferUnchanged) {
+    // GIVEN more text than the reader holds at a time, in lines that its buffer's end cuts
+    std::string text = kHeader;
+    std::size_t count = 0;
+    while (text.size() < (std::size_t{5} << 20)) {
+        text += std::to_string(count) + ",1,1,1,2,3,0.1,0.2,0.3\n";
+        ++count;
+    }
+    // WHEN it is read THEN every row is there in order
+    const auto rows = read(text);
+    ASSERT_EQ(rows.size(), count);
+    for (std::size_t i = 0; i < count; ++i) ASSERT_EQ(rows[i].time_s, static_cast<double>(i));
+}
+
+}  // namespace
+}  // namespace vibrig::proto
