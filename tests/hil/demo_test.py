@@ -1,0 +1,70 @@
+#!/usr/bin/python3
+"""daemon/demo as a newcomer types it.
+
+usage: demo_test.py
+"""
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+DEMO = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "daemon", "demo"))
+
+
+def demo(*arguments, temporary, timeout=400):
+    return subprocess.run([DEMO, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                          timeout=timeout, cwd=temporary, env={**os.environ, "TMPDIR": temporary})
+
+
+def processes_of(folder):
+    """Command lines that name the folder: what a demo there has left running."""
+    found = []
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            with open(f"/proc/{pid}/cmdline", "rb") as file:
+                command = file.read().replace(b"\0", b" ").decode(errors="replace")
+        except OSError:
+            continue
+        if folder in command and int(pid) != os.getpid():
+            found.append(command)
+    return found
+
+
+def main():
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory(prefix="vibrig demo ") as folder:   # a blank in the path, too
+        kept = os.path.join(folder, "kept")
+        begin = time.monotonic()
+        run = demo("--keep", kept, temporary=folder)
+        checks.check(run.returncode == 0, "the demo ends with all 30 coefficients within 4 sigma",
+                     f"status {run.returncode}\n{run.stdout[-3000:]}{run.stderr[-2000:]}")
+        checks.note(f"{time.monotonic() - begin:.0f} s")
+        names = set(re.findall(r"\bD_[FIOS]{1,2}[xyz]\b", run.stdout.split("truth")[-1]))
+        checks.equal(len(names), 30, "it prints the table of 30 coefficients")
+        checks.check(os.path.exists(os.path.join(kept, "vibrigd.toml")), "--keep keeps the configuration")
+        checks.equal(processes_of(kept), [], "no process is left")
+        wrong = demo("--seed", "many", temporary=folder)
+        checks.check(wrong.returncode == 2 and "many" in wrong.stderr, "a bad seed is refused by name", wrong.stderr)
+        # WHEN it is interrupted in the middle of a campaign
+        running = subprocess.Popen([DEMO], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                   text=True, cwd=folder, env={**os.environ, "TMPDIR": folder})
+        for line in running.stdout:
+            if line.startswith("Campaign:"):
+                break
+        time.sleep(0.5)
+        running.send_signal(signal.SIGTERM)
+        running.stdout.read()
+        checks.equal(running.wait(30), 143, "SIGTERM ends it")
+        checks.equal(processes_of(folder), [], "an interrupted demo leaves no process")
+        checks.equal(sorted(os.listdir(folder)), ["kept"], "an interrupted demo leaves no temporary folder")
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,248 @@
+"""The simulated rig and the daemon as processes, for campaigns driven from a test; and the checks, as TAP."""
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree
+
+PR_SET_PDEATHSIG = 1
+
+
+class Checks:
+    """Numbers the checks and prints each as it comes: 'ok N - text' or 'not ok N - text'."""
+
+    def __init__(self):
+        self.count = self.failed = 0
+
+    def check(self, good, text, found=""):
+        self.count += 1
+        self.failed += not good
+        print(f"{'ok' if good else 'not ok'} {self.count} - {text}", flush=True)
+        if not good and found != "":
+            self.note(found)
+        return bool(good)
+
+    def equal(self, found, expected, text):
+        return self.check(found == expected, text, f"found {found!r}, expected {expected!r}")
+
+    def skip(self, text, why):
+        self.count += 1
+        print(f"ok {self.count} - {text} # SKIP {why}", flush=True)
+
+    def note(self, text):
+        for line in str(text).splitlines():
+            print(f"# {line}", flush=True)
+
+    def gtest(self, program, timeout, environment=None):
+        """One check per test of a GoogleTest program."""
+        with tempfile.TemporaryDirectory() as folder:
+            report = os.path.join(folder, "report.xml")
+            run = subprocess.run([program, f"--gtest_output=xml:{report}"], timeout=timeout, capture_output=True,
+                                 text=True, errors="replace", env={**os.environ, **(environment or {})})
+            try:
+                cases = list(xml.etree.ElementTree.parse(report).getroot().iter("testcase"))
+            except (OSError, xml.etree.ElementTree.ParseError) as error:
+                self.check(False, f"{os.path.basename(program)} runs to its end", f"{error}\n{run.stdout}{run.stderr}")
+                return
+        for case in cases:
+            name = f"{case.get('classname')}.{case.get('name')}"
+            skipped = case.find("skipped")
+            if case.get("status") == "notrun" or skipped is not None:
+                self.skip(name, skipped.get("message", "").replace("\n", " ") if skipped is not None else "disabled")
+            else:
+                self.check(case.find("failure") is None, name,
+                           "\n".join(failure.get("message", "") for failure in case.iter("failure")))
+        self.check(run.returncode == 0 or any(c.find("failure") is not None for c in cases),
+                   f"{os.path.basename(program)} exits cleanly", f"status {run.returncode}\n{run.stderr[-2000:]}")
+
+    def end(self):
+        print(f"1..{self.count}", flush=True)
+        return 1 if self.failed else 0
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def toml_value(value):
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return json.dumps(value)
+
+
+def toml(tables):
+    lines = []
+    for table, keys in tables.items():
+        lines.append(f"[{table}]")
+        lines += [f"{key} = {toml_value(value)}" for key, value in keys.items()]
+    return "\n".join(lines) + "\n"
+
+
+class Child:
+    """A process whose output goes to a file; it dies with this one."""
+
+    def __init__(self, name, argv, folder, environment=None):
+        self.name, self.log = name, os.path.join(folder, name + ".log")
+        with open(self.log, "ab") as log:
+            self.process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                                            env={**os.environ, **(environment or {})}, preexec_fn=die_with_parent)
+
+    def running(self):
+        return self.process.poll() is None
+
+    def end(self, number=signal.SIGTERM, timeout=20):
+        """Exit status; None if it had to be killed."""
+        if self.running():
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            return None
+
+    def text(self):
+        with open(self.log, encoding="utf-8", errors="replace") as log:
+            return log.read()
+
+
+def die_with_parent():
+    import ctypes
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class Rig:
+    """vibrig-plant and vibrigd in one temporary folder. `bus`: "vcan0", or "seqpacket"."""
+
+    def __init__(self, programs, bus, clock, folder, poll_s=0.25):
+        self.programs, self.bus, self.clock, self.folder, self.poll_s = programs, bus, clock, folder, poll_s
+        self.modbus_port = free_port()
+        self.path = os.path.join(folder, "bus.sock")
+        self.socket = os.path.join(folder, "vibrigd.sock")
+        self.results = os.path.join(folder, "results")
+        self.configuration = os.path.join(folder, "vibrigd.toml")
+        self.plant = self.daemon = None
+        os.makedirs(self.results, exist_ok=True)
+
+    def program(self, name):
+        return os.path.join(self.programs, name)
+
+    def configure(self, campaign, **tables):
+        can = {"port": "seqpacket", "path": self.path} if self.bus == "seqpacket" else {"interface": self.bus}
+        everything = {"campaign": {"results": self.results, **campaign}, "can": can,
+                      "clock": {"source": self.clock}, "server": {"socket": self.socket},
+                      "shaker": {"host": "127.0.0.1", "port": self.modbus_port}}
+        for table, keys in tables.items():
+            everything.setdefault(table, {}).update(keys)
+        with open(self.configuration, "w", encoding="utf-8") as file:
+            file.write(toml(everything))
+
+    def start_plant(self, *more):
+        bus = self.path if self.bus == "seqpacket" else self.bus
+        self.plant = Child("plant", [self.program("vibrig-plant"), "run", "--can", bus, "--modbus",
+                                     f"tcp:127.0.0.1:{self.modbus_port}", "--clock", self.clock, *more], self.folder)
+
+    def start_daemon(self):
+        self.daemon = Child("vibrigd", [self.program("vibrigd"), "--config", self.configuration], self.folder)
+
+    def tool(self, *arguments, timeout=30):
+        return subprocess.run([self.program("vibrig"), *arguments, "--socket", self.socket], stdin=subprocess.DEVNULL,
+                              capture_output=True, text=True, timeout=timeout)
+
+    def status(self):
+        """The status as a dictionary; None while the daemon does not answer."""
+        run = self.tool("status", "--json")
+        if run.returncode != 0:
+            return None
+        return json.loads(run.stdout)
+
+    def wait_for(self, condition, timeout_s):
+        """The first status that fulfils the condition; else the last one. The clock is the one all processes see."""
+        end, status = time.monotonic() + timeout_s, None
+        while time.monotonic() < end:
+            if self.daemon is not None and not self.daemon.running():
+                return status
+            status = self.status() or status
+            if status is not None and condition(status):
+                return status
+            time.sleep(self.poll_s)
+        return status
+
+    def wait_for_state(self, wanted, timeout_s):
+        return self.wait_for(lambda s: s["campaign"]["state"] in wanted, timeout_s)
+
+    def result(self):
+        """result.json of the campaign, wherever below the results folder; its bytes."""
+        for folder, _, names in os.walk(self.results):
+            if "result.json" in names:
+                with open(os.path.join(folder, "result.json"), "rb") as file:
+                    return os.path.join(folder, "result.json"), file.read()
+        return None, b""
+
+    def stop(self):
+        for child in (self.daemon, self.plant):
+            if child is not None:
+                child.end(timeout=5)
+
+    def logs(self, lines=25):
+        found = []
+        for child in (self.plant, self.daemon):
+            if child is not None:
+                found.append(f"-- end of {child.name}.log")
+                found += child.text().splitlines()[-lines:]
+        return "\n".join(found)
+
+
+def state_of(status):
+    return "no answer" if status is None else status["campaign"]["state"] + \
+        (f" ({status['campaign']['reason']})" if status["campaign"].get("reason") else "")
+
+
+def number(value):
+    """Protobuf's JSON mapping writes 64-bit counters as strings."""
+    return int(value)
+
+
+def balances(status):
+    """Every stage with its loss balance: name, left side, right side."""
+    can, assembler, ring = status["can"], status["assembler"], status["estimator_ring"]
+    n = number
+    return [
+        ("CAN port", n(can["received"]),
+         n(can["delivered"]) + n(can["own"]) + n(can["error_frames"]) + n(can["malformed"])),
+        ("assembler", n(assembler["received"]),
+         sum(n(assembler[k]) for k in ("used", "unknown", "duplicate", "late", "wrong_length"))),
+        ("CAN port to assembler", n(can["delivered"]), n(assembler["received"])),
+        ("assembler to ring", n(assembler["samples"]), n(ring["pushed"]) + n(ring["dropped"])),
+        ("ring", n(ring["pushed"]), n(ring["popped"])),
+    ]
+
+
+def check_balances(checks, rig):
+    """A stage may hold something for the moment: each balance has to close within a few looks."""
+    for _ in range(20):
+        status = rig.status()
+        rows = balances(status) if status is not None else []
+        if rows and all(left == right for _, left, right in rows):
+            break
+        time.sleep(0.1)
+    for name, left, right in rows:
+        checks.check(left == right, f"loss balance closes: {name}", f"{left} on one side, {right} on the other")
+    return status
+
+
+SANITIZER = re.compile(r"(AddressSanitizer|LeakSanitizer|ThreadSanitizer|UndefinedBehaviorSanitizer|runtime error:)")
+
+
+def programs_from_command_line(usage):
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
+        print(usage, file=sys.stderr)
+        sys.exit(0 if sys.argv[1:] in (["-h"], ["--help"]) else 2)
+    return os.path.realpath(sys.argv[1])

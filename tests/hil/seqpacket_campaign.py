@@ -1,0 +1,45 @@
+#!/usr/bin/python3
+"""A campaign over the seqpacket bus on the rig's clock, with programs built under a sanitizer.
+
+usage: seqpacket_campaign.py PROGRAMS
+"""
+import os
+import signal
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+SHORT = {"name": "sanitized", "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 20.0}
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(programs, "seqpacket", "rig", folder)
+        rig.configure(SHORT)
+        try:
+            rig.start_plant("--seed", "3")
+            rig.start_daemon()
+            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            commands = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+            last = rig.wait_for_state(("finished", "aborted", "tripped"), 90)
+            checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
+                         f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}")
+            r.check_balances(checks, rig)
+            path, _ = rig.result()
+            checks.check(path is not None, "there is a result.json")
+            checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrigd with status 0")
+            checks.equal(rig.plant.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrig-plant with status 0")
+            for child in (rig.daemon, rig.plant):
+                checks.check(not r.SANITIZER.search(child.text()), f"the sanitizer has nothing on {child.name}",
+                             child.text()[-4000:])
+        finally:
+            rig.stop()
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,275 @@
+#!/usr/bin/python3
+"""Real time on a real vcan0: a short campaign and what may go wrong on a bus. To be run inside run-in-uml.
+
+usage: vcan_campaign.py PROGRAMS      folder of vibrigd, vibrig, vibrig-plant, can_port_hil_test
+"""
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+BUS = "vcan0"
+SHORT = {"name": "short", "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 4.0,
+         "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 1.0}
+SAMPLE_IDS = {0x080, 0x101, 0x102, 0x110, 0x111, 0x112}
+STATUS_IDS = {0x210, 0x220, 0x221}
+COMMAND_IDS = {0x200}
+SEED = 7
+
+
+def send(*frames):
+    for frame in frames:
+        subprocess.run(["cansend", BUS, frame], check=True, stdin=subprocess.DEVNULL)
+
+
+def garbage(rng, seconds):
+    """cangen at random, and by cansend what cangen does not make: error frames, known ids with wrong length or DLC."""
+    generators = [subprocess.Popen(["cangen", BUS, "-g", "5", "-I", "r", "-L", "r", "-D", "r", *more],
+                                   stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                  for more in (["-m"], ["-e", "-R"], ["-f"])]
+    known = sorted(SAMPLE_IDS | STATUS_IDS)
+    end, sent = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        identifier = rng.choice(known)
+        data = bytes(rng.randrange(256) for _ in range(rng.randrange(8))).hex()
+        send(f"{identifier:03X}#{data}",                       # too short
+             f"{identifier:03X}##1{data}",                     # FD with a known id
+             f"{identifier:03X}#R",                            # remote
+             f"{0x20000000 | rng.randrange(1 << 9):08X}#0000000000000000",  # error frame
+             f"{rng.randrange(0x300, 0x7FF):03X}#{data}", f"{rng.randrange(1 << 29):08X}#{data}")
+        sent += 6
+        time.sleep(0.2)
+    for generator in generators:
+        generator.terminate()
+        generator.wait()
+    return sent
+
+
+def counts_of(candump_log):
+    counts, syncs = {}, []
+    with open(candump_log, encoding="ascii", errors="replace") as log:
+        for line in log:
+            identifier, _, data = line.split()[2].partition("#")
+            if len(identifier) == 3:
+                counts[int(identifier, 16)] = counts.get(int(identifier, 16), 0) + 1
+                if identifier == "080" and len(data) >= 8:
+                    syncs.append(int.from_bytes(bytes.fromhex(data[:8]), "little"))
+    return counts, syncs
+
+
+def campaign(checks, rig, folder):
+    """arm, start, finished; candump looks on."""
+    log = os.path.join(folder, "candump.log")
+    with open(log, "wb") as file:
+        candump = subprocess.Popen(["candump", "-L", BUS], stdin=subprocess.DEVNULL, stdout=file)
+    first = rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running" and
+                         r.number(s["assembler"]["samples"]) > 20, 20)
+    checks.check(first is not None and first["can"]["link"] == "running", "vibrigd hears the rig on vcan0",
+                 r.state_of(first))
+    refused = rig.tool("start", "--by", "tester")
+    checks.check(refused.returncode == 1, "start is refused while nobody has armed the shaker",
+                 f"status {refused.returncode}: {refused.stdout}{refused.stderr}")
+    armed = rig.tool("arm", "--by", "tester")
+    checks.check(armed.returncode == 0, "a named person arms the shaker", armed.stderr)
+    started = rig.tool("start", "--by", "tester")
+    checks.check(started.returncode == 0, "the campaign starts", started.stderr)
+
+    seen, problems = [], []
+
+    def watch(status):
+        state = status["campaign"]["state"]
+        if not seen or seen[-1] != state:
+            seen.append(state)
+        if state == "recording" and r.number(status["assembler"]["samples"]) <= 0:
+            problems.append("recording without samples")
+        return state in ("finished", "aborted", "tripped")
+
+    last = rig.wait_for(watch, 150)
+    checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
+                 f"{r.state_of(last)}\nstates seen: {' '.join(seen)}\n{rig.logs()}")
+    checks.check("recording" in seen and not problems, "status answers while it records", f"{seen} {problems}")
+    candump.terminate()
+    candump.wait()
+
+    status = r.check_balances(checks, rig)
+    if status is not None:
+        checks.equal(len(status["campaign"]["dwells"]), 4, "four dwells are reported")
+        checks.equal(r.number(status["can"]["kernel_dropped"]), 0, "the kernel dropped no frame")
+        checks.equal(r.number(status["estimator_ring"]["dropped"]), 0, "the ring dropped no sample")
+    counts, syncs = counts_of(log)
+    for wanted, text in ((SAMPLE_IDS, "every message of a sample"), (STATUS_IDS, "every status message"),
+                         (COMMAND_IDS, "the gimbal commands")):
+        checks.check(wanted <= counts.keys(), f"candump saw {text}",
+                     f"missing: {sorted(hex(i) for i in wanted - counts.keys())}")
+    gaps = sum(b != a + 1 for a, b in zip(syncs, syncs[1:]))
+    checks.check(len(syncs) > 400 and gaps == 0, "candump saw every sync count", f"{len(syncs)} counts, {gaps} gaps")
+    uneven = {hex(i): counts.get(i, 0) for i in SAMPLE_IDS if abs(counts.get(i, 0) - len(syncs)) > 1}
+    checks.check(not uneven, "one frame of each kind came per sync count", uneven)
+    path, text = rig.result()
+    result = json.loads(text) if text else {}
+    checks.equal(len(result.get("parameters", [])), 30, "result.json holds 30 parameters")
+    checks.check(path is None or "NaN" not in text.decode(), "result.json holds no NaN")
+
+
+def survives_garbage(checks, rig):
+    rng = random.Random(SEED)
+    before = rig.status()
+    sent = garbage(rng, 4)
+    time.sleep(0.5)
+    after = rig.status()
+    checks.check(rig.daemon.running() and after is not None, f"vibrigd survives garbage (seed {SEED})", rig.logs())
+    if before is None or after is None:
+        return
+
+    def risen(room, key):
+        return r.number(after[room][key]) - r.number(before[room][key])
+
+    checks.check(risen("can", "received") > sent / 2, "the garbage arrived", f"{sent} sent by cansend")
+    checks.check(risen("assembler", "unknown") > 20, "unknown frames are counted", risen("assembler", "unknown"))
+    checks.check(risen("assembler", "wrong_length") > 5, "frames of a wrong length are counted",
+                 risen("assembler", "wrong_length"))
+    checks.check(risen("can", "error_frames") > 5, "error frames are counted", risen("can", "error_frames"))
+    r.check_balances(checks, rig)
+    later = rig.wait_for(lambda s: r.number(s["assembler"]["samples"]) > r.number(after["assembler"]["samples"]) + 40, 5)
+    good = [c["quality"] for c in later["sample"]["channels"]]
+    checks.check(all(quality in ("good", "unbound") for quality in good), "samples are good again afterwards", good)
+
+
+def recovers_from_interface_down(checks, rig):
+    before = rig.status()
+    subprocess.run(["ip", "link", "set", BUS, "down"], check=True)
+    down = rig.wait_for(lambda s: s["can"]["link"] != "running", 5)
+    checks.check(down is not None and down["can"]["link"] != "running", "a lowered interface is noticed",
+                 down and down["can"])
+    time.sleep(1)
+    subprocess.run(["ip", "link", "set", BUS, "up"], check=True)
+    up = rig.wait_for(lambda s: s["can"]["link"] == "running" and
+                      r.number(s["assembler"]["samples"]) > r.number(before["assembler"]["samples"]) + 40, 10)
+    checks.check(up["can"]["link"] == "running", "it recovers alone when the interface is raised", up["can"])
+    checks.check(r.number(up["assembler"]["samples"]) > r.number(before["assembler"]["samples"]) + 40,
+                 "samples come again", f"{before['assembler']} then {up['assembler']}")
+
+
+def shaker_registers(port):
+    from pymodbus.client import ModbusTcpClient
+    client = ModbusTcpClient("127.0.0.1", port=port)
+    client.connect()
+    reply = client.read_input_registers(0, 5, slave=1)
+    client.close()
+    return {"state": reply.registers[0], "fault": reply.registers[1],
+            "measured_g": (reply.registers[3] << 16 | reply.registers[4]) * 1e-4}
+
+
+def run_up(checks, rig, text):
+    """A campaign until the shaker runs at its level."""
+    accepted = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+    status = rig.wait_for(lambda s: s["shaker"].get("measured_g", 0) > 5 and
+                          s["campaign"]["state"] in ("settling", "recording"), 60)
+    return checks.check(status is not None and status["shaker"].get("measured_g", 0) > 5, text,
+                        f"{r.state_of(status)} {[a.stderr for a in accepted]}\n{rig.logs()}")
+
+
+def stops_on_sigterm(checks, rig):
+    if not run_up(checks, rig, "a second campaign brings the shaker to its level"):
+        return
+    code = rig.daemon.end(signal.SIGTERM, timeout=20)
+    checks.equal(code, 0, "SIGTERM ends vibrigd with status 0")
+    registers = shaker_registers(rig.modbus_port)
+    checks.check(registers["state"] == 0 and registers["fault"] == 0 and registers["measured_g"] < 0.05,
+                 "SIGTERM leaves the shaker ramped down and idle", registers)
+
+
+def dies_safely(checks, rig):
+    rig.start_daemon()
+    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 20)
+    checks.equal(r.state_of(rig.status()), "idle", "after a restart the shaker is disarmed")
+    if not run_up(checks, rig, "after a restart, armed anew, the shaker runs"):
+        return
+    rig.daemon.end(signal.SIGKILL)
+    end, registers = time.monotonic() + 10, {}
+    while time.monotonic() < end:
+        registers = shaker_registers(rig.modbus_port)
+        if registers["measured_g"] < 0.05:
+            break
+        time.sleep(0.2)
+    checks.check(registers["measured_g"] < 0.05 and registers["fault"] & 1,
+                 "a killed daemon means a stopped shaker: its watchdog expires", registers)
+
+
+def with_pymodbus(checks, programs, folder):
+    """The daemon's Modbus side against an independent implementation."""
+    os.makedirs(folder)
+    rig = r.Rig(programs, BUS, "real", folder)
+    rig.configure(SHORT)
+    played = r.Child("shaker", [sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
+                                                           "pymodbus_shaker.py"), str(rig.modbus_port)], folder)
+    platform = r.Rig(programs, BUS, "real", folder)   # its own shaker stays at rest
+    try:
+        platform.start_plant("--seed", str(SEED))
+        rig.start_daemon()
+        rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+        run_up(checks, rig, "pymodbus plays the shaker: it reaches its level")
+        rig.tool("abort", "--by", "tester")
+        stopped = rig.wait_for(lambda s: s["campaign"]["state"] in ("aborted", "tripped") and
+                               not s["shaker"].get("running", True), 20)
+        checks.check(stopped is not None and not stopped["shaker"].get("running", True),
+                     "pymodbus plays the shaker: abort stops it", f"{r.state_of(stopped)}\n{rig.logs()}")
+        said = [json.loads(line) for line in played.text().splitlines() if line.startswith("{")]
+        running = [s for s in said if s["run"] and s["state"] == 2]
+        checks.check(running and all(abs(s["frequency_hz"] - 15) < 1e-3 and abs(s["amplitude_g"] - 9) < 1e-3
+                                     for s in running), "pymodbus read 15 Hz and 9 g from the registers", said[-5:])
+        checks.check(said and said[-1]["feeds"] > 3, "pymodbus saw the watchdog fed", said[-1:])
+        checks.check(all(s["watchdog_s"] > 0 for s in running), "pymodbus saw a watchdog time-out", said[-5:])
+    finally:
+        rig.stop()
+        platform.stop()
+        played.end(timeout=5)
+
+
+def sane_log(checks, rig):
+    lines = rig.daemon.text().splitlines()
+    bad = [line for line in lines if r.SANITIZER.search(line) or "nan" in line.lower().split() or "terminate" in line]
+    checks.check(lines and not bad, "the log holds sane lines", bad[:5] or "it is empty")
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    start = time.monotonic()
+
+    def timed(function, *arguments):
+        begin = time.monotonic()
+        function(*arguments)
+        checks.note(f"{function.__name__}: {time.monotonic() - begin:.1f} s")
+
+    port_test = os.path.join(programs, "can_port_hil_test")
+    if os.path.exists(port_test):
+        timed(checks.gtest, port_test, 60)
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(programs, BUS, "real", folder)
+        rig.configure(SHORT)
+        try:
+            rig.start_plant("--seed", str(SEED))
+            rig.start_daemon()
+            timed(campaign, checks, rig, folder)
+            timed(survives_garbage, checks, rig)
+            timed(recovers_from_interface_down, checks, rig)
+            timed(stops_on_sigterm, checks, rig)
+            sane_log(checks, rig)
+            timed(dies_safely, checks, rig)
+        finally:
+            rig.stop()
+        timed(with_pymodbus, checks, programs, os.path.join(folder, "pymodbus"))
+    checks.note(f"{time.monotonic() - start:.0f} s in {os.environ.get('RUN_IN_UML', 'this kernel')}")
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
