@@ -20,14 +20,17 @@ class ConfigurationError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// Relative paths of the file (dbc, results, log file) are relative to its folder; here they are resolved.
 struct Configuration {
     estimator::Settings estimator;       ///< [site] [vibration] [platform] [accelerometer] [noise] [estimator]
     campaign::Settings campaign;         ///< [campaign], [shaker.limits]
     drivers::CanPortSettings can;        ///< [can]
-    std::string dbc;                     ///< [can] dbc: path, relative to the configuration; empty: the built-in rig.dbc
+    std::string dbc;                     ///< [can] dbc; empty: the built-in rig.dbc
     drivers::AssemblerSettings assembler;///< [can.signals], [can] sample_rate_hz, deadlines
     drivers::GimbalSettings gimbal;      ///< [gimbal]
-    drivers::ShakerSettings shaker;      ///< [shaker], [shaker.registers]
+    drivers::ShakerSettings shaker;      ///< [shaker], [shaker.registers]; scales in g peak, amplitude_unit folded in
+    /// [shaker] amplitude_unit: what the controller's amplitude registers count in.
+    enum class AmplitudeUnit : std::uint8_t { g_peak, g_rms, mps2_peak } amplitude_unit = AmplitudeUnit::g_peak;
     enum class ClockKind : std::uint8_t { real, rig } clock = ClockKind::real;  ///< [clock] source
     std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
     std::string log_level = "info";      ///< [log] level

@@ -1,0 +1,185 @@
+#include "daemon/configuration/configuration.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <numbers>
+
+#include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/nearest.hpp"
+#include "daemon/configuration/schema.hpp"
+#include "daemon/configuration/value.hpp"
+
+namespace vibrig::configuration {
+
+namespace {
+
+/// 10 000 positions are some 300 kB.
+constexpr std::size_t kLargestFile = 4U << 20U;
+
+/// Takes every value of a file to its key.
+class Reader {
+  public:
+    Reader(Configuration& configuration, Problems& problems)
+        : configuration_(configuration), problems_(problems) {
+        for (const Key& key : schema()) {
+            keys_[key.name] = &key;
+        }
+    }
+
+    void read(const toml::table& table, const std::string& prefix) {
+        for (const auto& [name, node] : table) {
+            const std::string key = prefix + std::string(name.str());
+            const bool section = is_section(key);
+            const auto known = keys_.find(key);
+            if (section && node.is_table()) {
+                read(*node.as_table(), key + ".");
+            } else if (known != keys_.end()) {
+                places_[key] = place_of(node.source());
+                known->second->read(node, configuration_, problems_);
+            } else if (section) {
+                problems_.add(place_of(node.source()), key, describe(node), "a table");
+            } else {
+                const std::string near = nearest_key(key, node.is_table());
+                problems_.add(place_of(name.source()), key,
+                              node.is_table() ? "an unknown table" : "an unknown key",
+                              near.empty() ? "a known one (vibrig --help lists them)"
+                                           : "a known one, perhaps " + near);
+            }
+        }
+    }
+
+    [[nodiscard]] const std::map<std::string, Place>& places() const { return places_; }
+
+  private:
+    [[nodiscard]] bool is_section(const std::string& key) const {
+        const auto next = keys_.lower_bound(key + ".");
+        return next != keys_.end() && next->first.compare(0, key.size() + 1, key + ".") == 0;
+    }
+
+    Configuration& configuration_;
+    Problems& problems_;
+    std::map<std::string, const Key*> keys_;
+    std::map<std::string, Place> places_;
+};
+
+/// From the controller's unit to g peak, the unit inside.
+double to_g_peak(Configuration::AmplitudeUnit unit, double gravity_mps2) {
+    switch (unit) {
+        case Configuration::AmplitudeUnit::g_peak:
+            return 1;
+        case Configuration::AmplitudeUnit::g_rms:
+            return std::numbers::sqrt2;
+        case Configuration::AmplitudeUnit::mps2_peak:
+            return 1 / gravity_mps2;
+    }
+    return 1;
+}
+
+std::vector<EffectiveValue> effective_of(Configuration& configuration, const std::string& file,
+                                         const std::map<std::string, Place>& places) {
+    std::vector<EffectiveValue> effective;
+    for (const Key& key : schema()) {
+        const std::string value = key.write(configuration);
+        if (value.empty()) {
+            continue;
+        }
+        const auto place = places.find(key.name);
+        effective.push_back(
+            {key.name, value, key.unit,
+             place == places.end() ? "default" : file + ":" + std::to_string(place->second.line),
+             key.doc});
+    }
+    return effective;
+}
+
+void resolve(std::string& path, const std::filesystem::path& folder) {
+    if (!path.empty() && !folder.empty()) {
+        path = (folder / path).lexically_normal().string();
+    }
+}
+
+std::string read_file(const std::string& path) {
+    const auto refuse = [&path](const std::string& found) -> ConfigurationError {
+        return ConfigurationError(path + ": found " + found + ", expected a configuration file");
+    };
+    std::error_code error;
+    if (std::filesystem::is_directory(path, error)) {
+        throw refuse("a folder");
+    }
+    errno = 0;
+    std::ifstream file(path, std::ios::binary);
+    if (!file) {
+        throw refuse(errno != 0 ? std::strerror(errno) : "nothing that can be read");
+    }
+    std::string text(kLargestFile + 1, '\0');
+    file.read(text.data(), static_cast<std::streamsize>(text.size()));
+    if (file.bad()) {
+        throw refuse("an error while reading");
+    }
+    text.resize(static_cast<std::size_t>(file.gcount()));
+    if (text.size() > kLargestFile) {
+        throw refuse("more than " + std::to_string(kLargestFile) + " bytes");
+    }
+    return text;
+}
+
+toml::table parse_toml(const std::string& text, const std::string& name) {
+    try {
+        return toml::parse(text, name);
+    } catch (const toml::parse_error& error) {
+        const Place place = place_of(error.source());
+        throw ConfigurationError(name + ":" + std::to_string(place.line) + ":" +
+                                 std::to_string(place.column) +
+                                 ": not TOML: " + printable(std::string(error.description()), 300));
+    }
+}
+
+}  // namespace
+
+Loaded parse(const std::string& text, const std::string& name, bool daemon) {
+    const toml::table table = parse_toml(text, name);
+    Loaded loaded;
+    Configuration& c = loaded.configuration;
+    Problems problems;
+    Reader reader(c, problems);
+    reader.read(table, "");
+    loaded.effective = effective_of(c, name, reader.places());
+
+    const double factor = to_g_peak(c.amplitude_unit, c.estimator.gravity_mps2);
+    c.shaker.registers.amplitude.scale *= factor;
+    c.shaker.registers.measured_amplitude.scale *= factor;
+    c.campaign.frequency_hz = c.estimator.frequency_hz;
+
+    CrossCheck check(c, reader.places(), problems);
+    check.everywhere();
+    if (daemon) {
+        check.for_daemon();
+    }
+    if (!problems.empty()) {
+        throw ConfigurationError(problems.text(name));
+    }
+
+    if (c.campaign.resonance_hz <= 0) {
+        c.campaign.resonance_hz =
+            isolator_resonance_hz(c.estimator.frequency_hz, c.estimator.transmission);
+    }
+    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+    resolve(c.dbc, folder);
+    resolve(c.results, folder);
+    resolve(c.log_file, folder);
+    return loaded;
+}
+
+Loaded load(const std::string& path, bool daemon) {
+    if (path.empty()) {
+        return parse("", "built-in configuration", daemon);
+    }
+    return parse(read_file(path), path, daemon);
+}
+
+}  // namespace vibrig::configuration

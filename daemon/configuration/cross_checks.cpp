@@ -1,0 +1,197 @@
+#include "daemon/configuration/cross_checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "daemon/configuration/value.hpp"
+
+namespace vibrig::configuration {
+
+namespace {
+
+bool starts_with(const std::string& text, const char* prefix) { return text.rfind(prefix, 0) == 0; }
+
+bool loopback(const std::string& host) {
+    const bool dotted = std::all_of(host.begin(), host.end(),
+                                    [](char ch) { return ch == '.' || (ch >= '0' && ch <= '9'); });
+    return host == "localhost" || host == "::1" || (dotted && starts_with(host, "127."));
+}
+
+/// For people: four significant digits are plenty for a limit.
+std::string rounded(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", value);
+    return text;
+}
+
+}  // namespace
+
+double isolator_resonance_hz(double frequency_hz, double transmission) {
+    return transmission < 1 ? frequency_hz / std::sqrt(1 + 1 / transmission) : 0;
+}
+
+bool CrossCheck::sound(std::initializer_list<const char*> keys) const {
+    return std::none_of(keys.begin(), keys.end(),
+                        [this](const char* key) { return problems_.concern(key); });
+}
+
+void CrossCheck::refuse(std::initializer_list<std::string> keys, const std::string& found,
+                        const std::string& expected) {
+    for (const std::string& key : keys) {
+        if (const auto place = places_.find(key); place != places_.end()) {
+            problems_.add(place->second, key, found, expected);
+            return;
+        }
+    }
+    problems_.add({}, *keys.begin(), found + " (default)", expected);
+}
+
+void CrossCheck::everywhere() {
+    bus();
+    if (sound({"shaker.backoff_min_ms", "shaker.backoff_max_ms"}) &&
+        c_.shaker.backoff_min > c_.shaker.backoff_max) {
+        refuse({"shaker.backoff_min_ms", "shaker.backoff_max_ms"},
+               "backoff_min_ms above backoff_max_ms", "backoff_min_ms <= backoff_max_ms");
+    }
+    if (sound({"shaker.unit"}) && c_.shaker.unit > 247 && c_.shaker.unit != 255) {
+        refuse({"shaker.unit"}, std::to_string(c_.shaker.unit), "1 to 247, or 255 (Modbus/TCP)");
+    }
+    registers();
+}
+
+void CrossCheck::for_daemon() {
+    rig_clock();
+    if (!c_.shaker.registers.watchdog) {
+        refuse({"shaker.registers.watchdog"}, "no watchdog register",
+               "one that vibrigd feeds: a dead daemon must mean a stopped shaker");
+    }
+    const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
+    if (sound({"shaker.transport", "shaker.device"}) && serial && c_.shaker.device.empty()) {
+        refuse({"shaker.transport", "shaker.device"}, "\"rtu\" without shaker.device",
+               "the serial device, such as \"/dev/ttyUSB0\"");
+    }
+    if (sound({"shaker.transport", "shaker.unit"}) && serial && c_.shaker.unit > 247) {
+        refuse({"shaker.unit"}, std::to_string(c_.shaker.unit), "1 to 247 on a serial line");
+    }
+    if (sound({"campaign.temperature_window_s", "campaign.ready_timeout_s"}) &&
+        c_.campaign.temperature_window_s >= c_.campaign.ready_timeout_s) {
+        refuse({"campaign.temperature_window_s", "campaign.ready_timeout_s"},
+               "temperature_window_s " + plain(c_.campaign.temperature_window_s) +
+                   " with ready_timeout_s " + plain(c_.campaign.ready_timeout_s),
+               "a window shorter than the timeout");
+    }
+    set_points_fit();
+    limits();
+    frequency();
+}
+
+void CrossCheck::bus() {
+    if (sound({"can.port", "can.path"}) &&
+        c_.can.kind == drivers::CanPortSettings::Kind::seqpacket && c_.can.path.empty()) {
+        refuse({"can.port", "can.path"}, "\"seqpacket\" without can.path",
+               "can.path, the Unix socket to connect to");
+    }
+    if (sound({"can.join_deadline_ms", "can.stale_deadline_ms"}) &&
+        c_.assembler.stale_deadline <= c_.assembler.join_deadline) {
+        refuse({"can.stale_deadline_ms", "can.join_deadline_ms"},
+               "stale_deadline_ms not above join_deadline_ms",
+               "a channel to be stale after samples are joined");
+    }
+    if (sound({"can.sample_rate_hz", "can.stale_deadline_ms"}) &&
+        c_.assembler.stale_deadline <= c_.assembler.sample_period) {
+        refuse({"can.stale_deadline_ms", "can.sample_rate_hz"},
+               plain(drivers::to_seconds(c_.assembler.stale_deadline) * 1e3) + " ms",
+               "more than one sample period, " +
+                   rounded(drivers::to_seconds(c_.assembler.sample_period) * 1e3) + " ms");
+    }
+}
+
+void CrossCheck::rig_clock() {
+    if (!sound({"clock.source"}) || c_.clock != Configuration::ClockKind::rig) {
+        return;
+    }
+    // The rig's clock stands still when the bus is silent: deadlines and watchdogs would never fire
+    // on real hardware.
+    const bool simulated_bus = c_.can.kind == drivers::CanPortSettings::Kind::seqpacket ||
+                               starts_with(c_.can.interface, "vcan") ||
+                               starts_with(c_.can.interface, "vxcan");
+    if (sound({"can.port", "can.interface"}) && !simulated_bus) {
+        refuse({"clock.source"}, "\"rig\" on the CAN interface " + c_.can.interface,
+               "can.port \"seqpacket\" or an interface named vcan* or vxcan*");
+    }
+    const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
+    if (sound({"shaker.host", "shaker.transport"}) && (serial || !loopback(c_.shaker.host))) {
+        refuse({"clock.source"},
+               "\"rig\" with the shaker on " + (serial ? "a serial line" : c_.shaker.host),
+               "shaker.host on loopback, such as \"127.0.0.1\"");
+    }
+}
+
+void CrossCheck::limits() {
+    if (!sound({"vibration.frequency_hz", "site.gravity_mps2", "shaker.limits"})) {
+        return;
+    }
+    const double f = c_.estimator.frequency_hz;
+    const double omega = 2 * std::numbers::pi * f;
+    for (std::size_t i = 0; i < c_.campaign.table_g.size() && sound({"campaign.table_g"}); ++i) {
+        const double a = c_.campaign.table_g[i];
+        const double mps2 = a * c_.estimator.gravity_mps2;
+        const std::string found = plain(a) + " g at " + plain(f) + " Hz";
+        const auto check = [&](double value, double limit, const char* unit, const char* key) {
+            if (value > limit) {
+                refuse({"campaign.table_g", "vibration.frequency_hz", key},
+                       found + ", that is " + rounded(value) + " " + unit + " peak,",
+                       rounded(limit) + " " + unit + " at most (" + key + ")");
+            }
+        };
+        check(a, c_.campaign.max_acceleration_g, "g", "shaker.limits.acceleration_g");
+        check(mps2 / omega, c_.campaign.max_velocity_mps, "m/s", "shaker.limits.velocity_mps");
+        check(mps2 / (omega * omega) * 1e3, c_.campaign.max_displacement_mm, "mm",
+              "shaker.limits.displacement_mm");
+    }
+}
+
+void CrossCheck::frequency() {
+    if (!sound({"vibration.frequency_hz"}) || !sound({"campaign.table_g"})) {
+        return;
+    }
+    const bool vibrating = std::any_of(c_.campaign.table_g.begin(), c_.campaign.table_g.end(),
+                                       [](double g) { return g > 0; });
+    if (!vibrating) {
+        return;
+    }
+    const double f = c_.estimator.frequency_hz;
+    if (sound({"can.sample_rate_hz", "vibration.level_window_s"})) {
+        const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
+        const double margin = 2 / c_.estimator.level_window_s;
+        // f or 2 f aliases to zero frequency there, and no test on the data can tell. Faster
+        // vibration than the sample rate folds down: every multiple counts.
+        const double m = std::max(1.0, std::round(2 * f / rate));
+        if (std::abs(f - m * rate / 2) < margin) {
+            refuse({"vibration.frequency_hz", "can.sample_rate_hz"}, plain(f) + " Hz",
+                   "at least " + rounded(margin) + " Hz off " + rounded(m * rate / 2) +
+                       " Hz, where it aliases to zero at " + rounded(rate) + " samples/s");
+        }
+    }
+    if (!sound({"vibration.transmission", "campaign.resonance_hz"})) {
+        return;
+    }
+    const double transmission = c_.estimator.transmission;
+    if (c_.campaign.resonance_hz > 0) {
+        const double lowest = std::numbers::sqrt2 * c_.campaign.resonance_hz;
+        if (f < lowest) {
+            refuse({"vibration.frequency_hz", "campaign.resonance_hz"}, plain(f) + " Hz",
+                   rounded(lowest) + " Hz at least, sqrt(2) times the isolators' resonance at " +
+                       plain(c_.campaign.resonance_hz) + " Hz, below which they amplify");
+        }
+    } else if (transmission > 1) {
+        // Above sqrt(2) f_n isolators attenuate; more than 1 means the resonance is near. Exactly
+        // 1: a rigid mount.
+        refuse({"vibration.transmission"}, plain(transmission) + " at " + plain(f) + " Hz",
+               "1 at most: isolators that amplify are near their resonance, and f must be above "
+               "sqrt(2) f_n");
+    }
+}
+
+}  // namespace vibrig::configuration

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <initializer_list>
+#include <map>
+#include <string>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/problems.hpp"
+
+namespace vibrig::configuration {
+
+/// What single bounds cannot tell. A rule whose keys have a problem of their own already is left
+/// out, so that one mistake is told once.
+class CrossCheck {
+  public:
+    CrossCheck(const Configuration& configuration, const std::map<std::string, Place>& places,
+               Problems& problems)
+        : c_(configuration), places_(places), problems_(problems) {}
+
+    void everywhere();  ///< contradictions, also for `vibrig identify`
+    void for_daemon();  ///< what only the daemon needs
+
+  private:
+    [[nodiscard]] bool sound(std::initializer_list<const char*> keys) const;
+    /// Blames the first of the keys that stands in the file; else the first.
+    void refuse(std::initializer_list<std::string> keys, const std::string& found,
+                const std::string& expected);
+    void bus();
+    void rig_clock();
+    void registers();
+    void writable_registers_apart();
+    void set_points_fit();
+    void limits();
+    void frequency();
+
+    const Configuration& c_;
+    const std::map<std::string, Place>& places_;
+    Problems& problems_;
+};
+
+/// Natural frequency of the isolators from one transmission, damping neglected (Tang et al. 2009,
+/// eq. 3 with k1 = k2 = 0, above resonance): transmission = 1 / ((f / f_n)^2 - 1). Zero if the
+/// transmission is 1 or more: then f is not that far above.
+[[nodiscard]] double isolator_resonance_hz(double frequency_hz, double transmission);
+
+}  // namespace vibrig::configuration

@@ -1,0 +1,74 @@
+#include "daemon/configuration/problems.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <limits>
+#include <utility>
+
+namespace vibrig::configuration {
+
+namespace {
+
+/// A file that is not a configuration at all would otherwise fill the screen.
+constexpr std::size_t kShown = 100;
+
+}  // namespace
+
+void Problems::add(Place place, std::string key, std::string found, std::string expected) {
+    problems_.push_back({place, std::move(key), std::move(found), std::move(expected)});
+}
+
+bool Problems::concern(const std::string& key) const {
+    return std::any_of(problems_.begin(), problems_.end(), [&](const Problem& problem) {
+        return problem.key.compare(0, key.size(), key) == 0 &&
+               (problem.key.size() == key.size() || problem.key[key.size()] == '.' ||
+                problem.key[key.size()] == '[');
+    });
+}
+
+std::string Problems::text(const std::string& file) const {
+    std::vector<Problem> sorted = problems_;
+    std::stable_sort(sorted.begin(), sorted.end(), [](const Problem& a, const Problem& b) {
+        // What does not stand in the file comes last: line 0 wraps to the largest number.
+        return std::pair(a.place.line - 1U, a.place.column) <
+               std::pair(b.place.line - 1U, b.place.column);
+    });
+    std::string text;
+    for (std::size_t i = 0; i < std::min(sorted.size(), kShown); ++i) {
+        const Problem& problem = sorted[i];
+        text += text.empty() ? "" : "\n";
+        text += file;
+        if (problem.place.line > 0) {
+            text += ":" + std::to_string(problem.place.line) + ":" +
+                    std::to_string(problem.place.column);
+        }
+        text += ": " + (problem.key.empty() ? "" : printable(problem.key, 120) + ": ") + "found " +
+                problem.found + ", expected " + problem.expected;
+    }
+    if (sorted.size() > kShown) {
+        text += "\n" + file + ": and " + std::to_string(sorted.size() - kShown) + " more";
+    }
+    return text;
+}
+
+std::string printable(const std::string& text, std::size_t at_most) {
+    std::string out;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        // Never cut within a UTF-8 sequence.
+        const auto byte = static_cast<unsigned char>(text[i]);
+        if (i >= at_most && (byte & 0xc0U) != 0x80U) {
+            return out + "...";
+        }
+        if (byte < 0x20 || byte == 0x7f) {
+            std::array<char, 8> escaped{};
+            std::snprintf(escaped.data(), escaped.size(), "\\x%02x", static_cast<unsigned>(byte));
+            out += escaped.data();
+        } else {
+            out += text[i];
+        }
+    }
+    return out;
+}
+
+}  // namespace vibrig::configuration

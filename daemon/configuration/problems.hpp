@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace vibrig::configuration {
+
+/// Where something stands in the file, from 1; line 0: it does not stand there (a default).
+struct Place {
+    std::uint32_t line = 0;
+    std::uint32_t column = 0;
+};
+
+struct Problem {
+    Place place;
+    std::string key;
+    std::string found;
+    std::string expected;
+};
+
+/// Everything wrong with one file, so that a person mends it in one go.
+class Problems {
+  public:
+    void add(Place place, std::string key, std::string found, std::string expected);
+    [[nodiscard]] bool empty() const { return problems_.empty(); }
+    /// True if the key itself, or something within it, has a problem already.
+    [[nodiscard]] bool concern(const std::string& key) const;
+    /// "file:line:column: key: found X, expected Y", one per line in the order of the file.
+    [[nodiscard]] std::string text(const std::string& file) const;
+
+  private:
+    std::vector<Problem> problems_;
+};
+
+/// Fit for a terminal: control characters escaped, cut after a while.
+[[nodiscard]] std::string printable(const std::string& text, std::size_t at_most = 60);
+
+}  // namespace vibrig::configuration

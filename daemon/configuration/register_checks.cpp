@@ -1,0 +1,151 @@
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/value.hpp"
+
+namespace vibrig::configuration {
+
+namespace {
+
+using proto::Access;
+using proto::Register;
+using proto::RegisterTable;
+using proto::RegisterType;
+
+struct Role {
+    const char* name;
+    const Register* reg;
+    bool written;  ///< by the daemon
+};
+
+std::vector<Role> roles_of(const proto::ShakerRegisters& r) {
+    std::vector<Role> roles{{"frequency", &r.frequency, true},
+                            {"amplitude", &r.amplitude, true},
+                            {"ramp_time", &r.ramp_time, true},
+                            {"run", &r.run, true},
+                            {"watchdog_timeout", &r.watchdog_timeout, true},
+                            {"state", &r.state, false},
+                            {"fault", &r.fault, false},
+                            {"emergency_stop", &r.emergency_stop, false},
+                            {"measured_amplitude", &r.measured_amplitude, false}};
+    if (r.watchdog) {
+        roles.push_back({"watchdog", &*r.watchdog, true});
+    }
+    return roles;
+}
+
+int words_of(const Register& reg) {
+    const bool two = reg.type == RegisterType::u32 || reg.type == RegisterType::i32 ||
+                     reg.type == RegisterType::f32;
+    return two ? 2 : 1;
+}
+
+double largest(RegisterType type) {
+    switch (type) {
+        case RegisterType::u16:
+            return 65'535;
+        case RegisterType::i16:
+            return 32'767;
+        case RegisterType::u32:
+            return 4'294'967'295.0;
+        case RegisterType::i32:
+            return 2'147'483'647.0;
+        case RegisterType::f32:
+            return static_cast<double>(std::numeric_limits<float>::max());
+        case RegisterType::bits:
+            return 1;
+    }
+    return 0;
+}
+
+}  // namespace
+
+void CrossCheck::registers() {
+    if (!sound({"shaker.registers"})) {
+        return;
+    }
+    for (const Role& role : roles_of(c_.shaker.registers)) {
+        const std::string key = std::string("shaker.registers.") + role.name;
+        const Register& reg = *role.reg;
+        if (reg.address + words_of(reg) > 65'536) {
+            refuse({key + ".address", key + ".type"}, std::to_string(reg.address) + " for 2 words",
+                   "65534 at most");
+        }
+        if (role.written && reg.table == RegisterTable::input) {
+            refuse({key + ".table"}, "\"input\"",
+                   "\"holding\": this register is written, input registers cannot be");
+        }
+        if (role.written && reg.access == Access::read) {
+            refuse({key + ".access"}, "\"read\"", "\"write\" or \"read_write\": it is written");
+        }
+        if (!role.written && reg.access == Access::write) {
+            refuse({key + ".access"}, "\"write\"", "\"read\" or \"read_write\": it is read");
+        }
+        const bool quantity = role.reg == &c_.shaker.registers.frequency ||
+                              role.reg == &c_.shaker.registers.amplitude ||
+                              role.reg == &c_.shaker.registers.ramp_time ||
+                              role.reg == &c_.shaker.registers.watchdog_timeout ||
+                              role.reg == &c_.shaker.registers.measured_amplitude;
+        if (quantity && reg.type == RegisterType::bits) {
+            refuse({key + ".type"}, "\"bits\"", "a number: u16, i16, u32, i32 or f32");
+        }
+    }
+    writable_registers_apart();
+}
+
+void CrossCheck::writable_registers_apart() {
+    const std::vector<Role> roles = roles_of(c_.shaker.registers);
+    for (std::size_t i = 0; i < roles.size(); ++i) {
+        for (std::size_t j = i + 1; j < roles.size(); ++j) {
+            const Register& a = *roles[i].reg;
+            const Register& b = *roles[j].reg;
+            const bool apart = a.table != b.table || a.address + words_of(a) <= b.address ||
+                               b.address + words_of(b) <= a.address;
+            // What is only read may share a register (state and its bits); what is written must
+            // not.
+            if (apart || !(roles[i].written || roles[j].written)) {
+                continue;
+            }
+            const std::string first = std::string("shaker.registers.") + roles[i].name;
+            const std::string second = std::string("shaker.registers.") + roles[j].name;
+            refuse({second + ".address", first + ".address", second + ".type", first + ".type"},
+                   std::string(roles[j].name) + " at " + std::to_string(b.address) + " over " +
+                       roles[i].name + " at " + std::to_string(a.address),
+                   "written registers that do not overlap");
+        }
+    }
+}
+
+void CrossCheck::set_points_fit() {
+    if (!sound({"shaker.registers", "shaker.amplitude_unit", "site.gravity_mps2"})) {
+        return;
+    }
+    const proto::ShakerRegisters& r = c_.shaker.registers;
+    const auto check = [this](const Register& reg, const std::string& role, double value,
+                              const std::string& unit, const char* from) {
+        const double most = largest(reg.type) * reg.scale;
+        if (value > most) {
+            const std::string key = "shaker.registers." + role;
+            refuse({key + ".type", key + ".scale", from},
+                   plain(value) + " " + unit + " to be written",
+                   "a register that holds it (" + plain(most) + " " + unit + " at most)");
+        }
+    };
+    if (sound({"campaign.table_g"})) {
+        check(r.amplitude, "amplitude",
+              *std::max_element(c_.campaign.table_g.begin(), c_.campaign.table_g.end()), "g",
+              "campaign.table_g");
+    }
+    if (sound({"vibration.frequency_hz"})) {
+        check(r.frequency, "frequency", c_.estimator.frequency_hz, "Hz", "vibration.frequency_hz");
+    }
+    if (sound({"campaign.ramp_s"})) {
+        check(r.ramp_time, "ramp_time", c_.campaign.ramp_s, "s", "campaign.ramp_s");
+    }
+}
+
+}  // namespace vibrig::configuration

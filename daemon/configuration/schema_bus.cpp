@@ -1,0 +1,118 @@
+#include <cmath>
+
+#include "daemon/configuration/key.hpp"
+#include "daemon/configuration/rules.hpp"
+
+namespace vibrig::configuration {
+
+namespace {
+
+using C = Configuration;
+using drivers::SignalBindings;
+
+void add_port_keys(std::vector<Key>& keys) {
+    using Kind = drivers::CanPortSettings::Kind;
+    keys.push_back(choice<Kind>(
+        "can.port", {{"socketcan", Kind::socketcan}, {"seqpacket", Kind::seqpacket}},
+        "the kernel's CAN, or a Unix socket that carries CAN frames",
+        [](C & c) -> auto& { return c.can.kind; }));
+    keys.push_back(text(
+        "can.interface", "1 to 15 characters", "socketcan: network interface", interface_rule,
+        [](C & c) -> auto& { return c.can.interface; }));
+    keys.push_back(text(
+        "can.path", "absolute or \"@name\"", "seqpacket: Unix socket; @: abstract name",
+        socket_or_empty_rule, [](C & c) -> auto& { return c.can.path; }));
+    keys.push_back(text(
+        "can.dbc", "a path", "DBC file of the bus; empty: the built-in rig.dbc", path_rule,
+        [](C & c) -> auto& { return c.dbc; }));
+    keys.push_back(
+        boolean("can.fd", "accept CAN FD frames", [](C& c) -> bool& { return c.can.fd; }));
+    keys.push_back(integer("can.receive_buffer", "byte", 4096, 1 << 30,
+                           "receive buffer of the socket",
+                           [](C& c) -> int& { return c.can.receive_buffer; }));
+    keys.push_back(converted(
+        "can.sample_rate_hz", "Hz", {1, 1000}, "samples, that is sync counts, per second",
+        [](C& c) {
+            // The period is kept in whole ns; a rate such as 30 Hz shows as it was written.
+            return std::round(1e9 / static_cast<double>(c.assembler.sample_period) * 1e4) / 1e4;
+        },
+        [](C& c, double rate) {
+            c.assembler.sample_period = static_cast<drivers::Time>(std::llround(1e9 / rate));
+        }));
+    keys.push_back(milliseconds(
+        "can.join_deadline_ms", {1, 10'000},
+        "a sample is given out this long after its first frame",
+        [](C & c) -> auto& { return c.assembler.join_deadline; }));
+    keys.push_back(milliseconds(
+        "can.stale_deadline_ms", {1, 60'000}, "a channel without a value for longer is stale",
+        [](C & c) -> auto& { return c.assembler.stale_deadline; }));
+}
+
+void add_signal_keys(std::vector<Key>& keys) {
+    struct Row {
+        const char* name;
+        std::string SignalBindings::*member;
+        const char* doc;
+    };
+    using S = SignalBindings;
+    static constexpr Row kRows[] = {
+        {"sync_count", &S::sync_count, "full counter, one count per sample"},
+        {"outer", &S::outer, "outer gimbal, deg"},
+        {"inner", &S::inner, "inner gimbal, deg"},
+        {"azimuth", &S::azimuth, "azimuth gimbal, deg"},
+        {"outer_valid", &S::outer_valid, "1: the angle is valid"},
+        {"inner_valid", &S::inner_valid, "1: the angle is valid"},
+        {"azimuth_valid", &S::azimuth_valid, "1: the angle is valid"},
+        {"accel_x", &S::accel_x, "specific force, g"},
+        {"accel_y", &S::accel_y, "specific force, g"},
+        {"accel_z", &S::accel_z, "specific force, g"},
+        {"accel_x_valid", &S::accel_x_valid, "1: the specific force is valid"},
+        {"accel_y_valid", &S::accel_y_valid, "1: the specific force is valid"},
+        {"accel_z_valid", &S::accel_z_valid, "1: the specific force is valid"},
+        {"table_accel", &S::table_accel, "table accelerometer, g"},
+        {"loop_closed", &S::loop_closed, "1: stabilisation loop closed"},
+        {"gyros_at_speed", &S::gyros_at_speed, "1: gyro wheels at speed"},
+        {"ready", &S::ready, "1: platform ready"},
+        {"fault", &S::fault, "1: platform fault"},
+        {"temperature", &S::temperature, "platform temperature, degC"},
+        {"in_position", &S::in_position, "1: gimbals in position"},
+        {"slewing", &S::slewing, "1: gimbals slewing"},
+        {"command_echo", &S::command_echo, "counter of the last gimbal command accepted"},
+    };
+    const auto at = [](std::string S::*member) -> At<std::string> {
+        return [member](C& c) -> std::string& { return c.assembler.bindings.*member; };
+    };
+    for (const Row& row : kRows) {
+        keys.push_back(text(std::string("can.signals.") + row.name, "\"Message.Signal\" or empty",
+                            row.doc, binding_rule, at(row.member)));
+    }
+    keys.push_back(text("can.signals.message_sync_signal", "a signal name or empty",
+                        "in any message with a channel: low bits of its sync count",
+                        identifier_or_empty_rule, at(&S::message_sync_signal)));
+}
+
+void add_gimbal_keys(std::vector<Key>& keys) {
+    keys.push_back(text(
+        "gimbal.message", "a message name",
+        "command with signals Outer, Inner, Azimuth, Mode, Counter", identifier_rule,
+        [](C & c) -> auto& { return c.gimbal.message; }));
+    keys.push_back(milliseconds(
+        "gimbal.status_deadline_ms", {10, 60'000}, "an older status is not believed",
+        [](C & c) -> auto& { return c.gimbal.status_deadline; }));
+    keys.push_back(seconds(
+        "gimbal.slew_timeout_s", {1, 3600}, "from command to in position",
+        [](C & c) -> auto& { return c.gimbal.slew_timeout; }));
+    keys.push_back(milliseconds(
+        "gimbal.repeat_ms", {10, 60'000}, "a command is sent again until its counter is echoed",
+        [](C & c) -> auto& { return c.gimbal.repeat; }));
+}
+
+}  // namespace
+
+void add_bus_keys(std::vector<Key>& keys) {
+    add_port_keys(keys);
+    add_signal_keys(keys);
+    add_gimbal_keys(keys);
+}
+
+}  // namespace vibrig::configuration

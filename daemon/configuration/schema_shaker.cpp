@@ -1,0 +1,166 @@
+#include <array>
+#include <utility>
+
+#include "daemon/configuration/key.hpp"
+#include "daemon/configuration/rules.hpp"
+#include "daemon/configuration/value.hpp"
+
+namespace vibrig::configuration {
+
+namespace {
+
+using C = Configuration;
+using drivers::ShakerSettings;
+using proto::Access;
+using proto::Register;
+using proto::RegisterTable;
+using proto::RegisterType;
+using proto::WordOrder;
+
+void add_link_keys(std::vector<Key>& keys) {
+    using Transport = ShakerSettings::Transport;
+    keys.push_back(choice<Transport>(
+        "shaker.transport", {{"tcp", Transport::tcp}, {"rtu", Transport::rtu}},
+        "Modbus over TCP or over a serial line",
+        [](C & c) -> auto& { return c.shaker.transport; }));
+    keys.push_back(text(
+        "shaker.host", "a host", "tcp: the shaker controller", host_rule,
+        [](C & c) -> auto& { return c.shaker.host; }));
+    keys.push_back(integer("shaker.port", "", 1, 65'535, "tcp: its port",
+                           [](C& c) -> int& { return c.shaker.port; }));
+    keys.push_back(text(
+        "shaker.device", "a path", "rtu: serial device", path_rule,
+        [](C & c) -> auto& { return c.shaker.device; }));
+    keys.push_back(integer("shaker.baud", "bit/s", 300, 4'000'000, "rtu: speed, 8E1",
+                           [](C& c) -> int& { return c.shaker.baud; }));
+    keys.push_back(integer("shaker.unit", "", 1, 255, "Modbus unit (slave) id",
+                           [](C& c) -> int& { return c.shaker.unit; }));
+    keys.push_back(milliseconds(
+        "shaker.response_timeout_ms", {10, 60'000}, "of one request",
+        [](C & c) -> auto& { return c.shaker.response_timeout; }));
+    keys.push_back(milliseconds(
+        "shaker.poll_period_ms", {10, 60'000}, "between read-backs",
+        [](C & c) -> auto& { return c.shaker.poll_period; }));
+    keys.push_back(milliseconds(
+        "shaker.watchdog_period_ms", {10, 60'000}, "between feeds of the controller's watchdog",
+        [](C & c) -> auto& { return c.shaker.watchdog_period; }));
+    keys.push_back(milliseconds(
+        "shaker.backoff_min_ms", {10, 60'000}, "before the first reconnect, doubled each time",
+        [](C & c) -> auto& { return c.shaker.backoff_min; }));
+    keys.push_back(milliseconds(
+        "shaker.backoff_max_ms", {10, 600'000}, "longest wait before a reconnect",
+        [](C & c) -> auto& { return c.shaker.backoff_max; }));
+    using Unit = C::AmplitudeUnit;
+    keys.push_back(choice<Unit>(
+        "shaker.amplitude_unit",
+        {{"g_peak", Unit::g_peak}, {"g_rms", Unit::g_rms}, {"mps2_peak", Unit::mps2_peak}},
+        "what amplitude and measured_amplitude count in, after their scale",
+        [](C& c) -> Unit& { return c.amplitude_unit; }));
+
+    keys.push_back(number("shaker.limits.acceleration_g", "g", {0.001, 1000},
+                          "largest peak acceleration at the table",
+                          [](C& c) -> double& { return c.campaign.max_acceleration_g; }));
+    keys.push_back(number("shaker.limits.velocity_mps", "m/s", {0.001, 1000},
+                          "largest peak velocity at the table",
+                          [](C& c) -> double& { return c.campaign.max_velocity_mps; }));
+    keys.push_back(number("shaker.limits.displacement_mm", "mm", {0.001, 10'000},
+                          "largest peak displacement at the table",
+                          [](C& c) -> double& { return c.campaign.max_displacement_mm; }));
+}
+
+void add_register_keys(std::vector<Key>& keys, const std::string& role, const std::string& unit,
+                       const std::string& doc, const At<Register>& at) {
+    const std::string name = "shaker.registers." + role;
+    keys.push_back(integer(
+        name + ".address", "", 0, 65'535, doc + ": first register, from 0 as on the wire",
+        [at](C& c) { return static_cast<int>(at(c).address); },
+        [at](C& c, int value) { at(c).address = static_cast<std::uint16_t>(value); }));
+    keys.push_back(choice<RegisterType>(
+        name + ".type",
+        {{"u16", RegisterType::u16},
+         {"i16", RegisterType::i16},
+         {"u32", RegisterType::u32},
+         {"i32", RegisterType::i32},
+         {"f32", RegisterType::f32},
+         {"bits", RegisterType::bits}},
+        "what the registers hold", [at](C & c) -> auto& { return at(c).type; }));
+    keys.push_back(choice<WordOrder>(
+        name + ".word_order", {{"big", WordOrder::big}, {"little", WordOrder::little}},
+        "big: high word first", [at](C & c) -> auto& { return at(c).order; }));
+    keys.push_back(choice<RegisterTable>(
+        name + ".table", {{"holding", RegisterTable::holding}, {"input", RegisterTable::input}},
+        "Modbus table", [at](C & c) -> auto& { return at(c).table; }));
+    keys.push_back(choice<Access>(
+        name + ".access",
+        {{"read", Access::read}, {"write", Access::write}, {"read_write", Access::read_write}},
+        "what the controller allows", [at](C & c) -> auto& { return at(c).access; }));
+    keys.push_back(number(name + ".scale", unit, {1e-12, 1e12}, "value of one count",
+                          [at](C& c) -> double& { return at(c).scale; }));
+    keys.push_back(integer(
+        name + ".mask", "", 1, 65'535, "bits: the value is 1 if any of these is set",
+        [at](C& c) { return static_cast<int>(at(c).mask); },
+        [at](C& c, int value) { at(c).mask = static_cast<std::uint16_t>(value); }));
+}
+
+/// Leaves a key out of --check while there is no watchdog register (or, inverted, while there is
+/// one).
+void show_if_watchdog(Key& key, bool present) {
+    key.write = [write = std::move(key.write), present](C& c) {
+        return c.shaker.registers.watchdog.has_value() == present ? write(c) : std::string();
+    };
+}
+
+void add_watchdog_keys(std::vector<Key>& keys) {
+    Key none{"shaker.registers.watchdog",
+             "boolean or table",
+             "",
+             "false or a register",
+             "false: the controller has none, and vibrigd refuses to run",
+             [](const toml::node& node, C& c, Problems& problems) {
+                 const auto* value = node.as_boolean();
+                 if (value == nullptr) {
+                     problems.add(place_of(node.source()), "shaker.registers.watchdog",
+                                  describe(node), "a table (the register) or false (none)");
+                 } else if (!value->get()) {
+                     c.shaker.registers.watchdog.reset();
+                 }
+             },
+             [](C&) { return std::string("false"); }};
+    show_if_watchdog(none, false);
+    keys.push_back(std::move(none));
+    const std::size_t first = keys.size();
+    add_register_keys(keys, "watchdog", "", "any changed value feeds it",
+                      [](C& c) -> Register& { return *c.shaker.registers.watchdog; });
+    for (std::size_t i = first; i < keys.size(); ++i) {
+        show_if_watchdog(keys[i], true);
+    }
+}
+
+}  // namespace
+
+void add_shaker_keys(std::vector<Key>& keys) {
+    add_link_keys(keys);
+    add_register_keys(keys, "frequency", "Hz", "set-point of the frequency",
+                      [](C& c) -> Register& { return c.shaker.registers.frequency; });
+    add_register_keys(keys, "amplitude", "amplitude_unit",
+                      "set-point of the amplitude at the table",
+                      [](C& c) -> Register& { return c.shaker.registers.amplitude; });
+    add_register_keys(keys, "ramp_time", "s", "time of a ramp",
+                      [](C& c) -> Register& { return c.shaker.registers.ramp_time; });
+    add_register_keys(keys, "run", "", "1 runs, 0 stops",
+                      [](C& c) -> Register& { return c.shaker.registers.run; });
+    add_watchdog_keys(keys);
+    add_register_keys(keys, "watchdog_timeout", "s", "the controller stops when not fed so long",
+                      [](C& c) -> Register& { return c.shaker.registers.watchdog_timeout; });
+    add_register_keys(keys, "state", "", "0 idle, 1 ramping, 2 running, 3 stopping, 4 fault",
+                      [](C& c) -> Register& { return c.shaker.registers.state; });
+    add_register_keys(keys, "fault", "", "fault bits",
+                      [](C& c) -> Register& { return c.shaker.registers.fault; });
+    add_register_keys(keys, "emergency_stop", "", "1: the chain is open",
+                      [](C& c) -> Register& { return c.shaker.registers.emergency_stop; });
+    add_register_keys(keys, "measured_amplitude", "amplitude_unit",
+                      "measured amplitude at the table",
+                      [](C& c) -> Register& { return c.shaker.registers.measured_amplitude; });
+}
+
+}  // namespace vibrig::configuration

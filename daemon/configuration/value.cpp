@@ -1,0 +1,122 @@
+#include "daemon/configuration/value.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+
+namespace vibrig::configuration {
+
+Place place_of(const toml::source_region& source) {
+    return {source.begin.line, source.begin.column};
+}
+
+std::string plain(double value) {
+    if (std::isnan(value)) {
+        return "nan";
+    }
+    if (std::isinf(value)) {
+        return value < 0 ? "-inf" : "inf";
+    }
+    std::array<char, 32> buffer{};
+    const auto [end, error] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+    return error == std::errc{} ? std::string(buffer.data(), end) : std::to_string(value);
+}
+
+std::string write_number(double value) {
+    std::string text = plain(value);
+    // TOML tells numbers and integers apart; a number keeps its point.
+    if (text.find_first_of(".en") == std::string::npos) {
+        text += ".0";
+    }
+    return text;
+}
+
+std::string write_triple(const std::array<double, 3>& value) {
+    return "[" + write_number(value[0]) + ", " + write_number(value[1]) + ", " +
+           write_number(value[2]) + "]";
+}
+
+std::string write_text(const std::string& value) {
+    std::ostringstream out;
+    out << toml::value<std::string>{value};
+    return out.str();
+}
+
+std::string describe(const toml::node& node) {
+    switch (node.type()) {
+        case toml::node_type::string:
+            return "\"" + printable(node.as_string()->get()) + "\" (a string)";
+        case toml::node_type::integer:
+            return std::to_string(node.as_integer()->get());
+        case toml::node_type::floating_point:
+            return write_number(node.as_floating_point()->get());
+        case toml::node_type::boolean:
+            return node.as_boolean()->get() ? "true" : "false";
+        case toml::node_type::array:
+            return "an array of " + std::to_string(node.as_array()->size());
+        case toml::node_type::table:
+            return "a table";
+        case toml::node_type::none:
+        case toml::node_type::date:
+        case toml::node_type::time:
+        case toml::node_type::date_time:
+            break;
+    }
+    return "a date or time";
+}
+
+std::string expected_number(Range range, const std::string& unit) {
+    return "a number from " + plain(range.low) + " to " + plain(range.high) +
+           (unit.empty() ? "" : " " + unit);
+}
+
+std::optional<double> read_number(const toml::node& node, const std::string& key, Range range,
+                                  const std::string& unit, Problems& problems) {
+    double value = std::nan("");
+    if (const auto* floating = node.as_floating_point()) {
+        value = floating->get();
+    } else if (const auto* whole = node.as_integer()) {
+        value = static_cast<double>(whole->get());
+    }
+    // Written so that NaN fails.
+    if (!(value >= range.low && value <= range.high)) {
+        problems.add(place_of(node.source()), key, describe(node), expected_number(range, unit));
+        return std::nullopt;
+    }
+    return value;
+}
+
+const toml::array* read_array(const toml::node& node, const std::string& key, std::size_t low,
+                              std::size_t high, const std::string& elements, Problems& problems) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr || array->size() < low || array->size() > high) {
+        const std::string count =
+            low == high ? std::to_string(low) : std::to_string(low) + " to " + std::to_string(high);
+        problems.add(place_of(node.source()), key, describe(node),
+                     "an array of " + count + " " + elements);
+        return nullptr;
+    }
+    return array;
+}
+
+std::optional<std::array<double, 3>> read_triple(const toml::node& node, const std::string& key,
+                                                 const std::array<Range, 3>& ranges,
+                                                 const std::string& unit, Problems& problems) {
+    const toml::array* array = read_array(node, key, 3, 3, "numbers", problems);
+    if (array == nullptr) {
+        return std::nullopt;
+    }
+    std::array<double, 3> value{};
+    bool good = true;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto element = read_number(*array->get(i), key + "[" + std::to_string(i) + "]",
+                                         ranges[i], unit, problems);
+        good = good && element.has_value();
+        value[i] = element.value_or(0);
+    }
+    return good ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace vibrig::configuration
