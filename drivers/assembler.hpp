@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "drivers/can_port.hpp"
@@ -11,9 +12,22 @@
 
 namespace vibrig::drivers {
 
+/// A binding the DBC cannot honour: the configuration key ("can.signals.outer"), the value found and what the DBC offers.
+class BindingError : public std::runtime_error {
+  public:
+    BindingError(std::string key, std::string value, const std::string& offer);
+    [[nodiscard]] const std::string& key() const noexcept { return key_; }
+    [[nodiscard]] const std::string& value() const noexcept { return value_; }
+
+  private:
+    std::string key_;
+    std::string value_;
+};
+
 /// Which DBC signal carries what, as "Message.Signal"; empty: not bound. The defaults are those of proto/rig.dbc.
 struct SignalBindings {
-    std::string sync_count = "Sync.SyncCount";  ///< full counter; wraps at the signal's width
+    /// Full counter; wraps at the signal's width. Without one, frames within half a period form a sample.
+    std::string sync_count = "Sync.SyncCount";
     std::string outer = "Resolvers.Outer", inner = "Resolvers.Inner", azimuth = "ResolverAzimuth.Azimuth";  ///< deg
     std::string outer_valid = "Resolvers.OuterValid", inner_valid = "Resolvers.InnerValid",
                 azimuth_valid = "ResolverAzimuth.AzimuthValid";
@@ -38,6 +52,7 @@ struct AssemblerSettings {
 };
 
 /// received = used + unknown + duplicate + late + wrong_length
+/// unknown: bound to nothing, remote, or of a sync count that no second one confirmed. late: its sample is already out.
 struct AssemblerCounters {
     std::uint64_t received = 0, used = 0, unknown = 0, duplicate = 0, late = 0, wrong_length = 0;
     std::uint64_t samples = 0, incomplete = 0;   ///< given out; of them with a missing channel

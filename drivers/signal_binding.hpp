@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "proto/dbc.hpp"
+
+namespace vibrig::drivers {
+
+/// A signal of a DBC and the message it comes in. Null: not bound.
+struct BoundSignal {
+    const proto::Message* message = nullptr;
+    const proto::Signal* signal = nullptr;
+    explicit operator bool() const noexcept { return signal != nullptr; }
+};
+
+/// Finds "Message.Signal"; an empty name binds nothing. Throws BindingError with the names closest to what was asked for.
+[[nodiscard]] BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std::string& name);
+
+/// Edit distance (Levenshtein), upper and lower case alike.
+[[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
+
+}  // namespace vibrig::drivers
