@@ -44,8 +44,8 @@ double wrapped_radians(double degrees) noexcept {
 struct OpenSample {
     bool shown = false;  ///< a frame of it has come
     std::int64_t count = 0;
-    Time first = 0;            ///< time of the first frame that came
-    std::uint64_t seen = 0;    ///< bits of the messages that came
+    Time first = 0;          ///< time of the first frame that came
+    std::uint64_t seen = 0;  ///< bits of the messages that came
     std::uint64_t frames = 0;
     std::array<double, kChannels> value{};
     std::array<Time, kChannels> time{};
@@ -55,7 +55,8 @@ struct OpenSample {
     std::array<bool, kChannels> valid{};
 };
 
-/// A sync count that does not follow from the last one: a restart of the device if the next one confirms it.
+/// A sync count that does not follow from the last one: a restart of the device if the next one
+/// confirms it.
 struct Suspect {
     bool pending = false;
     OpenSample sample;
@@ -66,16 +67,22 @@ struct Suspect {
 
 struct SampleAssembler::Impl {
     Impl(const proto::Dbc& dbc, const AssemblerSettings& s, SampleHandler handler)
-        : settings(s), on_sample(std::move(handler)), plan(dbc, s.bindings), clock(s.sample_period), open(s.open_samples) {}
+        : settings(s),
+          on_sample(std::move(handler)),
+          plan(dbc, s.bindings),
+          clock(s.sample_period),
+          open(s.open_samples) {}
 
     void feed(const ReceivedFrame& frame) noexcept;
-    void take_sync(const MessagePlan& message, const ReceivedFrame& frame, std::uint64_t raw) noexcept;
+    void take_sync(const MessagePlan& message, const ReceivedFrame& frame,
+                   std::uint64_t raw) noexcept;
     void take_without_count(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     void take_low(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     bool place(std::int64_t count, const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     void join(OpenSample& sample, const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     void take_status(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
-    void suspect_restart(std::uint64_t raw, unsigned bits, const MessagePlan& message, const ReceivedFrame& frame) noexcept;
+    void suspect_restart(std::uint64_t raw, unsigned bits, const MessagePlan& message,
+                         const ReceivedFrame& frame) noexcept;
     void drop_suspect() noexcept;
     void restart_at_suspect() noexcept;
     void begin_at(std::int64_t count, Time time) noexcept;
@@ -90,7 +97,9 @@ struct SampleAssembler::Impl {
     }
     /// The count that is due at `time` if the device ran on.
     [[nodiscard]] double periods_since_newest(Time time) const noexcept {
-        return std::floor(static_cast<double>(time - newest_time) / static_cast<double>(settings.sample_period) + 0.5);
+        return std::floor(static_cast<double>(time - newest_time) /
+                              static_cast<double>(settings.sample_period) +
+                          0.5);
     }
 
     AssemblerSettings settings;
@@ -116,7 +125,9 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
     const canid_t id = frame.frame.can_id;
     const bool extended = (id & CAN_EFF_FLAG) != 0;
     const MessagePlan* message =
-        (id & (CAN_RTR_FLAG | CAN_ERR_FLAG)) != 0 ? nullptr : plan.find(id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK), extended);
+        (id & (CAN_RTR_FLAG | CAN_ERR_FLAG)) != 0
+            ? nullptr
+            : plan.find(id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK), extended);
     if (message == nullptr) {
         ++counters.unknown;
         return;
@@ -125,7 +136,8 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
         ++counters.wrong_length;
         return;
     }
-    // Deadlines go by the stamps first: the result is the same whether the thread woke up in time or not.
+    // Deadlines go by the stamps first: the result is the same whether the thread woke up in time
+    // or not.
     drain(frame.time);
     take_status(*message, frame);
     if (message->bit == 0) {
@@ -137,8 +149,11 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
     } else if (message->count != nullptr) {
         const std::span<const std::uint8_t> payload(frame.frame.data, frame.frame.len);
         const std::optional<std::int64_t> raw = proto::decode_raw(*message->count, payload);
-        if (raw) take_sync(*message, frame, low_bits(static_cast<std::uint64_t>(*raw), message->count->length));
-        else ++counters.wrong_length;
+        if (raw)
+            take_sync(*message, frame,
+                      low_bits(static_cast<std::uint64_t>(*raw), message->count->length));
+        else
+            ++counters.wrong_length;
     } else {
         take_low(*message, frame);
     }
@@ -151,16 +166,19 @@ void SampleAssembler::Impl::begin_at(std::int64_t count, Time time) noexcept {
     newest_time = time;
 }
 
-void SampleAssembler::Impl::take_sync(const MessagePlan& message, const ReceivedFrame& frame, std::uint64_t raw) noexcept {
+void SampleAssembler::Impl::take_sync(const MessagePlan& message, const ReceivedFrame& frame,
+                                      std::uint64_t raw) noexcept {
     const unsigned bits = message.count->length;
     if (!begun) begin_at(static_cast<std::int64_t>(raw), frame.time);
     const double elapsed = periods_since_newest(frame.time);
     const std::int64_t expected = newest + static_cast<std::int64_t>(elapsed);
-    const std::int64_t count = expected + wrapped_difference(raw, static_cast<std::uint64_t>(expected), bits);
+    const std::int64_t count =
+        expected + wrapped_difference(raw, static_cast<std::uint64_t>(expected), bits);
     const auto depth = static_cast<std::int64_t>(open.size());
     const double from_expected = std::abs(static_cast<double>(count - expected));
-    const bool follows = (count > newest - depth && count <= newest + depth) ||
-                         from_expected <= std::max(static_cast<double>(depth), kRateTolerance * std::abs(elapsed));
+    const bool follows =
+        (count > newest - depth && count <= newest + depth) ||
+        from_expected <= std::max(static_cast<double>(depth), kRateTolerance * std::abs(elapsed));
     if (!follows) {
         suspect_restart(raw, bits, message, frame);
         return;
@@ -169,10 +187,12 @@ void SampleAssembler::Impl::take_sync(const MessagePlan& message, const Received
     if (place(count, message, frame)) clock.observe(count, frame.time);
 }
 
-void SampleAssembler::Impl::suspect_restart(std::uint64_t raw, unsigned bits, const MessagePlan& message,
+void SampleAssembler::Impl::suspect_restart(std::uint64_t raw, unsigned bits,
+                                            const MessagePlan& message,
                                             const ReceivedFrame& frame) noexcept {
     if (suspect.pending) {
-        const std::int64_t ahead = wrapped_difference(raw, static_cast<std::uint64_t>(suspect.sample.count), bits);
+        const std::int64_t ahead =
+            wrapped_difference(raw, static_cast<std::uint64_t>(suspect.sample.count), bits);
         if (ahead == 0) {
             ++counters.duplicate;
             return;
@@ -212,15 +232,18 @@ void SampleAssembler::Impl::restart_at_suspect() noexcept {
     slot(newest) = suspect.sample;
 }
 
-void SampleAssembler::Impl::take_low(const MessagePlan& message, const ReceivedFrame& frame) noexcept {
+void SampleAssembler::Impl::take_low(const MessagePlan& message,
+                                     const ReceivedFrame& frame) noexcept {
     std::optional<std::int64_t> low;
     if (message.low != nullptr) {
-        low = proto::decode_raw(*message.low, std::span<const std::uint8_t>(frame.frame.data, frame.frame.len));
+        low = proto::decode_raw(*message.low,
+                                std::span<const std::uint8_t>(frame.frame.data, frame.frame.len));
     }
     if (suspect.pending) {
         const bool of_suspect =
-            !low || low_bits(static_cast<std::uint64_t>(*low), message.low->length) ==
-                        low_bits(static_cast<std::uint64_t>(suspect.sample.count), message.low->length);
+            !low ||
+            low_bits(static_cast<std::uint64_t>(*low), message.low->length) ==
+                low_bits(static_cast<std::uint64_t>(suspect.sample.count), message.low->length);
         if (of_suspect && frame.time <= suspect.sample.first + settings.join_deadline) {
             join(suspect.sample, message, frame);
             return;
@@ -234,18 +257,23 @@ void SampleAssembler::Impl::take_low(const MessagePlan& message, const ReceivedF
         place(newest, message, frame);
         return;
     }
-    const std::int64_t expected = newest + static_cast<std::int64_t>(periods_since_newest(frame.time));
+    const std::int64_t expected =
+        newest + static_cast<std::int64_t>(periods_since_newest(frame.time));
     const std::int64_t count =
-        expected + wrapped_difference(static_cast<std::uint64_t>(*low), static_cast<std::uint64_t>(expected), message.low->length);
-    // A few bits cannot carry the count far: without its Sync a frame opens the next sample or the one that is due, no other.
-    if (count <= newest - static_cast<std::int64_t>(open.size()) || count > std::max(newest, expected) + 1) {
+        expected + wrapped_difference(static_cast<std::uint64_t>(*low),
+                                      static_cast<std::uint64_t>(expected), message.low->length);
+    // A few bits cannot carry the count far: without its Sync a frame opens the next sample or the
+    // one that is due, no other.
+    if (count <= newest - static_cast<std::int64_t>(open.size()) ||
+        count > std::max(newest, expected) + 1) {
         ++counters.late;
         return;
     }
     place(count, message, frame);
 }
 
-void SampleAssembler::Impl::take_without_count(const MessagePlan& message, const ReceivedFrame& frame) noexcept {
+void SampleAssembler::Impl::take_without_count(const MessagePlan& message,
+                                               const ReceivedFrame& frame) noexcept {
     if (!begun) {
         begin_at(0, frame.time);
     } else if (frame.time - newest_time >= settings.sample_period / 2) {
@@ -256,7 +284,8 @@ void SampleAssembler::Impl::take_without_count(const MessagePlan& message, const
 }
 
 /// True if the frame went into its sample.
-bool SampleAssembler::Impl::place(std::int64_t count, const MessagePlan& message, const ReceivedFrame& frame) noexcept {
+bool SampleAssembler::Impl::place(std::int64_t count, const MessagePlan& message,
+                                  const ReceivedFrame& frame) noexcept {
     if (count < next_out) {
         ++counters.late;
         return false;
@@ -276,7 +305,8 @@ bool SampleAssembler::Impl::place(std::int64_t count, const MessagePlan& message
     return sample.frames != before;
 }
 
-void SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message, const ReceivedFrame& frame) noexcept {
+void SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
+                                 const ReceivedFrame& frame) noexcept {
     if (!sample.shown) {
         sample.shown = true;
         sample.first = frame.time;
@@ -298,14 +328,16 @@ void SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
             sample.valid[c.channel] = *value != 0;
         } else {
             sample.has_value[c.channel] = true;
-            sample.in_range[c.channel] = std::isfinite(*value) && !proto::out_of_range(*c.signal, *value);
+            sample.in_range[c.channel] =
+                std::isfinite(*value) && !proto::out_of_range(*c.signal, *value);
             sample.value[c.channel] = std::isfinite(*value) ? *value : 0;
             sample.time[c.channel] = frame.time;
         }
     }
 }
 
-void SampleAssembler::Impl::take_status(const MessagePlan& message, const ReceivedFrame& frame) noexcept {
+void SampleAssembler::Impl::take_status(const MessagePlan& message,
+                                        const ReceivedFrame& frame) noexcept {
     const std::span<const std::uint8_t> payload(frame.frame.data, frame.frame.len);
     for (const MessagePlan::StatusSignal& s : message.status) {
         if (!proto::present(*message.message, *s.signal, payload)) continue;
@@ -313,18 +345,34 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message, const Receiv
         if (!value || !std::isfinite(*value) || proto::out_of_range(*s.signal, *value)) continue;
         using Field = MessagePlan::StatusField;
         const bool set = *value != 0;
-        const bool gimbal = s.field == Field::in_position || s.field == Field::slewing || s.field == Field::command_echo;
+        const bool gimbal = s.field == Field::in_position || s.field == Field::slewing ||
+                            s.field == Field::command_echo;
         (gimbal ? platform.gimbal_time : platform.time) = frame.time;
         switch (s.field) {
-            case Field::loop_closed: platform.loop_closed = set; break;
-            case Field::gyros_at_speed: platform.gyros_at_speed = set; break;
-            case Field::ready: platform.ready = set; break;
-            case Field::fault: platform.fault = set; break;
-            case Field::temperature: platform.temperature_c = *value; break;
-            case Field::in_position: platform.in_position = set; break;
-            case Field::slewing: platform.slewing = set; break;
+            case Field::loop_closed:
+                platform.loop_closed = set;
+                break;
+            case Field::gyros_at_speed:
+                platform.gyros_at_speed = set;
+                break;
+            case Field::ready:
+                platform.ready = set;
+                break;
+            case Field::fault:
+                platform.fault = set;
+                break;
+            case Field::temperature:
+                platform.temperature_c = *value;
+                break;
+            case Field::in_position:
+                platform.in_position = set;
+                break;
+            case Field::slewing:
+                platform.slewing = set;
+                break;
             case Field::command_echo:
-                platform.gimbal_command_echo = static_cast<std::uint8_t>(std::clamp(*value, 0.0, 255.0));
+                platform.gimbal_command_echo =
+                    static_cast<std::uint8_t>(std::clamp(*value, 0.0, 255.0));
                 break;
         }
     }
@@ -366,8 +414,10 @@ void SampleAssembler::Impl::drain(Time now) noexcept {
 
 Quality SampleAssembler::Impl::judge(const OpenSample& sample, std::size_t channel) const noexcept {
     if (!plan.bound(channel)) return Quality::unbound;
-    if (!sample.has_value[channel] || (plan.has_validity(channel) && !sample.has_validity[channel])) {
-        const bool stale = !ever_good[channel] || sample.first - last_good[channel] > settings.stale_deadline;
+    if (!sample.has_value[channel] ||
+        (plan.has_validity(channel) && !sample.has_validity[channel])) {
+        const bool stale =
+            !ever_good[channel] || sample.first - last_good[channel] > settings.stale_deadline;
         return stale ? Quality::stale : Quality::missing;
     }
     if (plan.has_validity(channel) && !sample.valid[channel]) return Quality::flagged;
@@ -378,8 +428,8 @@ void SampleAssembler::Impl::give_out(OpenSample& open_sample) noexcept {
     open_sample.shown = false;
     Sample sample;
     sample.sequence = static_cast<std::uint32_t>(open_sample.count);
-    const Time fitted = plan.has_count() ? clock.time_of(open_sample.count) : 0;
-    sample.time = fitted != 0 ? fitted : open_sample.first / kMicrosecond * kMicrosecond;
+    sample.time = plan.has_count() ? clock.time_of(open_sample.count)
+                                   : open_sample.first / kMicrosecond * kMicrosecond;
     if (any_out) sample.time = std::max(sample.time, last_out + kMicrosecond);
     last_out = sample.time;
     any_out = true;
@@ -405,15 +455,19 @@ void SampleAssembler::Impl::give_out(OpenSample& open_sample) noexcept {
     if (on_sample) on_sample(sample);
 }
 
-SampleAssembler::SampleAssembler(const proto::Dbc& dbc, const AssemblerSettings& settings, SampleHandler on_sample) {
+SampleAssembler::SampleAssembler(const proto::Dbc& dbc, const AssemblerSettings& settings,
+                                 SampleHandler on_sample) {
     const auto require = [](bool good, const char* key, std::int64_t value, const char* expected) {
         if (!good) throw BindingError(key, std::to_string(value), expected);
     };
-    require(settings.sample_period > 0, "can.sample_period", settings.sample_period, "more than 0 ns");
-    require(settings.join_deadline > 0, "can.join_deadline", settings.join_deadline, "more than 0 ns");
-    require(settings.stale_deadline > 0, "can.stale_deadline", settings.stale_deadline, "more than 0 ns");
-    require(settings.open_samples >= 1 && settings.open_samples <= kMaxOpenSamples, "can.open_samples", settings.open_samples,
-            "1 to 64");
+    require(settings.sample_period > 0, "can.sample_period", settings.sample_period,
+            "more than 0 ns");
+    require(settings.join_deadline > 0, "can.join_deadline", settings.join_deadline,
+            "more than 0 ns");
+    require(settings.stale_deadline > 0, "can.stale_deadline", settings.stale_deadline,
+            "more than 0 ns");
+    require(settings.open_samples >= 1 && settings.open_samples <= kMaxOpenSamples,
+            "can.open_samples", settings.open_samples, "1 to 64");
     impl_ = std::make_unique<Impl>(dbc, settings, std::move(on_sample));
 }
 

@@ -47,7 +47,8 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
         }
     }
     if (std::ranges::none_of(bound_, [](bool b) { return b; })) {
-        throw BindingError("can.signals", "", "at least one measured channel, such as outer = \"Resolvers.Outer\"");
+        throw BindingError("can.signals", "",
+                           "at least one measured channel, such as outer = \"Resolvers.Outer\"");
     }
 
     using Field = MessagePlan::StatusField;
@@ -77,7 +78,8 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
         if (plan.count != nullptr || !plan.channels.empty()) {
             plan.bit = std::uint64_t{1} << i;  // at most 22 names can be bound
             complete_ |= plan.bit;
-            if (has_count_ && plan.count == nullptr) plan.low = plan.message->find(names.message_sync_signal);
+            if (has_count_ && plan.count == nullptr)
+                plan.low = plan.message->find(names.message_sync_signal);
         }
         const auto entry = static_cast<std::uint16_t>(i + 1);
         if (plan.message->extended) {
@@ -102,7 +104,8 @@ const MessagePlan* FramePlan::find(std::uint32_t id, bool extended) const noexce
     if (!extended) {
         entry = id < standard_.size() ? standard_[id] : 0;
     } else {
-        const auto at = std::ranges::lower_bound(extended_, id, {}, &std::pair<std::uint32_t, std::uint16_t>::first);
+        const auto at = std::ranges::lower_bound(extended_, id, {},
+                                                 &std::pair<std::uint32_t, std::uint16_t>::first);
         if (at != extended_.end() && at->first == id) entry = at->second;
     }
     return entry == 0 ? nullptr : &plans_[entry - 1];

@@ -18,7 +18,14 @@ struct MessagePlan {
         bool validity;  ///< it says whether the channel is valid, and carries no value
     };
     enum class StatusField : std::uint8_t {
-        loop_closed, gyros_at_speed, ready, fault, temperature, in_position, slewing, command_echo
+        loop_closed,
+        gyros_at_speed,
+        ready,
+        fault,
+        temperature,
+        in_position,
+        slewing,
+        command_echo
     };
     struct StatusSignal {
         StatusField field;
@@ -41,7 +48,9 @@ class FramePlan {
     /// Null: nothing of this message is bound.
     [[nodiscard]] const MessagePlan* find(std::uint32_t id, bool extended) const noexcept;
     [[nodiscard]] bool bound(std::size_t channel) const noexcept { return bound_[channel]; }
-    [[nodiscard]] bool has_validity(std::size_t channel) const noexcept { return has_validity_[channel]; }
+    [[nodiscard]] bool has_validity(std::size_t channel) const noexcept {
+        return has_validity_[channel];
+    }
     /// The set of messages that make a sample complete.
     [[nodiscard]] std::uint64_t complete() const noexcept { return complete_; }
     [[nodiscard]] bool has_count() const noexcept { return has_count_; }
@@ -51,8 +60,8 @@ class FramePlan {
 
     proto::Dbc dbc_;  // the plans point into it
     std::vector<MessagePlan> plans_;
-    std::array<std::uint16_t, 2048> standard_{};                        // index + 1 by id
-    std::vector<std::pair<std::uint32_t, std::uint16_t>> extended_;     // sorted by id
+    std::array<std::uint16_t, 2048> standard_{};                     // index + 1 by id
+    std::vector<std::pair<std::uint32_t, std::uint16_t>> extended_;  // sorted by id
     std::array<bool, kChannels> bound_{};
     std::array<bool, kChannels> has_validity_{};
     std::uint64_t complete_ = 0;

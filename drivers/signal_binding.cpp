@@ -21,7 +21,8 @@ std::string nearest(const std::vector<std::string>& names, std::string_view want
     std::vector<std::pair<std::size_t, std::string>> ranked;
     ranked.reserve(names.size());
     for (const std::string& name : names) ranked.emplace_back(edit_distance(name, wanted), name);
-    std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
     std::string list;
     for (std::size_t i = 0; i < std::min(kOffers, ranked.size()); ++i) {
         list += (i == 0 ? "" : ", ") + ranked[i].second;
@@ -56,17 +57,22 @@ BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std
     const std::string_view message_name = std::string_view(name).substr(0, dot);
     if (dot != std::string::npos) {
         if (const proto::Message* message = dbc.find(message_name)) {
-            if (const proto::Signal* signal = message->find(std::string_view(name).substr(dot + 1))) {
+            if (const proto::Signal* signal =
+                    message->find(std::string_view(name).substr(dot + 1))) {
                 return {message, signal};
             }
             std::vector<std::string> signals;
-            for (const proto::Signal& signal : message->signals) signals.push_back(message->name + "." + signal.name);
-            throw BindingError(key, name, "a signal of message " + message->name + "; the DBC offers " + nearest(signals, name));
+            for (const proto::Signal& signal : message->signals)
+                signals.push_back(message->name + "." + signal.name);
+            throw BindingError(key, name,
+                               "a signal of message " + message->name + "; the DBC offers " +
+                                   nearest(signals, name));
         }
     }
     std::vector<std::string> all;
     for (const proto::Message& message : dbc.messages) {
-        for (const proto::Signal& signal : message.signals) all.push_back(message.name + "." + signal.name);
+        for (const proto::Signal& signal : message.signals)
+            all.push_back(message.name + "." + signal.name);
     }
     throw BindingError(key, name, "Message.Signal of the DBC, which offers " + nearest(all, name));
 }

@@ -14,8 +14,10 @@ struct BoundSignal {
     explicit operator bool() const noexcept { return signal != nullptr; }
 };
 
-/// Finds "Message.Signal"; an empty name binds nothing. Throws BindingError with the names closest to what was asked for.
-[[nodiscard]] BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std::string& name);
+/// Finds "Message.Signal"; an empty name binds nothing. Throws BindingError with the names closest
+/// to what was asked for.
+[[nodiscard]] BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key,
+                                      const std::string& name);
 
 /// Edit distance (Levenshtein), upper and lower case alike.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b);
