@@ -1,0 +1,216 @@
+#include "daemon/tool/remote.hpp"
+
+#include <google/protobuf/util/json_util.h>
+#include <pwd.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <thread>
+
+#include "daemon/serve/render.hpp"
+#include "daemon/tool/commands.hpp"
+
+namespace vibrig::tool {
+namespace {
+
+using Steady = std::chrono::steady_clock;
+
+struct StatusOptions {
+    std::string socket;
+    bool json = false;
+};
+
+struct CommandOptions {
+    std::string socket;
+    v1::Command::Kind kind = v1::Command::unspecified;
+    std::string by;
+    std::string argument;
+    bool json = false;
+};
+
+std::string login_name() {
+    const passwd* const entry = getpwuid(getuid());
+    return entry != nullptr ? entry->pw_name : "uid " + std::to_string(getuid());
+}
+
+/// What the daemon says about an answer other than 200.
+std::string problem_of(const serve::Reply& reply) {
+    v1::Problem problem;
+    google::protobuf::util::JsonParseOptions options;
+    options.ignore_unknown_fields = true;
+    if (google::protobuf::util::JsonStringToMessage(reply.body, &problem, options).ok() &&
+        !problem.detail().empty()) {
+        return problem.detail();
+    }
+    return "HTTP status " + std::to_string(reply.status);
+}
+
+int width_of_output() {
+    constexpr int kUsual = 100;
+    winsize size{};
+    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsual;
+}
+
+int show_status(const StatusOptions& options) {
+    serve::Client client(options.socket);
+    if (options.json) {
+        const serve::Reply reply = client.get("/api/v1/status");
+        if (reply.status != 200) throw serve::ClientError(problem_of(reply));
+        std::cout << reply.body << '\n';
+        return 0;
+    }
+    // Two looks a moment apart give the rates.
+    constexpr auto kBetween = std::chrono::milliseconds(300);
+    const v1::Status before = ask_status(client);
+    const auto began = Steady::now();
+    std::this_thread::sleep_for(kBetween);
+    const v1::Status status = ask_status(client);
+    const double wall_s = std::chrono::duration<double>(Steady::now() - began).count();
+    const serve::Rates rates = serve::rates_between(before, status, wall_s);
+    for (const std::string& line : serve::render_table(status, rates, width_of_output())) {
+        std::cout << line << '\n';
+    }
+    return 0;
+}
+
+int send_command(const CommandOptions& options) {
+    v1::Command command;
+    command.set_kind(options.kind);
+    command.set_by(options.by);
+    command.set_argument(options.argument);
+    std::string json;
+    if (!google::protobuf::util::MessageToJsonString(command, &json).ok()) {
+        throw serve::ClientError("--by: not UTF-8");
+    }
+    serve::Client client(options.socket);
+    const serve::Reply reply = client.post("/api/v1/commands", json);
+    if (options.json) std::cout << reply.body << '\n';
+    if (reply.status == 200) {
+        v1::CommandReply answer;
+        parse_answer(reply, answer);
+        if (!options.json) {
+            std::cout << (answer.message().empty() ? "accepted" : answer.message()) << '\n';
+        }
+        return 0;
+    }
+    constexpr int kRefused = 409;
+    std::cerr << "vibrig: " << problem_of(reply) << '\n';
+    return reply.status == kRefused ? kNo : kBadInput;
+}
+
+/// Runs a command's body; what it throws becomes one line and exit code 2.
+template <typename Body>
+void guarded(int& exit_code, Body&& body) {
+    try {
+        exit_code = body();
+    } catch (const std::exception& error) {
+        std::cerr << "vibrig: " << error.what() << '\n';
+        exit_code = kBadInput;
+    }
+}
+
+void add_socket(CLI::App& command, std::string& socket) {
+    socket = default_socket();
+    command
+        .add_option("--socket", socket,
+                    "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
+        ->capture_default_str();
+}
+
+void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char* name,
+                 const char* help) {
+    CLI::App& command = *app.add_subcommand(name, help);
+    auto options = std::make_shared<CommandOptions>();
+    options->kind = kind;
+    options->by = login_name();
+    add_socket(command, options->socket);
+    command.add_option("--by", options->by, "Who commands; goes into the event log")
+        ->capture_default_str();
+    command.add_flag("--json", options->json, "Print the daemon's answer as JSON");
+    std::string example = std::string("Example: vibrig ") + name;
+    if (kind == v1::Command::acknowledge) {
+        command
+            .add_option("what", options->argument,
+                        "What is acknowledged, as `vibrig status` names it")
+            ->required();
+        example += " trip";
+    }
+    command.footer(example + " --by 'Ada Lovelace'");
+    command.callback(
+        [options, &exit_code] { guarded(exit_code, [&] { return send_command(*options); }); });
+}
+
+}  // namespace
+
+std::string default_socket() {
+    const char* const other = std::getenv("VIBRIG_SOCKET");
+    return other != nullptr && *other != '\0' ? other : "/run/vibrig/vibrigd.sock";
+}
+
+void parse_answer(const serve::Reply& reply, google::protobuf::Message& message) {
+    if (reply.status != 200) throw serve::ClientError("vibrigd: " + problem_of(reply));
+    google::protobuf::util::JsonParseOptions options;
+    options.ignore_unknown_fields = true;  // a newer daemon may say more
+    const auto parsed = google::protobuf::util::JsonStringToMessage(reply.body, &message, options);
+    if (!parsed.ok()) {
+        throw serve::ClientError("the daemon's answer is not as expected: " +
+                                 std::string(parsed.message()));
+    }
+}
+
+v1::Status ask_status(serve::Client& client) {
+    v1::Status status;
+    parse_answer(client.get("/api/v1/status"), status);
+    return status;
+}
+
+void add_remote(CLI::App& app, int& exit_code) {
+    CLI::App& status = *app.add_subcommand("status", "What a running vibrigd does");
+    auto status_options = std::make_shared<StatusOptions>();
+    add_socket(status, status_options->socket);
+    status.add_flag("--json", status_options->json, "As JSON (vibrig.v1.Status)");
+    status.footer("Example: vibrig status --json");
+    status.callback([status_options, &exit_code] {
+        guarded(exit_code, [&] { return show_status(*status_options); });
+    });
+
+    CLI::App& watching = *app.add_subcommand("watch", "The status as a live table");
+    auto watch_options = std::make_shared<WatchOptions>();
+    add_socket(watching, watch_options->socket);
+    watching.add_flag(
+        "--until-finished", watch_options->until_finished,
+        "End with the campaign: exit code 0 when it finished, 1 when aborted or tripped");
+    watching.add_option("--interval", watch_options->interval_s, "Time between two looks, s")
+        ->check(CLI::Range(0.05, 3600.0))
+        ->capture_default_str();
+    watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
+    watching.callback(
+        [watch_options, &exit_code] { guarded(exit_code, [&] { return watch(*watch_options); }); });
+
+    CLI::App& events = *app.add_subcommand("events", "What happened, oldest first");
+    auto event_options = std::make_shared<EventOptions>();
+    add_socket(events, event_options->socket);
+    events.add_flag("--follow", event_options->follow, "Go on with what comes");
+    events.add_flag("--json", event_options->json, "One JSON object per line (vibrig.v1.Event)");
+    events.footer("Example: vibrig events --follow");
+    events.callback([event_options, &exit_code] {
+        guarded(exit_code, [&] { return show_events(*event_options); });
+    });
+
+    add_command(app, exit_code, v1::Command::arm, "arm", "Arm the shaker for one campaign");
+    add_command(app, exit_code, v1::Command::start, "start", "Start the armed campaign");
+    add_command(app, exit_code, v1::Command::pause, "pause",
+                "Pause at rest before the next position");
+    add_command(app, exit_code, v1::Command::resume, "resume", "Go on after a pause");
+    add_command(app, exit_code, v1::Command::abort, "abort",
+                "Stop the shaker and end the campaign");
+    add_command(app, exit_code, v1::Command::acknowledge, "ack", "Acknowledge a trip or an alarm");
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/serve/client.hpp"
+#include "proto/vibrig.pb.h"
+
+/// What the commands that talk to a running daemon share.
+namespace vibrig::tool {
+
+inline constexpr int kNo = 1;        ///< exit code: the result says no
+inline constexpr int kBadInput = 2;  ///< exit code: bad usage or input, or no daemon
+
+/// VIBRIG_SOCKET, else the socket of the installed daemon.
+[[nodiscard]] std::string default_socket();
+/// Parses an answer; throws serve::ClientError with the daemon's own words when it is a problem.
+void parse_answer(const serve::Reply& reply, google::protobuf::Message& message);
+[[nodiscard]] v1::Status ask_status(serve::Client& client);
+
+struct WatchOptions {
+    std::string socket;
+    bool until_finished = false;
+    double interval_s = 1.0;
+};
+/// Returns the exit code.
+int watch(const WatchOptions& options);
+
+struct EventOptions {
+    std::string socket;
+    bool follow = false;
+    bool json = false;
+};
+int show_events(const EventOptions& options);
+
+}  // namespace vibrig::tool
