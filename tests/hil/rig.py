@@ -3,7 +3,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -65,12 +64,6 @@ class Checks:
         return 1 if self.failed else 0
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def toml_value(value):
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -119,11 +112,11 @@ def die_with_parent():
 
 
 class Rig:
-    """vibrig-plant and vibrigd in one temporary folder. `bus`: "vcan0", or "seqpacket"."""
+    """vibrig-plant and vibrigd in one temporary folder. `bus`: "vcan0", or "seqpacket". The plant starts first."""
 
     def __init__(self, programs, bus, clock, folder, poll_s=0.25):
         self.programs, self.bus, self.clock, self.folder, self.poll_s = programs, bus, clock, folder, poll_s
-        self.modbus_port = free_port()
+        self.modbus_port = None
         self.path = os.path.join(folder, "bus.sock")
         self.socket = os.path.join(folder, "vibrigd.sock")
         self.results = os.path.join(folder, "results")
@@ -145,9 +138,16 @@ class Rig:
             file.write(toml(everything))
 
     def start_plant(self, *more):
-        bus = self.path if self.bus == "seqpacket" else self.bus
-        self.plant = Child("plant", [self.program("vibrig-plant"), "run", "--can", bus, "--modbus",
-                                     f"tcp:127.0.0.1:{self.modbus_port}", "--clock", self.clock, *more], self.folder)
+        bus = "seqpacket:" + self.path if self.bus == "seqpacket" else self.bus
+        ready = os.path.join(self.folder, "plant.json")
+        self.plant = Child("plant", [self.program("vibrig-plant"), "run", "--can", bus, "--modbus", "tcp:127.0.0.1:0",
+                                     "--clock", self.clock, "--ready-file", ready, *more], self.folder)
+        while self.plant.running() and not os.path.exists(ready):
+            time.sleep(0.05)
+        if not self.plant.running():
+            raise RuntimeError("vibrig-plant did not start: " + self.plant.text())
+        with open(ready, encoding="utf-8") as file:
+            self.modbus_port = json.load(file)["modbus_port"]
 
     def start_daemon(self):
         self.daemon = Child("vibrigd", [self.program("vibrigd"), "--config", self.configuration], self.folder)

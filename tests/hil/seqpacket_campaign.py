@@ -19,9 +19,9 @@ def main():
     checks = r.Checks()
     with tempfile.TemporaryDirectory() as folder:
         rig = r.Rig(programs, "seqpacket", "rig", folder)
-        rig.configure(SHORT)
         try:
             rig.start_plant("--seed", "3")
+            rig.configure(SHORT)
             rig.start_daemon()
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
             commands = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]

@@ -16,7 +16,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
 BUS = "vcan0"
-SHORT = {"name": "short", "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 4.0,
+SHORT = {"name": "short", "positions_deg": [[0, 0, 0], [0, 0, 20]], "table_g": [9.0, 7.0], "dwell_s": 4.0,
          "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 1.0}
 SAMPLE_IDS = {0x080, 0x101, 0x102, 0x110, 0x111, 0x112}
 STATUS_IDS = {0x210, 0x220, 0x221}
@@ -207,12 +207,13 @@ def with_pymodbus(checks, programs, folder):
     """The daemon's Modbus side against an independent implementation."""
     os.makedirs(folder)
     rig = r.Rig(programs, BUS, "real", folder)
+    rig.modbus_port = 1502
     rig.configure(SHORT)
-    played = r.Child("shaker", [sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
-                                                           "pymodbus_shaker.py"), str(rig.modbus_port)], folder)
-    platform = r.Rig(programs, BUS, "real", folder)   # its own shaker stays at rest
+    played = r.Child("shaker", [os.path.join(os.path.dirname(os.path.abspath(__file__)), "pymodbus_shaker.py"),
+                                str(rig.modbus_port)], folder)
+    platform = r.Rig(programs, BUS, "real", folder)  # its own shaker stays at rest
     try:
-        platform.start_plant("--seed", str(SEED))
+        platform.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
         rig.start_daemon()
         rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
         run_up(checks, rig, "pymodbus plays the shaker: it reaches its level")
@@ -254,9 +255,9 @@ def main():
         timed(checks.gtest, port_test, 60)
     with tempfile.TemporaryDirectory() as folder:
         rig = r.Rig(programs, BUS, "real", folder)
-        rig.configure(SHORT)
         try:
-            rig.start_plant("--seed", str(SEED))
+            rig.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
+            rig.configure(SHORT)
             rig.start_daemon()
             timed(campaign, checks, rig, folder)
             timed(survives_garbage, checks, rig)

@@ -22,10 +22,10 @@ def run_campaign(checks, programs, folder, campaign, seed, limit_s, text):
     """result.json's path and bytes of a campaign that finished."""
     os.makedirs(folder)
     rig = r.Rig(programs, "vcan0", "real", folder, poll_s=10)   # each look is an event, and events are what costs
-    rig.configure(campaign)
     begin = time.monotonic()
     try:
         rig.start_plant("--seed", str(seed))
+        rig.configure(campaign)
         rig.start_daemon()
         rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 60)
         commands = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
