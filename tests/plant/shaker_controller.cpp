@@ -85,8 +85,8 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
 }
 
 void ShakerController::open_emergency_stop(bool open) noexcept {
+    if (open && !emergency_stop_open_) trip(kFaultEmergencyStop, kEmergencyStop);
     emergency_stop_open_ = open;
-    if (open) trip(kFaultEmergencyStop, kEmergencyStop);
 }
 
 void ShakerController::ramp_to(double target_g, double time_s) noexcept {

@@ -1,0 +1,74 @@
+#include "tests/plant/control.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+
+namespace vibrig::plant {
+namespace {
+
+constexpr const char* kHelp = "fault SPEC, clear [NAME], estop open, estop close, status, help";
+
+std::string_view trimmed(std::string_view text) {
+    const auto begin = text.find_first_not_of(" \t\r");
+    if (begin == std::string_view::npos) return {};
+    return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+}  // namespace
+
+std::string Control::execute(std::string_view line) {
+    const std::string_view text = trimmed(line);
+    const auto space = text.find(' ');
+    const std::string_view word = text.substr(0, space);
+    const std::string_view rest =
+        space == std::string_view::npos ? "" : trimmed(text.substr(space));
+    try {
+        const std::scoped_lock lock(rig_.mutex);
+        if (word == "fault") {
+            rig_.faults.add(parse_fault(rest, rig_.now_s()));
+            return "ok fault " + std::string(rest);
+        }
+        if (word == "clear") {
+            rig_.faults.clear(rest);
+            return "ok clear";
+        }
+        if (word == "estop" && (rest == "open" || rest == "close")) {
+            rig_.emergency_stop_by_hand = rest == "open";
+            return "ok estop " + std::string(rest);
+        }
+        if (word == "status") {
+            std::array<char, 160> status{};
+            std::snprintf(status.data(), status.size(),
+                          "ok time %.3f s, shaker state %d, table %.4f g, faults %d", rig_.now_s(),
+                          static_cast<int>(rig_.rig.shaker().state()),
+                          rig_.rig.shaker().amplitude_g(), rig_.rig.shaker().faults());
+            return status.data();
+        }
+        if (word == "help") return std::string("ok ") + kHelp;
+    } catch (const PlantError& error) {
+        return std::string("error: ") + error.what();
+    }
+    return "error: found \"" + std::string(text) + "\", expected " + kHelp;
+}
+
+bool Control::read(int descriptor) {
+    std::array<char, 1024> buffer{};
+    const ssize_t size = ::read(descriptor, buffer.data(), buffer.size());
+    if (size < 0) return errno == EAGAIN || errno == EINTR;
+    if (size == 0) return false;
+    pending_.append(buffer.data(), static_cast<std::size_t>(size));
+    for (auto end = pending_.find('\n'); end != std::string::npos; end = pending_.find('\n')) {
+        if (!trimmed(std::string_view(pending_).substr(0, end)).empty()) {
+            std::printf("%s\n", execute(std::string_view(pending_).substr(0, end)).c_str());
+            std::fflush(stdout);
+        }
+        pending_.erase(0, end + 1);
+    }
+    if (pending_.size() > 4096) pending_.clear();
+    return true;
+}
+
+}  // namespace vibrig::plant

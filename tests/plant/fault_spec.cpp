@@ -1,0 +1,182 @@
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "tests/plant/faults.hpp"
+
+namespace vibrig::plant {
+namespace {
+
+enum class Value : std::uint8_t { none, rate, milliseconds, degrees, seconds, word };
+
+struct Description {
+    FaultKind kind;
+    std::string_view name;
+    Value value;
+    bool channel;
+    const char* help;
+};
+
+constexpr std::array<Description, 15> kDescriptions{{
+    {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
+    {FaultKind::stuck, "stuck", Value::none, true,
+     "stuck[:CHANNEL]       the channel shows its last value for ever"},
+    {FaultKind::late, "late", Value::milliseconds, false,
+     "late=MS[,RATE]        frames come later (from the next tick on)"},
+    {FaultKind::out_of_range, "out-of-range", Value::none, true,
+     "out-of-range[:CHANNEL]  all bits of the value set (also: nan)"},
+    {FaultKind::flag, "flag", Value::none, true, "flag[:CHANNEL]        valid bit 0"},
+    {FaultKind::duplicate, "duplicate", Value::rate, false,
+     "duplicate=RATE        share of frames sent twice"},
+    {FaultKind::reorder, "reorder", Value::rate, false,
+     "reorder=RATE          share of frames that swap with the next"},
+    {FaultKind::shorten, "shorten", Value::rate, false,
+     "shorten=RATE          share of frames cut to 3 bytes"},
+    {FaultKind::bus_silent, "bus-silent", Value::seconds, false,
+     "bus-silent[=S]        no frames, for S seconds"},
+    {FaultKind::modbus_silent, "modbus-silent", Value::seconds, false,
+     "modbus-silent[=S]     no answers over Modbus, for S seconds"},
+    {FaultKind::modbus_wrong, "modbus-wrong", Value::word, false,
+     "modbus-wrong[=exception|value]  server failure, or wrong register values"},
+    {FaultKind::estop, "estop", Value::none, false,
+     "estop                 emergency-stop chain open"},
+    {FaultKind::loop_open, "loop-open", Value::none, false,
+     "loop-open             stabilisation loop reported open"},
+    {FaultKind::platform_fault, "platform-fault", Value::none, false,
+     "platform-fault        fault bit of the platform"},
+    {FaultKind::spike, "spike", Value::degrees, true,
+     "spike[:CHANNEL]=DEG,RATE  angles jump for one sample"},
+}};
+
+constexpr std::array<std::string_view, kChannels> kChannelNames{"outer", "inner", "azimuth",
+                                                                "x",     "y",     "z"};
+
+[[noreturn]] void fail(std::string_view spec, const std::string& what) {
+    throw PlantError("fault \"" + std::string(spec) + "\": " + what);
+}
+
+double number(std::string_view spec, std::string_view text, const char* what, double low,
+              double high) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value) ||
+        value < low || value > high) {
+        fail(spec, "found \"" + std::string(text) + "\", expected " + what);
+    }
+    return value;
+}
+
+const Description& describe(std::string_view spec, std::string_view name) {
+    if (name == "nan") name = "out-of-range";
+    std::string names;
+    for (const Description& d : kDescriptions) {
+        if (d.name == name) return d;
+        names += (names.empty() ? "" : ", ") + std::string(d.name);
+    }
+    fail(spec, "unknown fault \"" + std::string(name) + "\", expected one of " + names);
+}
+
+// Cuts off and returns what follows the first `mark`, if there is one.
+std::optional<std::string_view> cut(std::string_view& text, std::string_view mark) {
+    const auto at = text.find(mark);
+    if (at == std::string_view::npos) return std::nullopt;
+    const std::string_view rest = text.substr(at + mark.size());
+    text = text.substr(0, at);
+    return rest;
+}
+
+void read_value(std::string_view spec, const Description& d, std::string_view text, Fault& fault) {
+    std::string_view first = text;
+    const auto second = cut(first, ",");
+    if (second && (d.value == Value::milliseconds || d.value == Value::degrees)) {
+        fault.rate = number(spec, *second, "a rate from 0 to 1", 0, 1);
+    } else if (second) {
+        fail(spec, "found \"," + std::string(*second) + "\", expected one value");
+    }
+    switch (d.value) {
+        case Value::none:
+            fail(spec, std::string(d.name) + " takes no value");
+        case Value::rate:
+            fault.value = number(spec, first, "a rate from 0 to 1", 0, 1);
+            break;
+        case Value::milliseconds:
+            fault.value = number(spec, first, "milliseconds from 0 to 1e6", 0, 1e6);
+            break;
+        case Value::degrees:
+            fault.value = number(spec, first, "degrees from -360 to 360", -360, 360);
+            break;
+        case Value::seconds:
+            fault.to_s = fault.from_s + number(spec, first, "seconds from 0 to 1e9", 0, 1e9);
+            break;
+        case Value::word:
+            if (first != "exception" && first != "value") {
+                fail(spec, "found \"" + std::string(first) + "\", expected exception or value");
+            }
+            fault.value = first == "value" ? 1 : 0;
+            break;
+    }
+}
+
+}  // namespace
+
+std::string_view name_of(FaultKind kind) noexcept {
+    for (const Description& d : kDescriptions) {
+        if (d.kind == kind) return d.name;
+    }
+    return "?";
+}
+
+std::string fault_help() {
+    std::string text =
+        "Faults: NAME[:CHANNEL][=VALUE][@FROM[..TO]], times in simulated seconds;\n"
+        "channels outer, inner, azimuth, x, y, z; without one: all that apply.\n";
+    for (const Description& d : kDescriptions) text += std::string("  ") + d.help + "\n";
+    return text;
+}
+
+Fault parse_fault(std::string_view spec, double now_s) {
+    std::string_view rest = spec;
+    Fault fault;
+    fault.from_s = now_s;
+    if (auto times = cut(rest, "@")) {
+        const auto to = cut(*times, "..");
+        fault.from_s = number(spec, *times, "a time in seconds, as in @100..200", 0, 1e9);
+        if (to)
+            fault.to_s = number(spec, *to, "a time in seconds after the first", fault.from_s, 1e9);
+    }
+    // "lose:0.01" is understood like "lose=0.01": only what is no channel can be a value.
+    auto value = cut(rest, "=");
+    auto channel = cut(rest, ":");
+    const Description& d = describe(spec, rest);
+    fault.kind = d.kind;
+    if (channel && !d.channel && !value) std::swap(channel, value);
+    if (channel) {
+        for (std::size_t i = 0; i < kChannels; ++i) {
+            if (kChannelNames[i] == *channel) fault.channel = i;
+        }
+        if (!d.channel || !fault.channel || (d.kind == FaultKind::spike && *fault.channel > 2)) {
+            fail(spec, "found channel \"" + std::string(*channel) + "\", expected " +
+                           (!d.channel                   ? "none"
+                            : d.kind == FaultKind::spike ? "outer, inner or azimuth"
+                                                         : "outer, inner, azimuth, x, y or z"));
+        }
+    }
+    if (value) {
+        read_value(spec, d, *value, fault);
+    } else if (d.value == Value::rate || d.value == Value::milliseconds ||
+               d.value == Value::degrees) {
+        fail(spec, "no value, expected " + std::string(d.help));
+    }
+    return fault;
+}
+
+void Faults::clear(std::string_view name) {
+    if (name.empty()) {
+        faults_.clear();
+        return;
+    }
+    const FaultKind kind = describe(name, name).kind;
+    std::erase_if(faults_, [kind](const Fault& fault) { return fault.kind == kind; });
+}
+
+}  // namespace vibrig::plant

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <linux/can.h>
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/plant/random.hpp"
+#include "tests/plant/sensors.hpp"
+
+namespace vibrig::plant {
+
+enum class FaultKind : std::uint8_t {
+    lose,
+    stuck,
+    late,
+    out_of_range,
+    flag,
+    duplicate,
+    reorder,
+    shorten,
+    bus_silent,
+    modbus_silent,
+    modbus_wrong,
+    estop,
+    loop_open,
+    platform_fault,
+    spike
+};
+
+/// Channels of a sample: outer, inner, azimuth, then the accelerometers x, y, z.
+inline constexpr std::size_t kChannels = 6;
+
+/// One fault over a range of simulated time.
+struct Fault {
+    FaultKind kind = FaultKind::lose;
+    std::optional<std::size_t> channel;  ///< none: all
+    double value = 0;                    ///< a rate, ms or deg, as the kind says
+    double rate = 1;                     ///< share of samples hit, where `value` is something else
+    double from_s = 0;
+    double to_s = std::numeric_limits<double>::infinity();
+};
+
+/// NAME[:CHANNEL][=VALUE[,RATE]][@FROM[..TO]], for instance "lose=0.01@100..200" or
+/// "stuck:outer@50"; the times are simulated seconds, from `now_s` on where none are given. Throws
+/// PlantError saying what was found and expected.
+[[nodiscard]] Fault parse_fault(std::string_view spec, double now_s);
+/// One line per fault, for --help and error messages.
+[[nodiscard]] std::string fault_help();
+[[nodiscard]] std::string_view name_of(FaultKind kind) noexcept;
+
+/// A sample as it goes out: what the instruments show and the valid bits.
+struct Sample {
+    Readings readings;
+    std::array<bool, kChannels> valid{true, true, true, true, true, true};
+};
+
+/// Spoils samples and frames as told. Deterministic for a seed.
+class Faults {
+  public:
+    explicit Faults(std::uint64_t seed) : random_(seed, 4) {}
+
+    void add(const Fault& fault) { faults_.push_back(fault); }
+    /// Ends all faults, or those of one kind. Throws PlantError for an unknown name.
+    void clear(std::string_view name = {});
+    /// The fault of this kind in force at a time, or none.
+    [[nodiscard]] const Fault* active(FaultKind kind, double time_s) const noexcept;
+
+    void spoil(Sample& sample, double time_s);
+    /// Loses, doubles, delays, shortens and swaps the frames of one tick.
+    void spoil(std::vector<can_frame>& frames, double time_s);
+    [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+
+  private:
+    struct Delayed {
+        double due_s;
+        can_frame frame;
+    };
+
+    [[nodiscard]] bool hit(double rate) { return rate >= 1 || random_.uniform() < rate; }
+
+    std::vector<Fault> faults_;
+    std::deque<Delayed> delayed_;
+    std::array<std::optional<double>, kChannels> held_;
+    Random random_;
+    std::uint64_t lost_ = 0;
+};
+
+}  // namespace vibrig::plant

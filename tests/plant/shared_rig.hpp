@@ -1,0 +1,25 @@
+#pragma once
+
+#include <mutex>
+
+#include "tests/plant/faults.hpp"
+#include "tests/plant/rig.hpp"
+
+namespace vibrig::plant {
+
+/// The rig as the bus thread and the Modbus thread share it. Everything under one mutex: a request
+/// is applied at the present simulated time.
+struct SharedRig {
+    explicit SharedRig(const Truth& truth) : rig(truth), faults(truth.seed) {}
+
+    [[nodiscard]] double now_s() const noexcept {
+        return 1e-6 * static_cast<double>(rig.time_us());
+    }
+
+    std::mutex mutex;
+    Rig rig;
+    Faults faults;
+    bool emergency_stop_by_hand = false;
+};
+
+}  // namespace vibrig::plant

@@ -1,0 +1,151 @@
+#include "tests/plant/simulation.hpp"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+
+namespace vibrig::plant {
+namespace {
+
+std::int64_t monotonic_ns() {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
+}
+
+}  // namespace
+
+Simulation::Simulation(SharedRig& shared, Bus& bus, const proto::Dbc& dbc,
+                       const SimulationSettings& settings, int stop_descriptor,
+                       int command_descriptor, std::function<bool()> on_commands)
+    : shared_(shared),
+      bus_(bus),
+      frames_(dbc),
+      settings_(settings),
+      stop_(stop_descriptor),
+      command_(command_descriptor),
+      on_commands_(std::move(on_commands)) {}
+
+void Simulation::run() {
+    const std::int64_t start = monotonic_ns();
+    const double speed = settings_.lockstep ? settings_.speed.value_or(0) : 1;
+    // In lockstep nothing happens before somebody is there to see it.
+    while (settings_.lockstep && !bus_.somebody_there()) {
+        if (wait(std::nullopt) == Wake::stop) return;
+    }
+    for (std::int64_t tick = 0;; ++tick) {
+        if (speed > 0 &&
+            !wait_until(start + std::llround(1e3 * static_cast<double>(tick * kTickUs) / speed)))
+            return;
+        if (settings_.duration_s &&
+            1e-6 * static_cast<double>(tick * kTickUs) > *settings_.duration_s)
+            return;
+        if (tick > 0) {
+            const std::scoped_lock lock(shared_.mutex);
+            shared_.rig.advance();
+        }
+        make_tick();
+        send_tick();
+        ++counters_.ticks;
+        if (settings_.lockstep && !wait_for_acknowledgement()) return;
+    }
+}
+
+void Simulation::make_tick() {
+    const std::scoped_lock lock(shared_.mutex);
+    const double now = shared_.now_s();
+    const bool open =
+        shared_.emergency_stop_by_hand || shared_.faults.active(FaultKind::estop, now) != nullptr;
+    shared_.rig.shaker().open_emergency_stop(open);
+    Sample sample;
+    sample.readings = shared_.rig.readings();
+    shared_.faults.spoil(sample, now);
+    std::vector<can_frame> data;
+    frames_.encode(shared_.rig, sample, shared_.faults, command_echo_, data);
+    shared_.faults.spoil(data, now);
+    time_us_ = shared_.rig.time_us();
+    counters_.frames += data.size();
+    tick_frames_.clear();
+    if (settings_.lockstep) tick_frames_.push_back(frames_.rig_time(time_us_, false));
+    tick_frames_.insert(tick_frames_.end(), data.begin(), data.end());
+    if (settings_.lockstep) tick_frames_.push_back(frames_.rig_time(time_us_, true));
+}
+
+void Simulation::send_tick() { bus_.send(tick_frames_, settings_.lockstep); }
+
+bool Simulation::wait_for_acknowledgement() {
+    std::int64_t resend_at = monotonic_ns() + settings_.resend_ns;
+    bool alone = !bus_.somebody_there();
+    while (acknowledged_us_ != time_us_) {
+        const std::uint64_t connections = bus_.connections();
+        const Wake wake = wait(bus_.somebody_there() ? std::optional(resend_at) : std::nullopt);
+        if (wake == Wake::stop) return false;
+        if (alone && bus_.connections() != connections && bus_.somebody_there()) {
+            send_tick();  // whoever comes to an empty bus has missed the frames of this tick
+            ++counters_.resent;
+        } else if (wake == Wake::deadline) {
+            bus_.send(std::span(tick_frames_).last(1), true);
+            ++counters_.resent;
+        }
+        if (wake == Wake::deadline) resend_at = monotonic_ns() + settings_.resend_ns;
+        alone = !bus_.somebody_there();
+    }
+    return true;
+}
+
+bool Simulation::wait_until(std::int64_t deadline_ns) {
+    for (;;) {
+        const Wake wake = wait(deadline_ns);
+        if (wake == Wake::stop) return false;
+        if (wake == Wake::deadline) return true;
+    }
+}
+
+Simulation::Wake Simulation::wait(std::optional<std::int64_t> deadline_ns) {
+    std::array<pollfd, 3> descriptors{
+        {{bus_.descriptor(), POLLIN, 0}, {stop_, POLLIN, 0}, {command_, POLLIN, 0}}};
+    timespec left{};
+    if (deadline_ns) {
+        const std::int64_t ns = std::max<std::int64_t>(*deadline_ns - monotonic_ns(), 0);
+        left = {static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
+    }
+    const int ready =
+        ppoll(descriptors.data(), descriptors.size(), deadline_ns ? &left : nullptr, nullptr);
+    if (ready == 0) return Wake::deadline;
+    if (ready < 0) return Wake::event;
+    if (descriptors[1].revents != 0) return Wake::stop;
+    if (descriptors[0].revents != 0) {
+        bus_.receive([this](const canfd_frame& frame) { handle(frame); });
+    }
+    if (descriptors[2].revents != 0 && !on_commands_())
+        command_ = -1;  // poll ignores it from now on
+    return Wake::event;
+}
+
+void Simulation::handle(const canfd_frame& frame) {
+    if (const auto time = frames_.acknowledged_us(frame)) {
+        acknowledged_us_ = time;
+        return;
+    }
+    if (const auto command = frames_.gimbal_command(frame)) {
+        const std::scoped_lock lock(shared_.mutex);
+        ++counters_.commands;
+        command_echo_ = command->counter;
+        if (command->mode == GimbalMode::slew) {
+            shared_.rig.slew_to(command->encoder_deg);
+        } else {
+            shared_.rig.release();
+        }
+        return;
+    }
+    if (const auto torque = frames_.torque_command(frame)) {
+        const std::scoped_lock lock(shared_.mutex);
+        ++counters_.commands;
+        shared_.rig.torque(*torque);
+    }
+}
+
+}  // namespace vibrig::plant
