@@ -1,0 +1,109 @@
+#include "estimator/drift_filter.hpp"
+
+#include <cmath>
+
+namespace vibrig::estimator {
+namespace {
+
+/// So many gated samples in a row mean that the angles, not the samples, are wrong.
+constexpr int kGatedBeforeRestart = 5;
+
+UdFilter::Matrix3 plain(const Eigen::Matrix3d& m, double scale) noexcept {
+    UdFilter::Matrix3 out{};
+    for (std::size_t r = 0; r < 3; ++r) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            out[r][c] = scale * m(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
+FilterNoise FilterNoise::of(const Settings& settings) noexcept {
+    const double lsb = 1296000.0 / std::exp2(settings.resolver_bits);  // arcsec
+    const double walk = 60.0 * settings.gyro_random_walk_deg_per_rt_h;
+    return {settings.resolver_arcsec * settings.resolver_arcsec + lsb * lsb / 12.0, walk * walk};
+}
+
+DriftFilter::DriftFilter(const Settings& settings, const ParameterArray& sigma)
+    : kinematics_(settings),
+      model_(settings),
+      noise_(FilterNoise::of(settings)),
+      gate_(settings.gate_nis),
+      filter_(sigma),
+      up_(kinematics_.up_reference()) {}
+
+void DriftFilter::begin_dwell() noexcept {
+    started_ = false;
+    gated_in_a_row_ = 0;
+}
+
+Eigen::Vector3d DriftFilter::angles() const noexcept {
+    const UdFilter::Vector3 a = filter_.angles();
+    return Eigen::Vector3d(a[0], a[1], a[2]) / kArcsecPerRad;
+}
+
+void DriftFilter::predict(double dt, double kappa) noexcept {
+    const Pose pose = kinematics_.pose(angles());
+    up_ = pose.up;
+    const Regressors h = model_.regressors(pose.up, kappa);
+    const Eigen::Vector3d rate = model_.platform_rate(pose, h, filter_.constants());
+    const Eigen::Matrix3d jacobian = model_.jacobian(pose, kappa, filter_.constants(), rate);
+    const Eigen::Vector3d increment = dt * (pose.m * rate);
+
+    UdFilter::Transition t;
+    t.angle_increment = {increment[0], increment[1], increment[2]};
+    t.f = plain(jacobian, dt / kArcsecPerRad);
+    for (std::size_t k = 0; k < 3; ++k) t.f[k][k] += 1.0;
+    t.g = plain(pose.m, model_.drift_sign() * dt);
+    for (std::size_t group = 0; group < kGroups; ++group) {
+        for (std::size_t j = 0; j < kGyros; ++j) t.h[internal_index(group, j)] = h[group][j];
+    }
+    t.noise_map = plain(pose.m, 1.0);
+    t.noise = noise_.walk * dt;
+    filter_.predict(t);
+}
+
+StepResult DriftFilter::step(double time_s, const Eigen::Vector3d& angles_rad,
+                             double kappa) noexcept {
+    StepResult result;
+    UdFilter::Vector3 z{};
+    if (!started_) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            z[k] = wrap(angles_rad[static_cast<Eigen::Index>(k)]) * kArcsecPerRad;
+        }
+        filter_.start_angles(z, noise_.angle_variance);
+        started_ = true;
+        up_ = kinematics_.pose(angles()).up;
+        time_s_ = time_s;
+        gated_in_a_row_ = 0;
+        result.outcome = StepOutcome::initialised;
+        return result;
+    }
+    predict(time_s - time_s_, kappa);
+    time_s_ = time_s;
+
+    const UdFilter::Vector3 predicted = filter_.angles();
+    for (std::size_t k = 0; k < 3; ++k) {
+        z[k] =
+            wrap_next_to(angles_rad[static_cast<Eigen::Index>(k)], predicted[k] / kArcsecPerRad) *
+            kArcsecPerRad;
+        result.innovation_arcsec[k] = z[k] - predicted[k];
+    }
+    result.nis = filter_.nis(z, noise_.angle_variance);
+    if (!(result.nis <= gate_)) {
+        result.outcome = StepOutcome::gated;
+        if (++gated_in_a_row_ < kGatedBeforeRestart) return result;
+        filter_.start_angles(z, noise_.angle_variance);
+        gated_in_a_row_ = 0;
+        result.outcome = StepOutcome::reinitialised;
+        return result;
+    }
+    gated_in_a_row_ = 0;
+    filter_.update(z, noise_.angle_variance);
+    result.outcome = StepOutcome::used;
+    return result;
+}
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,87 @@
+#include "estimator/dwell_record.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/vibration_level.hpp"
+
+namespace vibrig::estimator {
+namespace {
+
+constexpr double kForceTolerance = 0.02;     ///< of 1 g, spec section 6.3 of the method
+constexpr double kRejectedTolerance = 0.01;  ///< of the samples
+
+}  // namespace
+
+void DwellRecord::count(const StepResult& step) noexcept {
+    switch (step.outcome) {
+        case StepOutcome::used:
+            nis_sum += step.nis;
+            ++nis_count;
+            ++used;
+            break;
+        case StepOutcome::initialised:
+        case StepOutcome::bad_force:
+            ++used;
+            break;
+        case StepOutcome::reinitialised:
+            ++reinitialised;
+            ++rejected;
+            break;
+        case StepOutcome::gated:
+        case StepOutcome::bad_angles:
+        case StepOutcome::bad_time:
+            ++rejected;
+            break;
+        case StepOutcome::buffered:
+            break;
+    }
+}
+
+DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
+    DwellVerdict verdict;
+    DwellSummary& s = verdict.summary;
+    s.run = r.info.run;
+    s.position = r.info.position;
+    s.samples = r.samples;
+    s.used = r.used;
+    s.rejected = r.rejected;
+    s.reinitialised = r.reinitialised;
+    if (r.level_samples > 0) {
+        s.kappa = r.kappa_sum / r.level_samples;
+        s.mean_force_g = r.mean_force_sum / r.level_samples;
+    }
+    s.amplitude_g = std::sqrt(2.0 * std::max(0.0, s.kappa - 1.0));
+    s.frequency_hz = r.frequency_samples > 0 ? r.frequency_sum / r.frequency_samples : 0.0;
+    s.nis_per_dof = r.nis_count > 0 ? r.nis_sum / (3.0 * r.nis_count) : 0.0;
+
+    const auto flag = [&](const char* reason, bool reject) {
+        s.flagged = true;
+        s.reason = reason;
+        verdict.rejected = reject;
+    };
+    const double window_s =
+        std::clamp(r.span_s, VibrationLevel::kFirstWindow_s, settings.level_window_s);
+    if (r.samples == 0) {
+        flag("no samples", true);
+    } else if (r.level_samples <= 0) {
+        flag("no usable specific force", true);
+    } else if (!(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
+        flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
+    } else if (s.kappa > 1.0 && r.period_s > 0 &&
+               VibrationLevel::excluded(settings.frequency_hz, r.period_s, window_s)) {
+        flag(
+            "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
+            "rejected",
+            true);
+    } else if (s.rejected > kRejectedTolerance * s.samples) {
+        flag("more than 1 % of the samples rejected", false);
+    }
+    if (verdict.rejected) {
+        s.used = 0;
+        s.rejected = s.samples;
+    }
+    return verdict;
+}
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+#include "estimator/identification.hpp"
+
+namespace vibrig::estimator {
+
+/// Counts of the dwell in progress; samples = used + rejected at any time nothing is buffered.
+struct DwellRecord {
+    DwellInfo info;
+    std::uint32_t samples = 0, used = 0, rejected = 0, reinitialised = 0;
+    double nis_sum = 0;
+    std::uint32_t nis_count = 0;
+    // Over the stretches of the dwell between gaps of more than 1 s, weighted by their samples.
+    double level_samples = 0, kappa_sum = 0, mean_force_sum = 0, frequency_sum = 0,
+           frequency_samples = 0;
+    double period_s = 0, span_s = 0;
+
+    void count(const StepResult& step) noexcept;
+};
+
+/// Summary of an ended dwell; `rejected` tells whether its data must be taken out of the filter
+/// again.
+struct DwellVerdict {
+    DwellSummary summary;
+    bool rejected = false;
+};
+
+[[nodiscard]] DwellVerdict judge(const DwellRecord& record, const Settings& settings) noexcept;
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "estimator/identification_impl.hpp"
+
+namespace vibrig::estimator {
+namespace {
+
+constexpr double kHannNoiseBandwidth = 1.5;
+
+/// Per run: mean over its dwells; sigma from accelerometer noise with the gain calibrated by
+/// gravity, sigma_a sqrt((2 + a0^2) / n), and from the scatter of the dwells.
+std::vector<RunAmplitude> amplitudes_of(const std::vector<DwellSummary>& dwells, double noise_g) {
+    std::vector<RunAmplitude> runs;
+    std::vector<int> numbers;
+    for (const DwellSummary& d : dwells) {
+        if (std::find(numbers.begin(), numbers.end(), d.run) == numbers.end())
+            numbers.push_back(d.run);
+    }
+    std::sort(numbers.begin(), numbers.end());
+    for (const int number : numbers) {
+        RunAmplitude run;
+        run.run = number;
+        double n = 0, kappa = 0, kappa_square = 0, frequency = 0, vibrating = 0, samples = 0;
+        for (const DwellSummary& d : dwells) {
+            if (d.run != number || d.used == 0) continue;
+            n += 1;
+            kappa += d.kappa;
+            kappa_square += d.kappa * d.kappa;
+            samples += d.samples;
+            if (d.frequency_hz > 0) {
+                frequency += d.frequency_hz;
+                vibrating += 1;
+            }
+        }
+        if (n == 0) continue;
+        run.kappa = kappa / n;
+        run.amplitude_g = std::sqrt(2.0 * std::max(0.0, run.kappa - 1.0));
+        run.frequency_hz = vibrating > 0 ? frequency / vibrating : 0.0;
+        if (run.amplitude_g > 0) {
+            const double scatter =
+                std::max(0.0, kappa_square / n - run.kappa * run.kappa) / run.kappa;
+            // d a0 = d kappa / a0
+            const double of_dwells =
+                n > 1 ? scatter * run.kappa / ((n - 1) * run.amplitude_g * run.amplitude_g) : 0.0;
+            const double of_noise = noise_g * noise_g * kHannNoiseBandwidth *
+                                    (2.0 + run.amplitude_g * run.amplitude_g) / samples;
+            run.sigma_g = std::sqrt(of_dwells + of_noise);
+        }
+        runs.push_back(run);
+    }
+    return runs;
+}
+
+std::string dwell_name(const DwellSummary& d) {
+    return "run " + std::to_string(d.run) + " position " + std::to_string(d.position) + ": ";
+}
+
+std::vector<std::string> dwell_warnings(const std::vector<DwellSummary>& dwells) {
+    std::vector<std::string> warnings;
+    for (const DwellSummary& d : dwells) {
+        if (d.flagged) {
+            std::string text = dwell_name(d) + d.reason;
+            text += " (mean vertical force " + std::to_string(d.mean_force_g) + " g, " +
+                    std::to_string(d.rejected) + " of " + std::to_string(d.samples) +
+                    " samples rejected)";
+            warnings.push_back(std::move(text));
+        }
+        if (d.used < 2) continue;
+        // 99.9 % band of a mean of chi-squares, where the dwell is too short for 10 %.
+        const double band = std::max(0.1, 3.29 * std::sqrt(2.0 / (3.0 * d.used)));
+        if (std::abs(d.nis_per_dof - 1.0) > band) {
+            warnings.push_back(dwell_name(d) + "normalised innovation squared is " +
+                               std::to_string(d.nis_per_dof) +
+                               " per degree of freedom, expected 1 within " + std::to_string(band) +
+                               ": check the noise settings");
+        }
+    }
+    return warnings;
+}
+
+std::string unobservable_warning(const std::array<bool, kParameters>& observable) {
+    std::string names;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        if (!observable[i]) names += std::string(names.empty() ? "" : " ") + parameter_names()[i];
+    }
+    return names.empty() ? names
+                         : "not determined one by one by these positions and levels: " + names;
+}
+
+}  // namespace
+
+bool Identification::Impl::two_runs() const noexcept {
+    return filters[0].kappa.dwells > 0 && filters[1].kappa.dwells > 0;
+}
+
+void Identification::Impl::solve(Solution& out) const noexcept {
+    const auto take = [](const DriftFilter& filter, ParameterArray& value, Covariance& covariance) {
+        std::copy_n(filter.state().constants(), kParameters, value.begin());
+        filter.state().covariance(covariance.data());
+    };
+    if (settings.method == Method::joint) {
+        take(filters[0].filter, out.value, out.covariance);
+        out.found = observability(out.covariance, prior, filters[0].kappa);
+        return;
+    }
+    out.found = {};
+    out.found.undetermined = kParameters;
+    out.found.directions.setIdentity();
+    take(filters[0].filter, out.value, out.covariance);
+    if (!two_runs() || refused_run) return;
+    RunSolution first, second, joined;
+    take(filters[0].filter, first.value, first.covariance);
+    take(filters[1].filter, second.value, second.covariance);
+    first.kappa = filters[0].kappa.mean;
+    second.kappa = filters[1].kappa.mean;
+    KappaSpread spread;
+    spread.add(first.kappa);
+    spread.add(second.kappa);
+    if (spread.one_level() || !recover(first, second, joined)) return;
+    out.value = joined.value;
+    out.covariance = joined.covariance;
+    out.found = observability(joined.covariance, prior, spread);
+}
+
+Result Identification::Impl::result() const {
+    Result out;
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t a = internal_of(i);
+        out.observable[i] = solution.found.observable[a];
+        const auto ka = static_cast<Eigen::Index>(a);
+        out.value[i] = out.observable[i] ? solution.value[a] : none;
+        out.sigma[i] =
+            out.observable[i] ? std::sqrt(std::max(0.0, solution.covariance(ka, ka))) : none;
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            const std::size_t b = internal_of(j);
+            const bool both = solution.found.observable[a] && solution.found.observable[b];
+            out.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+                both ? solution.covariance(ka, static_cast<Eigen::Index>(b)) : none;
+        }
+    }
+    out.combinations =
+        determined_combinations(solution.found, solution.covariance, solution.value, prior);
+    out.amplitudes = amplitudes_of(dwells, settings.accelerometer_g);
+    out.nis_per_dof = nis_count > 0 ? nis_sum / (3.0 * static_cast<double>(nis_count)) : 0.0;
+    out.samples = samples;
+    out.rejected = rejected;
+    out.dwells = dwells;
+    out.warnings = dwell_warnings(dwells);
+    if (settings.method == Method::two_step && (refused_run || !two_runs())) {
+        out.warnings.emplace_back(
+            "the two-step route needs exactly two runs of different vibration level");
+    }
+    if (std::string text = unobservable_warning(out.observable); !text.empty()) {
+        out.warnings.push_back(std::move(text));
+    }
+    if (dwells_not_kept > 0) {
+        out.warnings.push_back(std::to_string(dwells_not_kept) +
+                               " dwells have no summary: no room was set aside");
+    }
+    return out;
+}
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "estimator/observability.hpp"
+#include "estimator/parameters.hpp"
+
+namespace vibrig::estimator {
+
+/// What one run of the two-step route leaves behind: the filter with the squares along the output
+/// axes fixed at zero.
+struct RunSolution {
+    double kappa = 1;        ///< mean over its dwells of the final 1 + a0^2 / 2
+    ParameterArray value{};  ///< filter order
+    Covariance covariance = Covariance::Zero();
+};
+
+/// Standard deviations that fix D_OO at zero, else the prior's.
+[[nodiscard]] ParameterArray two_step_prior(const ParameterArray& prior) noexcept;
+
+/// Recovery of all 30 coefficients from two runs (Tang et al. 2009, eqs 14-16, for any kappa):
+/// everything of the run with the larger kappa, of the other only the constants. False, and `out`
+/// untouched, if the two kappas are equal.
+[[nodiscard]] bool recover(const RunSolution& first, const RunSolution& second,
+                           RunSolution& out) noexcept;
+
+}  // namespace vibrig::estimator

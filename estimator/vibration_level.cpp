@@ -1,0 +1,116 @@
+#include "estimator/vibration_level.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vibrig::estimator {
+namespace {
+
+/// Below this kappa - 1 the table is at rest.
+constexpr double kAtRest = 1e-4;
+
+std::size_t samples_in(double seconds, double period_s) noexcept {
+    return static_cast<std::size_t>(std::max(1.0, std::round(seconds / period_s)));
+}
+
+}  // namespace
+
+VibrationLevel::VibrationLevel(double window_s, double noise_g, double nominal_hz)
+    : window_s_(window_s),
+      noise_g_(noise_g),
+      nominal_hz_(nominal_hz),
+      ring_(static_cast<std::size_t>(window_s * kHighestRate_hz)),
+      valid_(std::make_unique<bool[]>(ring_.size())) {
+    begin(period_s_);
+}
+
+void VibrationLevel::begin(double period_s) noexcept {
+    period_s_ = period_s;
+    window_ = std::min(samples_in(window_s_, period_s), ring_.size());
+    refresh_every_ = samples_in(kRefresh_s, period_s);
+    fit_every_ = samples_in(1.0, period_s);
+    next_ = filled_ = since_refresh_ = since_fit_ = fit_age_ = 0;
+    whole_.clear();
+    fit_ = {};
+    kappa_ = 1;
+}
+
+void VibrationLevel::push(double value, bool valid) noexcept {
+    ring_[next_] = value;
+    valid_[next_] = valid;
+    if (++next_ == ring_.size()) next_ = 0;
+    filled_ = std::min(filled_ + 1, ring_.size());
+}
+
+void VibrationLevel::prime() noexcept {
+    fit(filled_);
+    for (std::size_t i = 0; i < filled_; ++i) {
+        if (!valid_[i]) ring_[i] = fit_.at(static_cast<double>(i) * period_s_);
+        whole_.add(ring_[i]);
+    }
+    refresh();
+}
+
+void VibrationLevel::add(double vertical_force_g) noexcept {
+    push(vertical_force_g, true);
+    whole_.add(vertical_force_g);
+    ++fit_age_;
+    after_push();
+}
+
+void VibrationLevel::add_missing() noexcept {
+    // A hole would not average out: one missing peak of 6 g in 400 samples moves the mean by 3 %.
+    if (since_fit_ >= refresh_every_) fit(std::min(filled_, samples_in(kFirstWindow_s, period_s_)));
+    const double value = fit_.at(static_cast<double>(fit_age_) * period_s_);
+    push(value, false);
+    whole_.add(value);
+    ++fit_age_;
+    after_push();
+}
+
+void VibrationLevel::after_push() noexcept {
+    ++since_fit_;
+    if (++since_refresh_ >= refresh_every_) refresh();
+    if (since_fit_ >= fit_every_) fit(std::min(filled_, window_));
+}
+
+void VibrationLevel::refresh() noexcept {
+    since_refresh_ = 0;
+    const std::size_t n = std::min(filled_, window_);
+    const std::size_t begin = (next_ + ring_.size() - n) % ring_.size();
+    kappa_ = kappa_of(hann_means(ring_.data(), ring_.size(), begin, n));
+}
+
+void VibrationLevel::fit(std::size_t samples) noexcept {
+    since_fit_ = 0;
+    const std::size_t begin = (next_ + ring_.size() - samples) % ring_.size();
+    fit_ =
+        lock_in({ring_.data(), valid_.get(), ring_.size(), begin, samples, period_s_}, nominal_hz_);
+    fit_age_ = samples;
+}
+
+double VibrationLevel::kappa_of(const HannMeans& means) const noexcept {
+    // Far from 1 g the dwell is rejected anyway; a level is not made up from it.
+    if (!(std::abs(means.mean) > 0.1)) return kappa_;
+    const double kappa = means.mean_square / (means.mean * means.mean) - noise_g_ * noise_g_;
+    return kappa - 1.0 < kAtRest ? 1.0 : kappa;
+}
+
+VibrationLevel::Whole VibrationLevel::whole() const noexcept {
+    const HannMeans means = whole_.means();
+    return {kappa_of(means), means.mean};
+}
+
+double VibrationLevel::amplitude_g() const noexcept { return std::sqrt(2.0 * (kappa_ - 1.0)); }
+
+double VibrationLevel::frequency_hz() const noexcept {
+    return kappa_ > 1.0 ? fit_.frequency_hz : 0.0;
+}
+
+bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s) noexcept {
+    const double half_rate = 0.5 / period_s;
+    const double m = std::max(1.0, std::round(frequency_hz / half_rate));
+    return std::abs(frequency_hz - m * half_rate) < 2.0 / window_s;
+}
+
+}  // namespace vibrig::estimator

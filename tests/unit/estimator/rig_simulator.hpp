@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <random>
+
+#include "estimator/identification.hpp"
+
+namespace vibrig::estimator::testing {
+
+/// Positions of Tang et al. 2009, Table 1: alpha, beta, gamma, deg.
+extern const std::array<std::array<double, 3>, 14> kTable1;
+/// Table 2 in the order of parameter_names().
+extern const std::array<double, kParameters> kTable2;
+
+struct SimulatedDwell {
+    DwellInfo info;
+    std::array<double, 3> angles_deg{};
+    double amplitude_g = 6;  ///< at the platform
+    double frequency_hz = 15;
+    double second_harmonic = 0;  ///< of the fundamental
+    double duration_s = 100;
+    double period_s = 0.025;
+    double spike_probability = 0;  ///< per angle, 0.5 deg
+    double lost_probability = 0;   ///< per sample
+    double force_scale = 1;
+};
+
+/// A rig of its own: up = +y, cyclic gyro axes, drift sign -1, latitude 45.75 deg, written a second
+/// time and from the original model, with the vibration explicit; shares no code with the
+/// estimator.
+class RigSimulator {
+  public:
+    explicit RigSimulator(std::uint64_t seed) : random_(seed) {}
+
+    std::array<double, kParameters> truth = kTable2;
+    double resolver_arcsec = 5, random_walk_deg_per_rt_h = 0.001, force_noise_g = 1e-4;
+    bool quantise = true;
+
+    /// Feeds one dwell, from begin_dwell to end_dwell.
+    DwellSummary dwell(Identification& to, const SimulatedDwell& plan);
+    /// All positions of Table 1 at the given amplitudes, one run each.
+    void campaign(Identification& to, std::array<double, 2> amplitudes_g, SimulatedDwell plan = {});
+
+  private:
+    double gauss() { return normal_(random_); }
+
+    std::mt19937_64 random_;
+    std::normal_distribution<double> normal_;
+    std::uniform_real_distribution<double> uniform_;
+};
+
+}  // namespace vibrig::estimator::testing
