@@ -24,7 +24,6 @@ TEST(Campaign, TwoLevelsDetermineAllThirtyCoefficients) {
         EXPECT_TRUE(result.observable[i]) << parameter_names()[i];
         EXPECT_LT(std::abs(result.value[i] - kTable2[i]), 4 * result.sigma[i])
             << parameter_names()[i];
-                    result.sigma[i]);
     }
     EXPECT_TRUE(result.combinations.empty());
     EXPECT_NEAR(result.nis_per_dof, 1.0, 0.02);
