@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "estimator/identification.hpp"
+
+namespace vibrig::estimator {
+
+/// One dwell of a plan before it is run.
+struct PlannedDwell {
+    std::array<double, 3> angles_deg{};  ///< gimbal angles at its start: outer, inner, azimuth
+    double kappa = 1;                    ///< 1 + a0^2 / 2, a0 at the platform in g
+    double duration_s = 100;
+};
+
+/// Variance of one angle rate, (deg/h)^2, from a dwell whose rate is otherwise unknown.
+[[nodiscard]] double rate_variance(const Settings& settings, double duration_s, double period_s);
+
+/// Cramer-Rao bounds (1 sigma, no prior) of the coefficients for a plan, in the order of
+/// parameter_names(); infinite where the plan does not determine a coefficient. `nominal` (same
+/// order) moves the platform to where it is in the middle of each dwell.
+[[nodiscard]] std::array<double, kParameters> predicted_sigma(
+    const Settings& settings, const std::vector<PlannedDwell>& plan,
+    const std::array<double, kParameters>& nominal, double period_s = 0.025);
+
+}  // namespace vibrig::estimator
