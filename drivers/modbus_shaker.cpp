@@ -120,8 +120,9 @@ void ModbusShaker::work(Time now) {
     }
     if (stop && (!stop_tried_ || now >= next_stop_)) return write_stop(now);
     if (watchdog_due(now)) return serve_watchdog(now);
-    if (now >= next_poll_) return poll(now);
+    // Before the poll, which a slow line may have due all the time; it ends with one of its own.
     if (!stop && orders_.waiting()) return write_set_point();
+    if (now >= next_poll_) return poll(now);
     sleep_until(std::min(next_poll_, stop ? next_stop_ : next_feed_));
 }
 

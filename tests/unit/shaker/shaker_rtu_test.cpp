@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "test_bench.hpp"
+
+namespace vibrig::drivers::test {
+namespace {
+
+using Kind = Answer::Kind;
+
+TEST(ShakerRtu, WritesAndReadsBackOverASerialLine) {
+    TestServer server(TestServer::Line::rtu);
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply({15.0, 3.5, 4.0}));
+    EXPECT_EQ(addresses_written(server), (std::vector{kFrequency, kRampTime, kAmplitude, kRun}));
+    EXPECT_DOUBLE_EQ(bench.shaker->reading().measured_g, 3.5);
+    bench.shaker->stop_now();
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    EXPECT_EQ(server.holding(kRun), 0);
+}
+
+struct Fault {
+    Kind kind;
+    const char* name;
+    std::uint64_t ShakerCounters::*counter;
+};
+class ShakerRtuWire : public testing::TestWithParam<Fault> {};
+
+TEST_P(ShakerRtuWire, OpensTheLineAgain) {
+    TestServer server(TestServer::Line::rtu);
+    ShakerSettings settings = settings_for(server);
+    settings.response_timeout = 200 * kMillisecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.reaches(LinkState::running));
+    std::atomic<bool> spoiled = false;
+    server.script([&](const Request& request) {
+        return request.function == 3 && !spoiled.exchange(true) ? Answer{GetParam().kind, 0, {}}
+                                                                : Answer{};
+    });
+    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects == 1; }));
+    ASSERT_TRUE(bench.reaches(LinkState::running));
+    EXPECT_EQ(bench.shaker->counters().*GetParam().counter, 1U);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, ShakerRtuWire,
+    testing::Values(Fault{Kind::hang, "NoReply", &ShakerCounters::timeouts},
+                    Fault{Kind::damaged, "WrongChecksum", &ShakerCounters::wrong_replies},
+                    Fault{Kind::wrong_unit, "WrongUnit", &ShakerCounters::wrong_replies}),
+    [](const auto& fault) { return fault.param.name; });
+
+TEST(ShakerRtu, SendsAStopAsSoonAsTheLineIsFree) {
+    // GIVEN a device that does not answer one request
+    TestServer server(TestServer::Line::rtu);
+    ShakerSettings settings = settings_for(server);
+    settings.response_timeout = 200 * kMillisecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.apply({15.0, 3.5, 4.0}));
+    std::atomic<bool> hung = false;
+    server.script([&](const Request& request) {
+        return !request.is_write() && !hung.exchange(true) ? Answer{Kind::hang, 0, {}} : Answer{};
+    });
+    ASSERT_TRUE(bench.eventually([&] { return hung.load(); }));
+    server.forget();
+    bench.shaker->stop_now();
+    // THEN the stop is the first that is sent after its timeout
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    EXPECT_TRUE(server.requests().front().writes(kRun, 0));
+    EXPECT_EQ(bench.shaker->counters().timeouts, 1U);
+}
+
+TEST(ShakerRtu, WaitsForADeviceThatIsNotThere) {
+    ShakerSettings settings;
+    settings.transport = ShakerSettings::Transport::rtu;
+    settings.device = "/dev/vibrig-no-such-line";
+    settings.backoff_min = 2 * kMillisecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.reaches(LinkState::connecting));
+    EXPECT_NE(bench.said().front().second.find("No such file"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vibrig::drivers::test
