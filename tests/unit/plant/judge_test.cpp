@@ -1,0 +1,70 @@
+#include "tests/plant/judge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace vibrig::plant {
+namespace {
+
+nlohmann::json perfect() {
+    nlohmann::json root;
+    const Truth truth;
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        for (std::size_t term = 0; term < kTerms; ++term) {
+            root["parameters"].push_back({{"name", coefficient_name(gyro, term)},
+                                          {"value", truth.coefficients[gyro][term] + 0.001},
+                                          {"sigma", 0.001},
+                                          {"unit", coefficient_unit(term)},
+                                          {"observable", true}});
+        }
+    }
+    return root;
+}
+Verdict judged(const nlohmann::json& root, double sigma = 4) {
+    return judge(root.dump(), "result.json", Truth{}, sigma);
+}
+
+TEST(Judge, PassesThirtyGoodCoefficients) {
+    const Verdict verdict = judged(perfect());
+    EXPECT_TRUE(verdict.passed);
+    ASSERT_EQ(verdict.coefficients.size(), 30U);
+    EXPECT_NEAR(verdict.coefficients[7].ratio, 1, 1e-9);
+    EXPECT_NE(table_of(verdict).find("all 30 within"), std::string::npos);
+}
+
+TEST(Judge, FailsWhatIsFarMissingNullOrUnobservable) {
+    const auto fails = [](const char* what, auto change) {
+        nlohmann::json root = perfect();
+        change(root["parameters"]);
+        const Verdict verdict = judged(root);
+        EXPECT_FALSE(verdict.passed) << what;
+        EXPECT_FALSE(verdict.coefficients[verdict.worst].fault.empty()) << what;
+    };
+    fails("far", [](nlohmann::json& p) { p[3]["value"] = p[3]["value"].get<double>() + 0.0041; });
+    fails("missing", [](nlohmann::json& p) { p.erase(4); });
+    fails("null value", [](nlohmann::json& p) { p[5]["value"] = nullptr; });
+    fails("null sigma", [](nlohmann::json& p) { p[5]["sigma"] = nullptr; });
+    fails("zero sigma", [](nlohmann::json& p) { p[5]["sigma"] = 0; });
+    fails("empty", [](nlohmann::json& p) { p = nlohmann::json::array(); });
+    nlohmann::json root = perfect();
+    root["parameters"][9]["observable"] = false;
+    EXPECT_FALSE(judged(root).passed);
+    root = perfect();
+    root["parameters"][9]["unit"] = "deg/s";
+    EXPECT_FALSE(judged(root).passed);
+    EXPECT_FALSE(judged(perfect(), 0.5).passed);
+}
+
+TEST(Judge, RefusesWhatIsNoResult) {
+    for (const char* text :
+         {"", "{", "[]", "{}", R"({"parameters": 3})", R"({"parameters": [{"value": 1}]})"}) {
+        EXPECT_THROW(static_cast<void>(judge(text, "result.json", Truth{}, 4)), PlantError) << text;
+    }
+    nlohmann::json root = perfect();
+    root["parameters"].push_back(root["parameters"][0]);
+    EXPECT_THROW(static_cast<void>(judged(root)), PlantError);
+}
+
+}  // namespace
+}  // namespace vibrig::plant

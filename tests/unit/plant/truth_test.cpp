@@ -1,0 +1,88 @@
+#include "tests/plant/truth.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace vibrig::plant {
+namespace {
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string complaint(const std::string& json) {
+    try {
+        static_cast<void>(parse_truth(json, "truth.json"));
+    } catch (const PlantError& error) {
+        return error.what();
+    }
+    return "none";
+}
+
+TEST(Truth, SurvivesWritingAndReading) {
+    Truth truth;
+    truth.coefficients[2][kOS] = 0.123456789012345;
+    truth.up = {2, -1};
+    truth.matrix[0][1] = 2.4e-4;
+    truth.seed = 0xffffffffffffffffULL;
+    const std::string json = to_json(truth);
+    EXPECT_EQ(to_json(parse_truth(json, "truth.json")), json);
+    EXPECT_EQ(parse_truth(json, "truth.json").coefficients, truth.coefficients);
+}
+
+TEST(Truth, DefaultIsTable2) {
+    const Truth truth;
+    EXPECT_EQ(truth.coefficients[0][kF], 1);
+    EXPECT_EQ(truth.coefficients[0][kI], -1);
+    EXPECT_EQ(truth.coefficients[0][kS], 1);
+    EXPECT_EQ(truth.coefficients[0][kO], -1);
+    EXPECT_EQ(truth.coefficients[1][kII], -0.03);
+    EXPECT_EQ(truth.coefficients[1][kSS], 0.03);
+    EXPECT_EQ(truth.coefficients[1][kOO], -0.03);
+    EXPECT_EQ(truth.coefficients[2][kIS], -0.03);
+    EXPECT_EQ(truth.coefficients[2][kIO], 0.03);
+    EXPECT_EQ(truth.coefficients[2][kOS], -0.03);
+    EXPECT_EQ(coefficient_name(1, kSS), "D_SSy");
+    EXPECT_EQ(coefficient_unit(kF), "deg/h");
+    EXPECT_EQ(coefficient_unit(kS), "deg/h/g");
+    EXPECT_EQ(coefficient_unit(kII), "deg/h/g^2");
+}
+
+TEST(Truth, NamesTheKeyOfBadInput) {
+    const std::string good = to_json(Truth{});
+    EXPECT_EQ(complaint(good), "none");
+    const auto expect = [](const std::string& json, const char* part) {
+        EXPECT_NE(complaint(json).find(part), std::string::npos) << complaint(json);
+    };
+    expect(replaced(good, "\"D_OSy\"", "\"D_OSq\""), "coefficients.D_OSy: missing");
+    expect(replaced(good, "\"D_Fx\": 1.0", "\"D_Fx\": 1.0, \"D_Fw\": 2"),
+           "coefficients.D_Fw: unknown key");
+    expect(replaced(good, "\"D_Fx\": 1.0", "\"D_Fx\": null"), "coefficients.D_Fx: found null");
+    expect(replaced(good, "\"D_Fx\": 1.0", "\"D_Fx\": 1e999"), "truth.json");
+    expect(replaced(good, "\"latitude_deg\"", "\"lattitude_deg\""),
+           "site.lattitude_deg: unknown key");
+    expect(replaced(good, "\"latitude_deg\": 45.75", "\"latitude_deg\": 95"),
+           "site.latitude_deg: found 95");
+    expect(replaced(good, "\"noise\"", "\"nois\""), "nois: unknown key");
+    expect(replaced(good, "\"up\": \"+y\"", "\"up\": \"y\""), "platform.up: found \"y\"");
+    expect(replaced(good, "\"drift_sign\": -1", "\"drift_sign\": 0"), "expected -1 or 1");
+    expect(replaced(good, "\"transmission\":", "\"transmission\": \"a lot\", \"x\":"),
+           "isolator.transmission");
+    expect(replaced(good, "\"seed\": 1", "\"seed\": -1"), "seed: found -1");
+    expect("", "not JSON");
+    expect("[1, 2]", "expected an object");
+    expect("{}", "coefficients: missing");
+    expect(good.substr(0, good.size() / 2), "not JSON");
+}
+
+TEST(Truth, RefusesAnAxisUsedTwice) {
+    Truth truth;
+    truth.gyro_axes[1][0] = truth.gyro_axes[1][1];
+    EXPECT_NE(complaint(to_json(truth)).find("gyro_y_axes"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vibrig::plant
