@@ -74,6 +74,12 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
             "rejected",
             true);
+    } else if (s.kappa > 1.0 && r.period_s > 0 &&
+               VibrationLevel::excluded(settings.frequency_hz, r.period_s, window_s, 3)) {
+        flag(
+            "vibration.frequency_hz is close to a third of the sample rate: a second harmonic of "
+            "the shaker falsifies the level",
+            false);
     } else if (s.rejected > kRejectedTolerance * s.samples) {
         flag("more than 1 % of the samples rejected", false);
     }

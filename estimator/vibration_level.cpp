@@ -107,10 +107,12 @@ double VibrationLevel::frequency_hz() const noexcept {
     return kappa_ > 1.0 ? fit_.frequency_hz : 0.0;
 }
 
-bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s) noexcept {
-    const double half_rate = 0.5 / period_s;
-    const double m = std::max(1.0, std::round(frequency_hz / half_rate));
-    return std::abs(frequency_hz - m * half_rate) < 2.0 / window_s;
+bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s,
+                              int order) noexcept {
+    const double rate = 1.0 / period_s;
+    const double product = order * frequency_hz;
+    const double m = std::max(1.0, std::round(product / rate));
+    return std::abs(product - m * rate) < 4.0 / window_s;
 }
 
 }  // namespace vibrig::estimator

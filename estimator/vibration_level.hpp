@@ -49,10 +49,12 @@ class VibrationLevel {
     /// Over everything since begin().
     [[nodiscard]] Whole whole() const noexcept;
 
-    /// True if at this frequency and sample period 2f or f aliases to within 2 / window_s of zero:
-    /// no test on the data can tell the level then.
-    [[nodiscard]] static bool excluded(double frequency_hz, double period_s,
-                                       double window_s) noexcept;
+    /// True if at this sample period order * f aliases to within 4 / window_s of zero. Order 2 is
+    /// the square of the vibration itself: no test on the data can tell the level then. Order 3 is
+    /// the product of the vibration with its second harmonic, order 4 the square of that: kappa is
+    /// wrong by up to e a0^2 / kappa and e^2 a0^2 / (2 kappa) for a harmonic of relative size e.
+    [[nodiscard]] static bool excluded(double frequency_hz, double period_s, double window_s,
+                                       int order = 2) noexcept;
 
   private:
     void push(double value, bool valid) noexcept;

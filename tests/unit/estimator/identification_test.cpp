@@ -1,0 +1,234 @@
+#include "estimator/identification.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/unit/estimator/allocation_count.hpp"
+#include "tests/unit/estimator/rig_simulator.hpp"
+
+namespace vibrig::estimator::testing {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kRad = 3.14159265358979323846 / 180;
+
+/// A platform that stands still at (0, 0, 0) with the table at 15 Hz.
+Measurement still(int n, double amplitude_g = 6, double period_s = 0.025) {
+    Measurement m;
+    m.time_s = n * period_s;
+    m.force_g = {0, 1 + amplitude_g * std::sin(2 * 180 * kRad * 15 * m.time_s), 0};
+    return m;
+}
+
+void feed(Identification& to, int from, int until) {
+    for (int n = from; n < until; ++n) to.add(still(n));
+}
+
+TEST(Identification, NeitherAllocatesNorKeepsGrowing) {
+    Identification identification{Settings{}, 64};
+    RigSimulator rig(40);
+    SimulatedDwell plan;
+    plan.duration_s = 12;
+    plan.lost_probability = 0.01;
+    plan.spike_probability = 0.01;
+    rig.dwell(identification, plan);
+    // GIVEN dwells with gaps, spikes, long pauses and a last summary that has no room
+    const std::size_t before = allocations();
+    Estimate estimate;
+    for (int dwell = 0; dwell < 70; ++dwell) {
+        identification.begin_dwell({1 + dwell % 2, dwell, -1});
+        for (int n = 0; n < 200; ++n) {
+            Measurement m = still(n + (n > 120 ? 100 : 0), dwell % 2 == 0 ? 6 : 4);
+            if (n % 37 == 0) m.force_good = false;
+            if (n % 41 == 0) m.angle_rad[0] = 1;
+            identification.add(m);
+            if (n % 20 == 0) identification.estimate(estimate);
+        }
+        identification.end_dwell();
+    }
+    // THEN the heap was not touched
+    EXPECT_EQ(allocations() - before, 0U);
+    EXPECT_EQ(identification.result().dwells.size(), 64U);
+}
+
+TEST(Identification, BuffersTwoSecondsThenUsesThemAll) {
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    for (int n = 0; n < 79; ++n)
+        EXPECT_EQ(identification.add(still(n)).outcome, StepOutcome::buffered) << n;
+    EXPECT_EQ(identification.add(still(79)).outcome, StepOutcome::used);
+    Estimate estimate;
+    identification.estimate(estimate);
+    EXPECT_NEAR(estimate.kappa, 19, 19 * 1.5e-4);
+    EXPECT_NEAR(estimate.frequency_hz, 15, 1e-3);
+    const DwellSummary summary = identification.end_dwell();
+    EXPECT_EQ(summary.samples, 80U);
+    EXPECT_EQ(summary.used, 80U);
+}
+
+TEST(Identification, TakesWhatAShortDwellHas) {
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    feed(identification, 0, 40);
+    const DwellSummary summary = identification.end_dwell();
+    EXPECT_EQ(summary.used, 40U);
+    EXPECT_FALSE(summary.flagged) << summary.reason;
+    EXPECT_NEAR(summary.kappa, 19, 0.05);
+    // and an empty one is no more than flagged
+    identification.begin_dwell({});
+    EXPECT_TRUE(identification.end_dwell().flagged);
+}
+
+TEST(Identification, NeverTakesInWhatIsNotANumber) {
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    feed(identification, 0, 100);
+    Measurement m = still(100);
+    m.angle_rad[1] = kNan;
+    EXPECT_EQ(identification.add(m).outcome, StepOutcome::bad_angles);
+    m = still(101);
+    m.angle_rad[1] = 85 * kRad;  // the gimbals are singular near there
+    EXPECT_EQ(identification.add(m).outcome, StepOutcome::bad_angles);
+    m = still(102);
+    m.force_g[2] = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(identification.add(m).outcome, StepOutcome::bad_force);
+    m = still(103);
+    m.force_good = false;
+    EXPECT_EQ(identification.add(m).outcome, StepOutcome::bad_force);
+    m = still(104);
+    m.time_s = kNan;
+    EXPECT_EQ(identification.add(m).outcome, StepOutcome::bad_time);
+    EXPECT_EQ(identification.add(still(50)).outcome, StepOutcome::bad_time);
+    EXPECT_EQ(identification.add(still(105)).outcome, StepOutcome::used);
+    feed(identification, 106, 200);
+    const DwellSummary summary = identification.end_dwell();
+    EXPECT_EQ(summary.samples, summary.used + summary.rejected);
+    EXPECT_EQ(summary.rejected, 4U);
+    EXPECT_NEAR(summary.kappa, 19, 19 * 1e-4);
+    Estimate estimate;
+    identification.estimate(estimate);
+    for (double v : estimate.value) EXPECT_TRUE(std::isfinite(v));
+}
+
+TEST(Identification, RecoversFromOneStampInTheFuture) {
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    feed(identification, 0, 100);
+    Measurement m = still(100);
+    m.time_s = 1e9;
+    identification.add(m);
+    feed(identification, 101, 300);
+    const DwellSummary summary = identification.end_dwell();
+    EXPECT_LE(summary.rejected, 5U);
+    EXPECT_GE(summary.used, 280U);
+}
+
+TEST(Identification, AGapOfMoreThanASecondStartsTheAnglesAfresh) {
+    // GIVEN a dwell in which the platform is elsewhere after a pause
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    feed(identification, 0, 200);
+    for (int n = 260; n < 460; ++n) {
+        Measurement m = still(n);
+        m.angle_rad = {0, 0, 45 * kRad};
+        m.force_g = {-m.force_g[1] * std::sin(45 * kRad), m.force_g[1] * std::cos(45 * kRad), 0};
+        identification.add(m);
+    }
+    const DwellSummary summary = identification.end_dwell();
+    // THEN nothing is gated and the level is that of both stretches
+    EXPECT_EQ(summary.rejected, 0U);
+    EXPECT_NEAR(summary.kappa, 19, 19 * 1e-4);
+    EXPECT_NEAR(summary.mean_force_g, 1, 1e-4);
+}
+
+TEST(Identification, GatedSamplesStandAsideAndFiveInARowRestart) {
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    feed(identification, 0, 2000);
+    Measurement spike = still(2000);
+    spike.angle_rad[2] = 0.5 * kRad;
+    const StepResult step = identification.add(spike);
+    EXPECT_EQ(step.outcome, StepOutcome::gated);
+    EXPECT_NEAR(step.innovation_arcsec[2], 1800, 50);
+    EXPECT_EQ(identification.add(still(2001)).outcome, StepOutcome::used);
+    for (int n = 2002; n < 2007; ++n) {
+        spike = still(n);
+        spike.angle_rad[2] = 0.5 * kRad;
+        EXPECT_EQ(identification.add(spike).outcome,
+                  n < 2006 ? StepOutcome::gated : StepOutcome::reinitialised);
+    }
+    EXPECT_EQ(identification.end_dwell().reinitialised, 1U);
+}
+
+TEST(Identification, ADwellWhoseGravityIsWrongIsTakenOutAgain) {
+    // GIVEN one good dwell
+    Identification identification{Settings{}};
+    RigSimulator rig(41);
+    SimulatedDwell plan;
+    plan.duration_s = 10;
+    rig.dwell(identification, plan);
+    Estimate before, after;
+    identification.estimate(before);
+    // WHEN the accelerometers read 3 % too much in the next one
+    plan.force_scale = 1.03;
+    const DwellSummary summary = rig.dwell(identification, plan);
+    identification.estimate(after);
+    // THEN it leaves no trace but its counts
+    EXPECT_TRUE(summary.flagged);
+    EXPECT_NEAR(summary.mean_force_g, 1.03, 1e-3);
+    EXPECT_EQ(summary.used, 0U);
+    EXPECT_EQ(before.value, after.value);
+    EXPECT_EQ(before.sigma, after.sigma);
+    EXPECT_EQ(after.samples, after.used + after.rejected);
+    EXPECT_FALSE(identification.result().warnings.empty());
+}
+
+TEST(Identification, AFrequencyAtHalfTheSampleRateIsRefused) {
+    Settings settings;
+    settings.frequency_hz = 20.1;
+    Identification identification(settings);
+    RigSimulator rig(42);
+    SimulatedDwell plan;
+    plan.frequency_hz = 20.1;
+    plan.duration_s = 10;
+    EXPECT_EQ(rig.dwell(identification, plan).used, 0U);
+    plan.amplitude_g = 0;
+    EXPECT_EQ(rig.dwell(identification, plan).used, 400U) << "at rest there is nothing to alias";
+}
+
+TEST(Identification, RefusesSettingsThatCannotWorkByName) {
+    const auto message = [](auto change) -> std::string {
+        Settings settings;
+        change(settings);
+        try {
+            const Identification identification(settings);
+        } catch (const SettingsError& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_EQ(message([](Settings&) {}), "");
+    EXPECT_NE(message([](Settings& s) {
+                  s.gyro_axes[1][2] = {1, 1};
+              }).find("platform.gyro_y_axes"),
+              std::string::npos);
+    EXPECT_NE(
+        message([](Settings& s) { s.latitude_deg = kNan; }).find("site.latitude_deg: got nan"),
+        std::string::npos);
+    EXPECT_NE(message([](Settings& s) { s.level_window_s = 1; }).find("vibration.level_window_s"),
+              std::string::npos);
+    EXPECT_NE(message([](Settings& s) { s.up.sign = 0; }).find("platform.up"), std::string::npos);
+    EXPECT_NE(message([](Settings& s) { s.resolver_arcsec = -5; }).find("noise.resolver_arcsec"),
+              std::string::npos);
+    EXPECT_NE(message([](Settings& s) { s.prior_linear = 0; }).find("estimator.prior_sigma.linear"),
+              std::string::npos);
+    EXPECT_NE(message([](Settings& s) {
+                  s.accelerometer_matrix[2] = {0, 0, 0};
+              }).find("accelerometer.matrix"),
+              std::string::npos);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::testing
