@@ -298,8 +298,11 @@ bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
     const bool running = image_.value_of(map.run) != 0;
     const bool excite = nonzero(encoded(map.amplitude, set_point.amplitude_g));
     std::vector<Step> steps;
-    if (!same_raw(map.frequency, encoded(map.frequency, set_point.frequency_hz),
-                  image_.words_of(map.frequency))) {
+    // On the way to zero the frequency does not matter: nothing may keep the shaker from coming
+    // down.
+    const auto frequency = encoded(map.frequency, set_point.frequency_hz);
+    if ((excite || (!running && nonzero(frequency))) &&
+        !same_raw(map.frequency, frequency, image_.words_of(map.frequency))) {
         // Frequency changes only at zero amplitude; at rest the register may still hold the last
         // one.
         if (!running && nonzero(image_.words_of(map.amplitude)))

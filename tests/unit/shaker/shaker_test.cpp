@@ -97,6 +97,23 @@ TEST(Shaker, EndsARunWithAmplitudeZeroAndRunZero) {
     EXPECT_TRUE(bench.shaker->reading().at_rest());
 }
 
+TEST(Shaker, ComesDownWhateverTheFrequency) {
+    // GIVEN a device that refuses another frequency in motion, as devices do
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply({15.0, 1.0, 1.0}));
+    server.script([](const Request& request) {
+        return request.writes(kFrequency) ? Answer{Kind::exception, 3, {}} : Answer{};
+    });
+    // WHEN it is told to come down, with a frequency that is not the present one
+    server.forget();
+    ASSERT_TRUE(bench.apply({20.0, 0.0, 1.0}));
+    // THEN it does
+    EXPECT_EQ(addresses_written(server), (std::vector{kRampTime, kAmplitude, kRun}));
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_EQ(bench.shaker->counters().exceptions, 0U);
+}
+
 TEST(Shaker, ZeroesAnOldAmplitudeBeforeItChangesTheFrequency) {
     // GIVEN a device at rest that still holds the amplitude of a run that was stopped
     TestServer server;
