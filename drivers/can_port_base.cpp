@@ -22,6 +22,7 @@ namespace {
 using std::chrono::milliseconds;
 constexpr milliseconds kBackoffMin{100};
 constexpr milliseconds kBackoffMax{1000};
+constexpr milliseconds kLinkWatch{500};
 /// Full batches taken before other work of the io_context gets its turn.
 constexpr int kBatchesPerWake = 8;
 /// Batches taken from a socket that has failed: what it had queued is still good.
@@ -62,7 +63,7 @@ CanPortBase::CanPortBase(boost::asio::io_context& io, CanPortSettings settings, 
       place_(std::move(place)),
       pending_(std::make_shared<PendingOperations>()),
       socket_(io),
-      retry_(io),
+      timer_(io),
       backoff_(kBackoffMin) {
     refusing_fd_ = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     send_fd_ = ::fcntl(refusing_fd_, F_DUPFD_CLOEXEC, 0);
@@ -84,7 +85,7 @@ void CanPortBase::start(FrameHandler on_frames, StateHandler on_state, ErrorHand
     on_frames_ = std::move(on_frames);
     on_state_ = std::move(on_state);
     on_error_ = std::move(on_error);
-    announced_ = false;
+    announced_ = stopped_ = false;
     backoff_ = kBackoffMin;
     const Refusal refusal = open();
     if (refusal.beyond_waiting) {
@@ -99,9 +100,10 @@ void CanPortBase::start(FrameHandler on_frames, StateHandler on_state, ErrorHand
 }
 
 void CanPortBase::stop() noexcept {
+    stopped_ = true;
     ++pending_->generation;
     try {
-        retry_.cancel();
+        timer_.cancel();
     } catch (const boost::system::system_error&) {
     }
     close();
@@ -128,9 +130,13 @@ CanPortBase::Refusal CanPortBase::open() {
     } else {
         enter(PortState::running, 0, "running");
     }
+    if (stopped_) return {};
     wait_readable();
+    if (settings_.kind == CanPortSettings::Kind::socketcan) watch_link();
     return {};
 }
+
+int CanPortBase::link_error(int) const noexcept { return 0; }
 
 void CanPortBase::set_common_options(int fd) const noexcept {
     const int on = 1;
@@ -157,13 +163,24 @@ void CanPortBase::wait_readable() {
 }
 
 void CanPortBase::retry_later() {
-    retry_.expires_after(backoff_);
+    if (stopped_) return;
+    timer_.expires_after(backoff_);
     backoff_ = std::min(backoff_ * 2, kBackoffMax);
-    retry_.async_wait(completion([this] {
+    timer_.async_wait(completion([this] {
         const Refusal refusal = open();
         if (refusal.text[0] == '\0') return;
         enter(refusal.state, refusal.error, refusal.text);
         retry_later();
+    }));
+}
+
+/// The kernel tells a socket only once that its interface went down, and a send() in another thread
+/// may be the one to hear it.
+void CanPortBase::watch_link() {
+    timer_.expires_after(kLinkWatch);
+    timer_.async_wait(completion([this] {
+        if (const int error = link_error(socket_.native_handle())) return lost(error);
+        watch_link();
     }));
 }
 
@@ -266,6 +283,7 @@ void CanPortBase::watch_controller(const canfd_frame& error_frame) {
 }
 
 void CanPortBase::lost(int error) {
+    ++pending_->generation;  // neither the socket's nor the watch's completion counts any more
     close();
     if (error == ENODEV) {
         enter(PortState::absent, error, "gone, waiting");

@@ -45,6 +45,9 @@ class CanPortBase : public CanPort {
         Refusal refusal;
     };
     [[nodiscard]] virtual Opened open_socket() noexcept = 0;
+    /// Why the link under an open socket cannot carry frames, as errno; 0: it can, or the socket
+    /// itself would tell.
+    [[nodiscard]] virtual int link_error(int fd) const noexcept;
     /// Options both kinds want: time stamps, receive buffer.
     void set_common_options(int fd) const noexcept;
 
@@ -62,6 +65,7 @@ class CanPortBase : public CanPort {
     void close() noexcept;
     void wait_readable();
     void retry_later();
+    void watch_link();
     void on_readable();
     /// Hands the frames of one batch on. Returns how many packets at its end were empty: the caller
     /// knows whether these are packets at all or the end of the connection.
@@ -77,7 +81,7 @@ class CanPortBase : public CanPort {
     const std::string place_;
     std::shared_ptr<PendingOperations> pending_;
     Descriptor socket_;
-    Timer retry_;
+    Timer timer_;  ///< to the next attempt, or while running to the next look at the link
     std::chrono::milliseconds backoff_;
     FrameHandler on_frames_;
     StateHandler on_state_;
@@ -87,7 +91,8 @@ class CanPortBase : public CanPort {
     /// unconnected one that refuses.
     int send_fd_ = -1;
     int refusing_fd_ = -1;
-    bool announced_ = false;
+    bool announced_ = false;       ///< the present state has been told
+    bool stopped_ = true;          ///< possibly by a handler
     std::uint32_t overflows_ = 0;  ///< of this socket so far
     Time last_time_ = 0;
     ReceiveBatch batch_;

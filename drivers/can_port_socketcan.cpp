@@ -43,9 +43,27 @@ class SocketCanPort final : public CanPortBase {
         return {fd, {}};
     }
 
-    Refusal configure(int fd) const noexcept {
+    int link_error(int fd) const noexcept override {
+        ifreq request = named();
+        if (::ioctl(fd, SIOCGIFFLAGS, &request) != 0) return errno;
+        if ((static_cast<unsigned>(request.ifr_flags) & IFF_UP) == 0) return ENETDOWN;
+        sockaddr_can address{};
+        socklen_t length = sizeof address;
+        if (::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &length) != 0) return errno;
+        if (::ioctl(fd, SIOCGIFINDEX, &request) != 0) return errno;
+        return request.ifr_ifindex == address.can_ifindex
+                   ? 0
+                   : ENODEV;  // made anew under the same name
+    }
+
+    [[nodiscard]] ifreq named() const noexcept {
         ifreq request{};
         std::strncpy(request.ifr_name, settings().interface.c_str(), IFNAMSIZ - 1);
+        return request;
+    }
+
+    Refusal configure(int fd) const noexcept {
+        ifreq request = named();
         if (::ioctl(fd, SIOCGIFHWADDR, &request) != 0) {
             return {PortState::absent, errno, "no such interface, waiting"};
         }

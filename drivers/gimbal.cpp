@@ -127,8 +127,7 @@ Time Gimbal::next_deadline() const noexcept {
         return kNever;
     Time deadline = kNever;
     if (!echoed_) deadline = std::min(deadline, sent_at_ + settings_.repeat);
-    if (state_ != GimbalState::in_position)
-        deadline = std::min(deadline, commanded_at_ + settings_.slew_timeout);
+    if (!arrived_) deadline = std::min(deadline, commanded_at_ + settings_.slew_timeout);
     if (state_ != GimbalState::no_status && status_at_ > 0) {
         deadline = std::min(deadline, status_at_ + settings_.status_deadline + 1);
     }
