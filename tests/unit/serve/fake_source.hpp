@@ -1,0 +1,65 @@
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "daemon/serve/event_log.hpp"
+#include "daemon/status.hpp"
+
+namespace vibrig::serve {
+
+/// A status in which no field has its default value, so that a forgotten one shows.
+[[nodiscard]] StatusData full_status();
+[[nodiscard]] estimator::Result full_result();
+
+/// A daemon without devices.
+class FakeSource : public StatusSource {
+  public:
+    FakeSource() : status_(full_status()) {}
+
+    [[nodiscard]] StatusData status() const override {
+        if (broken) throw std::runtime_error("no status today");
+        const std::lock_guard lock(mutex_);
+        return status_;
+    }
+    [[nodiscard]] std::vector<EventRecord> events(std::uint64_t after_id,
+                                                  std::size_t at_most) const override {
+        return log.after(after_id, at_most);
+    }
+    [[nodiscard]] estimator::Result result() const override { return full_result(); }
+    [[nodiscard]] std::string effective_configuration() const override {
+        return "can.interface = vcan0\n";
+    }
+    CommandReply command(const CommandRequest& request) override {
+        const std::lock_guard lock(mutex_);
+        requests_.push_back(request);
+        return reply_;
+    }
+
+    void set(const StatusData& status) {
+        const std::lock_guard lock(mutex_);
+        status_ = status;
+    }
+    void answer_commands_with(const CommandReply& reply) {
+        const std::lock_guard lock(mutex_);
+        reply_ = reply;
+    }
+    [[nodiscard]] std::vector<CommandRequest> requests() const {
+        const std::lock_guard lock(mutex_);
+        return requests_;
+    }
+
+    EventLog log;
+    std::atomic<bool> broken = false;
+
+  private:
+    mutable std::mutex mutex_;
+    StatusData status_;
+    CommandReply reply_{true, "done"};
+    std::vector<CommandRequest> requests_;
+};
+
+}  // namespace vibrig::serve

@@ -1,0 +1,76 @@
+#include "tests/unit/serve/fake_source.hpp"
+
+namespace vibrig::serve {
+
+StatusData full_status() {
+    StatusData s;
+    s.version = "0.1.0";
+    s.campaign_name = "rehearsal";
+    s.clock = "rig";
+    s.time = 1'234'500'000'000;
+    s.utc_ns = 1'700'000'000'250'000'000;
+    s.uptime = 1'300 * drivers::kSecond;
+    s.state = CampaignState::recording;
+    s.reason = "why not";
+    s.armed_by = "Ada";
+    s.run = 1;
+    s.runs = 2;
+    s.position = 3;
+    s.positions = 14;
+    s.position_deg = {180, 5, 45};
+    s.progress = 0.375;
+    s.remaining_s = 750;
+    s.command_table_g = 9;
+    s.command_frequency_hz = 15;
+    s.shaker = {1'234'400'000'000, true, 15, 9, 8.9987, 2, 4, true, true};
+    s.shaker_link = drivers::LinkState::degraded;
+    s.shaker_counters = {11, 12, 13, 14, 15, 16, 17, 18, 19};
+    s.can = drivers::PortState::running;
+    s.can_counters = {21, 22, 23, 24, 25, 26, 27, 28, 29};
+    s.assembler = {31, 32, 33, 34, 35, 36, 37, 38, 39, 40};
+    s.estimator_ring = {41, 42, 43};
+    s.sample.time = 1'234'475'000'000;
+    s.sample.sequence = 51;
+    s.sample.dropped_before = 52;
+    s.sample.angle = {3.141592653589793, 1, 2};
+    s.sample.force = {0.1, 1.2, -0.3};
+    s.sample.table_accel = 8.5;
+    s.channel_age_s = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7};
+    s.platform = {1'234'000'000'000, true, true, true, 31.25, true,
+                  1'234'100'000'000, true, true, 61};
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        s.estimate.value[i] = -0.5 - static_cast<double>(i);
+        s.estimate.sigma[i] = 0.01 * static_cast<double>(i + 1);
+        s.estimate.observable[i] = true;
+    }
+    s.estimate.amplitude_g = 5.99;
+    s.estimate.frequency_hz = 15.001;
+    s.estimate.kappa = 18.94;
+    s.estimate.samples = 71;
+    s.estimate.used = 72;
+    s.estimate.rejected = 73;
+    s.estimate.nis_per_dof = 1.02;
+    s.estimate.innovation_arcsec = {1.5, -2.5, 3.5};
+    s.estimate.dwells = 2;
+    s.dwells.push_back({1, 2, 4000, 3990, 10, 1, 18.9, 5.98, 15.0, 1.001, 0.99, true, "rejected"});
+    return s;
+}
+
+estimator::Result full_result() {
+    estimator::Result r;
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        r.value[i] = 1 + static_cast<double>(i);
+        r.sigma[i] = 0.5;
+        r.observable[i] = true;
+    }
+    r.covariance.setIdentity();
+    r.amplitudes.push_back({1, 5.99, 18.9, 0.002, 15.0});
+    r.combinations.push_back({{{"D_Fx", 1.0}, {"D_OOx", 19.0}}, 2.5, 0.1});
+    r.nis_per_dof = 1.01;
+    r.samples = 112'000;
+    r.rejected = 5;
+    r.warnings.emplace_back("one run only");
+    return r;
+}
+
+}  // namespace vibrig::serve

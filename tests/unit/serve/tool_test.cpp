@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <string>
+#include <thread>
+
+#include "daemon/serve/status_json.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "tests/unit/serve/fake_source.hpp"
+#include "tests/unit/serve/raw_connection.hpp"
+
+namespace vibrig::serve {
+namespace {
+
+struct Outcome {
+    int code = -1;
+    std::string output;  ///< standard output and error
+};
+
+Outcome vibrig(const std::string& arguments) {
+    const std::string command = std::string(VIBRIG_PROGRAM) + ' ' + arguments + " 2>&1";
+    FILE* const pipe = popen(command.c_str(), "r");
+    Outcome outcome;
+    std::array<char, 4096> block{};
+    while (const std::size_t got = std::fread(block.data(), 1, block.size(), pipe)) {
+        outcome.output.append(block.data(), got);
+    }
+    const int status = pclose(pipe);
+    outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return outcome;
+}
+
+class Tool : public testing::Test {
+  protected:
+    FakeSource source;
+    TemporaryFolder folder;
+    std::string path = folder.file("s");
+    std::string at = " --socket " + path;
+};
+
+TEST_F(Tool, PrintsTheStatusAsTheServerSaysIt) {
+    const StatusServer server(source, path);
+    const Outcome json = vibrig("status --json" + at);
+    EXPECT_EQ(json.code, 0) << json.output;
+    EXPECT_EQ(json.output, status_json(source.status()) + '\n');
+    const Outcome table = vibrig("status" + at);
+    EXPECT_EQ(table.code, 0) << table.output;
+    EXPECT_NE(table.output.find("RECORDING  run 1/2, position 3/14"), std::string::npos)
+        << table.output;
+    EXPECT_EQ(table.output.find('\x1b'), std::string::npos) << "no colours into a pipe";
+}
+
+TEST_F(Tool, SaysWhenNoDaemonRuns) {
+    for (const char* command : {"status", "status --json", "watch", "events", "arm --by Ada",
+                                "abort --by Ada", "ack trip --by Ada"}) {
+        const Outcome outcome = vibrig(command + at);
+        EXPECT_EQ(outcome.code, 2) << command;
+        EXPECT_NE(outcome.output.find("no vibrigd answers at " + path + " (is it running?"),
+                  std::string::npos)
+            << outcome.output;
+    }
+}
+
+TEST_F(Tool, SendsCommandsAndReportsRefusals) {
+    const StatusServer server(source, path);
+    EXPECT_EQ(vibrig("arm --by 'Ada Lovelace'" + at).code, 0);
+    EXPECT_EQ(vibrig("start" + at).output, "done\n");
+    EXPECT_EQ(vibrig("pause" + at).code, 0);
+    EXPECT_EQ(vibrig("resume" + at).code, 0);
+    EXPECT_EQ(vibrig("abort" + at).code, 0);
+    EXPECT_EQ(vibrig("ack trip" + at).code, 0);
+    const auto requests = source.requests();
+    ASSERT_EQ(requests.size(), 6u);
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(static_cast<std::size_t>(requests[i].kind), i);
+    EXPECT_EQ(requests[0].by.rfind("Ada Lovelace (uid ", 0), 0u) << requests[0].by;
+    EXPECT_GT(requests[1].by.size(), std::string(" (uid 0)").size()) << "the login name";
+    EXPECT_EQ(requests[5].argument, "trip");
+
+    source.answer_commands_with({false, "the shaker is not armed"});
+    const Outcome refused = vibrig("start" + at);
+    EXPECT_EQ(refused.code, 1);
+    EXPECT_EQ(refused.output, "vibrig: the shaker is not armed\n");
+    EXPECT_EQ(vibrig("ack" + at).code, 2) << "what?";
+    EXPECT_EQ(vibrig("arm --by ''" + at).code, 2);
+    EXPECT_EQ(source.requests().size(), 7u);
+}
+
+TEST_F(Tool, WatchesUntilTheCampaignEnds) {
+    const StatusServer server(source, path);
+    StatusData status = full_status();
+    const std::string watch = "watch --until-finished --interval 0.05" + at;
+    status.state = CampaignState::finished;
+    source.set(status);
+    EXPECT_EQ(vibrig(watch).code, 0);
+    for (const CampaignState bad : {CampaignState::aborted, CampaignState::tripped}) {
+        status.state = bad;
+        source.set(status);
+        const Outcome outcome = vibrig(watch);
+        EXPECT_EQ(outcome.code, 1);
+        EXPECT_NE(outcome.output.find(name_of(bad)), std::string::npos) << outcome.output;
+    }
+    // GIVEN a campaign under way WHEN it goes on and ends THEN each place is one line
+    status.state = CampaignState::recording;
+    source.set(status);
+    Outcome outcome;
+    {
+        const std::jthread watcher([&] { outcome = vibrig(watch); });
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        status.state = CampaignState::finished;
+        source.set(status);
+    }
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("finished"), std::string::npos) << outcome.output;
+    EXPECT_LE(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 2) << outcome.output;
+}
+
+TEST_F(Tool, WatchFindsARestartedDaemonAgain) {
+    auto server = std::make_unique<StatusServer>(source, path);
+    StatusData status = full_status();
+    source.set(status);
+    Outcome outcome;
+    {
+        const std::jthread watcher(
+            [&] { outcome = vibrig("watch --until-finished --interval 0.05" + at); });
+        std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        server.reset();
+        std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        status.state = CampaignState::finished;
+        source.set(status);
+        server = std::make_unique<StatusServer>(source, path);
+    }
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("NO ANSWER FROM vibrigd"), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("answers again"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Tool, ListsEvents) {
+    const StatusServer server(source, path);
+    for (int i = 1; i <= 2500; ++i) {
+        EventRecord event;
+        event.source = "campaign";
+        event.text = "event " + std::to_string(i);
+        source.log.append(event);
+    }
+    const Outcome outcome = vibrig("events" + at);
+    EXPECT_EQ(outcome.code, 0);
+    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 2500);
+    EXPECT_NE(outcome.output.find("event 2500\n"), std::string::npos);
+    const Outcome json = vibrig("events --json" + at);
+    EXPECT_EQ(json.output.rfind("{\"id\":\"1\"", 0), 0u) << json.output.substr(0, 200);
+}
+
+}  // namespace
+}  // namespace vibrig::serve
