@@ -27,7 +27,8 @@ Signal make(unsigned start, unsigned length, ByteOrder order, bool is_signed = f
 
 /// A bit of the payload by the DBC's number.
 unsigned bit_of(std::span<const std::uint8_t> payload, unsigned bit) {
-    return (payload[bit / 8] >> (bit % 8)) & 1U;
+    const unsigned byte = payload[bit / 8];
+    return (byte >> (bit % 8)) & 1U;
 }
 
 /// The bit after this one on the way from the most to the least significant, big endian: right
