@@ -7,9 +7,10 @@
 namespace vibrig::drivers {
 namespace {
 
-/// The next multiple of the period that is still to come; one that was missed is not made up for.
+/// A period after `due` if this round was in time; one that came early, or so late that a period
+/// was missed, starts anew.
 [[nodiscard]] Time following(Time due, Time period, Time now) noexcept {
-    return due + period > now ? due + period : now + period;
+    return due <= now && now < due + period ? due + period : now + period;
 }
 
 [[nodiscard]] bool encodable(const proto::Register& reg, double value) noexcept {

@@ -47,6 +47,7 @@ INSTANTIATE_TEST_SUITE_P(
     Faults, ShakerRtuWire,
     testing::Values(Fault{Kind::hang, "NoReply", &ShakerCounters::timeouts},
                     Fault{Kind::damaged, "WrongChecksum", &ShakerCounters::wrong_replies},
+                    Fault{Kind::twice, "SecondReply", &ShakerCounters::wrong_replies},
                     Fault{Kind::wrong_unit, "WrongUnit", &ShakerCounters::wrong_replies}),
     [](const auto& fault) { return fault.param.name; });
 

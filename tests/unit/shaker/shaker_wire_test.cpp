@@ -56,6 +56,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Fault{Kind::wrong_transaction, "WrongTransaction",
                           &ShakerCounters::wrong_replies},
                     Fault{Kind::wrong_function, "WrongFunction", &ShakerCounters::wrong_replies},
+                    Fault{Kind::twice, "SecondReply", &ShakerCounters::wrong_replies},
                     Fault{Kind::wrong_length, "WrongLength", &ShakerCounters::wrong_replies},
                     Fault{Kind::half_then_close, "HalfAReply", &ShakerCounters::lost},
                     Fault{Kind::close, "Close", &ShakerCounters::lost}),

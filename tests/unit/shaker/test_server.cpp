@@ -271,6 +271,9 @@ void TestServer::serve(int client) {
             bytes.resize(bytes.size() / 2);
             send_all(client, bytes, answer);
             return drop(client);
+        case Answer::Kind::twice:
+            send_all(client, bytes, answer);
+            break;
         case Answer::Kind::wrong_transaction:
             bytes[1] ^= 0x55;
             break;

@@ -43,6 +43,7 @@ struct Answer {
         ignore_write,  ///< acknowledged, not carried out
         trip,          ///< carried out, and the run register drops to 0
         late,          ///< answered after `delay`
+        twice,         ///< answered, and then again
         wrong_transaction,
         wrong_unit,
         wrong_function,
