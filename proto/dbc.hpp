@@ -39,14 +39,16 @@ struct Signal {
     double maximum = 0;
     std::string unit;
     bool is_multiplexor = false;
-    std::optional<std::uint32_t> multiplex_value;  ///< present only when the multiplexor has this value
+    std::optional<std::uint32_t>
+        multiplex_value;  ///< present only when the multiplexor has this value
     std::map<std::int64_t, std::string> value_names;
-    std::optional<std::uint32_t> multiplex_last;  ///< end of a range (SG_MUL_VAL_); absent: one value
+    std::optional<std::uint32_t>
+        multiplex_last;  ///< end of a range (SG_MUL_VAL_); absent: one value
 };
 
 struct Message {
     std::string name;
-    std::uint32_t id = 0;   ///< without flags
+    std::uint32_t id = 0;  ///< without flags
     bool extended = false;
     std::uint8_t size = 0;  ///< bytes, up to 64
     std::string sender;
@@ -70,15 +72,23 @@ struct Dbc {
 /// The text of proto/rig.dbc, built into the library.
 [[nodiscard]] std::string_view rig_dbc_text() noexcept;
 
-/// The raw bits of a signal, sign-extended where it is signed. Payload shorter than the signal needs: nullopt.
-[[nodiscard]] std::optional<std::int64_t> decode_raw(const Signal& signal, std::span<const std::uint8_t> payload) noexcept;
-/// Physical value, raw * scale + offset (unsigned 64-bit and floats included). Shorter payload: nullopt.
-[[nodiscard]] std::optional<double> decode(const Signal& signal, std::span<const std::uint8_t> payload) noexcept;
-/// Writes the nearest raw value; clamps to what the bits hold. False if the payload is too short or value not finite.
-[[nodiscard]] bool encode(const Signal& signal, double value, std::span<std::uint8_t> payload) noexcept;
-[[nodiscard]] bool encode_raw(const Signal& signal, std::uint64_t raw, std::span<std::uint8_t> payload) noexcept;
+/// The raw bits of a signal, sign-extended where it is signed. Payload shorter than the signal
+/// needs: nullopt.
+[[nodiscard]] std::optional<std::int64_t> decode_raw(
+    const Signal& signal, std::span<const std::uint8_t> payload) noexcept;
+/// Physical value, raw * scale + offset (unsigned 64-bit and floats included). Shorter payload:
+/// nullopt.
+[[nodiscard]] std::optional<double> decode(const Signal& signal,
+                                           std::span<const std::uint8_t> payload) noexcept;
+/// Writes the nearest raw value; clamps to what the bits hold. False if the payload is too short or
+/// value not finite.
+[[nodiscard]] bool encode(const Signal& signal, double value,
+                          std::span<std::uint8_t> payload) noexcept;
+[[nodiscard]] bool encode_raw(const Signal& signal, std::uint64_t raw,
+                              std::span<std::uint8_t> payload) noexcept;
 /// True if the signal is in this frame: not multiplexed, or its multiplexor has its value.
-[[nodiscard]] bool present(const Message& message, const Signal& signal, std::span<const std::uint8_t> payload) noexcept;
+[[nodiscard]] bool present(const Message& message, const Signal& signal,
+                           std::span<const std::uint8_t> payload) noexcept;
 /// True if a range is declared and the value lies outside it, or the value is not finite.
 [[nodiscard]] bool out_of_range(const Signal& signal, double value) noexcept;
 
