@@ -18,13 +18,6 @@ bool loopback(const std::string& host) {
     return host == "localhost" || host == "::1" || (dotted && starts_with(host, "127."));
 }
 
-/// For people: four significant digits are plenty for a limit.
-std::string rounded(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return text;
-}
-
 }  // namespace
 
 double isolator_resonance_hz(double frequency_hz, double transmission) {
@@ -141,7 +134,7 @@ void CrossCheck::limits() {
         const auto check = [&](double value, double limit, const char* unit, const char* key) {
             if (value > limit) {
                 refuse({"campaign.table_g", "vibration.frequency_hz", key},
-                       found + ", that is " + rounded(value) + " " + unit + " peak,",
+                       found + ", that is " + rounded(value) + " " + unit + " peak",
                        rounded(limit) + " " + unit + " at most (" + key + ")");
             }
         };

@@ -132,7 +132,7 @@ void CrossCheck::set_points_fit() {
             const std::string key = "shaker.registers." + role;
             refuse({key + ".type", key + ".scale", from},
                    plain(value) + " " + unit + " to be written",
-                   "a register that holds it (" + plain(most) + " " + unit + " at most)");
+                   "a register that holds it (" + rounded(most) + " " + unit + " at most)");
         }
     };
     if (sound({"campaign.table_g"})) {

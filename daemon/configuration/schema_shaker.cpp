@@ -72,7 +72,7 @@ void add_register_keys(std::vector<Key>& keys, const std::string& role, const st
                        const std::string& doc, const At<Register>& at) {
     const std::string name = "shaker.registers." + role;
     keys.push_back(integer(
-        name + ".address", "", 0, 65'535, doc + ": first register, from 0 as on the wire",
+        name + ".address", "", 0, 65'535, "first register, from 0 as on the wire; " + doc,
         [at](C& c) { return static_cast<int>(at(c).address); },
         [at](C& c, int value) { at(c).address = static_cast<std::uint16_t>(value); }));
     keys.push_back(choice<RegisterType>(

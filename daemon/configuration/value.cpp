@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -19,9 +20,20 @@ std::string plain(double value) {
     if (std::isinf(value)) {
         return value < 0 ? "-inf" : "inf";
     }
-    std::array<char, 32> buffer{};
-    const auto [end, error] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+    // Nobody writes 6e+05 for 600000; 0.0001 is still easy to read, 1e-09 is not as a decimal.
+    const double size = std::abs(value);
+    const auto format = size == 0 || (size >= 1e-5 && size < 1e7) ? std::chars_format::fixed
+                                                                  : std::chars_format::general;
+    std::array<char, 64> buffer{};
+    const auto [end, error] =
+        std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, format);
     return error == std::errc{} ? std::string(buffer.data(), end) : std::to_string(value);
+}
+
+std::string rounded(double value) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.5g", value);
+    return text.data();
 }
 
 std::string write_number(double value) {
@@ -40,7 +52,8 @@ std::string write_triple(const std::array<double, 3>& value) {
 
 std::string write_text(const std::string& value) {
     std::ostringstream out;
-    out << toml::value<std::string>{value};
+    const toml::value<std::string> node{value};
+    out << toml::toml_formatter{node, toml::format_flags::none};
     return out.str();
 }
 

@@ -39,5 +39,7 @@ namespace vibrig::configuration {
 [[nodiscard]] std::string write_text(const std::string& value);
 /// A bound as a person would write it: no ".0".
 [[nodiscard]] std::string plain(double value);
+/// For people: five significant digits are plenty for a limit.
+[[nodiscard]] std::string rounded(double value);
 
 }  // namespace vibrig::configuration
