@@ -43,8 +43,7 @@ Observability observability(const Covariance& posterior, const ParameterArray& p
                             const KappaSpread& kappa) noexcept {
     Observability found;
     const Eigen::Map<const Vector30> sigma(prior.data());
-    found.one_level = kappa.one_level();
-    if (found.one_level) {
+    if (kappa.one_level()) {
         // |u| = 1: at one kappa (Dt, Dii, Dss, Doo) = (-kappa, 1, 1, 1) has no effect (Tang et al.
         // 2009, eq. 10).
         for (std::size_t gyro = 0; gyro < kGyros; ++gyro) {
@@ -77,13 +76,11 @@ Observability observability(const Covariance& posterior, const ParameterArray& p
 namespace {
 
 /// As many coefficients as undetermined directions, such that fixing them would determine
-/// everything: at one level the squares along the output axes, as Tang et al. 2009 do, then
-/// whatever keeps the weights small.
+/// everything; squares along the output axis first, as in Tang et al. 2009, section 2.
 std::vector<std::size_t> pivots(const Observability& found) {
     static constexpr std::array<std::size_t, kGroups> kPreference{kDoo, kDos, kDio, kDis, kDss,
                                                                   kDii, kDo,  kDs,  kDi,  kDt};
-    constexpr double kPreferAbove = 0.5;  // of the best candidate's
-    std::vector<std::size_t> candidates, chosen;
+    std::vector<std::size_t> candidates;
     for (const std::size_t group : kPreference) {
         for (std::size_t gyro = 0; gyro < kGyros; ++gyro) {
             if (!found.observable[internal_index(group, gyro)])
@@ -91,23 +88,21 @@ std::vector<std::size_t> pivots(const Observability& found) {
         }
     }
     Eigen::MatrixXd rows = found.directions.leftCols(index(found.undetermined));
-    const auto size = [&](std::size_t i) { return rows.row(index(i)).norm(); };
-    const auto choose = [&](std::vector<std::size_t>::iterator pick) {
+    std::vector<std::size_t> chosen;
+    while (chosen.size() < found.undetermined && !candidates.empty()) {
+        const auto strong = std::find_if(candidates.begin(), candidates.end(), [&](std::size_t i) {
+            return rows.row(index(i)).norm() > 0.1;
+        });
+        const auto pick =
+            strong != candidates.end()
+                ? strong
+                : std::max_element(candidates.begin(), candidates.end(), [&](auto a, auto b) {
+                      return rows.row(index(a)).norm() < rows.row(index(b)).norm();
+                  });
         const Eigen::RowVectorXd unit = rows.row(index(*pick)).normalized();
         rows -= (rows * unit.transpose()).eval() * unit;
         chosen.push_back(*pick);
         candidates.erase(pick);
-    };
-    for (std::size_t gyro = 0; found.one_level && gyro < kGyros; ++gyro) {
-        const auto pick =
-            std::find(candidates.begin(), candidates.end(), internal_index(kDoo, gyro));
-        if (pick != candidates.end() && size(*pick) > 1e-6) choose(pick);
-    }
-    while (chosen.size() < found.undetermined && !candidates.empty()) {
-        double largest = 0;
-        for (const std::size_t i : candidates) largest = std::max(largest, size(i));
-        choose(std::find_if(candidates.begin(), candidates.end(),
-                            [&](std::size_t i) { return size(i) >= kPreferAbove * largest; }));
     }
     return chosen;
 }

@@ -26,7 +26,6 @@ struct KappaSpread {
 /// Which coefficients the data determine. Filter order.
 struct Observability {
     std::array<bool, kParameters> observable{};
-    bool one_level = false;
     std::size_t undetermined = 0;  ///< dimension of the space of undetermined directions
     /// Its basis in units of the prior sigma, orthonormal: the first `undetermined` columns.
     Covariance directions = Covariance::Zero();

@@ -22,9 +22,7 @@ int main(int argc, char** argv) {
         "`vibrig COMMAND --help` explains a command.\n"
         "Exit codes: 0 done, 1 the result says no, 2 bad usage or input.");
     int exit_code = 0;
-#ifdef VIBRIG_WITH_IDENTIFY
     vibrig::tool::add_identify(app, exit_code);
-#endif
 #ifdef VIBRIG_WITH_REMOTE
     vibrig::tool::add_remote(app, exit_code);
 #endif

@@ -1,0 +1,134 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/progress.hpp"
+#include "daemon/tool/result_json.hpp"
+#include "daemon/tool/result_table.hpp"
+#include "estimator/identification.hpp"
+#include "proto/recording_csv.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using proto::RecordingRow;
+
+constexpr int kResultSaysNo = 1;
+constexpr int kBadInput = 2;
+
+struct Dwell {
+    int run = 0;
+    int position = 0;
+    std::vector<const RecordingRow*> rows;
+};
+
+/// One dwell for each (run, position) in the order in which they begin; a pair that comes back
+/// continues its dwell.
+std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
+    std::vector<Dwell> dwells;
+    std::map<std::pair<int, int>, std::size_t> index;
+    for (const RecordingRow& row : rows) {
+        const auto [at, is_new] = index.try_emplace({row.run, row.position}, dwells.size());
+        if (is_new) {
+            dwells.push_back({row.run, row.position, {}});
+        }
+        dwells[at->second].rows.push_back(&row);
+    }
+    return dwells;
+}
+
+estimator::Measurement measurement_of(const RecordingRow& row) {
+    estimator::Measurement measurement;
+    measurement.time_s = row.time_s;
+    for (std::size_t i = 0; i < 3; ++i) {
+        measurement.angle_rad[i] = row.angle_deg[i] * (std::numbers::pi / 180);
+        measurement.force_g[i] = row.force_g[i];
+    }
+    return measurement;
+}
+
+estimator::Result identify(const std::vector<RecordingRow>& rows,
+                           const estimator::Settings& settings) {
+    const std::vector<Dwell> dwells = dwells_of(rows);
+    estimator::Identification identification(settings, dwells.size());
+    Progress progress("identifying");
+    std::size_t done = 0;
+    for (const Dwell& dwell : dwells) {
+        identification.begin_dwell({dwell.run, dwell.position, -1});
+        for (const RecordingRow* row : dwell.rows) {
+            static_cast<void>(identification.add(measurement_of(*row)));
+            // Asking a clock costs more than a filter step.
+            if (++done % 1024 == 0) {
+                progress.show(done, rows.size());
+            }
+        }
+        static_cast<void>(identification.end_dwell());
+    }
+    return identification.result();
+}
+
+std::vector<RecordingRow> read(const std::string& path) {
+    Progress progress("reading " + path);
+    progress.show(0, 1);
+    return proto::read_recording(path);
+}
+
+int run(const std::string& recording, const std::string& config, bool json) {
+    estimator::Result result;
+    try {
+        const estimator::Settings settings =
+            configuration::load(config, false).configuration.estimator;
+        result = identify(read(recording), settings);
+    } catch (const std::exception& error) {
+        // The room that found the fault named file, line, key and value already.
+        std::cerr << error.what() << '\n';
+        return kBadInput;
+    }
+    std::cout << (json ? result_json(result) + "\n" : result_table(result)) << std::flush;
+    if (!std::cout) {
+        std::cerr << "standard output: cannot be written\n";
+        return kBadInput;
+    }
+    return all_observable(result) ? 0 : kResultSaysNo;
+}
+
+}  // namespace
+
+void add_identify(CLI::App& app, int& exit_code) {
+    struct Options {
+        std::string recording;
+        std::string config;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* command =
+        app.add_subcommand("identify", "Gyro error coefficients from a recording (CSV)");
+    command
+        ->add_option("FILE", options->recording,
+                     "CSV with a header row and the columns time_s, run, position, alpha_deg, "
+                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order")
+        ->required();
+    command->add_option("--config", options->config,
+                        "configuration file (TOML); without it all defaults apply");
+    command->add_flag("--json", options->json, "print the result as JSON");
+    command->footer(
+        "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
+        "Exit codes: 0 all 30 coefficients are determined, 1 some are not observable (the result "
+        "names\nthem and the combinations that are determined), 2 bad usage or input.");
+    command->callback([options, &exit_code] {
+        exit_code = run(options->recording, options->config, options->json);
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+namespace vibrig::tool {
+
+/// One line of progress on standard error, if that is a terminal and the work takes long enough to
+/// wonder.
+class Progress {
+  public:
+    explicit Progress(std::string what);
+    ~Progress();  ///< clears the line
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    void show(std::size_t done, std::size_t all);
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    std::string what_;
+    bool terminal_;
+    bool shown_ = false;
+    Clock::time_point next_;
+};
+
+}  // namespace vibrig::tool

@@ -1,0 +1,192 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string content_of(const std::filesystem::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+}
+
+struct Outcome {
+    int exit_code = -1;
+    std::string out;
+    std::string error;
+};
+
+/// Runs the real programs in a folder of their own.
+class Identify : public ::testing::Test {
+  protected:
+    Identify() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~Identify() override { std::filesystem::remove_all(folder_); }
+
+    Outcome run(const std::string& program, const std::string& arguments) {
+        // Redirections first, so that those among the arguments win.
+        const std::string command = "cd '" + folder_.string() + "' && '" + program +
+                                    "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content_of(folder_ / "out"),
+                content_of(folder_ / "error")};
+    }
+    Outcome vibrig(const std::string& arguments) { return run(VIBRIG, arguments); }
+    void record(const std::string& arguments) {
+        const Outcome outcome = run(VIBRIG_PLANT, "record --seed 11 -o rec.csv " + arguments);
+        ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+    }
+    void write(const std::string& name, const std::string& text) {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+
+    std::filesystem::path folder_;
+};
+
+const std::string kHeader = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
+
+TEST_F(Identify, FindsAllThirtyWithinFourSigma) {
+    // GIVEN the 14 positions at two amplitudes, recorded by the simulated rig with seed 11
+    record("--dwell 40");
+    // WHEN the recording is identified
+    const Outcome outcome = vibrig("identify rec.csv --json");
+    // THEN everything is observable and the rig's own judge agrees
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.error;
+    EXPECT_EQ(outcome.error, "") << "no progress where there is no terminal";
+    write("result.json", outcome.out);
+    const Outcome verdict = run(VIBRIG_PLANT, "judge result.json");
+    EXPECT_EQ(verdict.exit_code, 0) << verdict.out << verdict.error;
+    const Json result = Json::parse(outcome.out);
+    EXPECT_EQ(result["combinations"].size(), 0U);
+    EXPECT_EQ(result["samples"], 2 * 14 * 40 * 40);
+    ASSERT_EQ(result["amplitudes"].size(), 2U);
+    EXPECT_NEAR(result["amplitudes"][0]["amplitude_g"].get<double>(), 6.0, 0.05);
+    EXPECT_NEAR(result["amplitudes"][1]["frequency_hz"].get<double>(), 15.0, 0.01);
+    // and people get the same as a table
+    const Outcome table = vibrig("identify rec.csv");
+    EXPECT_EQ(table.exit_code, 0);
+    EXPECT_THAT(table.out, AllOf(HasSubstr("D_OSz"), HasSubstr("deg/h/g^2"), HasSubstr("NIS"),
+                                 Not(HasSubstr("nan")), Not(HasSubstr("Not observable"))));
+}
+
+TEST_F(Identify, WithOneAmplitudeGivesCombinationsInsteadOfNumbers) {
+    // GIVEN one amplitude only
+    record("--dwell 20 --table-g 9");
+    // WHEN the recording is identified
+    const Outcome outcome = vibrig("identify rec.csv --json");
+    // THEN the four of each gyro that cannot be told apart are null
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.error;
+    const Json result = Json::parse(outcome.out);
+    const std::set<std::string> together{"D_F", "D_II", "D_OO", "D_SS"};
+    for (const Json& parameter : result["parameters"]) {
+        const std::string name = parameter["name"];
+        const bool open = together.count(name.substr(0, name.size() - 1)) == 1;
+        EXPECT_EQ(parameter["observable"], !open) << name;
+        EXPECT_EQ(parameter["value"].is_null(), open) << name;
+        EXPECT_EQ(parameter["sigma"].is_null(), open) << name;
+    }
+    // and their determined combinations agree with Table 2 of Tang et al. 2009: three for each gyro
+    EXPECT_EQ(result["combinations"].size(), 9U);
+    for (const Json& combination : result["combinations"]) {
+        EXPECT_TRUE(combination["value"].is_number());
+        EXPECT_GT(combination["sigma"].get<double>(), 0);
+        EXPECT_EQ(combination["weights"].size(), 2U);
+    }
+    const Json& first = result["combinations"][0];
+    const double kappa = first["weights"]["D_OOx"];
+    EXPECT_EQ(first["weights"]["D_Fx"], 1.0);
+    EXPECT_NEAR(kappa, 19.0, 0.1);
+    EXPECT_NEAR(first["value"].get<double>(), 1 + 0.03 * kappa, 5 * first["sigma"].get<double>());
+    // and people get it in words
+    const Outcome table = vibrig("identify rec.csv");
+    EXPECT_EQ(table.exit_code, 1);
+    EXPECT_THAT(table.out, AllOf(HasSubstr("Not observable one by one"), HasSubstr("D_Fx + "),
+                                 HasSubstr(" D_OOx = "), Not(HasSubstr("nan"))));
+}
+
+TEST_F(Identify, FromTwoRowsIsHonest) {
+    write("rec.csv", kHeader + "0,1,1,0,0,0,0,1,0\n0.025,1,1,0,0,0,0,1,0\n");
+    const Outcome outcome = vibrig("identify rec.csv --json");
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.error;
+    const Json result = Json::parse(outcome.out);
+    for (const Json& parameter : result["parameters"]) {
+        EXPECT_EQ(parameter["observable"], false) << parameter;
+        EXPECT_TRUE(parameter["value"].is_null()) << parameter;
+    }
+    EXPECT_EQ(vibrig("identify rec.csv").exit_code, 1);
+}
+
+TEST_F(Identify, UsesTheConfiguration) {
+    // GIVEN an outer encoder that counts the other way
+    record("--dwell 4 --table-g 9");
+    write("rig.toml", "[platform]\nencoder_sign = [-1, 1, 1]\n");
+    // THEN the result is another one
+    const Outcome plain = vibrig("identify rec.csv --json");
+    const Outcome turned = vibrig("identify rec.csv --config rig.toml --json");
+    EXPECT_NE(plain.out, turned.out);
+}
+
+TEST_F(Identify, RefusesBadRecordingsByRowAndColumn) {
+    const std::string good = "0,1,1,0,0,0,0,1,0\n";
+    const auto refused = [this](const std::string& text) {
+        write("rec.csv", text);
+        const Outcome outcome = vibrig("identify rec.csv --json");
+        EXPECT_EQ(outcome.exit_code, 2) << text;
+        EXPECT_EQ(outcome.out, "") << "no result from bad input";
+        return outcome.error;
+    };
+    EXPECT_THAT(refused(kHeader + good + "0.025,1,1,nan,0,0,0,1,0\n"),
+                AllOf(HasSubstr("rec.csv:3"), HasSubstr("alpha_deg"), HasSubstr("nan")));
+    EXPECT_THAT(refused(kHeader + good + "-1,1,1,0,0,0,0,1,0\n"),
+                AllOf(HasSubstr("rec.csv:3"), HasSubstr("time_s")));
+    EXPECT_THAT(refused(kHeader + good + "0.025,1,1,0,0\n"), HasSubstr("rec.csv:3"));
+    EXPECT_THAT(refused(kHeader + good + "0.025,one,1,0,0,0,0,1,0\n"),
+                AllOf(HasSubstr("rec.csv:3"), HasSubstr("run"), HasSubstr("one")));
+    EXPECT_THAT(refused("time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g\n" + good),
+                HasSubstr("az_g"));
+    EXPECT_THAT(refused(""), HasSubstr("rec.csv"));
+    EXPECT_THAT(refused(kHeader), HasSubstr("rec.csv"));
+}
+
+TEST_F(Identify, RefusesBadConfigurationsAndUsage) {
+    write("rec.csv", kHeader + "0,1,1,0,0,0,0,1,0\n");
+    write("rig.toml", "[vibration]\nfrequenzy_hz = 15\n");
+    Outcome outcome = vibrig("identify rec.csv --config rig.toml");
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.error, AllOf(HasSubstr("rig.toml:2:1: vibration.frequenzy_hz: found"),
+                                     HasSubstr("perhaps vibration.frequency_hz")));
+    outcome = vibrig("identify rec.csv --config none.toml");
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.error, HasSubstr("none.toml"));
+    outcome = vibrig("identify none.csv");
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.error, HasSubstr("none.csv"));
+    EXPECT_EQ(vibrig("identify").exit_code, 2);
+    EXPECT_EQ(vibrig("identify rec.csv --jsn").exit_code, 2);
+    EXPECT_EQ(vibrig("").exit_code, 2);
+    EXPECT_EQ(vibrig("identify rec.csv --json >/dev/full").exit_code, 2) << "a full disk";
+}
+
+TEST_F(Identify, EveryCommandHasHelpWithAnExample) {
+    const Outcome help = vibrig("identify --help");
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_THAT(help.out, HasSubstr("Example: vibrig identify"));
+    EXPECT_EQ(vibrig("--help").exit_code, 0);
+    EXPECT_THAT(vibrig("--version").out, HasSubstr("vibrig "));
+}
+
+}  // namespace
