@@ -47,8 +47,7 @@ class Reader {
                 const std::string near = nearest_key(key, node.is_table());
                 problems_.add(place_of(name.source()), key,
                               node.is_table() ? "an unknown table" : "an unknown key",
-                              near.empty() ? "a known one (vibrig --help lists them)"
-                                           : "a known one, perhaps " + near);
+                              near.empty() ? "a known one" : "a known one, perhaps " + near);
             }
         }
     }

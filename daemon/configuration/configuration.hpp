@@ -20,23 +20,30 @@ class ConfigurationError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// Relative paths of the file (dbc, results, log file) are relative to its folder; here they are resolved.
+/// Relative paths of the file (dbc, results, log file) are relative to its folder; here they are
+/// resolved.
 struct Configuration {
-    estimator::Settings estimator;       ///< [site] [vibration] [platform] [accelerometer] [noise] [estimator]
-    campaign::Settings campaign;         ///< [campaign], [shaker.limits]
-    drivers::CanPortSettings can;        ///< [can]
-    std::string dbc;                     ///< [can] dbc; empty: the built-in rig.dbc
-    drivers::AssemblerSettings assembler;///< [can.signals], [can] sample_rate_hz, deadlines
-    drivers::GimbalSettings gimbal;      ///< [gimbal]
-    drivers::ShakerSettings shaker;      ///< [shaker], [shaker.registers]; scales in g peak, amplitude_unit folded in
+    estimator::Settings
+        estimator;  ///< [site] [vibration] [platform] [accelerometer] [noise] [estimator]
+    campaign::Settings campaign;           ///< [campaign], [shaker.limits]
+    drivers::CanPortSettings can;          ///< [can]
+    std::string dbc;                       ///< [can] dbc; empty: the built-in rig.dbc
+    drivers::AssemblerSettings assembler;  ///< [can.signals], [can] sample_rate_hz, deadlines
+    drivers::GimbalSettings gimbal;        ///< [gimbal]
+    drivers::ShakerSettings
+        shaker;  ///< [shaker], [shaker.registers]; scales in g peak, amplitude_unit folded in
     /// [shaker] amplitude_unit: what the controller's amplitude registers count in.
-    enum class AmplitudeUnit : std::uint8_t { g_peak, g_rms, mps2_peak } amplitude_unit = AmplitudeUnit::g_peak;
+    enum class AmplitudeUnit : std::uint8_t {
+        g_peak,
+        g_rms,
+        mps2_peak
+    } amplitude_unit = AmplitudeUnit::g_peak;
     enum class ClockKind : std::uint8_t { real, rig } clock = ClockKind::real;  ///< [clock] source
-    std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
-    std::string log_level = "info";      ///< [log] level
-    std::string log_file;                ///< [log] file; empty: standard error
-    std::string results;                 ///< [campaign] results: folder for result.json; empty: none written
-    int acquisition_priority = 60;       ///< [threads] SCHED_FIFO; 0: ordinary scheduling
+    std::string socket = "/run/vibrig/vibrigd.sock";                            ///< [server] socket
+    std::string log_level = "info";                                             ///< [log] level
+    std::string log_file;  ///< [log] file; empty: standard error
+    std::string results;   ///< [campaign] results: folder for result.json; empty: none written
+    int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
 };
 
@@ -50,8 +57,9 @@ struct Loaded {
     std::vector<EffectiveValue> effective;
 };
 
-/// Throws ConfigurationError. Empty path: all defaults. `daemon`: also checks what only the daemon needs
-/// (a watchdog register, the rig clock only with a simulated bus and Modbus on loopback, shaker limits).
+/// Throws ConfigurationError. Empty path: all defaults. `daemon`: also checks what only the daemon
+/// needs (a watchdog register, the rig clock only with a simulated bus and Modbus on loopback,
+/// shaker limits).
 [[nodiscard]] Loaded load(const std::string& path, bool daemon);
 [[nodiscard]] Loaded parse(const std::string& text, const std::string& name, bool daemon);
 /// The table of --check.
