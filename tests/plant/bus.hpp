@@ -22,8 +22,9 @@ class Bus {
     /// With `wait` a full queue is waited for (up to a second), so that nothing is lost in
     /// lockstep.
     virtual void send(std::span<const can_frame> frames, bool wait) = 0;
-    /// Counts changes of who listens; a bus that cannot know says 0 for ever.
-    [[nodiscard]] virtual std::uint64_t connections() const noexcept = 0;
+    /// True if somebody is there, but nobody of those the last send() went to: the newcomers have
+    /// missed it.
+    [[nodiscard]] virtual bool only_newcomers() const noexcept = 0;
     /// False only if it is certain that nobody listens.
     [[nodiscard]] virtual bool somebody_there() const noexcept = 0;
     [[nodiscard]] virtual std::uint64_t dropped()

@@ -12,6 +12,9 @@ int main(int argc, char** argv) {
         "The simulated vibration rig: platform, isolators and shaker, with a truth only it knows.",
         "vibrig-plant"};
     app.require_subcommand(1);
+    app.footer(
+        "Example:\n  vibrig-plant run --can seqpacket:/tmp/rig.sock --modbus tcp:127.0.0.1:1502 "
+        "--seed 7");
     int exit_code = 0;
     vibrig::plant::add_run_command(app, exit_code);
     vibrig::plant::add_record_command(app, exit_code);

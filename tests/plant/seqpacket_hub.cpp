@@ -99,6 +99,7 @@ void SeqpacketHub::accept_clients() {
 
 void SeqpacketHub::drop_client(int fd) {
     std::erase(clients_, fd);
+    std::erase(served_, fd);
     close(fd);  // takes it out of the epoll set
 }
 
@@ -135,6 +136,7 @@ bool SeqpacketHub::read_client(int fd, const Handler& on_frame) {
 void SeqpacketHub::send(std::span<const can_frame> frames, bool wait) {
     const std::vector<int> clients = clients_;  // one that does not read is dropped on the way
     for (const int fd : clients) send_to(fd, frames, wait);
+    served_ = clients_;
 }
 
 void SeqpacketHub::send_to(int fd, std::span<const can_frame> frames, bool wait) {

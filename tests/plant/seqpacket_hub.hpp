@@ -18,7 +18,10 @@ class SeqpacketHub final : public Bus {
     [[nodiscard]] int descriptor() const noexcept override { return epoll_; }
     void receive(const Handler& on_frame) override;
     void send(std::span<const can_frame> frames, bool wait) override;
-    [[nodiscard]] std::uint64_t connections() const noexcept override { return connections_; }
+    [[nodiscard]] bool only_newcomers() const noexcept override {
+        return !clients_.empty() && served_.empty();
+    }
+    [[nodiscard]] std::uint64_t connections() const noexcept { return connections_; }
     [[nodiscard]] bool somebody_there() const noexcept override { return !clients_.empty(); }
     [[nodiscard]] std::uint64_t dropped() const noexcept override { return dropped_; }
 
@@ -33,6 +36,7 @@ class SeqpacketHub final : public Bus {
     int listener_ = -1;
     int epoll_ = -1;
     std::vector<int> clients_;
+    std::vector<int> served_;  ///< clients of the last send() that are still there
     std::uint64_t connections_ = 0;
     std::uint64_t dropped_ = 0;
 };

@@ -78,20 +78,18 @@ void Simulation::send_tick() { bus_.send(tick_frames_, settings_.lockstep); }
 
 bool Simulation::wait_for_acknowledgement() {
     std::int64_t resend_at = monotonic_ns() + settings_.resend_ns;
-    bool alone = !bus_.somebody_there();
     while (acknowledged_us_ != time_us_) {
-        const std::uint64_t connections = bus_.connections();
         const Wake wake = wait(bus_.somebody_there() ? std::optional(resend_at) : std::nullopt);
         if (wake == Wake::stop) return false;
-        if (alone && bus_.connections() != connections && bus_.somebody_there()) {
-            send_tick();  // whoever comes to an empty bus has missed the frames of this tick
-            ++counters_.resent;
+        if (bus_.only_newcomers()) {
+            send_tick();
         } else if (wake == Wake::deadline) {
             bus_.send(std::span(tick_frames_).last(1), true);
-            ++counters_.resent;
+        } else {
+            continue;
         }
-        if (wake == Wake::deadline) resend_at = monotonic_ns() + settings_.resend_ns;
-        alone = !bus_.somebody_there();
+        ++counters_.resent;
+        resend_at = monotonic_ns() + settings_.resend_ns;
     }
     return true;
 }

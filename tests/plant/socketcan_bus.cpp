@@ -51,7 +51,7 @@ class SocketCanBus final : public Bus {
     SocketCanBus& operator=(const SocketCanBus&) = delete;
 
     [[nodiscard]] int descriptor() const noexcept override { return fd_; }
-    [[nodiscard]] std::uint64_t connections() const noexcept override { return 0; }
+    [[nodiscard]] bool only_newcomers() const noexcept override { return false; }  // cannot know
     [[nodiscard]] bool somebody_there() const noexcept override { return true; }
     [[nodiscard]] std::uint64_t dropped() const noexcept override { return dropped_; }
 
