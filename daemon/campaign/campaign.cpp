@@ -1,0 +1,406 @@
+#include "daemon/campaign/campaign.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace vibrig::campaign {
+
+using drivers::from_seconds;
+using drivers::kNever;
+using drivers::kSecond;
+using drivers::Time;
+using State = CampaignState;
+
+namespace {
+
+constexpr Time kPoll = 200 * drivers::kMillisecond;
+// The order of a dwell goes out this long before its first sample; the last part of settling.
+constexpr Time kOrderLead = kSecond;
+// How much later than the ramp itself the controller may report the level as reached.
+constexpr Time kRampGrace = 10 * kSecond;
+// How much later than the last sample of a dwell the estimator may report it as done.
+constexpr Time kDoneGrace = 2 * kSecond;
+constexpr double kAtRestG = 1e-9;
+
+}  // namespace
+
+Campaign::Campaign(const Settings& settings, Ports ports)
+    : settings_(settings), ports_(std::move(ports)) {}
+
+bool Campaign::active() const {
+    return state_ == State::waiting || state_ == State::slewing || state_ == State::ramping ||
+           state_ == State::settling || state_ == State::recording || state_ == State::resting ||
+           state_ == State::paused;
+}
+
+bool Campaign::done() const {
+    return shutting_down_ && !active() && !ports_.shaker.stop_pending();
+}
+
+void Campaign::enter(State state, Time now) {
+    state_ = state;
+    entered_ = now;
+    requested_ = false;
+    stop_sent_ = false;
+}
+
+CommandReply Campaign::command(const CommandRequest& request, Time now) {
+    using Kind = CommandRequest::Kind;
+    const auto refuse = [&](const std::string& why) { return CommandReply{false, why}; };
+    const auto accept = [&](const std::string& text) {
+        ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+        return CommandReply{true, text};
+    };
+    if (request.by.empty()) return refuse("by: found nothing, expected the name of a person");
+    if (shutting_down_) return refuse("the daemon is shutting down");
+    switch (request.kind) {
+        case Kind::arm:
+            if (active()) return refuse("a campaign is running");
+            if (state_ == State::tripped)
+                return refuse("tripped (" + reason_ + "): acknowledge it first");
+            if (ports_.shaker.stop_pending()) return refuse("a stop of the shaker is pending");
+            if (!ports_.shaker.reading().valid)
+                return refuse("no valid read-back from the shaker");
+            if (ports_.shaker.reading().emergency_stop_open)
+                return refuse("the emergency-stop chain is open");
+            armed_by_ = request.by;
+            reason_.clear();
+            enter(State::armed, now);
+            return accept(fmt::format("armed up to {:g} g at the table",
+                                      *std::ranges::max_element(settings_.table_g)));
+        case Kind::start:
+            if (state_ != State::armed) return refuse("not armed: a named person arms it first");
+            ports_.begin();
+            place_ = {};
+            positions_done_ = 0;
+            dwells_.clear();
+            temperatures_.clear();
+            pause_asked_ = false;
+            started_ = now;
+            enter(State::waiting, now);
+            return accept("campaign started");
+        case Kind::pause:
+            if (!active()) return refuse("no campaign is running");
+            pause_asked_ = true;
+            return accept("pause before the next position");
+        case Kind::resume:
+            if (state_ != State::paused && !pause_asked_) return refuse("not paused");
+            pause_asked_ = false;
+            return accept("resumed");
+        case Kind::abort:
+            ports_.shaker.stop_now();
+            if (active() || state_ == State::armed) abort("aborted by " + request.by, now);
+            return accept("stop sent");
+        case Kind::acknowledge:
+            if (state_ != State::tripped) return refuse("nothing to acknowledge");
+            enter(State::idle, now);
+            return accept("acknowledged: " + std::exchange(reason_, {}));
+    }
+    return refuse("unknown command");
+}
+
+Time Campaign::step(Time now) {
+    for (;;) {
+        const State before = state_;
+        const Place place = place_;
+        const Time next = step_once(now);
+        if (state_ == before && place.position == place_.position && place.run == place_.run)
+            return next;
+    }
+}
+
+Time Campaign::step_once(Time now) {
+    if (state_ == State::ramping || state_ == State::settling || state_ == State::recording) {
+        const auto reading = ports_.shaker.reading();
+        if (!reading.valid && table_g() > kAtRestG) {
+            abort("no valid read-back from the shaker", now);
+        }
+    }
+    switch (state_) {
+        case State::waiting: return wait_for_platform(now);
+        case State::slewing: return slew(now);
+        case State::ramping: return ramp(now);
+        case State::settling:
+        case State::recording: return record(now);
+        case State::resting: return rest(now);
+        case State::paused:
+            if (!pause_asked_ || shutting_down_) start_position(now);
+            return now + kSecond;
+        case State::idle:
+        case State::armed:
+        case State::finished:
+        case State::aborted:
+        case State::tripped: break;
+    }
+    return now + kSecond;
+}
+
+Time Campaign::wait_for_platform(Time now) {
+    const auto platform = ports_.platform();
+    if (temperatures_.empty() || platform.time > temperatures_.back().first) {
+        if (platform.time > 0) temperatures_.emplace_back(platform.time, platform.temperature_c);
+    }
+    const Time window = from_seconds(settings_.temperature_window_s);
+    while (temperatures_.size() > 2 && temperatures_[1].first <= now - window)
+        temperatures_.pop_front();
+    const auto [low, high] = std::ranges::minmax(temperatures_, {},
+                                                 &std::pair<Time, double>::second);
+    const bool covered = !temperatures_.empty() && temperatures_.front().first <= now - window;
+    const bool steady = covered && high.second - low.second <= settings_.temperature_band_c;
+    reason_.clear();
+    if (platform.time == 0) {
+        reason_ = "no platform status on the bus";
+    } else if (!platform.ready || !platform.gyros_at_speed) {
+        reason_ = "platform not ready";
+    } else if (!platform.loop_closed) {
+        reason_ = "stabilisation loop open";
+    } else if (!steady) {
+        reason_ = "temperature not steady";
+    } else {
+        start_position(now);
+        return now;
+    }
+    if (now - entered_ > from_seconds(settings_.ready_timeout_s)) {
+        abort(fmt::format("{} after {:g} s", reason_, settings_.ready_timeout_s), now);
+    }
+    return now + kSecond;
+}
+
+void Campaign::start_position(Time now) {
+    reason_.clear();
+    if (shutting_down_) return abort("the daemon is shutting down", now);
+    if (pause_asked_) {
+        if (state_ != State::paused) {
+            ports_.event(Severity::info, "paused");
+            enter(State::paused, now);
+        }
+        return;
+    }
+    const auto& angle = settings_.positions_deg[place_.position];
+    ports_.event(Severity::info,
+                 fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g",
+                             place_.run + 1, settings_.table_g.size(), place_.position + 1,
+                             settings_.positions_deg.size(), angle[0], angle[1], angle[2],
+                             table_g()));
+    enter(State::slewing, now);
+}
+
+Time Campaign::slew(Time now) {
+    if (!requested_) {
+        if (!ports_.shaker.reading().at_rest()) {  // never slews on a moving shaker
+            enter(State::resting, now);
+            return now;
+        }
+        ports_.gimbal.slew_to(settings_.positions_deg[place_.position], now);
+        requested_ = true;
+    }
+    switch (ports_.gimbal.update(ports_.platform(), now)) {
+        case drivers::GimbalState::in_position:
+            ports_.gimbal.release(now);
+            enter(State::ramping, now);
+            return now;
+        case drivers::GimbalState::timed_out:
+            abort("gimbals did not reach the position in time", now);
+            return now;
+        case drivers::GimbalState::no_status: abort("no gimbal status", now); return now;
+        default: return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+    }
+}
+
+bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading) const {
+    return reading.valid && reading.running && reading.state == 2 &&
+           std::abs(reading.measured_g - table_g()) <= settings_.amplitude_tolerance * table_g();
+}
+
+Time Campaign::ramp(Time now) {
+    ports_.gimbal.update(ports_.platform(), now);
+    if (ports_.gimbal.state() == drivers::GimbalState::commanding)
+        return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+    if (table_g() <= kAtRestG) {
+        enter(State::settling, now);
+        return now;
+    }
+    if (!requested_) {
+        ports_.watch(true);
+        requested_ = ports_.shaker.request(
+            {settings_.frequency_hz, table_g(), settings_.ramp_s});
+        if (!requested_) abort("the shaker takes no set-point", now);
+        return now + kPoll;
+    }
+    if (!ports_.shaker.busy() && vibrating_as_commanded(ports_.shaker.reading())) {
+        enter(State::settling, now);
+        return now;
+    }
+    if (now - entered_ > from_seconds(settings_.ramp_s) + kRampGrace) {
+        const auto reading = ports_.shaker.reading();
+        abort(fmt::format("shaker: measured {:.3f} g, expected {:g} g within {:g} %",
+                          reading.measured_g, table_g(), 100 * settings_.amplitude_tolerance),
+              now);
+    }
+    return now + kPoll;
+}
+
+Time Campaign::record(Time now) {
+    if (!dwell_ordered_) {
+        dwell_from_ = entered_ + std::max(from_seconds(settings_.settle_s), kOrderLead);
+        dwell_to_ = dwell_from_ + from_seconds(settings_.dwell_s);
+        dwell_done_ = false;
+        dwell_ordered_ = true;
+        rt::DwellOrder order;
+        order.from = dwell_from_;
+        order.to = dwell_to_;
+        order.dwell = {static_cast<int>(place_.run) + 1, static_cast<int>(place_.position) + 1,
+                       table_g()};
+        if (!ports_.order_dwell(order)) abort("the estimator takes no order", now);
+        return now + kPoll;
+    }
+    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.shaker.reading())) {
+        const auto reading = ports_.shaker.reading();
+        abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
+                          reading.state, reading.measured_g, table_g()),
+              now);
+        return now;
+    }
+    if (state_ == State::settling) {
+        if (now < dwell_from_) return std::min(dwell_from_, now + kPoll);
+        state_ = State::recording;
+    }
+    if (dwell_done_) {
+        dwell_ordered_ = false;
+        next_position(now);
+        return now;
+    }
+    if (now > dwell_to_ + kDoneGrace) {
+        abort("samples ceased during the dwell", now);
+        return now;
+    }
+    return std::min(now < dwell_to_ ? dwell_to_ : now + kPoll, now + kPoll);
+}
+
+void Campaign::next_position(Time now) {
+    ++positions_done_;
+    if (++place_.position == settings_.positions_deg.size()) {
+        place_.position = 0;
+        ++place_.run;
+    }
+    enter(State::resting, now);
+}
+
+Time Campaign::rest(Time now) {
+    const auto reading = ports_.shaker.reading();
+    if (!ports_.shaker.busy() && !ports_.shaker.stop_pending() && reading.at_rest() &&
+        reading.time > entered_) {
+        ports_.watch(false);
+        if (shutting_down_) {
+            abort("the daemon is shutting down", now);
+        } else if (place_.run == settings_.table_g.size()) {
+            place_.run = settings_.table_g.size() - 1;
+            place_.position = settings_.positions_deg.size() - 1;
+            armed_by_.clear();
+            enter(State::finished, now);
+            ports_.end(true);
+            ports_.event(Severity::info, "campaign finished");
+        } else {
+            start_position(now);
+        }
+        return now;
+    }
+    if (!requested_ && !ports_.shaker.stop_pending()) {
+        requested_ = ports_.shaker.request({settings_.frequency_hz, 0, settings_.ramp_s});
+    }
+    if (!stop_sent_ && now - entered_ > from_seconds(settings_.ramp_s + settings_.stop_timeout_s)) {
+        stop_sent_ = true;
+        ports_.event(Severity::alarm, "shaker did not come to rest in time: stop sent");
+        ports_.shaker.stop_now();
+    }
+    return now + kPoll;
+}
+
+void Campaign::leave_dwell() {
+    if (std::exchange(dwell_ordered_, false)) {
+        rt::DwellOrder cancel;
+        cancel.cancel = true;
+        static_cast<void>(ports_.order_dwell(cancel));
+    }
+}
+
+void Campaign::abort(const std::string& why, Time now) {
+    const bool had_campaign = active();
+    if (state_ == State::ramping || state_ == State::settling || state_ == State::recording) {
+        ports_.shaker.stop_now();
+    }
+    leave_dwell();
+    ports_.watch(false);
+    armed_by_.clear();
+    reason_ = why;
+    enter(State::aborted, now);
+    ports_.event(Severity::alarm, "campaign aborted: " + why);
+    if (had_campaign) ports_.end(false);
+}
+
+void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
+    dwell_done_ = true;
+    dwells_.push_back(summary);
+    if (summary.flagged) {
+        ports_.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
+                                                    summary.position, summary.reason));
+    }
+}
+
+void Campaign::on_trip(const std::string& cause, Time now) {
+    const bool had_campaign = active();
+    leave_dwell();
+    ports_.watch(false);
+    armed_by_.clear();
+    reason_ = cause;
+    enter(State::tripped, now);
+    ports_.event(Severity::trip, "shaker stopped: " + cause);
+    if (had_campaign) ports_.end(false);
+}
+
+void Campaign::shut_down(Time now) {
+    if (shutting_down_) return;
+    shutting_down_ = true;
+    if (!active()) return;
+    leave_dwell();
+    ports_.event(Severity::warning, "shutting down: ramping the shaker down");
+    enter(State::resting, now);
+}
+
+void Campaign::fill(StatusData& status, Time now) const {
+    status.campaign_name = settings_.name;
+    status.state = state_;
+    status.reason = reason_;
+    status.armed_by = armed_by_;
+    status.runs = static_cast<int>(settings_.table_g.size());
+    status.positions = static_cast<int>(settings_.positions_deg.size());
+    status.dwells = dwells_;
+    const auto total = static_cast<double>(settings_.table_g.size() * settings_.positions_deg.size());
+    const bool begun = active() || state_ == State::finished || !dwells_.empty();
+    if (begun && place_.run < settings_.table_g.size()) {
+        status.run = static_cast<int>(place_.run) + 1;
+        status.position = static_cast<int>(place_.position) + 1;
+        status.position_deg = settings_.positions_deg[place_.position];
+    }
+    double done = static_cast<double>(positions_done_);
+    if (state_ == State::recording && dwell_to_ > dwell_from_) {
+        done += std::clamp(static_cast<double>(now - dwell_from_) /
+                               static_cast<double>(dwell_to_ - dwell_from_), 0.0, 1.0);
+    }
+    status.progress = begun ? done / total : 0;
+    if (active()) {
+        // What is left at the pace so far, at first at the nominal one.
+        const double nominal = settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
+        const double pace = positions_done_ > 0 ? drivers::to_seconds(now - started_) / done
+                                                : nominal;
+        status.remaining_s = (total - done) * pace;
+        const bool vibrating = state_ == State::ramping || state_ == State::settling ||
+                               state_ == State::recording;
+        status.command_table_g = vibrating ? table_g() : 0;
+        status.command_frequency_hz = settings_.frequency_hz;
+    }
+}
+
+}  // namespace vibrig::campaign

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <deque>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/rt/acquisition.hpp"
+#include "daemon/rt/estimator_stage.hpp"
+#include "daemon/rt/interlock.hpp"
+#include "daemon/rt/real_clock.hpp"
+#include "daemon/rt/rig_clock.hpp"
+#include "daemon/serve/event_log.hpp"
+#include "daemon/status.hpp"
+
+namespace vibrig {
+
+/// A fixed-size event from a thread that may not format; the control thread turns it into words.
+struct RtEvent {
+    Severity severity = Severity::info;
+    std::array<char, 16> source{};
+    std::array<char, 128> text{};
+    std::uint32_t dropped_before = 0;
+};
+
+/// Joins the rooms: owns the stages, the rings between them and their threads.
+///   acquisition (io_context) -> ring -> estimator -> snapshot -> server;  control -> gimbal, shaker
+class Daemon final : public StatusSource {
+  public:
+    /// Throws ConfigurationError, BindingError, CanError, ShakerError, std::system_error.
+    explicit Daemon(configuration::Loaded loaded);
+    ~Daemon() override;
+
+    /// Starts the threads; throws CanError.
+    void start();
+    /// Asks for a clean end: shaker ramped down, dwell closed. Any thread.
+    void shut_down() noexcept;
+    /// Blocks until the control thread has ended after shut_down().
+    void join();
+
+    [[nodiscard]] StatusData status() const override;
+    [[nodiscard]] std::vector<EventRecord> events(std::uint64_t after_id,
+                                                  std::size_t at_most) const override;
+    [[nodiscard]] estimator::Result result() const override;
+    [[nodiscard]] std::string effective_configuration() const override;
+    CommandReply command(const CommandRequest& request) override;
+
+  private:
+    struct WaitingCommand {
+        CommandRequest request;
+        std::promise<CommandReply> reply;
+    };
+
+    void control_loop();
+    void take_commands(drivers::Time now);
+    void on_port_state(drivers::PortState state, const char* text) noexcept;
+    void log(Severity severity, const std::string& source, const std::string& text);
+    void end_campaign(bool complete);
+    [[nodiscard]] bool may_feed() const noexcept;
+
+    configuration::Loaded loaded_;
+    const configuration::Configuration& configuration_;
+    std::unique_ptr<rt::RigClock> rig_clock_;
+    std::unique_ptr<rt::RealClock> real_clock_;
+    drivers::Clock& clock_;
+    proto::Dbc dbc_;
+    boost::asio::io_context io_{1};
+    std::unique_ptr<drivers::CanPort> port_;
+    std::unique_ptr<drivers::Shaker> shaker_;
+    std::unique_ptr<drivers::Waiter> control_waiter_;
+    std::unique_ptr<drivers::Waiter> estimator_waiter_;
+    rt::Interlock interlock_;
+    rt::Ring<drivers::Sample> estimator_ring_{4096};
+    rt::Ring<RtEvent> port_events_{64};    ///< acquisition to control
+    rt::Ring<RtEvent> shaker_events_{64};  ///< shaker to control
+    estimator::Identification identification_;
+    rt::EstimatorStage estimator_stage_;
+    rt::Acquisition acquisition_;
+    drivers::Gimbal gimbal_;
+    campaign::Campaign campaign_;
+
+    std::atomic<bool> shut_down_{false};
+    std::atomic<drivers::Time> control_beat_{0};
+    drivers::Time started_ = 0;
+    serve::EventLog event_log_;
+    mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
+    std::deque<WaitingCommand> commands_;
+    StatusData campaign_status_;
+    estimator::Result result_;
+    bool ended_ = false;
+
+    std::thread acquisition_thread_;
+    std::thread estimator_thread_;
+    std::thread control_thread_;
+};
+
+}  // namespace vibrig

@@ -1,0 +1,139 @@
+#include "daemon/rt/acquisition.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <chrono>
+
+namespace vibrig::rt {
+
+using drivers::Time;
+
+namespace {
+// Silence is looked for this often on the real clock; stale deadlines are longer.
+constexpr Time kTimerPeriod = 50 * drivers::kMillisecond;
+}  // namespace
+
+Acquisition::Acquisition(boost::asio::io_context& io, drivers::CanPort& port, const proto::Dbc& dbc,
+                         const drivers::AssemblerSettings& settings, drivers::Clock& clock,
+                         RigClock* rig, Wiring wiring)
+    : io_(io),
+      port_(port),
+      clock_(clock),
+      rig_(rig),
+      to_(wiring),
+      assembler_(dbc, settings, [this](const drivers::Sample& s) { on_sample(s); }),
+      rest_(io),
+      timer_(io) {
+    if (rig_ != nullptr) {
+        rig_link_.emplace(port_);
+        rest_.assign(::dup(rig_->rest().fd()));
+    }
+}
+
+void Acquisition::start(Event on_port_state) {
+    port_.start([this](std::span<const drivers::ReceivedFrame> frames) { on_frames(frames); },
+                std::move(on_port_state), [](const drivers::ReceivedFrame&) {});
+    if (rig_ != nullptr) {
+        wait_for_rest();
+    } else {
+        arm_timer();
+    }
+}
+
+void Acquisition::stop() {
+    boost::asio::post(io_, [this] {
+        port_.stop();
+        timer_.cancel();
+        rest_.close();
+        io_.stop();
+    });
+}
+
+void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept {
+    for (const auto& frame : frames) {
+        if (!rig_link_) {
+            assembler_.feed(frame);
+            continue;
+        }
+        if (const auto tick = rig_link_->decode(frame.frame)) {
+            rig_->set(tick->time);
+            if (!tick->end) continue;
+            on_time(tick->time);
+            unacknowledged_ = tick->time;
+            rig_->fire();
+            acknowledge_if_at_rest();
+        } else {
+            drivers::ReceivedFrame stamped = frame;
+            stamped.time = rig_->now();
+            assembler_.feed(stamped);
+        }
+    }
+    if (!rig_link_) flush();
+}
+
+void Acquisition::on_time(Time now) noexcept {
+    assembler_.advance(now);
+    to_.interlock.check_ages(assembler_, now);
+    flush();
+}
+
+void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
+    to_.interlock.check(sample, assembler_.platform());
+    batch_[batched_++] = sample;
+    if (batched_ == batch_.size()) flush();
+}
+
+void Acquisition::flush() noexcept {
+    if (batched_ > 0) {
+        to_.estimator_ring.push_n({batch_.data(), batched_});
+        to_.estimator.notify();
+        shown_.sample = batch_[batched_ - 1];
+        batched_ = 0;
+    }
+    const auto& platform = assembler_.platform();
+    const auto& was = shown_.platform;
+    const bool changed =
+        platform.ready != was.ready || platform.loop_closed != was.loop_closed ||
+        platform.gyros_at_speed != was.gyros_at_speed || platform.fault != was.fault ||
+        platform.in_position != was.in_position || platform.slewing != was.slewing ||
+        platform.gimbal_command_echo != was.gimbal_command_echo;
+    shown_.platform = platform;
+    shown_.assembler = assembler_.counters();
+    for (std::size_t c = 0; c < drivers::kChannels; ++c) {
+        shown_.last_good[c] = assembler_.last_good(static_cast<drivers::Channel>(c));
+    }
+    shown_.beat = clock_.now();
+    view_.publish(shown_);
+    if (changed) to_.control.notify();
+}
+
+void Acquisition::arm_timer() {
+    const Time now = clock_.now();
+    const Time deadline = std::clamp(assembler_.next_deadline(), now, now + kTimerPeriod);
+    timer_.expires_at(std::chrono::steady_clock::time_point(std::chrono::nanoseconds(deadline)));
+    timer_.async_wait([this](const boost::system::error_code& error) {
+        if (error) return;
+        on_time(clock_.now());
+        arm_timer();
+    });
+}
+
+void Acquisition::wait_for_rest() {
+    rest_.async_wait(boost::asio::posix::stream_descriptor::wait_read,
+                     [this](const boost::system::error_code& error) {
+                         if (error) return;
+                         rig_->rest().clear();
+                         acknowledge_if_at_rest();
+                         wait_for_rest();
+                     });
+}
+
+void Acquisition::acknowledge_if_at_rest() noexcept {
+    if (unacknowledged_ && rig_->at_rest() && rig_link_->acknowledge(*unacknowledged_)) {
+        unacknowledged_.reset();
+    }
+}
+
+}  // namespace vibrig::rt

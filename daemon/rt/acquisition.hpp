@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <optional>
+
+#include "daemon/rt/interlock.hpp"
+#include "daemon/rt/rig_clock.hpp"
+#include "daemon/rt/rig_time_link.hpp"
+#include "daemon/rt/ring.hpp"
+#include "daemon/rt/snapshot.hpp"
+#include "drivers/assembler.hpp"
+#include "drivers/can_port.hpp"
+
+namespace vibrig::rt {
+
+/// What the acquisition thread shows of itself; latest wins.
+struct AcquisitionView {
+    drivers::Sample sample;  ///< the newest
+    drivers::PlatformStatus platform;
+    drivers::AssemblerCounters assembler;
+    std::array<drivers::Time, drivers::kChannels> last_good{};
+    drivers::Time beat = 0;  ///< when the thread last handled frames
+};
+
+/// First stage: frames in, interlock, samples out to the rings. Everything here runs in the thread of the io_context;
+/// after start() it neither allocates, locks, logs nor formats.
+class Acquisition {
+  public:
+    struct Wiring {
+        Ring<drivers::Sample>& estimator_ring;
+        drivers::Waiter& estimator;
+        drivers::Waiter& control;
+        Interlock& interlock;
+    };
+    using Event = std::function<void(drivers::PortState, const char* text)>;
+
+    /// `rig` is the clock itself when the simulated rig owns the time, else null. Throws drivers::BindingError.
+    Acquisition(boost::asio::io_context& io, drivers::CanPort& port, const proto::Dbc& dbc,
+                const drivers::AssemblerSettings& settings, drivers::Clock& clock, RigClock* rig,
+                Wiring wiring);
+
+    void start(Event on_port_state);
+    /// From any thread: closes the port and lets io_context::run() end.
+    void stop();
+    [[nodiscard]] AcquisitionView view() const noexcept { return view_.read(); }
+
+  private:
+    void on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept;
+    void on_sample(const drivers::Sample& sample) noexcept;
+    void flush() noexcept;
+    void on_time(drivers::Time now) noexcept;
+    void arm_timer();
+    void wait_for_rest();
+    void acknowledge_if_at_rest() noexcept;
+
+    boost::asio::io_context& io_;
+    drivers::CanPort& port_;
+    drivers::Clock& clock_;
+    RigClock* rig_;
+    Wiring to_;
+    drivers::SampleAssembler assembler_;
+    std::optional<RigTimeLink> rig_link_;
+    std::optional<drivers::Time> unacknowledged_;
+    boost::asio::posix::stream_descriptor rest_;
+    boost::asio::steady_timer timer_;
+    std::array<drivers::Sample, 32> batch_{};
+    std::size_t batched_ = 0;
+    Snapshot<AcquisitionView> view_;
+    AcquisitionView shown_;
+};
+
+}  // namespace vibrig::rt

@@ -1,0 +1,101 @@
+#include "daemon/rt/estimator_stage.hpp"
+
+namespace vibrig::rt {
+
+using drivers::Time;
+
+namespace {
+// Displays need no more; the filter itself sees every sample.
+constexpr Time kPublishPeriod = 200 * drivers::kMillisecond;
+
+estimator::Measurement measurement_of(const drivers::Sample& sample, Time origin) noexcept {
+    return {.time_s = drivers::to_seconds(sample.time - origin),
+            .angle_rad = sample.angle,
+            .force_g = sample.force,
+            .angles_good = sample.angles_good(),
+            .force_good = sample.force_good()};
+}
+}  // namespace
+
+EstimatorStage::EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& self,
+                               drivers::Waiter& control, estimator::Identification& identification)
+    : samples_(samples), self_(self), control_(control), identification_(identification) {}
+
+void EstimatorStage::run() noexcept {
+    while (!stop_.load()) {
+        orders_.consume([this](const DwellOrder& order) { take_order(order); });
+        while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
+        }
+        if (shown_.sample_time - published_at_ >= kPublishPeriod) publish();
+        self_.wait_until(drivers::kNever);
+    }
+    if (begun_) finish();
+}
+
+void EstimatorStage::stop() noexcept {
+    stop_.store(true);
+    self_.notify();
+}
+
+bool EstimatorStage::order(const DwellOrder& order) noexcept {
+    const bool fits = orders_.try_push(order);
+    self_.notify();
+    return fits;
+}
+
+bool EstimatorStage::take_done(DwellDone& done) noexcept {
+    return done_.consume([&done](const DwellDone& d) { done = d; }, 1) == 1;
+}
+
+void EstimatorStage::take_order(const DwellOrder& order) noexcept {
+    if (ordered_) finish();
+    if (order.cancel) return;
+    current_ = order;
+    ordered_ = true;
+}
+
+void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
+    ++shown_.taken;
+    shown_.sample_time = sample.time;
+    if (ordered_ && sample.time >= current_.to) finish();
+    if (!ordered_ || sample.time < current_.from) {
+        ++shown_.idle;
+        return;
+    }
+    ++shown_.in_dwell;
+    if (!begun_) {
+        identification_.begin_dwell(current_.dwell);
+        begun_ = true;
+    }
+    identification_.add(measurement_of(sample, current_.from));
+    shown_.dwell_fraction = static_cast<double>(sample.time - current_.from) /
+                            static_cast<double>(current_.to - current_.from);
+}
+
+void EstimatorStage::finish() noexcept {
+    DwellDone done;
+    shown_.dwell_fraction = 0;
+    if (begun_) {
+        done.summary = identification_.end_dwell();
+        publish();
+    } else {
+        done.summary.run = current_.dwell.run;
+        done.summary.position = current_.dwell.position;
+        done.summary.flagged = true;
+        done.summary.reason = "no samples";
+    }
+    ordered_ = false;
+    begun_ = false;
+    // From here on the Identification is the control thread's.
+    done_.try_push(done);
+    control_.notify();
+}
+
+void EstimatorStage::publish() noexcept {
+    // Outside a dwell the Identification may be in the control thread's hands.
+    if (begun_) identification_.estimate(shown_.estimate);
+    published_at_ = shown_.sample_time;
+    view_.publish(shown_);
+}
+
+}  // namespace vibrig::rt

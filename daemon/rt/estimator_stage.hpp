@@ -1,0 +1,63 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "daemon/rt/dwell_order.hpp"
+#include "daemon/rt/ring.hpp"
+#include "daemon/rt/snapshot.hpp"
+#include "drivers/clock.hpp"
+#include "drivers/sample.hpp"
+#include "estimator/identification.hpp"
+
+namespace vibrig::rt {
+
+/// Samples of the estimator's ring: taken = in_dwell + idle.
+struct EstimatorView {
+    estimator::Estimate estimate;
+    std::uint64_t taken = 0, in_dwell = 0, idle = 0;
+    drivers::Time sample_time = 0;  ///< of the newest sample taken
+    double dwell_fraction = 0;      ///< 0 to 1 in a dwell, else 0
+};
+
+/// Second stage, on its own thread: feeds the samples of ordered dwells to the identification. Between the end of one
+/// dwell and the order of the next the Identification belongs to the control thread, which may read or replace it.
+class EstimatorStage {
+  public:
+    EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& self, drivers::Waiter& control,
+                   estimator::Identification& identification);
+
+    /// The thread's body; returns after stop(). Neither allocates, locks, logs nor formats.
+    void run() noexcept;
+    void stop() noexcept;  ///< any thread
+
+    /// Control thread only.
+    bool order(const DwellOrder& order) noexcept;
+    /// Control thread only: takes one finished dwell, if there is one.
+    bool take_done(DwellDone& done) noexcept;
+    [[nodiscard]] EstimatorView view() const noexcept { return view_.read(); }
+    [[nodiscard]] RingCounts ring() const noexcept { return samples_.counts(); }
+
+  private:
+    void take_order(const DwellOrder& order) noexcept;
+    void take_sample(const drivers::Sample& sample) noexcept;
+    void finish() noexcept;
+    void publish() noexcept;
+
+    Ring<drivers::Sample>& samples_;
+    drivers::Waiter& self_;
+    drivers::Waiter& control_;
+    estimator::Identification& identification_;
+    Ring<DwellOrder> orders_{8};
+    Ring<DwellDone> done_{8};
+    std::atomic<bool> stop_{false};
+
+    DwellOrder current_;
+    bool ordered_ = false;
+    bool begun_ = false;
+    drivers::Time published_at_ = 0;
+    EstimatorView shown_;
+    Snapshot<EstimatorView> view_;
+};
+
+}  // namespace vibrig::rt

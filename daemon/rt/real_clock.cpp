@@ -1,0 +1,46 @@
+#include "daemon/rt/real_clock.hpp"
+
+#include <atomic>
+#include <ctime>
+
+#include "daemon/rt/event_fd.hpp"
+
+namespace vibrig::rt {
+namespace {
+
+drivers::Time monotonic() noexcept {
+    timespec now{};
+    ::clock_gettime(CLOCK_MONOTONIC, &now);
+    return static_cast<drivers::Time>(now.tv_sec) * drivers::kSecond + now.tv_nsec;
+}
+
+class RealWaiter final : public drivers::Waiter {
+  public:
+    void notify() noexcept override {
+        if (!pending_.exchange(true)) event_.signal();
+    }
+
+    bool wait_until(drivers::Time deadline) noexcept override {
+        for (;;) {
+            if (pending_.exchange(false)) return true;
+            long long left = -1;
+            if (deadline != drivers::kNever) {
+                left = deadline - monotonic();
+                if (left <= 0) return false;
+            }
+            if (event_.wait(left)) event_.clear();
+        }
+    }
+
+  private:
+    EventFd event_;
+    std::atomic<bool> pending_{false};
+};
+
+}  // namespace
+
+drivers::Time RealClock::now() const noexcept { return monotonic(); }
+
+std::unique_ptr<drivers::Waiter> RealClock::make_waiter() { return std::make_unique<RealWaiter>(); }
+
+}  // namespace vibrig::rt

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <vector>
+
+#include "drivers/shaker.hpp"
+
+namespace vibrig {
+
+/// Remembers what it was asked; the test decides what it reads back.
+class FakeShaker final : public drivers::Shaker {
+  public:
+    void start(std::function<bool()>, StateHandler) override {}
+    [[nodiscard]] bool request(const drivers::ShakerSetPoint& set_point) noexcept override {
+        if (refuse || stop_pending()) return false;
+        requests.push_back(set_point);
+        return true;
+    }
+    void stop_now() noexcept override {
+        ++stops;
+        stop_waits = true;
+    }
+    [[nodiscard]] bool stop_pending() const noexcept override { return stop_waits; }
+    [[nodiscard]] bool busy() const noexcept override { return false; }
+    [[nodiscard]] drivers::ShakerReading reading() const noexcept override { return now; }
+    [[nodiscard]] drivers::ShakerCounters counters() const noexcept override { return {}; }
+    [[nodiscard]] drivers::LinkState state() const noexcept override {
+        return drivers::LinkState::running;
+    }
+    void on_reading(std::function<void()>) override {}
+    void shut_down() noexcept override {}
+
+    drivers::ShakerReading now;
+    std::vector<drivers::ShakerSetPoint> requests;
+    std::atomic<int> stops{0};
+    std::atomic<bool> stop_waits{false};
+    bool refuse = false;
+};
+
+}  // namespace vibrig
