@@ -1,0 +1,278 @@
+#include "daemon/campaign/campaign.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/rt/fake_shaker.hpp"
+
+namespace vibrig::campaign {
+namespace {
+
+using drivers::kMillisecond;
+using drivers::kSecond;
+using drivers::Time;
+using Kind = CommandRequest::Kind;
+
+/// Takes gimbal commands as the platform would: echoes the counter, then is in position after two seconds.
+class FakePlatformPort final : public drivers::CanPort {
+  public:
+    void start(FrameHandler, StateHandler, ErrorHandler) override {}
+    void stop() noexcept override {}
+    [[nodiscard]] bool send(const canfd_frame& frame, bool) noexcept override {
+        frames.push_back(frame);
+        return true;
+    }
+    [[nodiscard]] drivers::CanPortCounters counters() const noexcept override { return {}; }
+    [[nodiscard]] drivers::PortState state() const noexcept override {
+        return drivers::PortState::running;
+    }
+    std::vector<canfd_frame> frames;
+};
+
+struct CampaignTest : testing::Test {
+    Settings settings;
+    proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    FakePlatformPort port;
+    drivers::Gimbal gimbal{dbc, {}, port};
+    FakeShaker shaker;
+    drivers::PlatformStatus platform;
+    std::vector<rt::DwellOrder> orders;
+    std::vector<std::string> events;
+    bool watching = false;
+    int ends = 0;
+    bool complete = false;
+    bool slewed_while_moving = false;
+    double slew_started_at = -1;
+    std::size_t frames_seen = 0;
+    Time now = kSecond;
+    std::unique_ptr<Campaign> campaign;
+
+    void make() {
+        campaign = std::make_unique<Campaign>(
+            settings, Ports{gimbal, shaker, [this] { return platform; },
+                            [this](const rt::DwellOrder& o) {
+                                orders.push_back(o);
+                                return true;
+                            },
+                            [this](bool w) { watching = w; }, [] {},
+                            [this](bool c) {
+                                ++ends;
+                                complete = c;
+                            },
+                            [this](Severity, const std::string& text) { events.push_back(text); }});
+    }
+
+    CampaignTest() {
+        settings.positions_deg = {{0, 0, 0}, {0, 0, 90}};
+        settings.table_g = {9, 0};
+        settings.dwell_s = 10;
+        settings.temperature_window_s = 5;
+        platform.ready = platform.loop_closed = platform.gyros_at_speed = true;
+        platform.temperature_c = 40;
+        shaker.now.valid = true;
+        make();
+    }
+
+    CommandReply command(Kind kind) { return campaign->command({kind, "Ada", ""}, now); }
+
+    StatusData status() const {
+        StatusData s;
+        campaign->fill(s, now);
+        return s;
+    }
+
+    /// The rest of the rig for one step of 100 ms.
+    void run_rig() {
+        now += 100 * kMillisecond;
+        platform.time = platform.gimbal_time = now;
+        for (; frames_seen < port.frames.size(); ++frames_seen) {
+            const auto& frame = port.frames[frames_seen];
+            platform.gimbal_command_echo = frame.data[7];
+            const bool slews = (frame.data[6] & 0x0f) == 1;
+            platform.slewing = slews;
+            platform.in_position = false;
+            slew_started_at = slews ? drivers::to_seconds(now) : -1;
+            if (slews && !shaker.now.at_rest()) slewed_while_moving = true;
+        }
+        if (slew_started_at >= 0 && drivers::to_seconds(now) > slew_started_at + 2) {
+            platform.slewing = false;
+            platform.in_position = true;
+        }
+        if (shaker.stop_waits.exchange(false)) shaker.requests.push_back({15, 0, 0});
+        shaker.now.time = now;
+        if (!shaker.requests.empty()) {
+            const auto& wanted = shaker.requests.back();
+            shaker.now.amplitude_g = shaker.now.measured_g = wanted.amplitude_g;
+            shaker.now.running = wanted.amplitude_g > 0;
+            shaker.now.state = wanted.amplitude_g > 0 ? 2 : 0;
+        }
+        if (!orders.empty() && !orders.back().cancel && now > orders.back().to &&
+            reported != orders.size()) {
+            reported = orders.size();
+            estimator::DwellSummary summary;
+            summary.run = orders.back().dwell.run;
+            summary.position = orders.back().dwell.position;
+            campaign->on_dwell_done(summary);
+        }
+        campaign->step(now);
+    }
+    std::size_t reported = 0;
+
+    void run_for(double seconds) {
+        for (int i = 0; i < static_cast<int>(seconds * 10); ++i) run_rig();
+    }
+    bool run_until(CampaignState state, double seconds) {
+        for (int i = 0; i < static_cast<int>(seconds * 10); ++i) {
+            run_rig();
+            if (status().state == state) return true;
+        }
+        return false;
+    }
+};
+
+TEST_F(CampaignTest, NothingMovesBeforeANamedPersonArmsAndStarts) {
+    // WHEN time passes, or somebody starts without arming, or nameless
+    run_for(30);
+    EXPECT_FALSE(command(Kind::start).accepted);
+    EXPECT_FALSE(campaign->command({Kind::arm, "", ""}, now).accepted);
+    run_for(30);
+    // THEN neither the shaker nor the gimbals were told anything
+    EXPECT_TRUE(shaker.requests.empty());
+    EXPECT_TRUE(port.frames.empty());
+}
+
+TEST_F(CampaignTest, VisitsEveryPositionOfEveryRunAndSlewsOnlyAtRest) {
+    // WHEN armed and started
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    EXPECT_EQ(status().armed_by, "Ada");
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    // THEN all dwells were ordered in turn, as long as configured, and announced ahead
+    ASSERT_EQ(orders.size(), 4U);
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(orders[i].dwell.run, static_cast<int>(i / 2) + 1);
+        EXPECT_EQ(orders[i].dwell.position, static_cast<int>(i % 2) + 1);
+        EXPECT_EQ(orders[i].dwell.table_g, settings.table_g[i / 2]);
+        EXPECT_EQ(orders[i].to - orders[i].from, 10 * kSecond);
+    }
+    EXPECT_FALSE(slewed_while_moving);
+    EXPECT_TRUE(complete);
+    EXPECT_EQ(ends, 1);
+    // AND the shaker is at rest, unwatched and disarmed
+    EXPECT_TRUE(shaker.now.at_rest());
+    EXPECT_FALSE(watching);
+    EXPECT_EQ(status().armed_by, "");
+    EXPECT_EQ(status().progress, 1.0);
+    EXPECT_FALSE(command(Kind::start).accepted) << "one arming covers one campaign";
+}
+
+TEST_F(CampaignTest, WaitsForAReadyPlatformAndASteadyTemperature) {
+    // GIVEN a platform that warms by 0.05 deg C a second
+    platform.ready = false;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    run_for(20);
+    EXPECT_EQ(status().state, CampaignState::waiting);
+    EXPECT_EQ(status().reason, "platform not ready");
+    platform.ready = true;
+    settings.temperature_band_c = 0.5;
+    for (int i = 0; i < 200; ++i) {
+        platform.temperature_c += 0.02;
+        run_rig();
+    }
+    EXPECT_EQ(status().reason, "temperature not steady");
+    EXPECT_TRUE(port.frames.empty());
+    // WHEN it is steady for the window, THEN the campaign begins
+    EXPECT_TRUE(run_until(CampaignState::slewing, 20));
+}
+
+TEST_F(CampaignTest, GivesUpWaitingAfterTheTimeLimit) {
+    platform.loop_closed = false;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    EXPECT_TRUE(run_until(CampaignState::aborted, settings.ready_timeout_s + 5));
+    EXPECT_EQ(status().reason, "stabilisation loop open after 600 s");
+}
+
+TEST_F(CampaignTest, AnAbortStopsTheShakerAndEndsTheArming) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    EXPECT_TRUE(watching);
+    EXPECT_TRUE(command(Kind::abort).accepted);
+    EXPECT_GE(shaker.stops, 1);
+    EXPECT_TRUE(orders.back().cancel);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+    const auto requests = shaker.requests.size();
+    run_for(30);
+    // the fake rig appends the one stop; no set-point follows it
+    EXPECT_EQ(shaker.requests.size(), requests + 1);
+    EXPECT_FALSE(command(Kind::start).accepted);
+    EXPECT_EQ(ends, 1);
+    EXPECT_FALSE(complete);
+}
+
+TEST_F(CampaignTest, ATripLatchesUntilAcknowledged) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    shaker.stop_now();  // the interlock does that itself
+    campaign->on_trip("emergency-stop chain open", now);
+    run_for(60);
+    EXPECT_EQ(status().state, CampaignState::tripped);
+    EXPECT_FALSE(command(Kind::arm).accepted);
+    EXPECT_TRUE(command(Kind::acknowledge).accepted);
+    EXPECT_EQ(status().state, CampaignState::idle);
+    EXPECT_TRUE(command(Kind::arm).accepted);
+}
+
+TEST_F(CampaignTest, StopsWhenTheMeasuredAmplitudeLeavesTheCommand) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    shaker.now.measured_g = 9 * 1.06;
+    campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+    EXPECT_GE(shaker.stops, 1);
+}
+
+TEST_F(CampaignTest, StopsWhenTheShakerNoLongerAnswers) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    shaker.now.valid = false;
+    campaign->step(now);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+    EXPECT_GE(shaker.stops, 1);
+}
+
+TEST_F(CampaignTest, PausesAtRestBeforeTheNextPositionAndResumes) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    ASSERT_TRUE(command(Kind::pause).accepted);
+    ASSERT_TRUE(run_until(CampaignState::paused, 60));
+    EXPECT_TRUE(shaker.now.at_rest());
+    run_for(30);
+    EXPECT_EQ(orders.size(), 1U);
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    EXPECT_TRUE(run_until(CampaignState::finished, 200));
+    EXPECT_EQ(orders.size(), 4U);
+}
+
+TEST_F(CampaignTest, ShutsDownByRampingToRestFirst) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    campaign->shut_down(now);
+    EXPECT_FALSE(campaign->done());
+    ASSERT_TRUE(run_until(CampaignState::aborted, 20));
+    EXPECT_TRUE(campaign->done());
+    EXPECT_TRUE(shaker.now.at_rest());
+    EXPECT_EQ(shaker.stops, 0) << "ramped down, not cut";
+    EXPECT_FALSE(command(Kind::arm).accepted);
+}
+
+}  // namespace
+}  // namespace vibrig::campaign
