@@ -140,7 +140,13 @@ void Daemon::on_port_state(drivers::PortState state, const char* text) noexcept 
 }
 
 void Daemon::log(Severity severity, const std::string& source, const std::string& text) {
-    event_log_.append(severity, source, text, clock_.now(), utc_now());
+    EventRecord record;
+    record.utc_ns = utc_now();
+    record.time = clock_.now();
+    record.severity = severity;
+    record.source = source;
+    record.text = text;
+    event_log_.append(record);
     const auto level = severity == Severity::info      ? spdlog::level::info
                        : severity == Severity::warning ? spdlog::level::warn
                                                        : spdlog::level::err;

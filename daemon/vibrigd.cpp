@@ -28,16 +28,15 @@ void set_up_log(const vibrig::configuration::Configuration& configuration) {
 int run(vibrig::configuration::Loaded loaded, const sigset_t& signals) {
     const auto socket = loaded.configuration.socket;
     vibrig::Daemon daemon(std::move(loaded));
-    vibrig::serve::StatusServer server(daemon, socket);
+    // Before anything moves: it refuses to run beside another vibrigd.
+    const vibrig::serve::StatusServer server(daemon, socket);
     daemon.start();
-    server.start();
     spdlog::info("vibrigd {} answers at {}; measuring, shaker disarmed", vibrig::kVersion, socket);
     int signal = 0;
     ::sigwait(&signals, &signal);
     spdlog::info("{}: stopping", ::strsignal(signal));
     daemon.shut_down();
     daemon.join();
-    server.stop();
     spdlog::info("stopped cleanly");
     return 0;
 }

@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <boost/asio/post.hpp>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <thread>
+
+#include "daemon/rt/acquisition.hpp"
+#include "daemon/rt/estimator_stage.hpp"
+#include "daemon/rt/real_clock.hpp"
+#include "tests/unit/rt/fake_shaker.hpp"
+
+namespace {
+thread_local bool watched = false;
+std::atomic<bool> counting{false};
+std::atomic<std::uint64_t> allocations{0};
+
+void* counted(std::size_t size) {
+    if (watched && counting.load()) ++allocations;
+    if (void* p = std::malloc(size == 0 ? 1 : size)) return p;
+    throw std::bad_alloc();
+}
+void* counted(std::size_t size, std::align_val_t alignment) {
+    if (watched && counting.load()) ++allocations;
+    const auto a = static_cast<std::size_t>(alignment);
+    if (void* p = std::aligned_alloc(a, (size + a - 1) / a * a)) return p;
+    throw std::bad_alloc();
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void* operator new(std::size_t size, std::align_val_t a) { return counted(size, a); }
+void* operator new[](std::size_t size, std::align_val_t a) { return counted(size, a); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete[](void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace vibrig::rt {
+namespace {
+
+using drivers::kMillisecond;
+using drivers::kSecond;
+
+/// Encodes one message of rig.dbc from named values.
+canfd_frame frame_of(const proto::Dbc& dbc, const char* message,
+                     const std::vector<std::pair<const char*, double>>& values) {
+    const auto* m = dbc.find(message);
+    canfd_frame frame{};
+    frame.can_id = m->id;
+    frame.len = m->size;
+    for (const auto& [name, value] : values)
+        EXPECT_TRUE(proto::encode(*m->find(name), value, {frame.data, frame.len})) << name;
+    return frame;
+}
+
+TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
+    // GIVEN a bus, the acquisition and the estimator on their own threads, and a dwell ordered
+    const std::string path = "@vibrig-allocation-test-" + std::to_string(::getpid());
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::memcpy(address.sun_path + 1, path.data() + 1, path.size() - 1);
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path.size());
+    const int listener = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
+    ASSERT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), length), 0);
+    ASSERT_EQ(::listen(listener, 1), 0);
+
+    const auto dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    RealClock clock;
+    const auto control = clock.make_waiter();
+    const auto estimator_waiter = clock.make_waiter();
+    FakeShaker shaker;
+    Interlock interlock(shaker, *control, {12.0});
+    interlock.watch(true);
+    Ring<drivers::Sample> ring(4096);
+    estimator::Identification identification{estimator::Settings{}};
+    EstimatorStage stage(ring, *estimator_waiter, *control, identification);
+    boost::asio::io_context io(1);
+    drivers::CanPortSettings can;
+    can.kind = drivers::CanPortSettings::Kind::seqpacket;
+    can.path = path;
+    const auto port = drivers::make_can_port(io, can);
+    drivers::AssemblerSettings settings;
+    settings.sample_period = kMillisecond;  // faster than life, to be done soon
+    Acquisition acquisition(io, *port, dbc, settings, clock, nullptr,
+                            {ring, *estimator_waiter, *control, interlock});
+    acquisition.start([](drivers::PortState, const char*) {});
+    DwellOrder order;
+    order.to = drivers::kNever;
+    ASSERT_TRUE(stage.order(order));
+    std::thread acquisition_thread([&] {
+        watched = true;
+        io.run();
+    });
+    std::thread estimator_thread([&] {
+        watched = true;
+        stage.run();
+    });
+    const int bus = ::accept(listener, nullptr, nullptr);
+    ASSERT_GE(bus, 0);
+
+    // WHEN samples stream, complete and with losses, garbage and platform status between them
+    constexpr std::uint32_t kSamples = 4000;
+    for (std::uint32_t n = 0; n < kSamples; ++n) {
+        if (n == kSamples / 4) counting.store(true);
+        const double low = n % 256;
+        const double f = std::sin(0.37 * n);
+        std::vector<canfd_frame> frames{
+            frame_of(dbc, "Sync", {{"SyncCount", n}}),
+            frame_of(dbc, "Resolvers", {{"Outer", 0.01}, {"Inner", 0.02}, {"OuterValid", 1},
+                                        {"InnerValid", 1}, {"SyncLow", low}}),
+            frame_of(dbc, "ResolverAzimuth", {{"Azimuth", 359.9}, {"AzimuthValid", 1}, {"SyncLow", low}}),
+            frame_of(dbc, "AccelerometersXY", {{"X", 0}, {"Y", 1 + f}, {"XValid", 1}, {"YValid", 1}, {"SyncLow", low}}),
+            frame_of(dbc, "AccelerometerZ", {{"Z", 0}, {"ZValid", 1}, {"SyncLow", low}}),
+            frame_of(dbc, "TableAccelerometer", {{"Axial", f}, {"SyncLow", low}})};
+        if (n % 4 == 0)
+            frames.push_back(frame_of(dbc, "PlatformStatus", {{"LoopClosed", 1}, {"Ready", 1}, {"Temperature", 20}}));
+        if (n % 50 == 7) frames.erase(frames.begin() + n % 6);
+        if (n % 70 == 3) frames[1].can_id = 0x7ff;
+        for (const auto& frame : frames)
+            ASSERT_EQ(::send(bus, &frame, CAN_MTU, 0), static_cast<ssize_t>(CAN_MTU));
+        if (n % 8 == 7) std::this_thread::sleep_for(std::chrono::milliseconds(8));
+    }
+    const auto deadline = clock.now() + 10 * kSecond;
+    while (stage.view().taken + 64 < kSamples && clock.now() < deadline)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    counting.store(false);
+    acquisition.stop();
+    acquisition_thread.join();
+    stage.stop();
+    estimator_thread.join();
+    ::close(bus);
+    ::close(listener);
+    // THEN the samples went through the filter and neither thread allocated
+    EXPECT_GT(stage.view().in_dwell, kSamples * 9 / 10);
+    EXPECT_GT(stage.view().estimate.used, kSamples / 2);
+    EXPECT_EQ(allocations.load(), 0U);
+}
+
+}  // namespace
+}  // namespace vibrig::rt
