@@ -155,8 +155,8 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
 
 bool Daemon::may_feed() const noexcept {
     const Time now = clock_.now();
-    const Time oldest = std::min({acquisition_.view().beat, estimator_stage_.view().sample_time,
-                                  control_beat_.load()});
+    const Time oldest = std::min(
+        {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
     return now - oldest <= kProgressDeadline;
 }
 
@@ -254,9 +254,8 @@ StatusData Daemon::status() const {
     status.estimator_ring = {ring.pushed, ring.popped, ring.dropped};
     status.sample = acquired.sample;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
-        status.channel_age_s[c] = acquired.last_good[c] == 0
-                                      ? -1.0
-                                      : drivers::to_seconds(now - acquired.last_good[c]);
+        status.channel_age_s[c] =
+            acquired.last_good[c] == 0 ? -1.0 : drivers::to_seconds(now - acquired.last_good[c]);
     }
     status.platform = acquired.platform;
     status.estimate = estimated.estimate;

@@ -30,7 +30,8 @@ struct RtEvent {
 };
 
 /// Joins the rooms: owns the stages, the rings between them and their threads.
-///   acquisition (io_context) -> ring -> estimator -> snapshot -> server;  control -> gimbal, shaker
+///   acquisition (io_context) -> ring -> estimator -> snapshot -> server;  control -> gimbal,
+///   shaker
 class Daemon final : public StatusSource {
   public:
     /// Throws ConfigurationError, BindingError, CanError, ShakerError, std::system_error.

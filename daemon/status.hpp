@@ -14,18 +14,18 @@
 namespace vibrig {
 
 enum class CampaignState : std::uint8_t {
-    idle,        ///< measuring; shaker disarmed
-    armed,       ///< a named person armed it; nothing moves
-    waiting,     ///< for platform ready and steady temperature
+    idle,     ///< measuring; shaker disarmed
+    armed,    ///< a named person armed it; nothing moves
+    waiting,  ///< for platform ready and steady temperature
     slewing,
     ramping,
     settling,
     recording,
-    resting,     ///< ramping down, waiting for rest
-    paused,      ///< at rest between positions, by command
+    resting,  ///< ramping down, waiting for rest
+    paused,   ///< at rest between positions, by command
     finished,
     aborted,
-    tripped,     ///< stopped by an interlock; latched until acknowledged
+    tripped,  ///< stopped by an interlock; latched until acknowledged
 };
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
@@ -33,22 +33,23 @@ struct RingCounters {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
 
-/// The whole status at one instant. Filled by the daemon, read by the server; strings only here, not in real-time threads.
+/// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
+/// not in real-time threads.
 struct StatusData {
     std::string version;
     std::string campaign_name;
-    std::string clock;               ///< "real" or "rig"
-    drivers::Time time = 0;          ///< of the daemon's clock, ns
+    std::string clock;       ///< "real" or "rig"
+    drivers::Time time = 0;  ///< of the daemon's clock, ns
     std::int64_t utc_ns = 0;
     drivers::Time uptime = 0;
 
     CampaignState state = CampaignState::idle;
-    std::string reason;              ///< why it is aborted, tripped, waiting; else empty
+    std::string reason;  ///< why it is aborted, tripped, waiting; else empty
     std::string armed_by;
     int run = 0, runs = 0, position = 0, positions = 0;  ///< from 1; 0: none
     std::array<double, 3> position_deg{};
-    double progress = 0;             ///< 0 to 1
-    double remaining_s = 0;          ///< estimate
+    double progress = 0;     ///< 0 to 1
+    double remaining_s = 0;  ///< estimate
 
     double command_table_g = 0;
     double command_frequency_hz = 0;
@@ -60,7 +61,7 @@ struct StatusData {
     drivers::CanPortCounters can_counters;
     drivers::AssemblerCounters assembler;
     RingCounters estimator_ring;
-    drivers::Sample sample;          ///< the newest
+    drivers::Sample sample;  ///< the newest
     std::array<double, drivers::kChannels> channel_age_s{};
     drivers::PlatformStatus platform;
 
@@ -76,12 +77,19 @@ struct EventRecord {
     std::int64_t utc_ns = 0;
     drivers::Time time = 0;
     Severity severity = Severity::info;
-    std::string source;   ///< "campaign", "can", "shaker", ...
+    std::string source;  ///< "campaign", "can", "shaker", ...
     std::string text;
 };
 
 struct CommandRequest {
-    enum class Kind : std::uint8_t { arm, start, pause, resume, abort, acknowledge } kind = Kind::abort;
+    enum class Kind : std::uint8_t {
+        arm,
+        start,
+        pause,
+        resume,
+        abort,
+        acknowledge
+    } kind = Kind::abort;
     std::string by;        ///< named person
     std::string argument;  ///< what is acknowledged
 };
@@ -95,7 +103,8 @@ class StatusSource {
   public:
     virtual ~StatusSource() = default;
     [[nodiscard]] virtual StatusData status() const = 0;
-    [[nodiscard]] virtual std::vector<EventRecord> events(std::uint64_t after_id, std::size_t at_most) const = 0;
+    [[nodiscard]] virtual std::vector<EventRecord> events(std::uint64_t after_id,
+                                                          std::size_t at_most) const = 0;
     /// Final or present result; empty while there is nothing.
     [[nodiscard]] virtual estimator::Result result() const = 0;
     [[nodiscard]] virtual std::string effective_configuration() const = 0;

@@ -53,7 +53,8 @@ int main(int argc, char** argv) {
     app.add_option("--config", path, "configuration file (TOML); all defaults without one");
     app.add_flag("--check", check,
                  "validate, print the effective configuration with units and origins, and end");
-    app.add_flag("--schema", schema, "print every key with type, unit, default and bounds, and end");
+    app.add_flag("--schema", schema,
+                 "print every key with type, unit, default and bounds, and end");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -26,20 +26,22 @@ class Waiter {
     virtual ~Waiter() = default;
     /// Wakes the owner, now or at its next wait. Any thread; never blocks, locks or allocates.
     virtual void notify() noexcept = 0;
-    /// Sleeps in a system call until notify() or until the clock reaches `deadline` (kNever: only notify()).
-    /// Returns at once when notify() came before. True if notified, false if the deadline came.
-    /// Called by the owner only.
+    /// Sleeps in a system call until notify() or until the clock reaches `deadline` (kNever: only
+    /// notify()). Returns at once when notify() came before. True if notified, false if the
+    /// deadline came. Called by the owner only.
     virtual bool wait_until(Time deadline) noexcept = 0;
 };
 
-/// The source of time. It comes in from outside: the real clock, the simulated rig's or a recording's.
-/// Every thread that measures or acts sleeps on a Waiter of its clock and nowhere else for long, so that a
-/// simulated clock knows when all of them are done with the present moment and time may go on.
+/// The source of time. It comes in from outside: the real clock, the simulated rig's or a
+/// recording's. Every thread that measures or acts sleeps on a Waiter of its clock and nowhere else
+/// for long, so that a simulated clock knows when all of them are done with the present moment and
+/// time may go on.
 class Clock {
   public:
     virtual ~Clock() = default;
     [[nodiscard]] virtual Time now() const noexcept = 0;
-    /// A Waiter must not outlive its Clock. From construction to the first wait_until its owner counts as busy.
+    /// A Waiter must not outlive its Clock. From construction to the first wait_until its owner
+    /// counts as busy.
     [[nodiscard]] virtual std::unique_ptr<Waiter> make_waiter() = 0;
 };
 

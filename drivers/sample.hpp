@@ -25,24 +25,26 @@ enum class Quality : std::uint8_t {
 };
 [[nodiscard]] const char* name_of(Quality quality) noexcept;
 
-/// One instant of the rig, joined from all frames that carry one sync count. Raw: encoder angles as they come
-/// (sign and zero not applied), specific force as it comes (zero and matrix not applied).
+/// One instant of the rig, joined from all frames that carry one sync count. Raw: encoder angles as
+/// they come (sign and zero not applied), specific force as it comes (zero and matrix not applied).
 struct alignas(64) Sample {
-    Time time = 0;                       ///< device time fitted to kernel stamps, ns, whole us
-    std::uint32_t sequence = 0;          ///< sync count, extended; wraps at 2^32
-    std::uint32_t dropped_before = 0;    ///< records lost in the ring since the previous record
-    std::array<double, 3> angle{};       ///< outer, inner, azimuth, rad, [0, 2 pi)
-    std::array<double, 3> force{};       ///< specific force, accelerometer axes, g
-    double table_accel = 0;              ///< table accelerometer along its axis, g
-    std::array<Quality, 8> quality{};    ///< by Channel; the eighth is padding
+    Time time = 0;                     ///< device time fitted to kernel stamps, ns, whole us
+    std::uint32_t sequence = 0;        ///< sync count, extended; wraps at 2^32
+    std::uint32_t dropped_before = 0;  ///< records lost in the ring since the previous record
+    std::array<double, 3> angle{};     ///< outer, inner, azimuth, rad, [0, 2 pi)
+    std::array<double, 3> force{};     ///< specific force, accelerometer axes, g
+    double table_accel = 0;            ///< table accelerometer along its axis, g
+    std::array<Quality, 8> quality{};  ///< by Channel; the eighth is padding
     std::array<std::uint8_t, 32> spare{};
 
     [[nodiscard]] Quality of(Channel c) const { return quality[static_cast<std::size_t>(c)]; }
     [[nodiscard]] bool angles_good() const {
-        return quality[0] == Quality::good && quality[1] == Quality::good && quality[2] == Quality::good;
+        return quality[0] == Quality::good && quality[1] == Quality::good &&
+               quality[2] == Quality::good;
     }
     [[nodiscard]] bool force_good() const {
-        return quality[3] == Quality::good && quality[4] == Quality::good && quality[5] == Quality::good;
+        return quality[3] == Quality::good && quality[4] == Quality::good &&
+               quality[5] == Quality::good;
     }
 };
 static_assert(std::is_trivially_copyable_v<Sample>);
@@ -50,13 +52,13 @@ static_assert(sizeof(Sample) == 128, "two cache lines per sample");
 
 /// What the platform says of itself; slower than samples. Latest value wins.
 struct PlatformStatus {
-    Time time = 0;                 ///< of the newest status frame; 0: none yet
-    bool ready = false;            ///< the platform's own ready flag
-    bool loop_closed = false;      ///< stabilisation loop closed
+    Time time = 0;             ///< of the newest status frame; 0: none yet
+    bool ready = false;        ///< the platform's own ready flag
+    bool loop_closed = false;  ///< stabilisation loop closed
     bool gyros_at_speed = false;
-    double temperature_c = 0;      ///< platform temperature, deg C
+    double temperature_c = 0;  ///< platform temperature, deg C
     bool fault = false;
-    Time gimbal_time = 0;          ///< of the newest gimbal status frame; 0: none yet
+    Time gimbal_time = 0;  ///< of the newest gimbal status frame; 0: none yet
     bool in_position = false;
     bool slewing = false;
     std::uint8_t gimbal_command_echo = 0;  ///< counter of the last gimbal command accepted

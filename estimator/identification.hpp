@@ -13,7 +13,8 @@ namespace vibrig::estimator {
 
 inline constexpr std::size_t kParameters = 30;
 
-/// Settings that cannot work; the message names the key ("platform.up"), the value and what was expected.
+/// Settings that cannot work; the message names the key ("platform.up"), the value and what was
+/// expected.
 class SettingsError : public std::invalid_argument {
   public:
     using std::invalid_argument::invalid_argument;
@@ -40,9 +41,8 @@ struct Settings {
     // platform
     SignedAxis up{1, 1};
     /// [gyro x, y, z][input, output, spin]
-    std::array<std::array<SignedAxis, 3>, 3> gyro_axes{{{{{0, 1}, {1, 1}, {2, 1}}},
-                                                        {{{1, 1}, {2, 1}, {0, 1}}},
-                                                        {{{2, 1}, {0, 1}, {1, 1}}}}};
+    std::array<std::array<SignedAxis, 3>, 3> gyro_axes{
+        {{{{0, 1}, {1, 1}, {2, 1}}}, {{{1, 1}, {2, 1}, {0, 1}}}, {{{2, 1}, {0, 1}, {1, 1}}}}};
     int drift_sign = -1;
     std::array<int, 3> encoder_sign{1, 1, 1};
     std::array<double, 3> encoder_zero_deg{0, 0, 0};
@@ -56,16 +56,16 @@ struct Settings {
     double accelerometer_g = 1e-4;
     // estimator
     Method method = Method::joint;
-    double prior_bias = 10.0;       ///< deg/h, 1 sigma
-    double prior_linear = 10.0;     ///< deg/h/g
-    double prior_quadratic = 1.0;   ///< deg/h/g^2
+    double prior_bias = 10.0;      ///< deg/h, 1 sigma
+    double prior_linear = 10.0;    ///< deg/h/g
+    double prior_quadratic = 1.0;  ///< deg/h/g^2
     double forgetting = 0.95;
     double gate_nis = 25.0;
 };
 
 /// One sample as the estimator takes it: raw encoder angles and raw specific force.
 struct Measurement {
-    double time_s = 0;                ///< grows within a dwell
+    double time_s = 0;                  ///< grows within a dwell
     std::array<double, 3> angle_rad{};  ///< outer, inner, azimuth
     std::array<double, 3> force_g{};    ///< accelerometer axes
     bool angles_good = true;
@@ -73,40 +73,50 @@ struct Measurement {
 };
 
 struct DwellInfo {
-    int run = 1;       ///< from 1; the two-step route joins two runs
-    int position = 1;  ///< from 1
+    int run = 1;          ///< from 1; the two-step route joins two runs
+    int position = 1;     ///< from 1
     double table_g = -1;  ///< commanded peak at the table; negative: not known (a CSV recording)
 };
 
-enum class StepOutcome : std::uint8_t { initialised, used, buffered, gated, bad_angles, bad_force, bad_time, reinitialised };
+enum class StepOutcome : std::uint8_t {
+    initialised,
+    used,
+    buffered,
+    gated,
+    bad_angles,
+    bad_force,
+    bad_time,
+    reinitialised
+};
 
 struct StepResult {
     StepOutcome outcome = StepOutcome::used;
-    double nis = 0;                          ///< three-axis, before the gate
+    double nis = 0;  ///< three-axis, before the gate
     std::array<double, 3> innovation_arcsec{};
 };
 
 struct DwellSummary {
     int run = 0, position = 0;
-    std::uint32_t samples = 0;      ///< offered
-    std::uint32_t used = 0;         ///< of them in the filter
+    std::uint32_t samples = 0;  ///< offered
+    std::uint32_t used = 0;     ///< of them in the filter
     std::uint32_t rejected = 0;
     std::uint32_t reinitialised = 0;
-    double kappa = 1;               ///< whole dwell, spec section 6.3
-    double amplitude_g = 0;         ///< sqrt(2 (kappa - 1)), platform
-    double frequency_hz = 0;        ///< lock-in; 0 at rest
-    double mean_force_g = 0;        ///< W{fu}; 1 within 2 % or the dwell is rejected
+    double kappa = 1;         ///< whole dwell, spec section 6.3
+    double amplitude_g = 0;   ///< sqrt(2 (kappa - 1)), platform
+    double frequency_hz = 0;  ///< lock-in; 0 at rest
+    double mean_force_g = 0;  ///< W{fu}; 1 within 2 % or the dwell is rejected
     double nis_per_dof = 0;
-    bool flagged = false;           ///< more than 1 % rejected, or vertical force not 1 g, or excluded frequency
-    const char* reason = "";        ///< static text; empty when not flagged
+    bool flagged =
+        false;  ///< more than 1 % rejected, or vertical force not 1 g, or excluded frequency
+    const char* reason = "";  ///< static text; empty when not flagged
 };
 
 /// Fixed-size state of the identification for displays; copied without allocation.
 struct Estimate {
-    std::array<double, kParameters> value{};   ///< in the order of parameter_names()
+    std::array<double, kParameters> value{};  ///< in the order of parameter_names()
     std::array<double, kParameters> sigma{};
     std::array<bool, kParameters> observable{};
-    double amplitude_g = 0;   ///< platform, present dwell
+    double amplitude_g = 0;  ///< platform, present dwell
     double frequency_hz = 0;
     double kappa = 1;
     std::uint64_t samples = 0, used = 0, rejected = 0;
@@ -130,7 +140,8 @@ struct Result {
     std::array<double, kParameters> value{};
     std::array<double, kParameters> sigma{};
     std::array<bool, kParameters> observable{};
-    /// 30 x 30, rows in the order of parameter_names(); rows of what is not observable are NaN (null in JSON).
+    /// 30 x 30, rows in the order of parameter_names(); rows of what is not observable are NaN
+    /// (null in JSON).
     Eigen::Matrix<double, kParameters, kParameters> covariance;
     std::vector<RunAmplitude> amplitudes;
     std::vector<Combination> combinations;
@@ -145,8 +156,8 @@ struct Result {
 /// "deg/h", "deg/h/g" or "deg/h/g^2".
 [[nodiscard]] const char* parameter_unit(std::size_t index) noexcept;
 
-/// The whole identification of one campaign: level, filter, recovery, observability (spec sections 2-9).
-/// begin_dwell, add, end_dwell and estimate neither allocate nor throw; one thread.
+/// The whole identification of one campaign: level, filter, recovery, observability (spec sections
+/// 2-9). begin_dwell, add, end_dwell and estimate neither allocate nor throw; one thread.
 class Identification {
   public:
     /// Throws SettingsError. Room for `max_dwells` dwell summaries is taken here.

@@ -35,9 +35,7 @@ bool Campaign::active() const {
            state_ == State::paused;
 }
 
-bool Campaign::done() const {
-    return shutting_down_ && !active() && !ports_.shaker.stop_pending();
-}
+bool Campaign::done() const { return shutting_down_ && !active() && !ports_.shaker.stop_pending(); }
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
@@ -61,8 +59,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (state_ == State::tripped)
                 return refuse("tripped (" + reason_ + "): acknowledge it first");
             if (ports_.shaker.stop_pending()) return refuse("a stop of the shaker is pending");
-            if (!ports_.shaker.reading().valid)
-                return refuse("no valid read-back from the shaker");
+            if (!ports_.shaker.reading().valid) return refuse("no valid read-back from the shaker");
             if (ports_.shaker.reading().emergency_stop_open)
                 return refuse("the emergency-stop chain is open");
             armed_by_ = request.by;
@@ -119,12 +116,17 @@ Time Campaign::step_once(Time now) {
         }
     }
     switch (state_) {
-        case State::waiting: return wait_for_platform(now);
-        case State::slewing: return slew(now);
-        case State::ramping: return ramp(now);
+        case State::waiting:
+            return wait_for_platform(now);
+        case State::slewing:
+            return slew(now);
+        case State::ramping:
+            return ramp(now);
         case State::settling:
-        case State::recording: return record(now);
-        case State::resting: return rest(now);
+        case State::recording:
+            return record(now);
+        case State::resting:
+            return rest(now);
         case State::paused:
             if (!pause_asked_ || shutting_down_) start_position(now);
             return now + kSecond;
@@ -132,7 +134,8 @@ Time Campaign::step_once(Time now) {
         case State::armed:
         case State::finished:
         case State::aborted:
-        case State::tripped: break;
+        case State::tripped:
+            break;
     }
     return now + kSecond;
 }
@@ -145,8 +148,8 @@ Time Campaign::wait_for_platform(Time now) {
     const Time window = from_seconds(settings_.temperature_window_s);
     while (temperatures_.size() > 2 && temperatures_[1].first <= now - window)
         temperatures_.pop_front();
-    const auto [low, high] = std::ranges::minmax(temperatures_, {},
-                                                 &std::pair<Time, double>::second);
+    const auto [low, high] =
+        std::ranges::minmax(temperatures_, {}, &std::pair<Time, double>::second);
     const bool covered = !temperatures_.empty() && temperatures_.front().first <= now - window;
     const bool steady = covered && high.second - low.second <= settings_.temperature_band_c;
     reason_.clear();
@@ -179,11 +182,11 @@ void Campaign::start_position(Time now) {
         return;
     }
     const auto& angle = settings_.positions_deg[place_.position];
-    ports_.event(Severity::info,
-                 fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g",
-                             place_.run + 1, settings_.table_g.size(), place_.position + 1,
-                             settings_.positions_deg.size(), angle[0], angle[1], angle[2],
-                             table_g()));
+    ports_.event(
+        Severity::info,
+        fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g", place_.run + 1,
+                    settings_.table_g.size(), place_.position + 1, settings_.positions_deg.size(),
+                    angle[0], angle[1], angle[2], table_g()));
     enter(State::slewing, now);
 }
 
@@ -204,8 +207,11 @@ Time Campaign::slew(Time now) {
         case drivers::GimbalState::timed_out:
             abort("gimbals did not reach the position in time", now);
             return now;
-        case drivers::GimbalState::no_status: abort("no gimbal status", now); return now;
-        default: return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+        case drivers::GimbalState::no_status:
+            abort("no gimbal status", now);
+            return now;
+        default:
+            return std::min(ports_.gimbal.next_deadline(), now + kPoll);
     }
 }
 
@@ -224,8 +230,7 @@ Time Campaign::ramp(Time now) {
     }
     if (!requested_) {
         ports_.watch(true);
-        requested_ = ports_.shaker.request(
-            {settings_.frequency_hz, table_g(), settings_.ramp_s});
+        requested_ = ports_.shaker.request({settings_.frequency_hz, table_g(), settings_.ramp_s});
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
     }
@@ -377,7 +382,8 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.runs = static_cast<int>(settings_.table_g.size());
     status.positions = static_cast<int>(settings_.positions_deg.size());
     status.dwells = dwells_;
-    const auto total = static_cast<double>(settings_.table_g.size() * settings_.positions_deg.size());
+    const auto total =
+        static_cast<double>(settings_.table_g.size() * settings_.positions_deg.size());
     const bool begun = active() || state_ == State::finished || !dwells_.empty();
     if (begun && place_.run < settings_.table_g.size()) {
         status.run = static_cast<int>(place_.run) + 1;
@@ -386,18 +392,19 @@ void Campaign::fill(StatusData& status, Time now) const {
     }
     double done = static_cast<double>(positions_done_);
     if (state_ == State::recording && dwell_to_ > dwell_from_) {
-        done += std::clamp(static_cast<double>(now - dwell_from_) /
-                               static_cast<double>(dwell_to_ - dwell_from_), 0.0, 1.0);
+        done += std::clamp(
+            static_cast<double>(now - dwell_from_) / static_cast<double>(dwell_to_ - dwell_from_),
+            0.0, 1.0);
     }
     status.progress = begun ? done / total : 0;
     if (active()) {
         // What is left at the pace so far, at first at the nominal one.
         const double nominal = settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
-        const double pace = positions_done_ > 0 ? drivers::to_seconds(now - started_) / done
-                                                : nominal;
+        const double pace =
+            positions_done_ > 0 ? drivers::to_seconds(now - started_) / done : nominal;
         status.remaining_s = (total - done) * pace;
-        const bool vibrating = state_ == State::ramping || state_ == State::settling ||
-                               state_ == State::recording;
+        const bool vibrating =
+            state_ == State::ramping || state_ == State::settling || state_ == State::recording;
         status.command_table_g = vibrating ? table_g() : 0;
         status.command_frequency_hz = settings_.frequency_hz;
     }

@@ -27,9 +27,9 @@ struct Ports {
     std::function<void(Severity, const std::string&)> event;
 };
 
-/// The campaign as a state machine: for each run and position slew, ramp, settle, record, rest. Moved on by step(),
-/// which never waits. The shaker moves only between a named person's arm() and the end of that campaign; gimbals slew
-/// only while it is at rest. Control thread only.
+/// The campaign as a state machine: for each run and position slew, ramp, settle, record, rest.
+/// Moved on by step(), which never waits. The shaker moves only between a named person's arm() and
+/// the end of that campaign; gimbals slew only while it is at rest. Control thread only.
 class Campaign {
   public:
     Campaign(const Settings& settings, Ports ports);
@@ -76,8 +76,8 @@ class Campaign {
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;
-    bool stop_sent_ = false;       ///< within rest(): the ramp down took too long
-    bool requested_ = false;       ///< within ramp() and rest(): the set-point was accepted
+    bool stop_sent_ = false;  ///< within rest(): the ramp down took too long
+    bool requested_ = false;  ///< within ramp() and rest(): the set-point was accepted
     bool dwell_ordered_ = false;
     bool dwell_done_ = false;
     drivers::Time dwell_from_ = 0;

@@ -8,7 +8,7 @@ namespace vibrig::campaign {
 
 /// Table 1 of Tang et al. 2009: outer, inner, azimuth in deg.
 inline const std::vector<std::array<double, 3>> kTable1Positions{
-    {0, 0, 0},  {0, 0, 45},   {0, 0, 90},    {0, 0, 180}, {180, 0, 45}, {45, 0, 0},  {45, 0, 90},
+    {0, 0, 0},   {0, 0, 45},   {0, 0, 90},    {0, 0, 180}, {180, 0, 45}, {45, 0, 0},  {45, 0, 90},
     {90, 0, 90}, {90, 0, 180}, {180, 0, 270}, {270, 0, 0}, {270, 0, 90}, {-45, 0, 0}, {-45, 0, 90}};
 
 /// What the campaign does; amplitudes are peak at the table.
@@ -18,18 +18,18 @@ struct Settings {
     std::vector<double> table_g{9.0, 7.0};  ///< one run each
     double frequency_hz = 15.0;             ///< [vibration] frequency_hz
     double dwell_s = 100.0;
-    double settle_s = 3.0;   ///< after the ramp, 2 s at least
+    double settle_s = 3.0;  ///< after the ramp, 2 s at least
     double ramp_s = 2.0;
-    double ready_timeout_s = 600.0;            ///< platform ready and temperature steady
+    double ready_timeout_s = 600.0;  ///< platform ready and temperature steady
     double temperature_window_s = 60.0;
-    double temperature_band_c = 0.5;           ///< largest spread within the window
-    double amplitude_tolerance = 0.05;         ///< relative; measured against commanded after the ramp
-    double stop_timeout_s = 10.0;              ///< from stop to rest
+    double temperature_band_c = 0.5;    ///< largest spread within the window
+    double amplitude_tolerance = 0.05;  ///< relative; measured against commanded after the ramp
+    double stop_timeout_s = 10.0;       ///< from stop to rest
     // limits of the shaker, checked at the frequency in force
     double max_acceleration_g = 12.0;
     double max_velocity_mps = 1.5;
-    double max_displacement_mm = 12.0;         ///< peak
-    double resonance_hz = 0.0;                 ///< of the isolators; 0: from frequency and transmission
+    double max_displacement_mm = 12.0;  ///< peak
+    double resonance_hz = 0.0;          ///< of the isolators; 0: from frequency and transmission
 };
 
 }  // namespace vibrig::campaign

@@ -94,11 +94,11 @@ void Acquisition::flush() noexcept {
     }
     const auto& platform = assembler_.platform();
     const auto& was = shown_.platform;
-    const bool changed =
-        platform.ready != was.ready || platform.loop_closed != was.loop_closed ||
-        platform.gyros_at_speed != was.gyros_at_speed || platform.fault != was.fault ||
-        platform.in_position != was.in_position || platform.slewing != was.slewing ||
-        platform.gimbal_command_echo != was.gimbal_command_echo;
+    const bool changed = platform.ready != was.ready || platform.loop_closed != was.loop_closed ||
+                         platform.gyros_at_speed != was.gyros_at_speed ||
+                         platform.fault != was.fault || platform.in_position != was.in_position ||
+                         platform.slewing != was.slewing ||
+                         platform.gimbal_command_echo != was.gimbal_command_echo;
     shown_.platform = platform;
     shown_.assembler = assembler_.counters();
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {

@@ -27,8 +27,8 @@ struct AcquisitionView {
     drivers::Time beat = 0;  ///< when the thread last handled frames
 };
 
-/// First stage: frames in, interlock, samples out to the rings. Everything here runs in the thread of the io_context;
-/// after start() it neither allocates, locks, logs nor formats.
+/// First stage: frames in, interlock, samples out to the rings. Everything here runs in the thread
+/// of the io_context; after start() it neither allocates, locks, logs nor formats.
 class Acquisition {
   public:
     struct Wiring {
@@ -39,7 +39,8 @@ class Acquisition {
     };
     using Event = std::function<void(drivers::PortState, const char* text)>;
 
-    /// `rig` is the clock itself when the simulated rig owns the time, else null. Throws drivers::BindingError.
+    /// `rig` is the clock itself when the simulated rig owns the time, else null. Throws
+    /// drivers::BindingError.
     Acquisition(boost::asio::io_context& io, drivers::CanPort& port, const proto::Dbc& dbc,
                 const drivers::AssemblerSettings& settings, drivers::Clock& clock, RigClock* rig,
                 Wiring wiring);

@@ -7,8 +7,8 @@
 
 namespace vibrig::rt {
 
-/// Control to estimator: the dwell that samples with from <= time < to belong to. Announced ahead of `from`, so that
-/// it does not matter which thread is faster.
+/// Control to estimator: the dwell that samples with from <= time < to belong to. Announced ahead
+/// of `from`, so that it does not matter which thread is faster.
 struct DwellOrder {
     drivers::Time from = 0;
     drivers::Time to = 0;

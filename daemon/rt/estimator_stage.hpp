@@ -20,8 +20,9 @@ struct EstimatorView {
     double dwell_fraction = 0;      ///< 0 to 1 in a dwell, else 0
 };
 
-/// Second stage, on its own thread: feeds the samples of ordered dwells to the identification. Between the end of one
-/// dwell and the order of the next the Identification belongs to the control thread, which may read or replace it.
+/// Second stage, on its own thread: feeds the samples of ordered dwells to the identification.
+/// Between the end of one dwell and the order of the next the Identification belongs to the control
+/// thread, which may read or replace it.
 class EstimatorStage {
   public:
     EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& self, drivers::Waiter& control,

@@ -8,12 +8,18 @@ using drivers::Channel;
 
 const char* text_of(Trip trip) noexcept {
     switch (trip) {
-        case Trip::none: return "none";
-        case Trip::stale_channel: return "a resolver or accelerometer channel is stale";
-        case Trip::loop_open: return "stabilisation loop open";
-        case Trip::over_amplitude: return "table acceleration above the shaker's limit";
-        case Trip::emergency_stop: return "emergency-stop chain open";
-        case Trip::can_lost: return "CAN bus lost";
+        case Trip::none:
+            return "none";
+        case Trip::stale_channel:
+            return "a resolver or accelerometer channel is stale";
+        case Trip::loop_open:
+            return "stabilisation loop open";
+        case Trip::over_amplitude:
+            return "table acceleration above the shaker's limit";
+        case Trip::emergency_stop:
+            return "emergency-stop chain open";
+        case Trip::can_lost:
+            return "CAN bus lost";
     }
     return "unknown";
 }

@@ -9,10 +9,18 @@
 
 namespace vibrig::rt {
 
-enum class Trip : std::uint8_t { none, stale_channel, loop_open, over_amplitude, emergency_stop, can_lost };
+enum class Trip : std::uint8_t {
+    none,
+    stale_channel,
+    loop_open,
+    over_amplitude,
+    emergency_stop,
+    can_lost
+};
 [[nodiscard]] const char* text_of(Trip trip) noexcept;
 
-/// Stops the shaker from the acquisition thread, before anything else sees the sample. Latched until acknowledged.
+/// Stops the shaker from the acquisition thread, before anything else sees the sample. Latched
+/// until acknowledged.
 class Interlock {
   public:
     struct Limits {

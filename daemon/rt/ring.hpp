@@ -16,10 +16,11 @@ struct RingCounts {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
 
-/// Lock-free ring for one producer and one consumer thread. A full ring drops the newest record, counts it, and the
-/// next record that fits carries the count in its `dropped_before`. Neither side waits, locks or allocates.
+/// Lock-free ring for one producer and one consumer thread. A full ring drops the newest record,
+/// counts it, and the next record that fits carries the count in its `dropped_before`. Neither side
+/// waits, locks or allocates.
 template <typename T>
-    requires std::is_trivially_copyable_v<T> && requires(T t) { t.dropped_before = 1U; }
+requires std::is_trivially_copyable_v<T> && requires(T t) { t.dropped_before = 1U; }
 class Ring {
   public:
     /// Throws std::invalid_argument unless capacity is a power of two.
@@ -34,7 +35,8 @@ class Ring {
     /// Producer only. False: dropped and counted.
     bool try_push(const T& record) noexcept { return push_n({&record, 1}) == 1; }
 
-    /// Producer only. Publishes all that fit with one store; returns how many. The rest is dropped and counted.
+    /// Producer only. Publishes all that fit with one store; returns how many. The rest is dropped
+    /// and counted.
     std::size_t push_n(std::span<const T> records) noexcept {
         const std::uint64_t head = head_.load(std::memory_order_relaxed);
         const std::uint64_t capacity = mask_ + 1;
@@ -57,7 +59,8 @@ class Ring {
         return n;
     }
 
-    /// Consumer only. Calls f(const T&) in place for up to `at_most` records and frees them with one store.
+    /// Consumer only. Calls f(const T&) in place for up to `at_most` records and frees them with
+    /// one store.
     template <typename F>
     std::size_t consume(F&& f, std::size_t at_most = 32) noexcept {
         const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
@@ -78,8 +81,9 @@ class Ring {
     }
 
   private:
-    // Indices grow for ever and are masked on use, so "full" and "empty" differ without a spare slot. Each side keeps
-    // a copy of the other's index and reads the shared line only when the copy says full or empty.
+    // Indices grow for ever and are masked on use, so "full" and "empty" differ without a spare
+    // slot. Each side keeps a copy of the other's index and reads the shared line only when the
+    // copy says full or empty.
     alignas(64) std::atomic<std::uint64_t> head_{0};
     std::uint64_t cached_tail_ = 0;
     std::uint32_t unreported_ = 0;

@@ -9,9 +9,10 @@
 
 namespace vibrig::rt {
 
-/// The latest value of T, written by one thread, readable by any without stopping the writer (a seqlock).
+/// The latest value of T, written by one thread, readable by any without stopping the writer (a
+/// seqlock).
 template <typename T>
-    requires std::is_trivially_copyable_v<T> && std::is_default_constructible_v<T>
+requires std::is_trivially_copyable_v<T> && std::is_default_constructible_v<T>
 class Snapshot {
   public:
     Snapshot() noexcept { publish(T{}); }

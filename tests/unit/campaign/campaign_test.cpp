@@ -14,7 +14,8 @@ using drivers::kSecond;
 using drivers::Time;
 using Kind = CommandRequest::Kind;
 
-/// Takes gimbal commands as the platform would: echoes the counter, then is in position after two seconds.
+/// Takes gimbal commands as the platform would: echoes the counter, then is in position after two
+/// seconds.
 class FakePlatformPort final : public drivers::CanPort {
   public:
     void start(FrameHandler, StateHandler, ErrorHandler) override {}
@@ -168,16 +169,16 @@ TEST_F(CampaignTest, VisitsEveryPositionOfEveryRunAndSlewsOnlyAtRest) {
 }
 
 TEST_F(CampaignTest, WaitsForAReadyPlatformAndASteadyTemperature) {
-    // GIVEN a platform that warms by 0.05 deg C a second
+    // GIVEN a platform that warms by 0.2 deg C a second and is not ready at first
     platform.ready = false;
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);
-    run_for(20);
-    EXPECT_EQ(status().state, CampaignState::waiting);
-    EXPECT_EQ(status().reason, "platform not ready");
-    platform.ready = true;
-    settings.temperature_band_c = 0.5;
-    for (int i = 0; i < 200; ++i) {
+    for (int i = 0; i < 400; ++i) {
+        if (i == 200) {
+            EXPECT_EQ(status().state, CampaignState::waiting);
+            EXPECT_EQ(status().reason, "platform not ready");
+            platform.ready = true;
+        }
         platform.temperature_c += 0.02;
         run_rig();
     }

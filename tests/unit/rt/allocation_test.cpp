@@ -119,14 +119,21 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
         const double f = std::sin(0.37 * n);
         std::vector<canfd_frame> frames{
             frame_of(dbc, "Sync", {{"SyncCount", n}}),
-            frame_of(dbc, "Resolvers", {{"Outer", 0.01}, {"Inner", 0.02}, {"OuterValid", 1},
-                                        {"InnerValid", 1}, {"SyncLow", low}}),
-            frame_of(dbc, "ResolverAzimuth", {{"Azimuth", 359.9}, {"AzimuthValid", 1}, {"SyncLow", low}}),
-            frame_of(dbc, "AccelerometersXY", {{"X", 0}, {"Y", 1 + f}, {"XValid", 1}, {"YValid", 1}, {"SyncLow", low}}),
+            frame_of(dbc, "Resolvers",
+                     {{"Outer", 0.01},
+                      {"Inner", 0.02},
+                      {"OuterValid", 1},
+                      {"InnerValid", 1},
+                      {"SyncLow", low}}),
+            frame_of(dbc, "ResolverAzimuth",
+                     {{"Azimuth", 359.9}, {"AzimuthValid", 1}, {"SyncLow", low}}),
+            frame_of(dbc, "AccelerometersXY",
+                     {{"X", 0}, {"Y", 1 + f}, {"XValid", 1}, {"YValid", 1}, {"SyncLow", low}}),
             frame_of(dbc, "AccelerometerZ", {{"Z", 0}, {"ZValid", 1}, {"SyncLow", low}}),
             frame_of(dbc, "TableAccelerometer", {{"Axial", f}, {"SyncLow", low}})};
         if (n % 4 == 0)
-            frames.push_back(frame_of(dbc, "PlatformStatus", {{"LoopClosed", 1}, {"Ready", 1}, {"Temperature", 20}}));
+            frames.push_back(frame_of(dbc, "PlatformStatus",
+                                      {{"LoopClosed", 1}, {"Ready", 1}, {"Temperature", 20}}));
         if (n % 50 == 7) frames.erase(frames.begin() + n % 6);
         if (n % 70 == 3) frames[1].can_id = 0x7ff;
         for (const auto& frame : frames)
@@ -134,7 +141,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
         if (n % 8 == 7) std::this_thread::sleep_for(std::chrono::milliseconds(8));
     }
     const auto deadline = clock.now() + 10 * kSecond;
-    while (stage.view().taken + 64 < kSamples && clock.now() < deadline)
+    while (stage.ring().popped + 16 < kSamples && clock.now() < deadline)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     counting.store(false);
     acquisition.stop();

@@ -76,7 +76,8 @@ TEST(RigClock, ADeadlineInThePastReturnsAtOnce) {
 }
 
 TEST(RigClock, EveryDeadlineFiresInItsOwnStepWhateverTheThreadsDo) {
-    // GIVEN three threads with periods of 25, 50 and 75 ms that write down when they ran, and wake one another
+    // GIVEN three threads with periods of 25, 50 and 75 ms that write down when they ran, and wake
+    // one another
     RigClock clock;
     std::array<std::unique_ptr<drivers::Waiter>, 3> waiters;
     for (auto& w : waiters) w = clock.make_waiter();
