@@ -77,6 +77,15 @@ Daemon::Daemon(configuration::Loaded loaded)
                      log(severity, "campaign", text);
                  }}) {}
 
+void Daemon::check_bindings(const configuration::Configuration& configuration) {
+    const auto dbc = load_dbc(configuration.dbc);
+    const drivers::SampleAssembler assembler(dbc, configuration.assembler,
+                                             [](const drivers::Sample&) {});
+    boost::asio::io_context io;
+    const auto port = drivers::make_can_port(io, configuration.can);
+    const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port);
+}
+
 Daemon::~Daemon() {
     shut_down();
     join();

@@ -36,6 +36,8 @@ class Daemon final : public StatusSource {
   public:
     /// Throws ConfigurationError, BindingError, CanError, ShakerError, std::system_error.
     explicit Daemon(configuration::Loaded loaded);
+    /// Throws DbcError or BindingError when the configured messages cannot be bound; opens nothing.
+    static void check_bindings(const configuration::Configuration& configuration);
     ~Daemon() override;
 
     /// Starts the threads; throws CanError.

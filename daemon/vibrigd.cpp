@@ -75,6 +75,7 @@ int main(int argc, char** argv) {
         }
         auto loaded = vibrig::configuration::load(path, true);
         if (check) {
+            vibrig::Daemon::check_bindings(loaded.configuration);
             std::cout << vibrig::configuration::format_effective(loaded);
             return 0;
         }

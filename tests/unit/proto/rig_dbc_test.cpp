@@ -40,6 +40,10 @@ TEST(RigDbc, CarriesAccelerationsOfThirtyTwoG) {
     EXPECT_EQ(decode(*message->find("X"), payload), -32.0);
     EXPECT_EQ(decode(*message->find("Y"), payload), 9.0 / 262144.0);
     EXPECT_EQ(decode_raw(*message->find("X"), payload), -8388608);
+    // AND a saturated accelerometer is out of range, 31 g is not
+    EXPECT_TRUE(out_of_range(*message->find("X"), -32.0));
+    EXPECT_TRUE(out_of_range(*message->find("X"), 8388607.0 / 262144.0));
+    EXPECT_FALSE(out_of_range(*message->find("X"), 31.0));
 }
 
 TEST(RigDbc, NamesUnitsValuesAndMultiplexedTemperatures) {
