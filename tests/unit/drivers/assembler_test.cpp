@@ -200,20 +200,15 @@ TEST_F(Assembler, KeepsTheFirstOfTwoFramesThatDiffer) {
 
 TEST_F(Assembler, MarksWhatTheDeviceFlagsAndWhatIsOutOfRange) {
     std::vector<ReceivedFrame> frames = frames_of_count(1, time_of(1));
-    // GIVEN the inner resolver flagged invalid and 31.9 g on x, -32 g on y (the ends of the 24
-    // bits), in a DBC whose range ends at 20 g
-    proto::Dbc dbc = rig_dbc();
-    for (proto::Message& m : dbc.messages) {
-        for (proto::Signal& s : m.signals) {
-            if (m.name == "AccelerometersXY" && s.name == "X") s.maximum = 20;
-        }
-    }
+    // GIVEN the inner resolver flagged invalid, x saturated beyond the DBC's range of 31 g, y
+    // inside
+    const proto::Dbc dbc = rig_dbc();
     make({}, dbc);
     frames[1] = frame_of(
         dbc, "Resolvers", time_of(1),
         {{"Outer", 1}, {"Inner", 2}, {"OuterValid", 1}, {"InnerValid", 0}, {"SyncLow", 1}});
     frames[3] = frame_of(dbc, "AccelerometersXY", time_of(1),
-                         {{"X", 31.9}, {"Y", -31.9}, {"XValid", 1}, {"YValid", 1}, {"SyncLow", 1}});
+                         {{"X", 31.9}, {"Y", -30.9}, {"XValid", 1}, {"YValid", 1}, {"SyncLow", 1}});
     for (const ReceivedFrame& f : frames) assembler_->feed(f);
     const Sample& s = samples_.at(0);
     EXPECT_EQ(s.of(Channel::outer), Quality::good);
