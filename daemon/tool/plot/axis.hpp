@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace vibrig::tool::plot {
+
+/// One axis of a chart. Without a range (low == high) it takes the data's.
+class Axis {
+  public:
+    Axis() = default;
+    explicit Axis(std::string name, bool logarithmic = false)
+        : label(std::move(name)), log(logarithmic) {}
+
+    std::string label;  ///< with unit
+    bool log = false;
+    double low = 0;
+    double high = 0;
+
+    void include(double value);                       ///< widens the range; log: only if > 0
+    void settle();                                    ///< rounds the range to ticks
+    [[nodiscard]] double place(double value) const;   ///< 0 at low, 1 at high
+    [[nodiscard]] std::vector<double> ticks() const;  ///< labelled
+    [[nodiscard]] std::vector<double> minor() const;  ///< not labelled, log axes only
+    [[nodiscard]] std::string text_of(double tick) const;
+
+  private:
+    [[nodiscard]] double step() const;
+    bool empty_ = true;
+};
+
+}  // namespace vibrig::tool::plot

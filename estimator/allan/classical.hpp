@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/allan/fit.hpp"
+
+namespace vibrig::estimator::allan {
+
+/// Autocorrelation s^2 exp(-|t| / tm) cos(om t): Gauss-Markov for om = 0.
+struct Oscillation {
+    double s = 0;   ///< deg/h
+    double tm = 1;  ///< s
+    double om = 0;  ///< rad/s
+};
+
+/// Variance of the tau-average about the true mean, exact, with quantisation Q (arcsec).
+[[nodiscard]] double classical_variance(std::span<const Oscillation> oscillations, double q,
+                                        double tau);
+/// Stationary processes: AVAR(tau) = 2 (classical(tau) - classical(2 tau)).
+[[nodiscard]] double allan_variance(std::span<const Oscillation> oscillations, double q,
+                                    double tau);
+
+/// sigma_c^2 = a0 + a1 tau + a2 tau^2 + a3 / tau + a4 / tau^2: slow class a0 a1 a2, fast a3 a4.
+using Polynomial = std::array<double, 5>;
+inline constexpr std::array<int, 5> kPowers{0, 1, 2, -1, -2};
+/// AVAR of a_k tau^n: 2 (1 - 2^n), that is 0, -2, -6, 1, 1.5.
+[[nodiscard]] double allan_multiplier(int power);
+/// Limits of one oscillation for tau much shorter (a0 a1 a2) and much longer (a3 a4) than tm.
+[[nodiscard]] Polynomial limits_of(const Oscillation& oscillation);
+
+/// What is known of the mean. With the mean of the window removed each tau^n becomes tau^n - T^n,
+/// so a0 cancels and cannot be known.
+enum class MeanMode : unsigned char {
+    window_mean,  ///< the paper's way, for reproduction: fits a0 although it cancelled
+    corrected,    ///< basis tau^n - T^n without a0
+    known_mean    ///< deviations from a reference mean: the only way to an a0
+};
+
+struct ClassicalPoint {
+    double tau = 0;       ///< s
+    double variance = 0;  ///< (deg/h)^2, of overlapping averages about the window's or known mean
+};
+
+struct ClassicalFit {
+    Polynomial a{};
+    bool a0_known = false;
+    /// Allan coefficients; NaN where the variance they would need is negative.
+    Terms terms{};
+    std::vector<std::string> notes;  ///< classes with negative sums, terms with negative squares
+};
+
+/// Weighted least squares, free of sign, relative to the variance itself. T is the window, s.
+[[nodiscard]] ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, double window,
+                                         MeanMode mode);
+/// Terms and notes of given coefficients, for instance of their mean over windows.
+[[nodiscard]] ClassicalFit interpret(const Polynomial& a, bool a0_known, double shortest,
+                                     double longest);
+
+}  // namespace vibrig::estimator::allan

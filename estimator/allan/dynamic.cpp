@@ -1,0 +1,174 @@
+#include "estimator/allan/dynamic.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimator/allan/deviation.hpp"
+
+namespace vibrig::estimator::allan {
+
+namespace {
+
+constexpr std::size_t kFewestSamples = 9;
+constexpr std::size_t kGrid = 20;
+constexpr std::size_t kDecimation = 16;
+constexpr double kLargestMissingShare = 0.1;
+
+std::size_t checked_window(std::size_t window) {
+    if (window < kFewestSamples) {
+        throw DataError("window: " + std::to_string(window) + " samples found, at least " +
+                        std::to_string(kFewestSamples) + " needed");
+    }
+    return window;
+}
+
+std::vector<VariancePoint> curve_of(const std::vector<double>& allan,
+                                    const std::vector<double>& share,
+                                    const std::vector<std::size_t>& factors, double tau0) {
+    std::vector<VariancePoint> curve;
+    for (std::size_t k = 0; k < factors.size(); ++k) {
+        if (allan[k] > 0) {
+            curve.push_back(
+                {static_cast<double>(factors[k]) * tau0, factors[k], allan[k], share[k]});
+        }
+    }
+    return curve;
+}
+
+}  // namespace
+
+std::vector<std::size_t> window_factors(std::size_t window) {
+    std::vector<std::size_t> factors = log_factors(window / 3, kGrid);
+    const std::vector<std::size_t> octaves = octave_factors(window / 4);
+    factors.insert(factors.end(), octaves.begin(), octaves.end());
+    std::sort(factors.begin(), factors.end());
+    factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
+    return factors;
+}
+
+DynamicAllan::DynamicAllan(const DynamicSettings& settings)
+    : settings_(settings),
+      near_(settings.tau0, checked_window(settings.window), window_factors(settings.window)),
+      hop_(std::max<std::uint64_t>(
+          1, static_cast<std::uint64_t>(static_cast<double>(settings.window) *
+                                        (1 - std::clamp(settings.overlap, 0.0, 1.0))))) {
+    if (!(settings.overlap >= 0 && settings.overlap < 1)) {
+        throw DataError("overlap: must be at least 0 and below 1, got " +
+                        std::to_string(settings.overlap));
+    }
+    if (settings.long_records) {
+        far_.emplace(settings.tau0 * kDecimation, settings.window, window_factors(settings.window));
+    }
+}
+
+bool DynamicAllan::add(double rate) noexcept {
+    near_.add(rate);
+    if (far_) {
+        // A block with a missing sample is missing.
+        block_ += rate / static_cast<double>(kDecimation);
+        if (++in_block_ == kDecimation) {
+            far_->add(block_);
+            block_ = 0;
+            in_block_ = 0;
+        }
+    }
+    return near_.full() && (near_.samples() - settings_.window) % hop_ == 0;
+}
+
+WindowRow DynamicAllan::row() const {
+    WindowRow row;
+    const double tau0 = settings_.tau0;
+    const std::vector<std::size_t>& factors = near_.factors();
+    row.begin_s = static_cast<double>(near_.samples() - settings_.window) * tau0;
+    row.centre_s = row.begin_s + 0.5 * static_cast<double>(settings_.window) * tau0;
+    row.mean = near_.mean();
+    row.missing = near_.missing();
+    const double centre = settings_.mode == MeanMode::known_mean ? settings_.known_mean : row.mean;
+    std::vector<ClassicalPoint> classical;
+    for (std::size_t k = 0; k < factors.size(); ++k) {
+        row.allan.push_back(near_.allan(k));
+        row.classical.push_back(near_.classical(k, centre));
+        row.share.push_back(near_.share(k));
+        if (row.classical[k] > 0) {
+            classical.push_back({static_cast<double>(factors[k]) * tau0, row.classical[k]});
+        }
+    }
+    const std::vector<VariancePoint> curve = curve_of(row.allan, row.share, factors, tau0);
+    row.refused = static_cast<double>(row.missing) >
+                      kLargestMissingShare * static_cast<double>(settings_.window) ||
+                  curve.size() < 2 || classical.size() < kPowers.size();
+    if (!row.refused) {
+        row.fit = fit_noise(curve, settings_.window + 1, tau0, settings_.wanted);
+        row.classical_fit =
+            fit_classical(classical, static_cast<double>(settings_.window) * tau0, settings_.mode);
+    }
+    return row;
+}
+
+std::vector<VariancePoint> DynamicAllan::beyond() const {
+    std::vector<VariancePoint> points;
+    if (!far_ || !far_->full()) {
+        return points;
+    }
+    for (std::size_t k = 0; k < far_->factors().size(); ++k) {
+        const std::size_t m = far_->factors()[k] * kDecimation;
+        if (m > factors().back() && far_->allan(k) > 0) {
+            points.push_back(
+                {static_cast<double>(m) * settings_.tau0, m, far_->allan(k), far_->share(k)});
+        }
+    }
+    return points;
+}
+
+std::uint64_t DynamicAllan::faults() const { return near_.faults() + (far_ ? far_->faults() : 0); }
+
+DynamicSummary summarise(const DynamicAllan& dynamic, const std::vector<WindowRow>& rows) {
+    DynamicSummary summary;
+    const std::vector<std::size_t>& factors = dynamic.factors();
+    const DynamicSettings& settings = dynamic.settings();
+    std::vector<double> allan(factors.size(), 0.0);
+    std::vector<double> share(factors.size(), 0.0);
+    Polynomial a{};
+    for (const WindowRow& row : rows) {
+        if (row.refused) {
+            ++summary.refused;
+            continue;
+        }
+        ++summary.windows;
+        for (std::size_t k = 0; k < factors.size(); ++k) {
+            allan[k] += row.allan[k];
+            share[k] += row.share[k];
+        }
+        for (std::size_t k = 0; k < a.size(); ++k) {
+            a[k] += row.classical_fit.a[k];
+        }
+    }
+    summary.faults = dynamic.faults();
+    if (summary.windows == 0) {
+        return summary;
+    }
+    const auto n = static_cast<double>(summary.windows);
+    for (std::size_t k = 0; k < factors.size(); ++k) {
+        allan[k] /= n;
+        // Degrees of freedom add over the time covered, not over windows that share samples.
+        share[k] *= 1 - settings.overlap * (n - 1) / n;
+    }
+    for (double& coefficient : a) {
+        coefficient /= n;
+    }
+    const double tau0 = settings.tau0;
+    summary.fit = fit_noise(curve_of(allan, share, factors, tau0), settings.window + 1, tau0,
+                            settings.wanted);
+    const double shortest = tau0;
+    const double longest = static_cast<double>(factors.back()) * tau0;
+    summary.classical = interpret(a, settings.mode == MeanMode::known_mean, shortest, longest);
+    if (settings.mode == MeanMode::window_mean) {
+        summary.classical.terms[static_cast<std::size_t>(Term::B)] =
+            rows.empty() || a[0] < 0 ? std::numeric_limits<double>::quiet_NaN()
+                                     : std::sqrt(a[0]) / 0.664;
+    }
+    return summary;
+}
+
+}  // namespace vibrig::estimator::allan

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/allan/classical.hpp"
+#include "estimator/allan/fit.hpp"
+#include "estimator/allan/sliding_variance.hpp"
+
+namespace vibrig::estimator::allan {
+
+struct DynamicSettings {
+    double tau0 = 1.0;          ///< s
+    std::size_t window = 3600;  ///< samples
+    double overlap = 0.5;       ///< of neighbouring windows, 0 to below 1
+    MeanMode mode = MeanMode::corrected;
+    double known_mean = 0;  ///< deg/h, for MeanMode::known_mean
+    std::array<bool, kTerms> wanted = kAllTerms;
+    bool long_records = false;  ///< a second ring, decimated by 16, for tau beyond the window
+};
+
+/// One window of the surface, by the factors of the grid.
+struct WindowRow {
+    double begin_s = 0;  ///< from the first sample
+    double centre_s = 0;
+    double mean = 0;  ///< deg/h
+    std::size_t missing = 0;
+    bool refused = false;           ///< more than a tenth is missing, or nothing varies: no fit
+    std::vector<double> allan;      ///< (deg/h)^2
+    std::vector<double> classical;  ///< (deg/h)^2
+    std::vector<double> share;      ///< differences present over those of a full window
+    Fit fit;
+    ClassicalFit classical_fit;
+};
+
+/// Mean over windows: the paper averages classical coefficients and maps them, we fit the mean
+/// AVAR.
+struct DynamicSummary {
+    std::size_t windows = 0;
+    std::size_t refused = 0;
+    ClassicalFit classical;
+    Fit fit;
+    std::uint64_t faults = 0;
+};
+
+class DynamicAllan {
+  public:
+    explicit DynamicAllan(const DynamicSettings& settings);
+
+    /// True when a window is complete: then ask for row(). Allocates and throws nothing.
+    [[nodiscard]] bool add(double rate) noexcept;
+    /// Of the window that ends with the newest sample. Fits, and so allocates.
+    [[nodiscard]] WindowRow row() const;
+
+    [[nodiscard]] const std::vector<std::size_t>& factors() const { return near_.factors(); }
+    [[nodiscard]] const DynamicSettings& settings() const { return settings_; }
+    /// Factors (of tau0) and variances beyond the window; empty before sixteen windows have passed.
+    [[nodiscard]] std::vector<VariancePoint> beyond() const;
+    [[nodiscard]] std::uint64_t faults() const;
+
+  private:
+    DynamicSettings settings_;
+    SlidingVariance near_;
+    std::optional<SlidingVariance> far_;
+    std::uint64_t hop_;
+    double block_ = 0;
+    std::size_t in_block_ = 0;
+};
+
+/// 20 log-spaced factors up to a third of the window, and the octaves up to a quarter.
+[[nodiscard]] std::vector<std::size_t> window_factors(std::size_t window);
+
+[[nodiscard]] DynamicSummary summarise(const DynamicAllan& dynamic,
+                                       const std::vector<WindowRow>& rows);
+
+}  // namespace vibrig::estimator::allan

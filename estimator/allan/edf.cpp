@@ -1,0 +1,199 @@
+#include "estimator/allan/edf.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <unsupported/Eigen/SpecialFunctions>
+#include <vector>
+
+namespace vibrig::estimator::allan {
+
+namespace {
+
+// Above this factor sums over lags are sampled: the terms are smooth in lag / m.
+constexpr std::size_t kLagResolution = 64;
+constexpr std::size_t kFewestForIdentification = 30;
+
+double number(std::size_t n) { return static_cast<double>(n); }
+
+/// Generalised autocovariance of the phase, up to a factor.
+double s_w(double t, Alpha alpha) {
+    const double a = std::abs(t);
+    const double log_a = a > 0 ? std::log(a) : 0.0;
+    switch (alpha) {
+        case 2:
+            return -a;
+        case 1:
+            return a * a * log_a;
+        case 0:
+            return a * a * a;
+        case -1:
+            return -std::pow(a, 4) * log_a;
+        default:
+            return -std::pow(a, 5);
+    }
+}
+
+/// As s_w for phase averaged over 1 / f of a step; f <= 0 stands for no averaging.
+double s_x(double t, double f, Alpha alpha) {
+    if (f <= 0) {
+        switch (alpha) {
+            case 2:
+                return t == 0.0 ? 1.0 : 0.0;
+            case 1:
+                return 0.0;
+            default:
+                return s_w(t, alpha + 2);
+        }
+    }
+    return f * f * (2 * s_w(t, alpha) - s_w(t - 1 / f, alpha) - s_w(t + 1 / f, alpha));
+}
+
+double s_z(double t, double f, Alpha alpha, int order) {
+    const auto s = [&](double at) { return s_x(at, f, alpha); };
+    if (order == 2) {
+        return 6 * s(t) - 4 * (s(t - 1) + s(t + 1)) + s(t - 2) + s(t + 2);
+    }
+    return 20 * s(t) - 15 * (s(t - 1) + s(t + 1)) + 6 * (s(t - 2) + s(t + 2)) - s(t - 3) - s(t + 3);
+}
+
+double difference_edf(Alpha alpha, std::size_t points, std::size_t m, int order, bool modified,
+                      bool overlapping) {
+    const double factor = number(m);
+    const double span = factor * order + (modified ? factor : 1.0);
+    if (number(points) < span) {
+        return 1.0;
+    }
+    const std::size_t stride = overlapping ? std::min(m, kLagResolution) : 1;
+    const double f = modified ? 1.0 : number(std::min(m, kLagResolution));
+    const double terms = 1 + std::floor(number(stride) * (number(points) - span) / factor);
+    const double lags = std::min(terms, number(stride) * (order + 1));
+    const double zero = std::pow(s_z(0, f, alpha, order), 2);
+    double sum = zero;
+    for (double j = 1; j < lags; ++j) {
+        sum += 2 * (1 - j / terms) * std::pow(s_z(j / number(stride), f, alpha, order), 2);
+    }
+    sum += (1 - lags / terms) * std::pow(s_z(lags / number(stride), f, alpha, order), 2);
+    return zero * terms / sum;
+}
+
+double overlapping_allan_edf(Alpha alpha, double n, double m) {
+    switch (alpha) {
+        case 2:
+            return (n + 1) * (n - 2 * m) / (2 * (n - m));
+        case 1:
+            return std::exp(std::sqrt(
+                std::max(0.0, std::log((n - 1) / (2 * m)) * std::log((2 * m + 1) * (n - 1) / 4))));
+        case 0:
+            return (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m * m / (4 * m * m + 5);
+        case -1:
+            return m < 2 ? 2 * (n - 2) * (n - 2) / (2.3 * n - 4.9)
+                         : 5 * n * n / (4 * m * (n + 3 * m));
+        default:
+            return (n - 2) / m * ((n - 1) * (n - 1) - 3 * m * (n - 1) + 4 * m * m) /
+                   ((n - 3) * (n - 3));
+    }
+}
+
+double total_edf(Alpha alpha, double n, double m) {
+    const double ratio = (n - 1) / m;
+    switch (alpha) {
+        case 0:
+            return 1.50 * ratio;
+        case -1:
+            return 1.17 * ratio - 0.22;
+        case -2:
+            return 0.93 * ratio - 0.36;
+        default:
+            return overlapping_allan_edf(alpha, n, m);
+    }
+}
+
+double statistic_edf(Statistic statistic, Alpha alpha, std::size_t points, std::size_t m) {
+    switch (statistic) {
+        case Statistic::adev:
+            return difference_edf(alpha, points, m, 2, false, false);
+        case Statistic::oadev:
+            return overlapping_allan_edf(alpha, number(points), number(m));
+        case Statistic::mdev:
+        case Statistic::tdev:
+            return difference_edf(alpha, points, m, 2, true, true);
+        case Statistic::hdev:
+            return difference_edf(alpha, points, m, 3, false, false);
+        case Statistic::ohdev:
+            return difference_edf(alpha, points, m, 3, false, true);
+        case Statistic::totdev:
+            return total_edf(alpha, number(points), number(m));
+    }
+    return 1.0;
+}
+
+/// Lag-1 autocorrelation about the mean.
+double lag_one(const std::vector<double>& z) {
+    double mean = 0;
+    for (const double value : z) {
+        mean += value / number(z.size());
+    }
+    double zero = 0;
+    double one = 0;
+    for (std::size_t i = 0; i < z.size(); ++i) {
+        zero += (z[i] - mean) * (z[i] - mean);
+        one += i > 0 ? (z[i] - mean) * (z[i - 1] - mean) : 0;
+    }
+    return zero > 0 ? one / zero : 0;
+}
+
+}  // namespace
+
+double edf(Statistic statistic, Alpha alpha, std::size_t points, std::size_t m) {
+    const double value = statistic_edf(statistic, std::clamp(alpha, -2, 2), points, m);
+    // The closed forms fall below one, or turn negative, at the very end of a record.
+    return value >= 1.0 ? value : 1.0;
+}
+
+Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback) {
+    const Segment& part = series.longest();
+    if (part.points() / m < kFewestForIdentification) {
+        return fallback;
+    }
+    std::vector<double> z;
+    for (std::size_t i = part.begin; i < part.end; i += m) {
+        z.push_back(series.phase[i]);
+    }
+    constexpr int kMostDifferences = 2;
+    for (int order = 0;; ++order) {
+        const double r = lag_one(z);
+        const double delta = r / (1 + r);
+        if (order == kMostDifferences || delta < 0.25) {
+            return std::clamp(static_cast<int>(std::lround(2 - 2 * (delta + order))), -2, 2);
+        }
+        for (std::size_t i = 0; i + 1 < z.size(); ++i) {
+            z[i] = z[i + 1] - z[i];
+        }
+        z.pop_back();
+    }
+}
+
+double normal_quantile(double probability) { return Eigen::numext::ndtri(probability); }
+
+double chi_square_quantile(double probability, double degrees) {
+    // Wilson and Hilferty bring the start, bisection in the logarithm cannot fail after it.
+    const double c = 2 / (9 * degrees);
+    const double cube = 1 - c + normal_quantile(probability) * std::sqrt(c);
+    const double guess = std::max(1e-12 * degrees, degrees * cube * cube * cube);
+    const auto below = [&](double x) { return Eigen::numext::igamma(degrees / 2, x / 2); };
+    double low = guess;
+    double high = guess;
+    while (below(low) > probability && low > 1e-300) {
+        low /= 2;
+    }
+    while (below(high) < probability && high < 1e300) {
+        high *= 2;
+    }
+    for (int i = 0; i < 60 && high > low * (1 + 1e-13); ++i) {
+        const double middle = std::sqrt(low * high);
+        (below(middle) < probability ? low : high) = middle;
+    }
+    return std::sqrt(low * high);
+}
+
+}  // namespace vibrig::estimator::allan

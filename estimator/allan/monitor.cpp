@@ -1,0 +1,137 @@
+#include "estimator/allan/monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/allan/deviation.hpp"
+
+namespace vibrig::estimator::allan {
+
+const char* words_of(Reading reading) {
+    switch (reading) {
+        case Reading::short_tau:
+            return "short averaging times: quantisation or vibration leakage";
+        case Reading::middle_tau:
+            return "middle averaging times: angle random walk N";
+        case Reading::long_tau:
+            return "long averaging times: temperature, rate random walk K or ramp R";
+        case Reading::mean_step:
+            return "step of the mean between adjacent windows";
+    }
+    return "";
+}
+
+StationarityMonitor::StationarityMonitor(const MonitorSettings& settings,
+                                         const DynamicAllan& dynamic)
+    : settings_(settings),
+      tau0_(dynamic.settings().tau0),
+      window_(dynamic.settings().window),
+      back_(std::max<std::size_t>(
+          1, static_cast<std::size_t>(std::ceil(1 / (1 - dynamic.settings().overlap) - 1e-9)))),
+      overlap_(dynamic.settings().overlap) {
+    if (!(settings.alpha > 0 && settings.alpha < 1)) {
+        throw DataError("alpha: must be between 0 and 1, got " + std::to_string(settings.alpha));
+    }
+    const std::vector<std::size_t>& factors = dynamic.factors();
+    for (const std::size_t m : octave_factors(window_ / 4)) {
+        const auto at = std::find(factors.begin(), factors.end(), m);
+        octaves_.push_back({static_cast<std::size_t>(at - factors.begin()), m, 0, 0, 0, {}});
+    }
+}
+
+void StationarityMonitor::set_reference(const Terms& terms) {
+    for (Octave& octave : octaves_) {
+        octave.reference = model_variance(terms, static_cast<double>(octave.m) * tau0_);
+    }
+    set_bounds(terms, 0);
+}
+
+void StationarityMonitor::set_bounds(const Terms& terms, double reference_windows) {
+    const double tail = settings_.alpha / static_cast<double>(octaves_.size()) / 2;
+    for (Octave& octave : octaves_) {
+        const double tau = static_cast<double>(octave.m) * tau0_;
+        double degrees = edf(Statistic::oadev, dominant_noise(terms, tau), window_ + 1, octave.m);
+        if (reference_windows > 0) {
+            // The reference is uncertain too; variances of the logarithm add.
+            degrees *= reference_windows / (1 + reference_windows);
+        }
+        octave.low = chi_square_quantile(tail, degrees) / degrees;
+        octave.high = chi_square_quantile(1 - tail, degrees) / degrees;
+    }
+    mean_sigma_ = std::sqrt(2 * model_variance(terms, static_cast<double>(window_) * tau0_));
+}
+
+void StationarityMonitor::learn(const WindowRow& row) {
+    lessons_.push_back(row);
+    if (lessons_.size() < settings_.reference_windows) {
+        return;
+    }
+    const auto n = static_cast<double>(lessons_.size());
+    std::vector<VariancePoint> curve;
+    for (Octave& octave : octaves_) {
+        for (const WindowRow& lesson : lessons_) {
+            octave.reference += lesson.allan[octave.k] / n;
+        }
+        if (octave.reference > 0) {
+            curve.push_back(
+                {static_cast<double>(octave.m) * tau0_, octave.m, octave.reference, 1.0});
+        }
+    }
+    set_bounds(fit_noise(curve, window_ + 1, tau0_).values(), 1 + (n - 1) * (1 - overlap_));
+    lessons_.clear();
+}
+
+std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
+    std::vector<Alarm> alarms;
+    if (row.refused) {
+        means_.clear();
+        return alarms;
+    }
+    means_.push_back(row.mean);
+    if (means_.size() > back_ + 1) {
+        means_.erase(means_.begin());
+    }
+    if (!has_reference()) {
+        learn(row);
+        return alarms;
+    }
+    for (std::size_t i = 0; i < octaves_.size(); ++i) {
+        Octave& octave = octaves_[i];
+        const double ratio = row.allan[octave.k] / octave.reference;
+        if (ratio >= octave.low && ratio <= octave.high) {
+            octave.since.reset();
+            continue;
+        }
+        octave.since = octave.since.value_or(row.begin_s);
+        alarms.push_back({reading_of(i), static_cast<double>(octave.m) * tau0_, ratio,
+                          ratio < octave.low ? octave.low : octave.high, *octave.since});
+    }
+    const double step = means_.size() > back_ && mean_sigma_ > 0
+                            ? (means_.back() - means_.front()) / mean_sigma_
+                            : 0;
+    const double limit = normal_quantile(1 - settings_.alpha / 2);
+    if (std::abs(step) <= limit) {
+        step_since_.reset();
+        return alarms;
+    }
+    step_since_ = step_since_.value_or(row.begin_s);
+    alarms.push_back({Reading::mean_step, static_cast<double>(window_) * tau0_, step,
+                      std::copysign(limit, step), *step_since_});
+    return alarms;
+}
+
+Reading StationarityMonitor::reading_of(std::size_t octave) const {
+    const std::size_t part = 3 * octave / octaves_.size();
+    return part == 0 ? Reading::short_tau : part == 1 ? Reading::middle_tau : Reading::long_tau;
+}
+
+double StationarityMonitor::smallest_change() const {
+    double least = 0;
+    for (const Octave& octave : octaves_) {
+        const double change = std::sqrt(octave.high) - 1;
+        least = least > 0 ? std::min(least, change) : change;
+    }
+    return least;
+}
+
+}  // namespace vibrig::estimator::allan

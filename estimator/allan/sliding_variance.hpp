@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace vibrig::estimator::allan {
+
+/// Overlapping Allan and classical variance of the last `window` samples of a stream. One addition
+/// costs a fixed number of operations per averaging factor; add() allocates and throws nothing.
+class SlidingVariance {
+  public:
+    /// Factors from 1 to window / 2. Throws DataError when the window is too short for them.
+    SlidingVariance(double tau0, std::size_t window, std::vector<std::size_t> factors);
+
+    /// Rate; not finite means missing, and no difference will span it.
+    void add(double rate) noexcept;
+
+    [[nodiscard]] bool full() const noexcept { return newest_ >= window_; }
+    [[nodiscard]] std::uint64_t samples() const noexcept { return newest_; }
+    [[nodiscard]] std::size_t window() const noexcept { return window_; }
+    [[nodiscard]] std::size_t missing() const noexcept { return missing_; }
+    [[nodiscard]] const std::vector<std::size_t>& factors() const noexcept { return factors_; }
+    [[nodiscard]] double tau0() const noexcept { return tau0_; }
+
+    [[nodiscard]] double mean() const noexcept;
+    /// Rate unit squared, 0 without terms.
+    [[nodiscard]] double allan(std::size_t k) const noexcept;
+    /// Of overlapping averages about `mean`.
+    [[nodiscard]] double classical(std::size_t k, double mean) const noexcept;
+    /// Second differences in the window over those of a window without gaps.
+    [[nodiscard]] double share(std::size_t k) const noexcept;
+
+    /// Once per window the sums are computed anew: how often they were off by more than 1e-9.
+    [[nodiscard]] std::uint64_t faults() const noexcept { return faults_; }
+    [[nodiscard]] double largest_error() const noexcept { return largest_error_; }
+
+  private:
+    struct Sums {
+        double second = 0;  ///< squares of second differences
+        double first = 0;
+        double first_squares = 0;
+        std::size_t seconds = 0;  ///< terms
+        std::size_t firsts = 0;
+    };
+
+    [[nodiscard]] std::uint64_t oldest() const noexcept {
+        return newest_ > window_ ? newest_ - window_ : 0;
+    }
+    void enter(std::size_t m, std::uint64_t end, double sign, Sums& sums) const noexcept;
+    void recompute() noexcept;
+
+    double tau0_;
+    std::size_t window_;
+    std::vector<std::size_t> factors_;
+    std::size_t mask_;
+    std::vector<double> angle_;         ///< ring, relative to the oldest at the last recomputation
+    std::vector<std::uint64_t> start_;  ///< ring: first angle without a gap before this one
+    std::vector<Sums> sums_;
+    double offset_ = 0;         ///< rate taken out of the angles
+    std::uint64_t newest_ = 0;  ///< index of the newest angle
+    std::size_t missing_ = 0;
+    std::uint64_t faults_ = 0;
+    double largest_error_ = 0;
+};
+
+}  // namespace vibrig::estimator::allan
