@@ -8,14 +8,12 @@ namespace {
 /// So many gated samples in a row mean that the angles, not the samples, are wrong.
 constexpr int kGatedBeforeRestart = 5;
 
-UdFilter::Matrix3 plain(const Eigen::Matrix3d& m, double scale) noexcept {
-    UdFilter::Matrix3 out{};
+void copy_scaled(const Eigen::Matrix3d& m, double scale, double (&out)[3][3]) noexcept {
     for (std::size_t r = 0; r < 3; ++r) {
         for (std::size_t c = 0; c < 3; ++c) {
             out[r][c] = scale * m(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
         }
     }
-    return out;
 }
 
 }  // namespace
@@ -52,15 +50,17 @@ void DriftFilter::predict(double dt, double kappa) noexcept {
     const Eigen::Matrix3d jacobian = model_.jacobian(pose, kappa, filter_.constants(), rate);
     const Eigen::Vector3d increment = dt * (pose.m * rate);
 
-    UdFilter::Transition t;
-    t.angle_increment = {increment[0], increment[1], increment[2]};
-    t.f = plain(jacobian, dt / kArcsecPerRad);
-    for (std::size_t k = 0; k < 3; ++k) t.f[k][k] += 1.0;
-    t.g = plain(pose.m, model_.drift_sign() * dt);
+    UdFilter::Transition t{};
+    copy_scaled(jacobian, dt / kArcsecPerRad, t.f);
+    for (std::size_t k = 0; k < 3; ++k) {
+        t.f[k][k] += 1.0;
+        t.angle_increment[k] = increment[static_cast<Eigen::Index>(k)];
+    }
+    copy_scaled(pose.m, model_.drift_sign() * dt, t.g);
     for (std::size_t group = 0; group < kGroups; ++group) {
         for (std::size_t j = 0; j < kGyros; ++j) t.h[internal_index(group, j)] = h[group][j];
     }
-    t.noise_map = plain(pose.m, 1.0);
+    copy_scaled(pose.m, 1.0, t.noise_map);
     t.noise = noise_.walk * dt;
     filter_.predict(t);
 }
@@ -91,8 +91,9 @@ StepResult DriftFilter::step(double time_s, const Eigen::Vector3d& angles_rad,
             kArcsecPerRad;
         result.innovation_arcsec[k] = z[k] - predicted[k];
     }
-    result.nis = filter_.nis(z, noise_.angle_variance);
-    if (!(result.nis <= gate_)) {
+    const UdFilter::Update update = filter_.update(z, noise_.angle_variance, gate_);
+    result.nis = update.nis;
+    if (!update.done) {
         result.outcome = StepOutcome::gated;
         if (++gated_in_a_row_ < kGatedBeforeRestart) return result;
         filter_.start_angles(z, noise_.angle_variance);
@@ -101,7 +102,6 @@ StepResult DriftFilter::step(double time_s, const Eigen::Vector3d& angles_rad,
         return result;
     }
     gated_in_a_row_ = 0;
-    filter_.update(z, noise_.angle_variance);
     result.outcome = StepOutcome::used;
     return result;
 }

@@ -7,7 +7,10 @@ namespace {
 constexpr double kRadPerDeg = kPi / 180.0;
 }
 
-double wrap(double angle_rad) noexcept { return std::remainder(angle_rad, 2.0 * kPi); }
+double wrap(double angle_rad) noexcept {
+    // std::remainder gives the same, slowly.
+    return std::abs(angle_rad) <= kPi ? angle_rad : std::remainder(angle_rad, 2.0 * kPi);
+}
 
 double wrap_next_to(double angle_rad, double reference_rad) noexcept {
     return reference_rad + wrap(angle_rad - reference_rad);

@@ -124,10 +124,10 @@ std::vector<Vec3> read_positions(const std::string& name) {
     return positions;
 }
 
-std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
-                     const std::function<void(std::size_t, std::size_t)>& progress) {
+std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
+                       const std::function<void(const PlannedSample&)>& sink,
+                       const std::function<void(std::size_t, std::size_t)>& progress) {
     Rig rig(truth);
-    out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
     std::uint64_t samples = 0;
     std::size_t dwell = 0;
     const auto ticks =
@@ -137,20 +137,29 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
             prepare(rig, plan, plan.positions_deg[position], plan.table_g[run]);
             for (std::int64_t i = 0; i < ticks; ++i) {
                 rig.advance();
-                const Readings& r = rig.readings();
-                std::array<char, 200> row{};
-                const int length = std::snprintf(
-                    row.data(), row.size(), "%.3f,%zu,%zu,%.7f,%.7f,%.7f,%.7f,%.7f,%.7f\n",
-                    1e-6 * static_cast<double>(rig.time_us()), run + 1, position + 1,
-                    r.encoder_deg[0], r.encoder_deg[1], r.encoder_deg[2], r.raw_g[0], r.raw_g[1],
-                    r.raw_g[2]);
-                out.write(row.data(), length);
+                sink({run + 1, position + 1, 1e-6 * static_cast<double>(rig.time_us()),
+                      rig.readings()});
                 ++samples;
             }
             if (progress) progress(++dwell, plan.table_g.size() * plan.positions_deg.size());
         }
     }
     return samples;
+}
+
+std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
+                     const std::function<void(std::size_t, std::size_t)>& progress) {
+    out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
+    const auto write = [&out](const PlannedSample& s) {
+        const Readings& r = s.readings;
+        std::array<char, 200> row{};
+        const int length =
+            std::snprintf(row.data(), row.size(), "%.3f,%zu,%zu,%.7f,%.7f,%.7f,%.7f,%.7f,%.7f\n",
+                          s.time_s, s.run, s.position, r.encoder_deg[0], r.encoder_deg[1],
+                          r.encoder_deg[2], r.raw_g[0], r.raw_g[1], r.raw_g[2]);
+        out.write(row.data(), length);
+    };
+    return simulate(truth, plan, write, progress);
 }
 
 }  // namespace vibrig::plant

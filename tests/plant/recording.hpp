@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/plant/sensors.hpp"
 #include "tests/plant/truth.hpp"
 
 namespace vibrig::plant {
@@ -26,6 +27,19 @@ struct CampaignPlan {
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg; "table1" is the built-in list. Throws
 /// PlantError naming the line.
 [[nodiscard]] std::vector<Vec3> read_positions(const std::string& name_or_path);
+
+/// A sample of a simulated campaign.
+struct PlannedSample {
+    std::size_t run = 1, position = 1;  ///< from 1
+    double time_s = 0;
+    const Readings& readings;
+};
+
+/// Simulates the plan, dwell by dwell, without any bus or file. Returns the number of samples.
+/// `progress` hears of every finished dwell.
+std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
+                       const std::function<void(const PlannedSample&)>& sink,
+                       const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 /// Writes the recording as CSV (time_s, run, position, alpha_deg ... az_g). Returns the number of
 /// samples. `progress` hears of every finished dwell.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -11,6 +12,7 @@ namespace {
 
 using Real = long double;
 constexpr std::size_t kN = UdFilter::kStates;
+constexpr double kNoGate = std::numeric_limits<double>::infinity();
 
 /// Textbook covariance filter in Joseph form; dense, slow and plain.
 struct DenseFilter {
@@ -71,7 +73,7 @@ struct DenseFilter {
 /// u_z^2 is collinear.
 UdFilter::Transition transition(int step, std::mt19937_64& random, double noise) {
     std::uniform_real_distribution<double> uniform(-1, 1);
-    UdFilter::Transition t;
+    UdFilter::Transition t{};
     const double a = 0.9 * step, b = 0.5 * step;
     const std::array<double, 3> u{std::sin(a) * std::cos(b), std::cos(a) * std::cos(b),
                                   std::sin(b)};
@@ -118,7 +120,7 @@ Difference compare(double prior, double r, double q, int steps, std::uint64_t se
         dense.predict(t);
         const UdFilter::Vector3 predicted = ud.angles();
         for (std::size_t k = 0; k < 3; ++k) z[k] = predicted[k] + std::sqrt(r) * z[k];
-        ud.update(z, r);
+        ud.update(z, r, kNoGate);
         dense.update(z, r);
     }
     Difference d;
@@ -172,7 +174,14 @@ TEST(UdFilter, NisIsThatOfTheFullInnovationCovariance) {
         for (std::size_t i = 0; i < 3; ++i) m[i][k] = n[i];
         expected += n[k] * det(m) / det(s);
     }
-    EXPECT_NEAR(ud.nis({x[0] + n[0], x[1] + n[1], x[2] + n[2]}, r) / expected, 1, 1e-9);
+    const UdFilter::Vector3 z{x[0] + n[0], x[1] + n[1], x[2] + n[2]};
+    const UdFilter::Update refused = ud.update(z, r, 0.999 * expected);
+    EXPECT_FALSE(refused.done);
+    EXPECT_EQ(ud.angles(), x);
+    const UdFilter::Update update = ud.update(z, r, 1.001 * expected);
+    EXPECT_TRUE(update.done);
+    EXPECT_NEAR(update.nis / expected, 1, 1e-9);
+    EXPECT_EQ(refused.nis, update.nis);
 }
 
 TEST(UdFilter, FixedConstantsStayFixed) {
@@ -184,7 +193,7 @@ TEST(UdFilter, FixedConstantsStayFixed) {
     ud.start_angles({0, 0, 0}, 25);
     for (int n = 1; n < 100; ++n) {
         ud.predict(transition(n, random, 1e-4));
-        ud.update({1.0 * n, -2.0 * n, 0.5 * n}, 25);
+        ud.update({1.0 * n, -2.0 * n, 0.5 * n}, 25, kNoGate);
     }
     std::array<double, 30> s{};
     ud.sigma(s);
