@@ -74,7 +74,7 @@ Polynomial limits_of(const Oscillation& o) {
             2 * s2 * o.tm / (1 + u), -2 * s2 * o.tm * o.tm * (1 - u) / ((1 + u) * (1 + u))};
 }
 
-ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, double window, MeanMode mode) {
+ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, MeanMode mode) {
     const bool corrected = mode == MeanMode::corrected;
     const std::size_t unknowns = corrected ? 4 : 5;
     if (curve.size() < unknowns) {
@@ -93,7 +93,8 @@ ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, double window,
         for (Eigen::Index k = 0; k < columns; ++k) {
             const int power = kPowers[static_cast<std::size_t>(k + (corrected ? 1 : 0))];
             basis(i, k) =
-                weight * (std::pow(point.tau, power) - (corrected ? std::pow(window, power) : 0.0));
+                weight * (corrected ? std::pow(point.tau, power) - std::pow(point.covered, power)
+                                    : std::pow(point.tau, power));
         }
     }
     const Eigen::VectorXd scale = basis.colwise().norm().cwiseMax(1e-300);

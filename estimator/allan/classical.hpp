@@ -35,13 +35,18 @@ inline constexpr std::array<int, 5> kPowers{0, 1, 2, -1, -2};
 /// so a0 cancels and cannot be known.
 enum class MeanMode : unsigned char {
     window_mean,  ///< the paper's way, for reproduction: fits a0 although it cancelled
-    corrected,    ///< basis tau^n - T^n without a0
+    corrected,    ///< basis tau^n - T^n without a0 (see ClassicalPoint)
     known_mean    ///< deviations from a reference mean: the only way to an a0
 };
 
+/// Window-mean and known-mean: overlapping averages about that mean. Corrected: averages side by
+/// side about the mean of just those, which cover `covered` seconds: only then is the expectation
+/// exactly sigma_c^2(tau) - sigma_c^2(covered). Overlapping averages visit the window's middle more
+/// often and leave tau and tau^2 almost indistinguishable.
 struct ClassicalPoint {
     double tau = 0;       ///< s
-    double variance = 0;  ///< (deg/h)^2, of overlapping averages about the window's or known mean
+    double variance = 0;  ///< (deg/h)^2
+    double covered = 0;   ///< s
 };
 
 struct ClassicalFit {
@@ -52,9 +57,8 @@ struct ClassicalFit {
     std::vector<std::string> notes;  ///< classes with negative sums, terms with negative squares
 };
 
-/// Weighted least squares, free of sign, relative to the variance itself. T is the window, s.
-[[nodiscard]] ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, double window,
-                                         MeanMode mode);
+/// Weighted least squares, free of sign, relative to the variance itself.
+[[nodiscard]] ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, MeanMode mode);
 /// Terms and notes of given coefficients, for instance of their mean over windows.
 [[nodiscard]] ClassicalFit interpret(const Polynomial& a, bool a0_known, double shortest,
                                      double longest);

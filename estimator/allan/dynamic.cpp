@@ -88,10 +88,20 @@ WindowRow DynamicAllan::row() const {
     std::vector<ClassicalPoint> classical;
     for (std::size_t k = 0; k < factors.size(); ++k) {
         row.allan.push_back(near_.allan(k));
-        row.classical.push_back(near_.classical(k, centre));
         row.share.push_back(near_.share(k));
-        if (row.classical[k] > 0) {
-            classical.push_back({static_cast<double>(factors[k]) * tau0, row.classical[k]});
+        const double tau = static_cast<double>(factors[k]) * tau0;
+        if (settings_.mode == MeanMode::corrected) {
+            const SlidingVariance::Tiled tiled = near_.tiled(k);
+            row.classical.push_back(tiled.variance);
+            if (tiled.variance > 0) {
+                classical.push_back(
+                    {tau, tiled.variance, static_cast<double>(tiled.covered) * tau0});
+            }
+        } else {
+            row.classical.push_back(near_.classical(k, centre));
+            if (row.classical[k] > 0) {
+                classical.push_back({tau, row.classical[k], 0});
+            }
         }
     }
     const std::vector<VariancePoint> curve = curve_of(row.allan, row.share, factors, tau0);
@@ -100,8 +110,7 @@ WindowRow DynamicAllan::row() const {
                   curve.size() < 2 || classical.size() < kPowers.size();
     if (!row.refused) {
         row.fit = fit_noise(curve, settings_.window + 1, tau0, settings_.wanted);
-        row.classical_fit =
-            fit_classical(classical, static_cast<double>(settings_.window) * tau0, settings_.mode);
+        row.classical_fit = fit_classical(classical, settings_.mode);
     }
     return row;
 }

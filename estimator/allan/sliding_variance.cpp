@@ -152,6 +152,41 @@ double SlidingVariance::classical(std::size_t k, double mean) const noexcept {
                              2 * centre * sums.first / (tau * n) + centre * centre);
 }
 
+SlidingVariance::Tiled SlidingVariance::tiled(std::size_t k) const noexcept {
+    const std::uint64_t from = oldest();
+    std::uint64_t first = from;
+    std::uint64_t last = from;
+    for (std::uint64_t end = newest_ + 1; end > from + 1;) {
+        const std::uint64_t begin = std::max(from, start_[(end - 1) & mask_]);
+        if (end - 1 - begin > last - first) {
+            first = begin;
+            last = end - 1;
+        }
+        end = begin;
+        if (end == from) {
+            break;
+        }
+    }
+    const std::size_t m = factors_[k];
+    const std::size_t tiles = (last - first) / m;
+    if (tiles < 2) {
+        return {};
+    }
+    const std::size_t covered = tiles * m;
+    double sum = 0;
+    for (std::uint64_t at = first; at + covered <= last; ++at) {
+        const double mean =
+            (angle_[(at + covered) & mask_] - angle_[at & mask_]) / static_cast<double>(tiles);
+        for (std::uint64_t i = at; i < at + covered; i += m) {
+            const double d = angle_[(i + m) & mask_] - angle_[i & mask_] - mean;
+            sum += d * d;
+        }
+    }
+    const double tau = static_cast<double>(m) * tau0_;
+    const auto terms = static_cast<double>(tiles * (last - first - covered + 1));
+    return {sum / (terms * tau * tau), covered};
+}
+
 double SlidingVariance::share(std::size_t k) const noexcept {
     const auto all = static_cast<double>(window_ + 1 - 2 * factors_[k]);
     return static_cast<double>(sums_[k].seconds) / all;

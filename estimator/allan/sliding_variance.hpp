@@ -28,6 +28,13 @@ class SlidingVariance {
     [[nodiscard]] double allan(std::size_t k) const noexcept;
     /// Of overlapping averages about `mean`.
     [[nodiscard]] double classical(std::size_t k, double mean) const noexcept;
+    struct Tiled {
+        double variance = 0;      ///< about the mean of the tiles
+        std::size_t covered = 0;  ///< samples, 0: fewer than two tiles between gaps
+    };
+    /// Classical variance of averages side by side in the longest part without gaps, averaged over
+    /// all positions of the first. Costs one pass over the window.
+    [[nodiscard]] Tiled tiled(std::size_t k) const noexcept;
     /// Second differences in the window over those of a window without gaps.
     [[nodiscard]] double share(std::size_t k) const noexcept;
 

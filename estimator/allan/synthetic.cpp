@@ -1,5 +1,6 @@
 #include "estimator/allan/synthetic.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -10,12 +11,23 @@ void add_gauss_markov(std::vector<double>& rate, double tau0, double s, double t
                       std::uint64_t seed) {
     std::mt19937_64 generator(seed);
     std::normal_distribution<double> normal;
-    const double keep = std::exp(-tau0 / tm);
-    const double drive = s * std::sqrt(-std::expm1(-2 * tau0 / tm));
+    const double h = tau0 / tm;
+    const double keep = std::exp(-h);
+    const double lost = -std::expm1(-h);
+    // State at the end of a step and mean over it are drawn together, exactly. The mean's variance
+    // loses its digits for slow processes: first terms of its series.
+    const double end_variance = s * s * -std::expm1(-2 * h);
+    const double mean_variance =
+        s * s * (h < 1e-3 ? h * (2.0 / 3 - h / 2) : (2 * h - 2 * lost - lost * lost) / (h * h));
+    const double covariance = s * s * lost * lost / h;
+    const double end_sigma = std::sqrt(end_variance);
+    const double common = covariance / end_sigma;
+    const double own = std::sqrt(std::max(0.0, mean_variance - common * common));
     double x = s * normal(generator);
     for (double& y : rate) {
-        y += x;
-        x = keep * x + drive * normal(generator);
+        const double drive = normal(generator);
+        y += x * lost / h + common * drive + own * normal(generator);
+        x = keep * x + end_sigma * drive;
     }
 }
 
@@ -39,11 +51,8 @@ std::vector<double> synthetic_rate(const Terms& terms, std::size_t n, double tau
     // One-sided spectrum B^2 / (pi f) from Lorentzians spaced by ln 2 in time: s^2 = B^2 ln 2 / pi.
     const double s = flicker * std::sqrt(std::numbers::ln2 / std::numbers::pi);
     const double longest = 16 * static_cast<double>(n) * tau0;
-    for (double tm = tau0 / 4; flicker > 0 && tm < longest; tm *= 2) {
-        // Processes much faster than tau0 average down within a sample.
-        const double averaged =
-            s * std::sqrt(2 * tm / tau0 * (1 - tm / tau0 * -std::expm1(-tau0 / tm)));
-        add_gauss_markov(rate, tau0, averaged, tm, generator());
+    for (double tm = tau0 / 64; flicker > 0 && tm < longest; tm *= 2) {
+        add_gauss_markov(rate, tau0, s, tm, generator());
     }
     return rate;
 }

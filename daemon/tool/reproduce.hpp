@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vibrig::tool {
+
+struct ReproduceOptions {
+    std::size_t seeds = 0;  ///< Monte-Carlo runs; 0: what the table was made with
+};
+
+struct ReproducedRow {
+    std::string item;
+    std::string published;
+    std::string computed;
+    std::optional<bool> agrees = {};  ///< nothing to compare with: empty
+};
+
+/// A paper's table, published next to computed.
+struct Reproduction {
+    std::string name;
+    std::string title;
+    std::vector<ReproducedRow> rows;
+    std::vector<std::string> notes;
+};
+
+// One function for each name in the table of reproduce.cpp.
+[[nodiscard]] Reproduction reproduce_allan(const ReproduceOptions& options);
+
+}  // namespace vibrig::tool
