@@ -73,6 +73,9 @@ def campaign(checks, rig, folder):
                          r.number(s["assembler"]["samples"]) > 20, 20)
     checks.check(first is not None and first["can"]["link"] == "running", "vibrigd hears the rig on vcan0",
                  r.state_of(first))
+    # Strangers on the bus all along. Extended identifiers only: a random frame of a known kind would be believed.
+    strangers = subprocess.Popen(["cangen", BUS, "-g", "20", "-e", "-I", "r", "-L", "r", "-D", "r"],
+                                 stdin=subprocess.DEVNULL)
     refused = rig.tool("start", "--by", "tester")
     checks.check(refused.returncode == 1, "start is refused while nobody has armed the shaker",
                  f"status {refused.returncode}: {refused.stdout}{refused.stderr}")
@@ -95,14 +98,19 @@ def campaign(checks, rig, folder):
     checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
                  f"{r.state_of(last)}\nstates seen: {' '.join(seen)}\n{rig.logs()}")
     checks.check("recording" in seen and not problems, "status answers while it records", f"{seen} {problems}")
-    candump.terminate()
-    candump.wait()
+    for process in (strangers, candump):
+        process.terminate()
+        process.wait()
 
     status = r.check_balances(checks, rig)
     if status is not None:
         checks.equal(len(status["campaign"]["dwells"]), 4, "four dwells are reported")
         checks.equal(r.number(status["can"]["kernel_dropped"]), 0, "the kernel dropped no frame")
         checks.equal(r.number(status["estimator_ring"]["dropped"]), 0, "the ring dropped no sample")
+        lost = {k: r.number(status["assembler"][k]) for k in ("gaps", "resyncs")}
+        checks.equal(lost, {"gaps": 0, "resyncs": 0}, "no sample was lost among strangers' frames")
+        checks.check(r.number(status["assembler"]["unknown"]) > 200, "strangers' frames are counted as unknown",
+                     status["assembler"])
     counts, syncs = counts_of(log)
     for wanted, text in ((SAMPLE_IDS, "every message of a sample"), (STATUS_IDS, "every status message"),
                          (COMMAND_IDS, "the gimbal commands")):
@@ -137,7 +145,8 @@ def survives_garbage(checks, rig):
                  risen("assembler", "wrong_length"))
     checks.check(risen("can", "error_frames") > 5, "error frames are counted", risen("can", "error_frames"))
     r.check_balances(checks, rig)
-    later = rig.wait_for(lambda s: r.number(s["assembler"]["samples"]) > r.number(after["assembler"]["samples"]) + 40, 5)
+    wanted = r.number(after["assembler"]["samples"]) + 40
+    later = rig.wait_for(lambda s: r.number(s["assembler"]["samples"]) > wanted, 5)
     good = [c["quality"] for c in later["sample"]["channels"]]
     checks.check(all(quality in ("good", "unbound") for quality in good), "samples are good again afterwards", good)
 
