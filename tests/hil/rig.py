@@ -1,4 +1,5 @@
 """The simulated rig and the daemon as processes, for campaigns driven from a test; and the checks, as TAP."""
+import ctypes
 import json
 import os
 import re
@@ -122,9 +123,8 @@ class Child:
             return log.read()
 
 
-def die_with_parent():
-    import ctypes
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+def die_with_parent(number=signal.SIGKILL):
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, number)
 
 
 class Rig:

@@ -6,6 +6,7 @@ usage: virtual_time_campaign.py PROGRAMS                     boots two machines 
 """
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -68,7 +69,8 @@ class Boot(threading.Thread):
     def run(self):
         begin = time.monotonic()
         self.ended = subprocess.run(self.argv, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                    stderr=subprocess.STDOUT, text=True, errors="replace", check=False)
+                                    stderr=subprocess.STDOUT, text=True, errors="replace", check=False,
+                                    preexec_fn=lambda: r.die_with_parent(signal.SIGTERM))
         self.took_s = time.monotonic() - begin
 
     def result(self, checks):
