@@ -2,8 +2,10 @@
 
 #include <pthread.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <filesystem>
@@ -38,6 +40,15 @@ std::int64_t utc_now() {
         .count();
 }
 
+drivers::ShakerSettings shaker_settings(const configuration::Configuration& configuration) {
+    auto settings = configuration.shaker;
+    if (configuration.clock == configuration::Configuration::ClockKind::rig) {
+        // The rig's time stands still meanwhile: a busy machine is slower, not different.
+        settings.response_timeout = std::max(settings.response_timeout, 10 * drivers::kSecond);
+    }
+    return settings;
+}
+
 /// Ordinary scheduling when it cannot be had; the reason is returned for the log.
 std::string set_fifo(std::thread& thread, int priority) {
     if (priority <= 0) return {};
@@ -58,24 +69,39 @@ Daemon::Daemon(configuration::Loaded loaded)
       clock_(rig_clock_ ? static_cast<drivers::Clock&>(*rig_clock_) : *real_clock_),
       dbc_(load_dbc(configuration_.dbc)),
       port_(drivers::make_can_port(io_, configuration_.can)),
-      shaker_(drivers::make_shaker(clock_, configuration_.shaker)),
+      shaker_(drivers::make_shaker(clock_, shaker_settings(configuration_))),
       control_waiter_(clock_.make_waiter()),
       estimator_waiter_(clock_.make_waiter()),
-      interlock_(*shaker_, *control_waiter_, {configuration_.campaign.max_acceleration_g}),
+      interlock_(
+          *shaker_, *control_waiter_,
+          {configuration_.campaign.max_acceleration_g, configuration_.gimbal.status_deadline}),
       identification_(configuration_.estimator),
       estimator_stage_(estimator_ring_, *estimator_waiter_, *control_waiter_, identification_),
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
                    {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_}),
       gimbal_(dbc_, configuration_.gimbal, *port_),
-      campaign_(configuration_.campaign,
-                {gimbal_, *shaker_, [this] { return acquisition_.view().platform; },
-                 [this](const rt::DwellOrder& order) { return estimator_stage_.order(order); },
-                 [this](bool excitation) { interlock_.watch(excitation); },
-                 [this] { identification_ = estimator::Identification(configuration_.estimator); },
-                 [this](bool complete) { end_campaign(complete); },
-                 [this](Severity severity, const std::string& text) {
-                     log(severity, "campaign", text);
-                 }}) {}
+      campaign_(
+          configuration_.campaign,
+          {gimbal_, *shaker_, [this] { return acquisition_.view().platform; },
+           [this](const rt::DwellOrder& order) {
+               const bool taken = estimator_stage_.order(order);
+               if (taken && !order.cancel) ++dwells_with_estimator_;
+               return taken;
+           },
+           [this](rt::Guard level) {
+               excitation_.store(level == rt::Guard::excitation);
+               interlock_.guard(level);
+           },
+           [this] { return dwells_with_estimator_ == 0; },
+           [this] {
+               identification_ = estimator::Identification(configuration_.estimator);
+               const std::lock_guard lock(mutex_);
+               result_ = {};
+           },
+           [this](bool complete) { to_write_ = complete ? ToWrite::complete : ToWrite::partial; },
+           [this](Severity severity, const std::string& text) {
+               log(severity, "campaign", text);
+           }}) {}
 
 void Daemon::check_bindings(const configuration::Configuration& configuration) {
     const auto dbc = load_dbc(configuration.dbc);
@@ -93,6 +119,17 @@ Daemon::~Daemon() {
 
 void Daemon::start() {
     started_ = clock_.now();
+    if (const auto& folder = configuration_.results; !folder.empty()) {
+        std::error_code error;
+        std::filesystem::create_directories(folder, error);
+        if (::access(folder.c_str(), W_OK) != 0) {
+            throw std::runtime_error(
+                "campaign.results: found \"" + folder +
+                "\", expected a folder that can be written: " + std::strerror(errno));
+        }
+    }
+    // A daemon that died may have left it running inside the watchdog's time.
+    shaker_->stop_now();
     shaker_->on_reading([this] {
         interlock_.check(shaker_->reading());
         control_waiter_->notify();
@@ -128,14 +165,28 @@ void Daemon::shut_down() noexcept {
     control_waiter_->notify();
 }
 
+bool Daemon::wait_for_end(double wall_seconds) {
+    std::unique_lock lock(mutex_);
+    return ended_changed_.wait_for(lock, std::chrono::duration<double>(wall_seconds),
+                                   [this] { return ended_; });
+}
+
+double Daemon::longest_end_s() const {
+    return configuration_.campaign.ramp_s + configuration_.campaign.stop_timeout_s +
+           3 * drivers::to_seconds(configuration_.shaker.watchdog_period);
+}
+
 void Daemon::join() {
+    give_up_.store(true);
+    control_waiter_->notify();
     if (control_thread_.joinable()) control_thread_.join();
-    if (!acquisition_thread_.joinable()) return;
     shaker_->shut_down();
     estimator_stage_.stop();
-    acquisition_.stop();
-    estimator_thread_.join();
-    acquisition_thread_.join();
+    if (estimator_thread_.joinable()) estimator_thread_.join();
+    if (acquisition_thread_.joinable()) {
+        acquisition_.stop();
+        acquisition_thread_.join();
+    }
 }
 
 void Daemon::on_port_state(drivers::PortState state, const char* text) noexcept {
@@ -163,6 +214,8 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
 }
 
 bool Daemon::may_feed() const noexcept {
+    const auto reading = shaker_->reading();
+    if (reading.running && !excitation_.load()) return false;
     const Time now = clock_.now();
     const Time oldest = std::min(
         {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
@@ -176,67 +229,117 @@ void Daemon::take_commands(Time now) {
         taken.swap(commands_);
     }
     for (auto& waiting : taken) {
-        if (waiting.request.kind == CommandRequest::Kind::acknowledge) interlock_.acknowledge();
-        waiting.reply.set_value(campaign_.command(waiting.request, now));
+        if (waiting.abandoned->exchange(true)) continue;
+        const rt::Trip handled = interlock_.tripped();
+        const auto reply = campaign_.command(waiting.request, now);
+        if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
+            interlock_.acknowledge(handled);
+        }
+        waiting.reply.set_value(reply);
     }
+}
+
+void Daemon::take_done_dwells() {
+    rt::DwellDone done;
+    while (estimator_stage_.take_done(done)) {
+        --dwells_with_estimator_;
+        campaign_.on_dwell_done(done.summary);
+        auto result = identification_.result();
+        const std::lock_guard lock(mutex_);
+        result_ = std::move(result);
+    }
+    // After the last dwell's verdict, so that the file holds it.
+    if (to_write_ != ToWrite::nothing && dwells_with_estimator_ == 0) write_result();
 }
 
 void Daemon::control_loop() {
     rt::Trip handled = rt::Trip::none;
-    for (;;) {
+    bool stop_was_pending = false;
+    while (!give_up_.load()) {
         const Time now = clock_.now();
         control_beat_.store(now);
         const auto words = [this](const RtEvent& event) {
+            if (event.dropped_before > 0) {
+                log(Severity::warning, event.source.data(),
+                    fmt::format("{} events lost before the next", event.dropped_before));
+            }
             log(event.severity, event.source.data(), event.text.data());
         };
         port_events_.consume(words);
         shaker_events_.consume(words);
-        const rt::Trip trip = interlock_.tripped();
-        if (trip != rt::Trip::none && handled == rt::Trip::none) {
-            campaign_.on_trip(rt::text_of(trip), now);
+        if (const rt::Trip trip = interlock_.tripped(); trip != handled) {
+            if (trip != rt::Trip::none) campaign_.on_trip(rt::text_of(trip), now);
+            handled = trip;
         }
-        handled = trip;
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
-        rt::DwellDone done;
-        while (estimator_stage_.take_done(done)) {
-            campaign_.on_dwell_done(done.summary);
-            auto result = identification_.result();
-            const std::lock_guard lock(mutex_);
-            result_ = std::move(result);
-        }
+        take_done_dwells();
         const Time next = campaign_.step(now);
+        take_done_dwells();
+        const bool stop_pending = shaker_->stop_pending();
+        if (stop_was_pending && !stop_pending) log(Severity::info, "shaker", "stop confirmed");
+        stop_was_pending = stop_pending;
+        check_balance(now);
         {
             const std::lock_guard lock(mutex_);
             campaign_.fill(campaign_status_, now);
-            ended_ = campaign_.done();
-            if (ended_) {
-                for (auto& waiting : commands_)
-                    waiting.reply.set_value({false, "the daemon is shutting down"});
-                commands_.clear();
-                break;
-            }
+            if (campaign_.done()) break;
         }
         control_waiter_->wait_until(std::min(next, now + drivers::kSecond / 2));
     }
+    const std::lock_guard lock(mutex_);
+    ended_ = campaign_.done();
+    ended_changed_.notify_all();
+    for (auto& waiting : commands_) waiting.reply.set_value({false, "the daemon is shutting down"});
+    commands_.clear();
 }
 
-void Daemon::end_campaign(bool complete) {
+void Daemon::write_result() {
+    const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
     if (configuration_.results.empty()) return;
-    const auto folder = std::filesystem::path(configuration_.results);
-    const auto path = folder / "result.json";
-    const std::lock_guard lock(mutex_);
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    std::ofstream file(path);
-    file << tool::result_json(result_);
+    std::string text;
+    {
+        const std::lock_guard lock(mutex_);
+        text = tool::result_json(result_);
+    }
+    // A partial result never takes the place of a complete one.
+    const auto path = std::filesystem::path(configuration_.results) /
+                      (complete ? "result.json" : "result-partial.json");
+    auto unfinished = path;
+    unfinished += ".new";
+    std::ofstream file(unfinished);
+    file << text;
     file.close();
-    if (!file) {
+    std::error_code error;
+    if (file) std::filesystem::rename(unfinished, path, error);
+    if (!file || error) {
         log(Severity::alarm, "campaign", "cannot write " + path.string());
     } else {
         log(Severity::info, "campaign",
             fmt::format("{} result in {}", complete ? "complete" : "partial", path.string()));
     }
+}
+
+void Daemon::check_balance(Time now) {
+    if (now - balance_checked_ < drivers::kSecond) return;
+    balance_checked_ = now;
+    const auto a = acquisition_.view();
+    const auto e = estimator_stage_.view();
+    std::string found;
+    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
+        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
+    };
+    equal("frames received", a.port.received,
+          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
+    equal("frames delivered", a.port.delivered, a.assembler.received + a.rig_ticks + a.in_hand);
+    equal("frames for samples", a.assembler.received,
+          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
+              a.assembler.wrong_length);
+    equal("samples offered", a.samples_offered, a.assembler.samples);
+    equal("samples taken", e.taken, e.in_dwell + e.idle);
+    if (!found.empty() && imbalance_.empty())
+        log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
+    imbalance_ = found;
 }
 
 StatusData Daemon::status() const {
@@ -256,11 +359,15 @@ StatusData Daemon::status() const {
     status.shaker = shaker_->reading();
     status.shaker_link = shaker_->state();
     status.shaker_counters = shaker_->counters();
+    status.stop_pending = shaker_->stop_pending();
     status.can = port_->state();
     status.can_counters = port_->counters();
     status.assembler = acquired.assembler;
     const auto ring = estimator_stage_.ring();
     status.estimator_ring = {ring.pushed, ring.popped, ring.dropped};
+    status.rig_ticks = acquired.rig_ticks;
+    status.estimator_in_dwell = estimated.in_dwell;
+    status.estimator_idle = estimated.idle;
     status.sample = acquired.sample;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         status.channel_age_s[c] =
@@ -287,14 +394,16 @@ std::string Daemon::effective_configuration() const {
 CommandReply Daemon::command(const CommandRequest& request) {
     // A stop does not wait for the control thread.
     if (request.kind == CommandRequest::Kind::abort) shaker_->stop_now();
+    const auto abandoned = std::make_shared<std::atomic<bool>>(false);
     std::future<CommandReply> reply;
     {
         const std::lock_guard lock(mutex_);
         if (ended_) return {false, "the daemon is shutting down"};
-        reply = commands_.emplace_back(WaitingCommand{request, {}}).reply.get_future();
+        reply = commands_.emplace_back(WaitingCommand{request, {}, abandoned}).reply.get_future();
         control_waiter_->notify();
     }
-    if (reply.wait_for(std::chrono::seconds(5)) != std::future_status::ready) {
+    if (reply.wait_for(std::chrono::seconds(5)) != std::future_status::ready &&
+        !abandoned->exchange(true)) {
         return {false, "no answer from the control thread within 5 s"};
     }
     return reply.get();

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <boost/asio/io_context.hpp>
+#include <condition_variable>
 #include <deque>
 #include <future>
 #include <memory>
@@ -44,7 +45,11 @@ class Daemon final : public StatusSource {
     void start();
     /// Asks for a clean end: shaker ramped down, dwell closed. Any thread.
     void shut_down() noexcept;
-    /// Blocks until the control thread has ended after shut_down().
+    /// After shut_down(): true once everything is at rest, false when `wall_seconds` have passed.
+    [[nodiscard]] bool wait_for_end(double wall_seconds);
+    /// Longest orderly end: ramp, stop, watchdog.
+    [[nodiscard]] double longest_end_s() const;
+    /// Ends the threads, orderly or not.
     void join();
 
     [[nodiscard]] StatusData status() const override;
@@ -58,13 +63,17 @@ class Daemon final : public StatusSource {
     struct WaitingCommand {
         CommandRequest request;
         std::promise<CommandReply> reply;
+        /// Whoever asked no longer waits: it must not happen later.
+        std::shared_ptr<std::atomic<bool>> abandoned;
     };
 
     void control_loop();
     void take_commands(drivers::Time now);
     void on_port_state(drivers::PortState state, const char* text) noexcept;
     void log(Severity severity, const std::string& source, const std::string& text);
-    void end_campaign(bool complete);
+    void take_done_dwells();
+    void write_result();
+    void check_balance(drivers::Time now);
     [[nodiscard]] bool may_feed() const noexcept;
 
     configuration::Loaded loaded_;
@@ -89,6 +98,12 @@ class Daemon final : public StatusSource {
     campaign::Campaign campaign_;
 
     std::atomic<bool> shut_down_{false};
+    std::atomic<bool> give_up_{false};
+    std::atomic<bool> excitation_{false};  ///< the campaign is between ramp and rest
+    int dwells_with_estimator_ = 0;        ///< ordered, not yet reported done; control thread
+    enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
+    std::string imbalance_;  ///< as last looked at
+    drivers::Time balance_checked_ = 0;
     std::atomic<drivers::Time> control_beat_{0};
     drivers::Time started_ = 0;
     serve::EventLog event_log_;
@@ -97,6 +112,7 @@ class Daemon final : public StatusSource {
     StatusData campaign_status_;
     estimator::Result result_;
     bool ended_ = false;
+    std::condition_variable ended_changed_;
 
     std::thread acquisition_thread_;
     std::thread estimator_thread_;

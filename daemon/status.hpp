@@ -56,12 +56,15 @@ struct StatusData {
     drivers::ShakerReading shaker;
     drivers::LinkState shaker_link = drivers::LinkState::absent;
     drivers::ShakerCounters shaker_counters;
+    bool stop_pending = false;  ///< a stop is ordered and not read back as done
 
     drivers::PortState can = drivers::PortState::absent;
     drivers::CanPortCounters can_counters;
     drivers::AssemblerCounters assembler;
+    std::uint64_t rig_ticks = 0;  ///< delivered frames that were the simulated rig's time
     RingCounters estimator_ring;
-    drivers::Sample sample;  ///< the newest
+    std::uint64_t estimator_in_dwell = 0, estimator_idle = 0;  ///< popped = in a dwell + idle
+    drivers::Sample sample;                                    ///< the newest
     std::array<double, drivers::kChannels> channel_age_s{};
     drivers::PlatformStatus platform;
 

@@ -16,7 +16,7 @@ namespace {
 
 void set_up_log(const vibrig::configuration::Configuration& configuration) {
     if (!configuration.log_file.empty()) {
-        spdlog::set_default_logger(spdlog::basic_logger_st("vibrigd", configuration.log_file));
+        spdlog::set_default_logger(spdlog::basic_logger_mt("vibrigd", configuration.log_file));
     } else {
         spdlog::set_default_logger(spdlog::stderr_color_mt("vibrigd"));
     }
@@ -36,7 +36,19 @@ int run(vibrig::configuration::Loaded loaded, const sigset_t& signals) {
     ::sigwait(&signals, &signal);
     spdlog::info("{}: stopping", ::strsignal(signal));
     daemon.shut_down();
+    // In wall time: the rig's clock may stand still, a link may be gone. A second signal cuts it
+    // short.
+    bool orderly = false;
+    const timespec at_once{};
+    for (double left = daemon.longest_end_s(); left > 0 && !orderly; left -= 0.1) {
+        orderly = daemon.wait_for_end(0.1);
+        if (::sigtimedwait(&signals, nullptr, &at_once) > 0) break;
+    }
     daemon.join();
+    if (!orderly) {
+        spdlog::error("ended without the shaker read back at rest: its watchdog stops it");
+        return 1;
+    }
     spdlog::info("stopped cleanly");
     return 0;
 }

@@ -67,7 +67,9 @@ void ModbusShaker::stop_now() noexcept {
 
 ShakerReading ModbusShaker::reading() const noexcept {
     ShakerReading reading = latest_.load();
-    if (clock_.now() - reading.time > 3 * settings_.poll_period) reading.valid = false;
+    // One lost reply and the reconnect after it are lived through; the watchdog waits longer still.
+    const Time lifetime = std::max(3 * settings_.poll_period, 2 * settings_.watchdog_period);
+    if (clock_.now() - reading.time > lifetime) reading.valid = false;
     return reading;
 }
 

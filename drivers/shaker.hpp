@@ -40,10 +40,14 @@ struct ShakerSetPoint {
     double ramp_s = 0;       ///< from the present amplitude to this one
 };
 
+/// Values of the state register.
+inline constexpr std::uint16_t kShakerRunning = 2;
+inline constexpr std::uint16_t kShakerFault = 4;
+
 /// The newest read-back. Nothing of it is valid while `valid` is false.
 struct ShakerReading {
     Time time = 0;
-    bool valid = false;
+    bool valid = false;       ///< false when older than 3 polls and 2 feeds
     double frequency_hz = 0;  ///< set-point read back
     double amplitude_g = 0;   ///< set-point read back, peak at the table
     double measured_g = 0;    ///< measured, peak at the table

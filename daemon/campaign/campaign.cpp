@@ -23,6 +23,27 @@ constexpr Time kRampGrace = 10 * kSecond;
 // How much later than the last sample of a dwell the estimator may report it as done.
 constexpr Time kDoneGrace = 2 * kSecond;
 constexpr double kAtRestG = 1e-9;
+// Read back against commanded; a register resolves 1 mHz.
+constexpr double kFrequencyToleranceHz = 0.01;
+// A status older than this is no status.
+constexpr Time kPlatformDeadline = kSecond;
+
+rt::Guard guard_in(State state) {
+    switch (state) {
+        case State::ramping:
+        case State::settling:
+        case State::recording:
+        case State::resting:
+            return rt::Guard::excitation;
+        case State::armed:
+        case State::waiting:
+        case State::slewing:
+        case State::paused:
+            return rt::Guard::armed;
+        default:
+            return rt::Guard::idle;
+    }
+}
 
 }  // namespace
 
@@ -35,10 +56,24 @@ bool Campaign::active() const {
            state_ == State::paused;
 }
 
-bool Campaign::done() const { return shutting_down_ && !active() && !ports_.shaker.stop_pending(); }
+bool Campaign::done() const {
+    return shutting_down_ && !active() && !(may_move_ && ports_.shaker.stop_pending());
+}
+
+std::string Campaign::not_fit_to_excite() const {
+    const auto reading = ports_.shaker.reading();
+    if (ports_.shaker.stop_pending()) return "a stop of the shaker is pending";
+    if (!reading.valid) return "no valid read-back from the shaker";
+    if (reading.emergency_stop_open) return "the emergency-stop chain is open";
+    if (reading.fault != 0 || reading.state == drivers::kShakerFault)
+        return fmt::format("shaker fault {:#06x}", reading.fault);
+    if (!reading.at_rest()) return "the shaker is not at rest";
+    return {};
+}
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
+    ports_.guard(guard_in(state));
     entered_ = now;
     requested_ = false;
     stop_sent_ = false;
@@ -58,10 +93,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (active()) return refuse("a campaign is running");
             if (state_ == State::tripped)
                 return refuse("tripped (" + reason_ + "): acknowledge it first");
-            if (ports_.shaker.stop_pending()) return refuse("a stop of the shaker is pending");
-            if (!ports_.shaker.reading().valid) return refuse("no valid read-back from the shaker");
-            if (ports_.shaker.reading().emergency_stop_open)
-                return refuse("the emergency-stop chain is open");
+            if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             reason_.clear();
             enter(State::armed, now);
@@ -69,6 +101,8 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
                                       *std::ranges::max_element(settings_.table_g)));
         case Kind::start:
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
+            if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
+            if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
             ports_.begin();
             place_ = {};
             positions_done_ = 0;
@@ -109,11 +143,14 @@ Time Campaign::step(Time now) {
 }
 
 Time Campaign::step_once(Time now) {
-    if (state_ == State::ramping || state_ == State::settling || state_ == State::recording) {
-        const auto reading = ports_.shaker.reading();
-        if (!reading.valid && table_g() > kAtRestG) {
-            abort("no valid read-back from the shaker", now);
-        }
+    if (const auto reading = ports_.shaker.reading();
+        guard_in(state_) != rt::Guard::excitation && reading.time > entered_ && reading.at_rest() &&
+        !ports_.shaker.stop_pending()) {
+        may_move_ = false;
+    }
+    // A link that was lost ends the arming: excitation never recovers alone.
+    if ((active() || state_ == State::armed) && !shutting_down_ && !ports_.shaker.reading().valid) {
+        abort("no valid read-back from the shaker", now);
     }
     switch (state_) {
         case State::waiting:
@@ -135,7 +172,9 @@ Time Campaign::step_once(Time now) {
         case State::finished:
         case State::aborted:
         case State::tripped:
-            break;
+            // An aborted slew's last command is repeated until the platform has it.
+            ports_.gimbal.update(ports_.platform(), now);
+            return std::min(ports_.gimbal.next_deadline(), now + kSecond);
     }
     return now + kSecond;
 }
@@ -153,8 +192,11 @@ Time Campaign::wait_for_platform(Time now) {
     const bool covered = !temperatures_.empty() && temperatures_.front().first <= now - window;
     const bool steady = covered && high.second - low.second <= settings_.temperature_band_c;
     reason_.clear();
-    if (platform.time == 0) {
+    if (platform.time == 0 || now - platform.time > kPlatformDeadline) {
         reason_ = "no platform status on the bus";
+        temperatures_.clear();
+    } else if (platform.fault) {
+        reason_ = "platform fault";
     } else if (!platform.ready || !platform.gyros_at_speed) {
         reason_ = "platform not ready";
     } else if (!platform.loop_closed) {
@@ -191,11 +233,15 @@ void Campaign::start_position(Time now) {
 }
 
 Time Campaign::slew(Time now) {
-    if (!requested_) {
-        if (!ports_.shaker.reading().at_rest()) {  // never slews on a moving shaker
+    if (!ports_.shaker.reading().at_rest()) {  // gimbals never slew on a moving shaker
+        if (requested_) {
+            abort("the shaker left rest during a slew", now);
+        } else {
             enter(State::resting, now);
-            return now;
         }
+        return now;
+    }
+    if (!requested_) {
         ports_.gimbal.slew_to(settings_.positions_deg[place_.position], now);
         requested_ = true;
     }
@@ -216,20 +262,25 @@ Time Campaign::slew(Time now) {
 }
 
 bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading) const {
-    return reading.valid && reading.running && reading.state == 2 &&
+    return reading.valid && reading.running && reading.state == drivers::kShakerRunning &&
+           std::abs(reading.frequency_hz - settings_.frequency_hz) <= kFrequencyToleranceHz &&
            std::abs(reading.measured_g - table_g()) <= settings_.amplitude_tolerance * table_g();
 }
 
 Time Campaign::ramp(Time now) {
-    ports_.gimbal.update(ports_.platform(), now);
-    if (ports_.gimbal.state() == drivers::GimbalState::commanding)
+    const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
+    if (gimbal == drivers::GimbalState::commanding)
         return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+    if (gimbal != drivers::GimbalState::idle) {
+        abort(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)), now);
+        return now;
+    }
     if (table_g() <= kAtRestG) {
         enter(State::settling, now);
         return now;
     }
     if (!requested_) {
-        ports_.watch(true);
+        may_move_ = true;
         requested_ = ports_.shaker.request({settings_.frequency_hz, table_g(), settings_.ramp_s});
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
@@ -297,9 +348,9 @@ Time Campaign::rest(Time now) {
     const auto reading = ports_.shaker.reading();
     if (!ports_.shaker.busy() && !ports_.shaker.stop_pending() && reading.at_rest() &&
         reading.time > entered_) {
-        ports_.watch(false);
+        may_move_ = false;
         if (shutting_down_) {
-            abort("the daemon is shutting down", now);
+            end(State::aborted, "the daemon is shutting down", now);
         } else if (place_.run == settings_.table_g.size()) {
             place_.run = settings_.table_g.size() - 1;
             place_.position = settings_.positions_deg.size() - 1;
@@ -314,11 +365,19 @@ Time Campaign::rest(Time now) {
     }
     if (!requested_ && !ports_.shaker.stop_pending()) {
         requested_ = ports_.shaker.request({settings_.frequency_hz, 0, settings_.ramp_s});
+        if (!requested_) {  // no ramp to be had: the hard way
+            stop_sent_ = true;
+            ports_.shaker.stop_now();
+        }
     }
     if (!stop_sent_ && now - entered_ > from_seconds(settings_.ramp_s + settings_.stop_timeout_s)) {
         stop_sent_ = true;
-        ports_.event(Severity::alarm, "shaker did not come to rest in time: stop sent");
-        ports_.shaker.stop_now();
+        if (shutting_down_) {
+            ports_.event(Severity::alarm, "shaker did not come to rest in time: stop ordered");
+            ports_.shaker.stop_now();
+        } else {
+            abort("the shaker did not come to rest in time", now);
+        }
     }
     return now + kPoll;
 }
@@ -332,16 +391,23 @@ void Campaign::leave_dwell() {
 }
 
 void Campaign::abort(const std::string& why, Time now) {
+    ports_.shaker.stop_now();
+    end(State::aborted, why, now);
+}
+
+void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
-    if (state_ == State::ramping || state_ == State::settling || state_ == State::recording) {
-        ports_.shaker.stop_now();
-    }
+    const bool slewing = state_ == State::slewing;
     leave_dwell();
-    ports_.watch(false);
     armed_by_.clear();
     reason_ = why;
-    enter(State::aborted, now);
-    ports_.event(Severity::alarm, "campaign aborted: " + why);
+    enter(state, now);
+    if (slewing) ports_.gimbal.release(now);
+    if (state == State::tripped) {
+        ports_.event(Severity::trip, "stop of the shaker ordered: " + why);
+    } else {
+        ports_.event(Severity::alarm, "campaign aborted: " + why);
+    }
     if (had_campaign) ports_.end(false);
 }
 
@@ -355,14 +421,9 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
 }
 
 void Campaign::on_trip(const std::string& cause, Time now) {
-    const bool had_campaign = active();
-    leave_dwell();
-    ports_.watch(false);
-    armed_by_.clear();
-    reason_ = cause;
-    enter(State::tripped, now);
-    ports_.event(Severity::trip, "shaker stopped: " + cause);
-    if (had_campaign) ports_.end(false);
+    // Once more: a set-point of this thread may have slipped in behind the interlock's stop.
+    ports_.shaker.stop_now();
+    end(State::tripped, cause, now);
 }
 
 void Campaign::shut_down(Time now) {
@@ -370,6 +431,8 @@ void Campaign::shut_down(Time now) {
     shutting_down_ = true;
     if (!active()) return;
     leave_dwell();
+    if (state_ == State::slewing) ports_.gimbal.release(now);
+    if (!may_move_) return end(State::aborted, "the daemon is shutting down", now);
     ports_.event(Severity::warning, "shutting down: ramping the shaker down");
     enter(State::resting, now);
 }

@@ -9,6 +9,7 @@
 
 #include "daemon/campaign/settings.hpp"
 #include "daemon/rt/dwell_order.hpp"
+#include "daemon/rt/interlock.hpp"
 #include "daemon/status.hpp"
 #include "drivers/gimbal.hpp"
 #include "drivers/shaker.hpp"
@@ -21,9 +22,10 @@ struct Ports {
     drivers::Shaker& shaker;
     std::function<drivers::PlatformStatus()> platform;
     std::function<bool(const rt::DwellOrder&)> order_dwell;
-    std::function<void(bool excitation)> watch;  ///< interlock on and off
-    std::function<void()> begin;                 ///< a new campaign: forget earlier dwells
-    std::function<void(bool complete)> end;      ///< write what there is
+    std::function<void(rt::Guard)> guard;    ///< what the interlock has to watch
+    std::function<bool()> estimator_free;    ///< no dwell is with the estimator
+    std::function<void()> begin;             ///< a new campaign: forget earlier dwells
+    std::function<void(bool complete)> end;  ///< write what there is
     std::function<void(Severity, const std::string&)> event;
 };
 
@@ -38,12 +40,11 @@ class Campaign {
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
     void on_dwell_done(const estimator::DwellSummary& summary);
-    /// An interlock has already stopped the shaker; latches until acknowledged.
+    /// An interlock has ordered the stop; latches until acknowledged.
     void on_trip(const std::string& cause, drivers::Time now);
     /// Ramps down and ends; step() goes on until done() is true.
     void shut_down(drivers::Time now);
     [[nodiscard]] bool done() const;
-
     void fill(StatusData& status, drivers::Time now) const;
 
   private:
@@ -61,7 +62,9 @@ class Campaign {
     void next_position(drivers::Time now);
     void start_position(drivers::Time now);
     void abort(const std::string& why, drivers::Time now);
+    void end(CampaignState state, const std::string& why, drivers::Time now);
     void leave_dwell();
+    [[nodiscard]] std::string not_fit_to_excite() const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading) const;
     [[nodiscard]] double table_g() const { return settings_.table_g[place_.run]; }
     [[nodiscard]] bool active() const;
@@ -78,6 +81,7 @@ class Campaign {
     bool shutting_down_ = false;
     bool stop_sent_ = false;  ///< within rest(): the ramp down took too long
     bool requested_ = false;  ///< within ramp() and rest(): the set-point was accepted
+    bool may_move_ = false;   ///< a level was asked for and rest has not been read back since
     bool dwell_ordered_ = false;
     bool dwell_done_ = false;
     drivers::Time dwell_from_ = 0;

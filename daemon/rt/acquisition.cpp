@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <boost/asio/post.hpp>
+#include <cerrno>
 #include <chrono>
+#include <system_error>
 
 namespace vibrig::rt {
 
@@ -28,7 +30,9 @@ Acquisition::Acquisition(boost::asio::io_context& io, drivers::CanPort& port, co
       timer_(io) {
     if (rig_ != nullptr) {
         rig_link_.emplace(port_);
-        rest_.assign(::dup(rig_->rest().fd()));
+        const int rest = ::dup(rig_->rest().fd());
+        if (rest < 0) throw std::system_error(errno, std::generic_category(), "dup");
+        rest_.assign(rest);
     }
 }
 
@@ -52,46 +56,55 @@ void Acquisition::stop() {
 }
 
 void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept {
+    shown_.in_hand = frames.size();
     for (const auto& frame : frames) {
+        --shown_.in_hand;
         if (!rig_link_) {
             assembler_.feed(frame);
-            continue;
-        }
-        if (const auto tick = rig_link_->decode(frame.frame)) {
-            rig_->set(tick->time);
-            if (!tick->end) continue;
-            on_time(tick->time);
-            unacknowledged_ = tick->time;
-            rig_->fire();
-            acknowledge_if_at_rest();
+        } else if (rig_link_->is_time(frame.frame)) {
+            ++shown_.rig_ticks;
+            if (const auto tick = rig_link_->decode(frame.frame)) on_tick(*tick);
         } else {
             drivers::ReceivedFrame stamped = frame;
             stamped.time = rig_->now();
             assembler_.feed(stamped);
         }
     }
-    if (!rig_link_) flush();
+    if (!rig_link_) hand_on();
+}
+
+void Acquisition::on_tick(const RigTimeLink::Tick& tick) noexcept {
+    rig_->set(tick.time);
+    if (!tick.end) return;
+    on_time(tick.time);
+    unacknowledged_ = tick;
+    rig_->fire();
+    acknowledge_if_at_rest();
 }
 
 void Acquisition::on_time(Time now) noexcept {
     assembler_.advance(now);
     to_.interlock.check_ages(assembler_, now);
-    flush();
+    hand_on();
 }
 
 void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     to_.interlock.check(sample, assembler_.platform());
     batch_[batched_++] = sample;
-    if (batched_ == batch_.size()) flush();
+    if (batched_ == batch_.size()) push_batch();
 }
 
-void Acquisition::flush() noexcept {
-    if (batched_ > 0) {
-        to_.estimator_ring.push_n({batch_.data(), batched_});
-        to_.estimator.notify();
-        shown_.sample = batch_[batched_ - 1];
-        batched_ = 0;
-    }
+void Acquisition::push_batch() noexcept {
+    if (batched_ == 0) return;
+    to_.estimator_ring.push_n({batch_.data(), batched_});
+    to_.estimator.notify();
+    shown_.samples_offered += batched_;
+    shown_.sample = batch_[batched_ - 1];
+    batched_ = 0;
+}
+
+void Acquisition::hand_on() noexcept {
+    push_batch();
     const auto& platform = assembler_.platform();
     const auto& was = shown_.platform;
     const bool changed = platform.ready != was.ready || platform.loop_closed != was.loop_closed ||
@@ -101,6 +114,7 @@ void Acquisition::flush() noexcept {
                          platform.gimbal_command_echo != was.gimbal_command_echo;
     shown_.platform = platform;
     shown_.assembler = assembler_.counters();
+    shown_.port = port_.counters();
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         shown_.last_good[c] = assembler_.last_good(static_cast<drivers::Channel>(c));
     }

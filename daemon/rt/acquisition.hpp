@@ -23,6 +23,10 @@ struct AcquisitionView {
     drivers::Sample sample;  ///< the newest
     drivers::PlatformStatus platform;
     drivers::AssemblerCounters assembler;
+    drivers::CanPortCounters port;  ///< of the same moment as the assembler's
+    std::uint64_t rig_ticks = 0;    ///< delivered frames that were the rig's time
+    std::uint64_t in_hand = 0;      ///< delivered frames of the batch at work, not looked at yet
+    std::uint64_t samples_offered = 0;  ///< to the ring: pushed + dropped
     std::array<drivers::Time, drivers::kChannels> last_good{};
     drivers::Time beat = 0;  ///< when the thread last handled frames
 };
@@ -53,7 +57,9 @@ class Acquisition {
   private:
     void on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept;
     void on_sample(const drivers::Sample& sample) noexcept;
-    void flush() noexcept;
+    void on_tick(const RigTimeLink::Tick& tick) noexcept;
+    void push_batch() noexcept;
+    void hand_on() noexcept;
     void on_time(drivers::Time now) noexcept;
     void arm_timer();
     void wait_for_rest();
@@ -66,7 +72,7 @@ class Acquisition {
     Wiring to_;
     drivers::SampleAssembler assembler_;
     std::optional<RigTimeLink> rig_link_;
-    std::optional<drivers::Time> unacknowledged_;
+    std::optional<RigTimeLink::Tick> unacknowledged_;
     boost::asio::posix::stream_descriptor rest_;
     boost::asio::steady_timer timer_;
     std::array<drivers::Sample, 32> batch_{};

@@ -26,7 +26,6 @@ class RigClock::RigWaiter final : public drivers::Waiter {
     RigWaiter& operator=(const RigWaiter&) = delete;
 
     void notify() noexcept override {
-        if (pending_.load()) return;
         clock_.take_token();  // before the flag: the sleeper may take it over at once
         if (pending_.exchange(true)) {
             clock_.drop_token();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <thread>
 #include <type_traits>
 
 namespace vibrig::rt {
@@ -37,6 +38,8 @@ class Snapshot {
             for (std::size_t i = 0; i < kWords; ++i)
                 words[i] = words_[i].load(std::memory_order_acquire);
             if (before % 2 == 0 && sequence_.load(std::memory_order_relaxed) == before) break;
+            // A writer that was put aside half-way: no spinning, on one CPU it would never go on.
+            std::this_thread::yield();
         }
         T value;
         std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));

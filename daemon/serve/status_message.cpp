@@ -67,6 +67,9 @@ void fill(v1::Shaker& out, const StatusData& status) {
     out.set_feeds(counters.feeds);
     out.set_stops_written(counters.stops_written);
     out.set_read_back_mismatches(counters.read_back_mismatches);
+    out.set_wrong_replies(counters.wrong_replies);
+    out.set_lost(counters.lost);
+    out.set_stop_pending(status.stop_pending);
 }
 
 void fill(v1::Can& out, const StatusData& status) {
@@ -220,6 +223,9 @@ void fill(v1::Status& out, const StatusData& status) {
     out.mutable_estimator_ring()->set_pushed(status.estimator_ring.pushed);
     out.mutable_estimator_ring()->set_popped(status.estimator_ring.popped);
     out.mutable_estimator_ring()->set_dropped(status.estimator_ring.dropped);
+    out.mutable_estimator_ring()->set_in_dwell(status.estimator_in_dwell);
+    out.mutable_estimator_ring()->set_idle(status.estimator_idle);
+    out.mutable_assembler()->set_rig_ticks(status.rig_ticks);
     fill(*out.mutable_sample(), status);
     fill(*out.mutable_platform(), status.platform);
     fill(*out.mutable_estimate(), status.estimate);

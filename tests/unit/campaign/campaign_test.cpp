@@ -40,7 +40,7 @@ struct CampaignTest : testing::Test {
     drivers::PlatformStatus platform;
     std::vector<rt::DwellOrder> orders;
     std::vector<std::string> events;
-    bool watching = false;
+    rt::Guard guard = rt::Guard::idle;
     int ends = 0;
     bool complete = false;
     bool slewed_while_moving = false;
@@ -56,7 +56,7 @@ struct CampaignTest : testing::Test {
                                 orders.push_back(o);
                                 return true;
                             },
-                            [this](bool w) { watching = w; }, [] {},
+                            [this](rt::Guard g) { guard = g; }, [] { return true; }, [] {},
                             [this](bool c) {
                                 ++ends;
                                 complete = c;
@@ -105,6 +105,7 @@ struct CampaignTest : testing::Test {
         if (!shaker.requests.empty()) {
             const auto& wanted = shaker.requests.back();
             shaker.now.amplitude_g = shaker.now.measured_g = wanted.amplitude_g;
+            shaker.now.frequency_hz = wanted.frequency_hz;
             shaker.now.running = wanted.amplitude_g > 0;
             shaker.now.state = wanted.amplitude_g > 0 ? 2 : 0;
         }
@@ -162,7 +163,7 @@ TEST_F(CampaignTest, VisitsEveryPositionOfEveryRunAndSlewsOnlyAtRest) {
     EXPECT_EQ(ends, 1);
     // AND the shaker is at rest, unwatched and disarmed
     EXPECT_TRUE(shaker.now.at_rest());
-    EXPECT_FALSE(watching);
+    EXPECT_EQ(guard, rt::Guard::idle);
     EXPECT_EQ(status().armed_by, "");
     EXPECT_EQ(status().progress, 1.0);
     EXPECT_FALSE(command(Kind::start).accepted) << "one arming covers one campaign";
@@ -200,7 +201,7 @@ TEST_F(CampaignTest, AnAbortStopsTheShakerAndEndsTheArming) {
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);
     ASSERT_TRUE(run_until(CampaignState::recording, 60));
-    EXPECT_TRUE(watching);
+    EXPECT_EQ(guard, rt::Guard::excitation);
     EXPECT_TRUE(command(Kind::abort).accepted);
     EXPECT_GE(shaker.stops, 1);
     EXPECT_TRUE(orders.back().cancel);

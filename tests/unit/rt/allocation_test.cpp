@@ -83,7 +83,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     const auto estimator_waiter = clock.make_waiter();
     FakeShaker shaker;
     Interlock interlock(shaker, *control, {12.0});
-    interlock.watch(true);
+    interlock.guard(Guard::excitation);
     Ring<drivers::Sample> ring(4096);
     estimator::Identification identification{estimator::Settings{}};
     EstimatorStage stage(ring, *estimator_waiter, *control, identification);

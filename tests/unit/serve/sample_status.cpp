@@ -29,6 +29,12 @@ StatusData full_status() {
     s.can_counters = {21, 22, 23, 24, 25, 26, 27, 28, 29};
     s.assembler = {31, 32, 33, 34, 35, 36, 37, 38, 39, 40};
     s.estimator_ring = {41, 42, 43};
+    s.estimator_in_dwell = 30;
+    s.estimator_idle = 12;
+    s.rig_ticks = 44;
+    s.stop_pending = true;
+    s.shaker_counters.wrong_replies = 45;
+    s.shaker_counters.lost = 46;
     s.sample.time = 1'234'475'000'000;
     s.sample.sequence = 51;
     s.sample.dropped_before = 52;
