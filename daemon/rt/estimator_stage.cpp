@@ -55,9 +55,10 @@ void EstimatorStage::take_order(const DwellOrder& order) noexcept {
 }
 
 void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
+    // First, since it publishes counts: those hold whole samples only.
+    if (ordered_ && sample.time >= current_.to) finish();
     ++shown_.taken;
     shown_.sample_time = sample.time;
-    if (ordered_ && sample.time >= current_.to) finish();
     if (!ordered_ || sample.time < current_.from) {
         ++shown_.idle;
         return;
