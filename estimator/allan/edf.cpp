@@ -96,9 +96,13 @@ double overlapping_allan_edf(Alpha alpha, double n, double m) {
 
 double total_edf(Alpha alpha, double n, double m) {
     const double ratio = (n - 1) / m;
+    // At m = 1 both variances are the same sum; the table is for long averaging times.
+    if (m < 2) {
+        return overlapping_allan_edf(alpha, n, m);
+    }
     switch (alpha) {
         case 0:
-            return 1.50 * ratio;
+            return 1.50 * ratio * 4 * m * m / (4 * m * m + 5);
         case -1:
             return 1.17 * ratio - 0.22;
         case -2:

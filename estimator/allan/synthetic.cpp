@@ -44,9 +44,13 @@ std::vector<double> synthetic_rate(const Terms& terms, std::size_t n, double tau
     for (std::size_t i = 0; i < n; ++i) {
         const double next = q * normal(generator);
         const double t = (static_cast<double>(i) + 0.5) * tau0;
-        rate[i] = (next - angle) / tau0 + white_sigma * normal(generator) + bias + ramp * t / 3600;
+        const double step = walk_sigma * normal(generator);
+        // The mean of a random walk over a step: half of what it does, and a part of its own.
+        const double within = step / 2 + walk_sigma / std::sqrt(12.0) * normal(generator);
+        rate[i] = (next - angle) / tau0 + white_sigma * normal(generator) + bias + within +
+                  ramp * t / 3600;
         angle = next;
-        bias += walk_sigma * normal(generator);
+        bias += step;
     }
     // One-sided spectrum B^2 / (pi f) from Lorentzians spaced by ln 2 in time: s^2 = B^2 ln 2 / pi.
     const double s = flicker * std::sqrt(std::numbers::ln2 / std::numbers::pi);
