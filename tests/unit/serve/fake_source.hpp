@@ -18,9 +18,12 @@ namespace vibrig::serve {
 /// A daemon without devices.
 class FakeSource : public StatusSource {
   public:
+    mutable std::atomic<int> asked{0};  ///< times the status was asked for
+
     FakeSource() : status_(full_status()) {}
 
     [[nodiscard]] StatusData status() const override {
+        ++asked;
         if (broken) throw std::runtime_error("no status today");
         const std::lock_guard lock(mutex_);
         return status_;

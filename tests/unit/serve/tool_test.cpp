@@ -34,6 +34,13 @@ Outcome vibrig(const std::string& arguments) {
 
 class Tool : public testing::Test {
   protected:
+    /// Until the program that was just started has asked: under a sanitizer that takes a while.
+    void wait_until_asked() {
+        const int before = source.asked;
+        for (int i = 0; i < 3000 && source.asked == before; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+
     FakeSource source;
     TemporaryFolder folder;
     std::string path = folder.file("s");
@@ -107,7 +114,7 @@ TEST_F(Tool, WatchesUntilTheCampaignEnds) {
     Outcome outcome;
     {
         const std::jthread watcher([&] { outcome = vibrig(watch); });
-        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        wait_until_asked();
         status.state = CampaignState::finished;
         source.set(status);
     }
@@ -124,9 +131,10 @@ TEST_F(Tool, WatchFindsARestartedDaemonAgain) {
     {
         const std::jthread watcher(
             [&] { outcome = vibrig("watch --until-finished --interval 0.05" + at); });
-        std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        wait_until_asked();
         server.reset();
-        std::this_thread::sleep_for(std::chrono::milliseconds(400));
+        // The tool runs and asks twenty times a second: it sees that nobody answers.
+        std::this_thread::sleep_for(std::chrono::seconds(2));
         status.state = CampaignState::finished;
         source.set(status);
         server = std::make_unique<StatusServer>(source, path);
