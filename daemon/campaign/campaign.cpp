@@ -187,10 +187,12 @@ Time Campaign::wait_for_platform(Time now) {
     const Time window = from_seconds(settings_.temperature_window_s);
     while (temperatures_.size() > 2 && temperatures_[1].first <= now - window)
         temperatures_.pop_front();
-    const auto [low, high] =
-        std::ranges::minmax(temperatures_, {}, &std::pair<Time, double>::second);
-    const bool covered = !temperatures_.empty() && temperatures_.front().first <= now - window;
-    const bool steady = covered && high.second - low.second <= settings_.temperature_band_c;
+    bool steady = false;
+    if (!temperatures_.empty() && temperatures_.front().first <= now - window) {
+        const auto [low, high] =
+            std::ranges::minmax(temperatures_, {}, &std::pair<Time, double>::second);
+        steady = high.second - low.second <= settings_.temperature_band_c;
+    }
     reason_.clear();
     if (platform.time == 0 || now - platform.time > kPlatformDeadline) {
         reason_ = "no platform status on the bus";
