@@ -189,6 +189,19 @@ TEST_F(CampaignTest, WaitsForAReadyPlatformAndASteadyTemperature) {
     EXPECT_TRUE(run_until(CampaignState::slewing, 20));
 }
 
+TEST_F(CampaignTest, WaitsForTheFirstPlatformStatus) {
+    // GIVEN a campaign started before the platform has said anything
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    platform.time = 0;
+    // WHEN the campaign looks at it, THEN it waits and says for what
+    for (int i = 0; i < 3; ++i) campaign->step(now += 100 * kMillisecond);
+    EXPECT_EQ(status().state, CampaignState::waiting);
+    EXPECT_EQ(status().reason, "no platform status on the bus");
+    // and goes on when the platform speaks
+    EXPECT_TRUE(run_until(CampaignState::slewing, 30));
+}
+
 TEST_F(CampaignTest, GivesUpWaitingAfterTheTimeLimit) {
     platform.loop_closed = false;
     ASSERT_TRUE(command(Kind::arm).accepted);

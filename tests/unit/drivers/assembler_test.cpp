@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
-#include "tests/unit/drivers/counting_new.hpp"
 #include "tests/unit/drivers/rig_frames.hpp"
+#include "tests/unit/support/allocation_count.hpp"
 
 namespace vibrig::test {
 namespace {

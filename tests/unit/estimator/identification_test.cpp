@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/unit/estimator/allocation_count.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
+#include "tests/unit/support/allocation_count.hpp"
 
 namespace vibrig::estimator::testing {
 namespace {
@@ -35,7 +35,7 @@ TEST(Identification, NeitherAllocatesNorKeepsGrowing) {
     plan.spike_probability = 0.01;
     rig.dwell(identification, plan);
     // GIVEN dwells with gaps, spikes, long pauses and a last summary that has no room
-    const std::size_t before = allocations();
+    const std::uint64_t before = test::allocations();
     Estimate estimate;
     for (int dwell = 0; dwell < 70; ++dwell) {
         identification.begin_dwell({1 + dwell % 2, dwell, -1});
@@ -49,7 +49,7 @@ TEST(Identification, NeitherAllocatesNorKeepsGrowing) {
         identification.end_dwell();
     }
     // THEN the heap was not touched
-    EXPECT_EQ(allocations() - before, 0U);
+    EXPECT_EQ(test::allocations() - before, 0U);
     EXPECT_EQ(identification.result().dwells.size(), 64U);
 }
 

@@ -3,63 +3,17 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <boost/asio/post.hpp>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <cstring>
-#include <new>
 #include <thread>
 
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/real_clock.hpp"
 #include "tests/unit/rt/fake_shaker.hpp"
-
-namespace {
-thread_local bool watched = false;
-std::atomic<bool> counting{false};
-std::atomic<std::uint64_t> allocations{0};
-
-void* counted(std::size_t size) {
-    if (watched && counting.load()) ++allocations;
-    if (void* p = std::malloc(size == 0 ? 1 : size)) return p;
-    throw std::bad_alloc();
-}
-void* counted(std::size_t size, std::align_val_t alignment) {
-    if (watched && counting.load()) ++allocations;
-    const auto a = static_cast<std::size_t>(alignment);
-    if (void* p = std::aligned_alloc(a, (size + a - 1) / a * a)) return p;
-    throw std::bad_alloc();
-}
-}  // namespace
-
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void* operator new(std::size_t size, std::align_val_t a) { return counted(size, a); }
-void* operator new[](std::size_t size, std::align_val_t a) { return counted(size, a); }
-// The non-throwing forms too: std::stable_sort uses them, and all must fit together.
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-    try {
-        return counted(size);
-    } catch (const std::bad_alloc&) {
-        return nullptr;
-    }
-}
-void* operator new[](std::size_t size, const std::nothrow_t& tag) noexcept {
-    return operator new(size, tag);
-}
-void operator delete(void* p, const std::nothrow_t&) noexcept { std::free(p); }
-void operator delete[](void* p, const std::nothrow_t&) noexcept { std::free(p); }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete[](void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
-void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+#include "tests/unit/support/allocation_count.hpp"
 
 namespace vibrig::rt {
 namespace {
@@ -114,11 +68,11 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     order.to = drivers::kNever;
     ASSERT_TRUE(stage.order(order));
     std::thread acquisition_thread([&] {
-        watched = true;
+        test::watch_this_thread();
         io.run();
     });
     std::thread estimator_thread([&] {
-        watched = true;
+        test::watch_this_thread();
         stage.run();
     });
     const int bus = ::accept(listener, nullptr, nullptr);
@@ -126,8 +80,9 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
 
     // WHEN samples stream, complete and with losses, garbage and platform status between them
     constexpr std::uint32_t kSamples = 4000;
+    std::uint64_t before = 0;  // taken after start-up
     for (std::uint32_t n = 0; n < kSamples; ++n) {
-        if (n == kSamples / 4) counting.store(true);
+        if (n == kSamples / 4) before = test::watched_allocations();
         const double low = n % 256;
         const double f = std::sin(0.37 * n);
         std::vector<canfd_frame> frames{
@@ -156,7 +111,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     const auto deadline = clock.now() + 10 * kSecond;
     while (stage.ring().popped + 16 < kSamples && clock.now() < deadline)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    counting.store(false);
+    const std::uint64_t after = test::watched_allocations();
     acquisition.stop();
     acquisition_thread.join();
     stage.stop();
@@ -166,7 +121,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     // THEN the samples went through the filter and neither thread allocated
     EXPECT_GT(stage.view().in_dwell, kSamples * 9 / 10);
     EXPECT_GT(stage.view().estimate.used, kSamples / 2);
-    EXPECT_EQ(allocations.load(), 0U);
+    EXPECT_EQ(after - before, 0U);
 }
 
 }  // namespace
