@@ -18,7 +18,7 @@
 
 #include "drivers/can_port.hpp"
 #include "drivers/receive_batch.hpp"
-#include "tests/unit/drivers/counting_new.hpp"
+#include "tests/unit/support/allocation_count.hpp"
 
 /// What any CAN port does, whatever bus it is on: included by the test of each kind, which brings
 /// its TestBus.
