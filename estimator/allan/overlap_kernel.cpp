@@ -6,37 +6,38 @@ namespace vibrig::estimator::allan {
 
 namespace {
 
-constexpr std::size_t kBlock = 64;
-constexpr std::size_t kLanes = 8;
-
-using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+// 8 KiB of phase: with factors in growing octaves the first two operands of a block stay in the
+// first cache and only the third streams in. Shorter blocks would jump between as many streams as
+// there are factors, at distances of powers of two that all fall into the same few lines of every
+// cache.
+constexpr std::size_t kBlock = 1024;
+constexpr std::size_t kSums = 4;  // side by side, so that no addition waits for the one before
 
 // Plain arrays only: each copy below is compiled for its own instruction set, and an inline
 // function of a library would be shared between them by the linker.
+using Two = double __attribute__((vector_size(16)));
+using Four = double __attribute__((vector_size(32)));
+using Eight = double __attribute__((vector_size(64)));
+
+template <typename Lanes>
 [[gnu::always_inline]] inline double block(const double* x, std::size_t m, std::size_t length) {
-    double sum = 0;
+    constexpr std::size_t kLanes = sizeof(Lanes) / sizeof(double);
+    Lanes sums[kSums] = {};
     std::size_t i = 0;
-    if (length == kBlock) {
-        Lanes even{};
-        Lanes odd{};
-        for (; i < kBlock; i += 2 * kLanes) {
-            Lanes a, b, c, d, e, f;
-            std::memcpy(&a, x + i, sizeof a);
-            std::memcpy(&b, x + i + m, sizeof b);
-            std::memcpy(&c, x + i + 2 * m, sizeof c);
-            std::memcpy(&d, x + i + kLanes, sizeof d);
-            std::memcpy(&e, x + i + kLanes + m, sizeof e);
-            std::memcpy(&f, x + i + kLanes + 2 * m, sizeof f);
+    for (; i + kSums * kLanes <= length; i += kSums * kLanes) {
+#pragma GCC unroll 4
+        for (std::size_t k = 0; k < kSums; ++k) {
+            Lanes a, b, c;
+            std::memcpy(&a, x + i + k * kLanes, sizeof a);
+            std::memcpy(&b, x + i + k * kLanes + m, sizeof b);
+            std::memcpy(&c, x + i + k * kLanes + 2 * m, sizeof c);
             a = (c - b) - (b - a);
-            d = (f - e) - (e - d);
-            even += a * a;
-            odd += d * d;
-        }
-        even += odd;
-        for (std::size_t lane = 0; lane < kLanes; ++lane) {
-            sum += even[lane];
+            sums[k] += a * a;
         }
     }
+    for (std::size_t k = 1; k < kSums; ++k) sums[0] += sums[k];
+    double sum = 0;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) sum += sums[0][lane];
     for (; i < length; ++i) {
         const double difference = (x[i + 2 * m] - x[i + m]) - (x[i + m] - x[i]);
         sum += difference * difference;
@@ -44,6 +45,7 @@ using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
     return sum;
 }
 
+template <typename Lanes>
 [[gnu::always_inline]] inline void sweep(const double* x, std::size_t points,
                                          const std::size_t* factors, std::size_t count,
                                          double* sum) {
@@ -54,7 +56,7 @@ using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
                 continue;
             }
             const std::size_t left = points - 2 * m - start;
-            sum[k] += block(x + start, m, left < kBlock ? left : kBlock);
+            sum[k] += block<Lanes>(x + start, m, left < kBlock ? left : kBlock);
         }
     }
 }
@@ -63,20 +65,20 @@ using Sweep = void(const double*, std::size_t, const std::size_t*, std::size_t, 
 
 void sweep_baseline(const double* x, std::size_t points, const std::size_t* factors,
                     std::size_t count, double* sum) {
-    sweep(x, points, factors, count, sum);
+    sweep<Two>(x, points, factors, count, sum);
 }
 
 #if defined(__x86_64__)
 [[gnu::target("avx2,fma")]] void sweep_avx2(const double* x, std::size_t points,
                                             const std::size_t* factors, std::size_t count,
                                             double* sum) {
-    sweep(x, points, factors, count, sum);
+    sweep<Four>(x, points, factors, count, sum);
 }
 
 [[gnu::target("avx512f")]] void sweep_avx512(const double* x, std::size_t points,
                                              const std::size_t* factors, std::size_t count,
                                              double* sum) {
-    sweep(x, points, factors, count, sum);
+    sweep<Eight>(x, points, factors, count, sum);
 }
 
 Sweep* choose() {
