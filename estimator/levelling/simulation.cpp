@@ -1,0 +1,97 @@
+#include "estimator/levelling/simulation.hpp"
+
+#include <cmath>
+#include <random>
+
+namespace vibrig::estimator::levelling {
+
+double SimulatedStart::last_above(double fraction) const noexcept {
+    if (trace.empty()) {
+        return 0;
+    }
+    const double limit = fraction * std::abs(trace.front().tilt[0]);
+    for (std::size_t i = trace.size(); i-- > 0;) {
+        if (std::abs(trace[i].tilt[0]) > limit) {
+            return trace[i].time_s;
+        }
+    }
+    return 0;
+}
+
+double SimulatedStart::tilt_deviation() const noexcept {
+    double sum = 0;
+    double squares = 0;
+    for (const TracePoint& point : trace) {
+        sum += point.tilt[0];
+        squares += point.tilt[0] * point.tilt[0];
+    }
+    const double n = static_cast<double>(trace.size());
+    return std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n)));
+}
+
+SimulatedStart simulate(const Scenario& scenario) {
+    const LevellerSettings& loop = scenario.loop;
+    const double t = loop.period_s;
+    std::mt19937_64 generator(scenario.seed);
+    std::normal_distribution<double> normal;
+    Leveller leveller(loop);
+    std::array<ConventionalNetwork, 2> conventional{ConventionalNetwork(loop.earth),
+                                                    ConventionalNetwork(loop.earth)};
+    std::array<FastNetwork, 2> undamped{FastNetwork(loop.earth), FastNetwork(loop.earth)};
+    SimulatedStart result;
+    Pair tilt = scenario.tilt;
+    const auto steps = static_cast<std::size_t>(std::llround(scenario.duration_s / t));
+    if (!scenario.until_settled) {
+        result.trace.reserve(steps);
+    }
+    bool tipped = false;
+    for (std::size_t k = 0; k < steps; ++k) {
+        const double now = static_cast<double>(k) * t;
+        if (scenario.step_s >= 0 && now >= scenario.step_s && !tipped) {
+            tipped = true;
+            for (std::size_t i = 0; i < 2; ++i) tilt[i] += scenario.step[i];
+        }
+        LevelInput input;
+        for (std::size_t i = 0; i < 2; ++i) {
+            input.force[i] = loop.earth.gravity_mps2 * tilt[i] + scenario.zero[i] +
+                             loop.noise.accelerometer_mps2 * normal(generator);
+            input.reference[i] =
+                scenario.reference_error[i] + loop.noise.reference_mps * normal(generator);
+        }
+        for (std::size_t i = 0; k == 0 && i < 2; ++i) {
+            conventional[i].start(input.reference[i]);
+            undamped[i].start(input.reference[i]);
+        }
+        Pair rate{};
+        if (scenario.network == Network::fast) {
+            rate = leveller.step(input).rate;
+        } else {
+            for (std::size_t i = 0; i < 2; ++i) {
+                rate[i] = scenario.network == Network::conventional
+                              ? conventional[i].step(input.force[i], input.reference[i], t)
+                              : undamped[i].step(input.force[i], input.reference[i], {}, t);
+            }
+        }
+        if (!scenario.until_settled) {
+            result.trace.push_back({now, tilt, rate});
+        }
+        if (leveller.settled_s() && result.settled_s < 0) {
+            result.settled_s = *leveller.settled_s();
+            result.tilt_when_settled = tilt;
+            if (scenario.until_settled) {
+                break;
+            }
+        }
+        for (std::size_t i = 0; i < 2; ++i) {
+            tilt[i] += t * (scenario.drift[i] - rate[i]) +
+                       loop.noise.gyro_random_walk * std::sqrt(t) * normal(generator);
+        }
+    }
+    result.verdict = leveller.verdict();
+    result.drift = leveller.drift();
+    result.observables = leveller.observables();
+    result.message = leveller.message();
+    return result;
+}
+
+}  // namespace vibrig::estimator::levelling

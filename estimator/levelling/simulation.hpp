@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "estimator/levelling/leveller.hpp"
+
+namespace vibrig::estimator::levelling {
+
+enum class Network : std::uint8_t { undamped, conventional, fast };
+
+/// A simulated start: two channels at rest with what is wrong with them.
+struct Scenario {
+    LevellerSettings loop;
+    Network network = Network::fast;
+    Pair tilt{};             ///< at the start, rad
+    Pair drift{};            ///< rad/s
+    Pair zero{};             ///< of the accelerometers, m/s^2
+    Pair reference_error{};  ///< constant, m/s
+    double step_s = -1;      ///< when the platform tips; negative: never
+    Pair step{};             ///< by how much, rad
+    double duration_s = 600;
+    bool until_settled = false;
+    std::uint64_t seed = 1;
+};
+
+struct TracePoint {
+    double time_s = 0;
+    Pair tilt{};  ///< true, rad
+    Pair rate{};  ///< commanded, rad/s
+};
+
+/// `trace` holds every step; the noise is loop.noise, drawn from the seed.
+struct SimulatedStart {
+    std::vector<TracePoint> trace;
+    Verdict verdict = Verdict::settling;
+    double settled_s = -1;
+    Pair tilt_when_settled{};  ///< true, rad
+    Pair drift{};              ///< found, rad/s
+    Leveller::Observables observables;
+    std::string message;
+
+    /// Last time at which the first channel's tilt was above the fraction of its start, s.
+    [[nodiscard]] double last_above(double fraction) const noexcept;
+    /// Standard deviation of the first channel's tilt about its mean, rad.
+    [[nodiscard]] double tilt_deviation() const noexcept;
+};
+
+[[nodiscard]] SimulatedStart simulate(const Scenario& scenario);
+
+}  // namespace vibrig::estimator::levelling
