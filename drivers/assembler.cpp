@@ -40,32 +40,32 @@ double wrapped_radians(double degrees) noexcept {
     return angle < kTurn ? angle : 0.0;
 }
 
-/// One sync count while its frames come in.
-struct OpenSample {
-    bool shown = false;  ///< a frame of it has come
-    std::int64_t count = 0;
-    Time first = 0;          ///< time of the first frame that came
-    std::uint64_t seen = 0;  ///< bits of the messages that came
-    std::uint64_t frames = 0;
-    std::array<double, kChannels> value{};
-    std::array<Time, kChannels> time{};
-    std::array<bool, kChannels> has_value{};
-    std::array<bool, kChannels> in_range{};
-    std::array<bool, kChannels> has_validity{};
-    std::array<bool, kChannels> valid{};
-};
-
-/// A sync count that does not follow from the last one: a restart of the device if the next one
-/// confirms it.
-struct Suspect {
-    bool pending = false;
-    OpenSample sample;
-    Time sync_time = 0;
-};
-
 }  // namespace
 
 struct SampleAssembler::Impl {
+    /// One sync count while its frames come in.
+    struct OpenSample {
+        bool shown = false;  ///< a frame of it has come
+        std::int64_t count = 0;
+        Time first = 0;          ///< time of the first frame that came
+        std::uint64_t seen = 0;  ///< bits of the messages that came
+        std::uint64_t frames = 0;
+        std::array<double, kChannels> value{};
+        std::array<Time, kChannels> time{};
+        std::array<bool, kChannels> has_value{};
+        std::array<bool, kChannels> in_range{};
+        std::array<bool, kChannels> has_validity{};
+        std::array<bool, kChannels> valid{};
+    };
+
+    /// A sync count that does not follow from the last one: a restart of the device if the next one
+    /// confirms it.
+    struct Suspect {
+        bool pending = false;
+        OpenSample sample;
+        Time sync_time = 0;
+    };
+
     Impl(const proto::Dbc& dbc, const AssemblerSettings& s, SampleHandler handler)
         : settings(s),
           on_sample(std::move(handler)),
@@ -378,7 +378,7 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
     }
 }
 
-OpenSample* SampleAssembler::Impl::first_shown() noexcept {
+auto SampleAssembler::Impl::first_shown() noexcept -> OpenSample* {
     for (std::int64_t count = next_out; count <= newest; ++count) {
         OpenSample& sample = slot(count);
         if (sample.shown) return &sample;
@@ -478,7 +478,7 @@ void SampleAssembler::feed(const ReceivedFrame& frame) noexcept { impl_->feed(fr
 void SampleAssembler::advance(Time now) noexcept { impl_->drain(now); }
 
 Time SampleAssembler::next_deadline() const noexcept {
-    const OpenSample* sample = impl_->first_shown();
+    const auto* sample = impl_->first_shown();
     return sample != nullptr ? sample->first + impl_->settings.join_deadline : kNever;
 }
 

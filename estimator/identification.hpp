@@ -142,7 +142,8 @@ struct Result {
     std::array<bool, kParameters> observable{};
     /// 30 x 30, rows in the order of parameter_names(); rows of what is not observable are NaN
     /// (null in JSON).
-    Eigen::Matrix<double, kParameters, kParameters> covariance;
+    Eigen::Matrix<double, kParameters, kParameters> covariance =
+        Eigen::Matrix<double, kParameters, kParameters>::Zero();
     std::vector<RunAmplitude> amplitudes;
     std::vector<Combination> combinations;
     double nis_per_dof = 0;

@@ -17,7 +17,6 @@ namespace vibrig::tool {
 namespace {
 
 constexpr int kAlarms = 1;
-constexpr int kBadInput = 2;
 
 struct Options {
     AllanRequest request;

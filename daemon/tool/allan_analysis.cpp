@@ -15,7 +15,6 @@ namespace vibrig::tool {
 
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTimeTolerance = 0.01;  // of tau0
 constexpr std::size_t kFitGrid = 30;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,8 @@
 namespace vibrig::tool {
 
 namespace allan = estimator::allan;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  ///< no value
 
 /// What the user asked `vibrig allan` for.
 struct AllanRequest {

@@ -11,7 +11,6 @@ namespace vibrig::tool {
 
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kModelPoints = 121;
 
 std::string upper(std::string text) {

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kChunk = 1 << 20;
 constexpr std::size_t kLongestLine = 1 << 16;
 constexpr std::size_t kNoColumn = std::numeric_limits<std::size_t>::max();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 std::string_view trimmed(std::string_view text) {
     constexpr std::string_view kBlank = " \t\r\"";
@@ -38,7 +38,7 @@ bool is_missing(std::string_view field) {
 
 bool parse(std::string_view field, double& value) {
     if (is_missing(field)) {
-        value = kNaN;
+        value = kMissing;
         return true;
     }
     field.remove_prefix(field.front() == '+' ? 1 : 0);

@@ -4,6 +4,8 @@
 
 namespace vibrig::tool {
 
+constexpr int kBadInput = 2;  ///< exit status: bad usage or input
+
 /// Each adds one or several subcommands to `vibrig`. A callback that fails sets `exit_code` (1: the
 /// result says no, 2: bad usage or input) and has printed why to standard error.
 void add_identify(CLI::App& app, int& exit_code);

@@ -25,7 +25,6 @@ namespace {
 using proto::RecordingRow;
 
 constexpr int kResultSaysNo = 1;
-constexpr int kBadInput = 2;
 
 struct Dwell {
     int run = 0;

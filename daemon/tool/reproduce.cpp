@@ -22,7 +22,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kDisagrees = 1;
-constexpr int kBadInput = 2;
 
 struct Entry {
     const char* name;

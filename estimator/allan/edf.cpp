@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kLagResolution = 64;
 constexpr std::size_t kFewestForIdentification = 30;
 
-double number(std::size_t n) { return static_cast<double>(n); }
+double real(std::size_t n) { return static_cast<double>(n); }
 
 /// Generalised autocovariance of the phase, up to a factor.
 double s_w(double t, Alpha alpha) {
@@ -58,21 +58,21 @@ double s_z(double t, double f, Alpha alpha, int order) {
 
 double difference_edf(Alpha alpha, std::size_t points, std::size_t m, int order, bool modified,
                       bool overlapping) {
-    const double factor = number(m);
+    const double factor = real(m);
     const double span = factor * order + (modified ? factor : 1.0);
-    if (number(points) < span) {
+    if (real(points) < span) {
         return 1.0;
     }
     const std::size_t stride = overlapping ? std::min(m, kLagResolution) : 1;
-    const double f = modified ? 1.0 : number(std::min(m, kLagResolution));
-    const double terms = 1 + std::floor(number(stride) * (number(points) - span) / factor);
-    const double lags = std::min(terms, number(stride) * (order + 1));
+    const double f = modified ? 1.0 : real(std::min(m, kLagResolution));
+    const double terms = 1 + std::floor(real(stride) * (real(points) - span) / factor);
+    const double lags = std::min(terms, real(stride) * (order + 1));
     const double zero = std::pow(s_z(0, f, alpha, order), 2);
     double sum = zero;
     for (double j = 1; j < lags; ++j) {
-        sum += 2 * (1 - j / terms) * std::pow(s_z(j / number(stride), f, alpha, order), 2);
+        sum += 2 * (1 - j / terms) * std::pow(s_z(j / real(stride), f, alpha, order), 2);
     }
-    sum += (1 - lags / terms) * std::pow(s_z(lags / number(stride), f, alpha, order), 2);
+    sum += (1 - lags / terms) * std::pow(s_z(lags / real(stride), f, alpha, order), 2);
     return zero * terms / sum;
 }
 
@@ -117,7 +117,7 @@ double statistic_edf(Statistic statistic, Alpha alpha, std::size_t points, std::
         case Statistic::adev:
             return difference_edf(alpha, points, m, 2, false, false);
         case Statistic::oadev:
-            return overlapping_allan_edf(alpha, number(points), number(m));
+            return overlapping_allan_edf(alpha, real(points), real(m));
         case Statistic::mdev:
         case Statistic::tdev:
             return difference_edf(alpha, points, m, 2, true, true);
@@ -126,7 +126,7 @@ double statistic_edf(Statistic statistic, Alpha alpha, std::size_t points, std::
         case Statistic::ohdev:
             return difference_edf(alpha, points, m, 3, false, true);
         case Statistic::totdev:
-            return total_edf(alpha, number(points), number(m));
+            return total_edf(alpha, real(points), real(m));
     }
     return 1.0;
 }
@@ -135,7 +135,7 @@ double statistic_edf(Statistic statistic, Alpha alpha, std::size_t points, std::
 double lag_one(const std::vector<double>& z) {
     double mean = 0;
     for (const double value : z) {
-        mean += value / number(z.size());
+        mean += value / real(z.size());
     }
     double zero = 0;
     double one = 0;

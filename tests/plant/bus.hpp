@@ -2,12 +2,15 @@
 
 #include <linux/can.h>
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
 #include <string>
 
 namespace vibrig::plant {
+
+constexpr std::size_t kBatch = 64;  ///< frames of one system call
 
 /// The rig's end of a CAN bus. One thread.
 class Bus {

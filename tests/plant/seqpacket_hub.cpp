@@ -18,7 +18,6 @@
 namespace vibrig::plant {
 namespace {
 
-constexpr std::size_t kBatch = 64;
 constexpr int kPatienceMs = 1000;
 
 struct Address {

@@ -18,8 +18,6 @@
 namespace vibrig::plant {
 namespace {
 
-constexpr std::size_t kBatch = 64;
-
 /// A socket of the rig's own on a CAN interface of the kernel.
 class SocketCanBus final : public Bus {
   public:

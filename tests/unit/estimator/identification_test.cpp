@@ -12,7 +12,6 @@ namespace vibrig::estimator::testing {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kRad = 3.14159265358979323846 / 180;
 
 /// A platform that stands still at (0, 0, 0) with the table at 15 Hz.
 Measurement still(int n, double amplitude_g = 6, double period_s = 0.025) {

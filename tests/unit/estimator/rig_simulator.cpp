@@ -5,7 +5,6 @@
 namespace vibrig::estimator::testing {
 namespace {
 
-constexpr double kRad = 3.14159265358979323846 / 180.0;
 constexpr double kArcsec = 3600.0 / kRad;
 using Vec = std::array<double, 3>;
 using Mat = std::array<Vec, 3>;

@@ -8,6 +8,8 @@
 
 namespace vibrig::estimator::testing {
 
+constexpr double kRad = 3.14159265358979323846 / 180.0;  ///< of a degree
+
 /// Positions of Tang et al. 2009, Table 1: alpha, beta, gamma, deg.
 extern const std::array<std::array<double, 3>, 14> kTable1;
 /// Table 2 in the order of parameter_names().

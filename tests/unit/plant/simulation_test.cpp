@@ -37,7 +37,7 @@ class SimulationTest : public testing::Test {
     void stop() {
         if (!thread_.joinable()) return;
         const std::uint64_t one = 1;
-        ASSERT_EQ(write(stop_, &one, sizeof(one)), 8);
+        ASSERT_EQ(::write(stop_, &one, sizeof(one)), 8);
         thread_.join();
     }
     void TearDown() override {

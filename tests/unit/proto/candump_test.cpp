@@ -10,7 +10,7 @@
 namespace vibrig::proto {
 namespace {
 
-std::string error(std::string_view line) {
+std::string error_in_line(std::string_view line) {
     try {
         (void)parse_candump_line(line);
     } catch (const CandumpError& failure) {
@@ -70,37 +70,43 @@ TEST(Candump, GivesBackWhatItWrote) {
 }
 
 TEST(Candump, SaysWhatIsWrongWithALine) {
-    EXPECT_EQ(error(""), "found '', expected a time such as (1700000000.123456)");
-    EXPECT_EQ(error("1.5 can0 123#"), "found '1.5', expected a time such as (1700000000.123456)");
-    EXPECT_EQ(error("(x.5) can0 123#"),
+    EXPECT_EQ(error_in_line(""), "found '', expected a time such as (1700000000.123456)");
+    EXPECT_EQ(error_in_line("1.5 can0 123#"),
+              "found '1.5', expected a time such as (1700000000.123456)");
+    EXPECT_EQ(error_in_line("(x.5) can0 123#"),
               "found '(x.5)', expected a time such as (1700000000.123456)");
-    EXPECT_EQ(error("(5) can0 123#"), "found '(5)', expected a time such as (1700000000.123456)");
-    EXPECT_EQ(error("("), "found '(', expected a time such as (1700000000.123456)");
-    EXPECT_EQ(error("(99999999999999.0) can0 123#"),
+    EXPECT_EQ(error_in_line("(5) can0 123#"),
+              "found '(5)', expected a time such as (1700000000.123456)");
+    EXPECT_EQ(error_in_line("("), "found '(', expected a time such as (1700000000.123456)");
+    EXPECT_EQ(error_in_line("(99999999999999.0) can0 123#"),
               "found '(99999999999999.0)', expected a time such as (1700000000.123456)");
-    EXPECT_EQ(error("(1.5)"), "found '', expected an interface's name of at most 15 letters");
-    EXPECT_EQ(error("(1.5) can0"), "found '', expected a frame such as 123#1122 or 123##1AABB");
+    EXPECT_EQ(error_in_line("(1.5)"),
+              "found '', expected an interface's name of at most 15 letters");
+    EXPECT_EQ(error_in_line("(1.5) can0"),
+              "found '', expected a frame such as 123#1122 or 123##1AABB");
     const std::string id =
         "', expected an identifier of 3 hexadecimal digits (to 7FF) or 8 (to 1FFFFFFF)";
-    EXPECT_EQ(error("(1.5) can0 12#"), "found '12" + id);
-    EXPECT_EQ(error("(1.5) can0 800#"), "found '800" + id);
-    EXPECT_EQ(error("(1.5) can0 40000000#"), "found '40000000" + id);
-    EXPECT_EQ(error("(1.5) can0 -12#"), "found '-12" + id);
-    EXPECT_EQ(error("(1.5) can0 123#1"), "found '1', expected data as pairs of hexadecimal digits");
-    EXPECT_EQ(error("(1.5) can0 123#1g"),
+    EXPECT_EQ(error_in_line("(1.5) can0 12#"), "found '12" + id);
+    EXPECT_EQ(error_in_line("(1.5) can0 800#"), "found '800" + id);
+    EXPECT_EQ(error_in_line("(1.5) can0 40000000#"), "found '40000000" + id);
+    EXPECT_EQ(error_in_line("(1.5) can0 -12#"), "found '-12" + id);
+    EXPECT_EQ(error_in_line("(1.5) can0 123#1"),
+              "found '1', expected data as pairs of hexadecimal digits");
+    EXPECT_EQ(error_in_line("(1.5) can0 123#1g"),
               "found '1g', expected data as pairs of hexadecimal digits");
-    EXPECT_EQ(error("(1.5) can0 123#-1"),
+    EXPECT_EQ(error_in_line("(1.5) can0 123#-1"),
               "found '-1', expected data as pairs of hexadecimal digits");
-    EXPECT_EQ(error("(1.5) can0 123#112233445566778899"),
+    EXPECT_EQ(error_in_line("(1.5) can0 123#112233445566778899"),
               "found '112233445566778899', expected at most 8 bytes");
-    EXPECT_EQ(error("(1.5) can0 123##0112233445566778899"),
+    EXPECT_EQ(error_in_line("(1.5) can0 123##0112233445566778899"),
               "found '112233445566778899', expected 0 to 8, 12, 16, 20, 24, 32, 48 or 64 bytes");
-    EXPECT_EQ(error("(1.5) can0 123##"),
+    EXPECT_EQ(error_in_line("(1.5) can0 123##"),
               "found '123##', expected a digit of CAN FD flags after ##");
-    EXPECT_EQ(error("(1.5) can0 123#R9"), "found '123#R9', expected R and a length of at most 8");
-    EXPECT_EQ(error("(1.5) can0 123#11 X"),
+    EXPECT_EQ(error_in_line("(1.5) can0 123#R9"),
+              "found '123#R9', expected R and a length of at most 8");
+    EXPECT_EQ(error_in_line("(1.5) can0 123#11 X"),
               "found 'X', expected the line's end, or R or T before it");
-    EXPECT_EQ(error("(1.5) can0 123#11 R 5"),
+    EXPECT_EQ(error_in_line("(1.5) can0 123#11 R 5"),
               "found '5', expected the line's end, or R or T before it");
 }
 

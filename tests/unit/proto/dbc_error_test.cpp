@@ -8,7 +8,7 @@
 namespace vibrig::proto {
 namespace {
 
-std::string error(const std::string& text) {
+std::string error_in_dbc(const std::string& text) {
     try {
         (void)parse_dbc(text, "f.dbc");
     } catch (const DbcError& failure) {
@@ -18,7 +18,9 @@ std::string error(const std::string& text) {
 }
 
 /// The error for a message of 8 bytes with these lines of signals and statements after it.
-std::string in_message(const std::string& lines) { return error("BO_ 5 Msg: 8 Box\n" + lines); }
+std::string in_message(const std::string& lines) {
+    return error_in_dbc("BO_ 5 Msg: 8 Box\n" + lines);
+}
 
 TEST(DbcErrors, NameLineColumnWhatWasFoundAndWhatWasExpected) {
     try {
@@ -32,49 +34,50 @@ TEST(DbcErrors, NameLineColumnWhatWasFoundAndWhatWasExpected) {
 }
 
 TEST(DbcErrors, NameWhatIsNoDbc) {
-    EXPECT_EQ(error(""),
+    EXPECT_EQ(error_in_dbc(""),
               "f.dbc:1:1: found end of file, expected a DBC statement such as VERSION, BU_ or BO_");
-    EXPECT_EQ(error("\n \n"),
+    EXPECT_EQ(error_in_dbc("\n \n"),
               "f.dbc:3:1: found end of file, expected a DBC statement such as VERSION, BU_ or BO_");
-    EXPECT_EQ(error("{\"a\": 1}"),
+    EXPECT_EQ(error_in_dbc("{\"a\": 1}"),
               "f.dbc:1:1: found '{', expected a DBC statement such as BO_, SG_, CM_ or VAL_");
-    EXPECT_EQ(error("BOO_ 5 Msg: 8 Box"),
+    EXPECT_EQ(error_in_dbc("BOO_ 5 Msg: 8 Box"),
               "f.dbc:1:1: found 'BOO_', expected a DBC statement such as BO_, SG_, CM_ or VAL_");
-    EXPECT_EQ(error(std::string("\0\x01", 2)),
+    EXPECT_EQ(error_in_dbc(std::string("\0\x01", 2)),
               "f.dbc:1:1: found '\\x00', expected a DBC statement such as BO_, SG_, CM_ or VAL_");
-    EXPECT_EQ(error(" SG_ A : 0|8@1+ (1,0) [0|0] \"\" X"),
+    EXPECT_EQ(error_in_dbc(" SG_ A : 0|8@1+ (1,0) [0|0] \"\" X"),
               "f.dbc:1:2: found 'SG_', expected a message (BO_) before its signals");
 }
 
 TEST(DbcErrors, NameTruncatedFiles) {
-    EXPECT_EQ(error("BO_ 5 Msg: 8"), "f.dbc:1:13: found end of file, expected the sending node");
-    EXPECT_EQ(error("VERSION \"1"),
+    EXPECT_EQ(error_in_dbc("BO_ 5 Msg: 8"),
+              "f.dbc:1:13: found end of file, expected the sending node");
+    EXPECT_EQ(error_in_dbc("VERSION \"1"),
               "f.dbc:1:9: found a string that never ends, expected its closing '\"'");
-    EXPECT_EQ(error("CM_ \"a text\"\nBO_ 5 Msg: 8 Box\n"),
+    EXPECT_EQ(error_in_dbc("CM_ \"a text\"\nBO_ 5 Msg: 8 Box\n"),
               "f.dbc:2:1: found 'BO_', expected the ';' that ends the statement before");
-    EXPECT_EQ(error("CM_ \"a text\"\n"),
+    EXPECT_EQ(error_in_dbc("CM_ \"a text\"\n"),
               "f.dbc:2:1: found end of file, expected the ';' that ends the statement before");
     EXPECT_EQ(in_message(" SG_ A : 0|8@1+ (1,0) [0|0]"),
               "f.dbc:2:28: found end of file, expected the unit as a string");
 }
 
 TEST(DbcErrors, NameMessagesThatCannotBe) {
-    EXPECT_EQ(error("BO_ -5 Msg: 8 Box"), "f.dbc:1:5: found '-', expected a message id");
-    EXPECT_EQ(error("BO_ 99999999999999999999 Msg: 8 Box"),
+    EXPECT_EQ(error_in_dbc("BO_ -5 Msg: 8 Box"), "f.dbc:1:5: found '-', expected a message id");
+    EXPECT_EQ(error_in_dbc("BO_ 99999999999999999999 Msg: 8 Box"),
               "f.dbc:1:5: found '99999999999999999999', expected a message id");
-    EXPECT_EQ(error("BO_ 2048 Msg: 8 Box"),
+    EXPECT_EQ(error_in_dbc("BO_ 2048 Msg: 8 Box"),
               "f.dbc:1:5: found '2048', expected a standard id up to 2047, or bit 31 set for an "
               "extended id");
     EXPECT_EQ(
-        error("BO_ 3758096384 Msg: 8 Box"),
+        error_in_dbc("BO_ 3758096384 Msg: 8 Box"),
         "f.dbc:1:5: found '3758096384', expected an extended id up to 0x1FFFFFFF (plus bit 31)");
-    EXPECT_EQ(error("BO_ 5 Msg: 65 Box"),
+    EXPECT_EQ(error_in_dbc("BO_ 5 Msg: 65 Box"),
               "f.dbc:1:12: found '65', expected a size of 0 to 64 bytes");
-    EXPECT_EQ(error("BO_ 5 Msg: 8 Box\nBO_ 5 Other: 8 Box"),
+    EXPECT_EQ(error_in_dbc("BO_ 5 Msg: 8 Box\nBO_ 5 Other: 8 Box"),
               "f.dbc:2:5: found '5', expected an id that no other message has");
-    EXPECT_EQ(error("BO_ 5 Msg: 8 Box\nBO_ 6 Msg: 8 Box"),
+    EXPECT_EQ(error_in_dbc("BO_ 5 Msg: 8 Box\nBO_ 6 Msg: 8 Box"),
               "f.dbc:2:7: found 'Msg', expected a name that no other message has");
-    EXPECT_EQ(error("BO_ 5 Msg: 8 Box\nBO_ 2147483653 Ext: 8 Box"), "no error");
+    EXPECT_EQ(error_in_dbc("BO_ 5 Msg: 8 Box\nBO_ 2147483653 Ext: 8 Box"), "no error");
 }
 
 TEST(DbcErrors, NameSignalsThatDoNotFit) {
@@ -216,27 +219,27 @@ TEST(DbcErrors, NameStatementsAboutWhatIsNotThere) {
     EXPECT_EQ(in_message(a + "BA_ \"GenMsgCycleTime\" BO_ 5 \"fast\";"),
               "f.dbc:3:29: found string \"fast\", expected a cycle time of 0 to 4294967295 ms, a "
               "finite number");
-    EXPECT_EQ(error("VAL_TABLE_ T 0 \"a\" ;\nVAL_TABLE_ T 0 \"a\" ;"),
+    EXPECT_EQ(error_in_dbc("VAL_TABLE_ T 0 \"a\" ;\nVAL_TABLE_ T 0 \"a\" ;"),
               "f.dbc:2:12: found 'T', expected a name that no other value table has");
 }
 
 TEST(DbcErrors, CountColumnsInBytesAndLinesThroughStrings) {
-    EXPECT_EQ(error("CM_ \"one\r\ntwo\r\nthree\" ? ;\r\n  oops"),
+    EXPECT_EQ(error_in_dbc("CM_ \"one\r\ntwo\r\nthree\" ? ;\r\n  oops"),
               "f.dbc:4:3: found 'oops', expected a DBC statement such as BO_, SG_, CM_ or VAL_");
 }
 
 TEST(DbcErrors, RefuseAbsurdSizesWithoutDelay) {
-    EXPECT_EQ(error(std::string((std::size_t{16} << 20) + 1, ' ')),
+    EXPECT_EQ(error_in_dbc(std::string((std::size_t{16} << 20) + 1, ' ')),
               "f.dbc: found 16777217 bytes, expected at most 16777216");
     std::string many = "BO_ 5 Msg: 8 Box\n SG_ M M : 0|32@1+ (1,0) [0|0] \"\" X\n";
     for (int i = 0; i < 5000; ++i) {
         many += " SG_ S" + std::to_string(i) + " m" + std::to_string(i) +
                 " : 32|8@1+ (1,0) [0|0] \"\" X\n";
     }
-    EXPECT_EQ(error(many),
+    EXPECT_EQ(error_in_dbc(many),
               "f.dbc:4098:6: found 'S4095', expected at most 4096 signals in a message");
-    EXPECT_TRUE(error(std::string(1000000, '(')).starts_with("f.dbc:1:1: found '('"));
-    EXPECT_TRUE(error("BU_:" + std::string(1000000, 'a')) == "no error");
+    EXPECT_TRUE(error_in_dbc(std::string(1000000, '(')).starts_with("f.dbc:1:1: found '('"));
+    EXPECT_TRUE(error_in_dbc("BU_:" + std::string(1000000, 'a')) == "no error");
 }
 
 TEST(DbcErrors, AreTheOnlyAnswerToDamagedFiles) {

@@ -21,13 +21,13 @@ TEST(ShakerRtu, WritesAndReadsBackOverASerialLine) {
     EXPECT_EQ(server.holding(kRun), 0);
 }
 
-struct Fault {
+struct RtuFault {
     Kind kind;
     const char* name;
     std::uint64_t ShakerCounters::*counter;
 };
-void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
-class ShakerRtuWire : public testing::TestWithParam<Fault> {};
+void PrintTo(const RtuFault& fault, std::ostream* out) { *out << fault.name; }
+class ShakerRtuWire : public testing::TestWithParam<RtuFault> {};
 
 TEST_P(ShakerRtuWire, OpensTheLineAgain) {
     TestServer server(TestServer::Line::rtu);
@@ -52,10 +52,10 @@ TEST_P(ShakerRtuWire, OpensTheLineAgain) {
 
 INSTANTIATE_TEST_SUITE_P(
     Faults, ShakerRtuWire,
-    testing::Values(Fault{Kind::hang, "NoReply", &ShakerCounters::timeouts},
-                    Fault{Kind::damaged, "WrongChecksum", &ShakerCounters::wrong_replies},
-                    Fault{Kind::twice, "SecondReply", &ShakerCounters::wrong_replies},
-                    Fault{Kind::wrong_unit, "WrongUnit", &ShakerCounters::wrong_replies}),
+    testing::Values(RtuFault{Kind::hang, "NoReply", &ShakerCounters::timeouts},
+                    RtuFault{Kind::damaged, "WrongChecksum", &ShakerCounters::wrong_replies},
+                    RtuFault{Kind::twice, "SecondReply", &ShakerCounters::wrong_replies},
+                    RtuFault{Kind::wrong_unit, "WrongUnit", &ShakerCounters::wrong_replies}),
     [](const auto& fault) { return fault.param.name; });
 
 TEST(ShakerRtu, SendsAStopAsSoonAsTheLineIsFree) {

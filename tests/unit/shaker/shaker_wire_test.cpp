@@ -17,16 +17,16 @@ namespace {
 
 using Kind = Answer::Kind;
 
-struct Fault {
+struct WireFault {
     Kind kind;
     const char* name;
     std::uint64_t ShakerCounters::*counter;
 };
 
-void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
+void PrintTo(const WireFault& fault, std::ostream* out) { *out << fault.name; }
 
 /// The link must be given up after each of these: the next reply could belong to this request.
-class ShakerWire : public testing::TestWithParam<Fault> {};
+class ShakerWire : public testing::TestWithParam<WireFault> {};
 
 TEST_P(ShakerWire, GivesTheLinkUpAndConnectsAgain) {
     // GIVEN a running link and a device that spoils one reply to a read
@@ -57,15 +57,15 @@ TEST_P(ShakerWire, GivesTheLinkUpAndConnectsAgain) {
 
 INSTANTIATE_TEST_SUITE_P(
     Faults, ShakerWire,
-    testing::Values(Fault{Kind::hang, "NoReply", &ShakerCounters::timeouts},
-                    Fault{Kind::late, "LateReply", &ShakerCounters::timeouts},
-                    Fault{Kind::wrong_transaction, "WrongTransaction",
-                          &ShakerCounters::wrong_replies},
-                    Fault{Kind::wrong_function, "WrongFunction", &ShakerCounters::wrong_replies},
-                    Fault{Kind::twice, "SecondReply", &ShakerCounters::wrong_replies},
-                    Fault{Kind::wrong_length, "WrongLength", &ShakerCounters::wrong_replies},
-                    Fault{Kind::half_then_close, "HalfAReply", &ShakerCounters::lost},
-                    Fault{Kind::close, "Close", &ShakerCounters::lost}),
+    testing::Values(
+        WireFault{Kind::hang, "NoReply", &ShakerCounters::timeouts},
+        WireFault{Kind::late, "LateReply", &ShakerCounters::timeouts},
+        WireFault{Kind::wrong_transaction, "WrongTransaction", &ShakerCounters::wrong_replies},
+        WireFault{Kind::wrong_function, "WrongFunction", &ShakerCounters::wrong_replies},
+        WireFault{Kind::twice, "SecondReply", &ShakerCounters::wrong_replies},
+        WireFault{Kind::wrong_length, "WrongLength", &ShakerCounters::wrong_replies},
+        WireFault{Kind::half_then_close, "HalfAReply", &ShakerCounters::lost},
+        WireFault{Kind::close, "Close", &ShakerCounters::lost}),
     [](const auto& fault) { return fault.param.name; });
 
 TEST(ShakerWire, ReadsRepliesOneByteAtATime) {
