@@ -2,9 +2,9 @@
 
 #include <CLI/App.hpp>
 
-namespace vibrig::tool {
+#include "daemon/tool/exit_status.hpp"
 
-constexpr int kBadInput = 2;  ///< exit status: bad usage or input
+namespace vibrig::tool {
 
 /// Each adds one or several subcommands to `vibrig`. A callback that fails sets `exit_code` (1: the
 /// result says no, 2: bad usage or input) and has printed why to standard error.

@@ -3,13 +3,11 @@
 #include <string>
 
 #include "daemon/serve/client.hpp"
+#include "daemon/tool/exit_status.hpp"
 #include "proto/vibrig.pb.h"
 
 /// What the commands that talk to a running daemon share.
 namespace vibrig::tool {
-
-inline constexpr int kNo = 1;        ///< exit code: the result says no
-inline constexpr int kBadInput = 2;  ///< exit code: bad usage or input, or no daemon
 
 /// VIBRIG_SOCKET, else the socket of the installed daemon.
 [[nodiscard]] std::string default_socket();

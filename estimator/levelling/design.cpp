@@ -4,15 +4,10 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/levelling/refusal.hpp"
+
 namespace vibrig::estimator::levelling {
 namespace {
-
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 256> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
 
 double envelope(double x) noexcept { return std::exp(-x) * (1 + x + x * x); }
 
@@ -24,12 +19,6 @@ double crossing(Function f, double above, double below, double value) noexcept {
         (f(middle) > value ? above : below) = middle;
     }
     return below;
-}
-
-void require(bool good, const char* name, double value, const char* expected) {
-    if (!good) {
-        throw DesignError(text("%s: %g, expected %s", name, value, expected));
-    }
 }
 
 }  // namespace

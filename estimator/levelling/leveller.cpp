@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/levelling/refusal.hpp"
+
 namespace vibrig::estimator::levelling {
 namespace {
 
@@ -12,19 +14,6 @@ constexpr double kLargestTilt = 5 * kPi / 180;
 constexpr int kMissingAllowed = 3;
 constexpr double kPatience = 3;  // settling times
 constexpr double kSureness = 4;  // standard deviations
-
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 320> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
-
-void require(bool good, const char* name, double value, const char* expected) {
-    if (!good) {
-        throw DesignError(text("%s: %g, expected %s", name, value, expected));
-    }
-}
 
 Gains between(const Gains& a, const Gains& b, double part) noexcept {
     return {a.k1 + part * (b.k1 - a.k1), a.k2 + part * (b.k2 - a.k2), a.k3 + part * (b.k3 - a.k3)};

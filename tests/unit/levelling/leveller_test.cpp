@@ -15,7 +15,7 @@ namespace {
 using namespace vibrig::estimator::levelling;
 
 constexpr double kG = 9.80665;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 LevellerSettings rig() {
     LevellerSettings s;
@@ -188,8 +188,12 @@ TEST(Leveller, MissingSamplesAndNansHoldTheLoop) {
     const std::vector<Case> cases{
         {[](LevelInput& in) { in.missing = true; }, 3, {}},
         {[](LevelInput& in) { in.missing = true; }, 30, {"missing since 50", "not integrating"}},
-        {[](LevelInput& in) { in.force[1] = kNaN; }, 1, {"second channel", "not a number", "50"}},
-        {[](LevelInput& in) { in.reference[0] = kNaN; }, 5, {"reference", "first", "not a number"}},
+        {[](LevelInput& in) { in.force[1] = kNoValue; },
+         1,
+         {"second channel", "not a number", "50"}},
+        {[](LevelInput& in) { in.reference[0] = kNoValue; },
+         5,
+         {"reference", "first", "not a number"}},
         {[](LevelInput& in) { in.force[0] = std::numeric_limits<double>::infinity(); },
          1,
          {"first channel"}}};
@@ -236,7 +240,7 @@ TEST(Leveller, WithoutItsReferenceItBecomesUndampedWithoutAStep) {
                   "follow the carrier's acceleration); switched to undamped"});
     // A reference whose age is not known is lost too.
     Leveller other(rig());
-    stale.reference_age_s = kNaN;
+    stale.reference_age_s = kNoValue;
     EXPECT_EQ(other.step(stale).phase, Phase::undamped);
 }
 
@@ -245,7 +249,8 @@ TEST(Leveller, TooLargeATiltAsksForCoarseLevelling) {
     Platform platform{{0, 8 * kPi / 180}, {}, {}};
     const LevelOutput out = run(loop, platform, 2, 0.1);
     EXPECT_EQ(out.verdict, Verdict::cannot_settle);
-    expect_words(loop.message(), {"second channel", "about 7.99 deg", "5 deg", "coarse levelling first"});
+    expect_words(loop.message(),
+                 {"second channel", "about 7.99 deg", "5 deg", "coarse levelling first"});
 }
 
 TEST(Leveller, SaturatesWithoutWindingUp) {
