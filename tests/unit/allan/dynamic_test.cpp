@@ -11,9 +11,9 @@
 namespace {
 
 using namespace vibrig::estimator::allan;
+using vibrig::test::kNaN;
 using vibrig::test::white;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kN = 0.001;
 constexpr double kSigma = 60 * kN;  // of one sample of 1 s
 

@@ -13,9 +13,8 @@
 namespace {
 
 using namespace vibrig::estimator::allan;
+using vibrig::test::kNaN;
 using vibrig::test::white;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<Point> octaves(const std::vector<double>& rate, double tau0,
                            Statistic statistic = Statistic::oadev, double confidence = kOneSigma) {

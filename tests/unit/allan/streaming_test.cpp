@@ -10,9 +10,8 @@
 namespace {
 
 using namespace vibrig::estimator::allan;
+using vibrig::test::kNaN;
 using vibrig::test::white;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// AVAR of the last `window` rates by the batch code.
 double batch(const std::vector<double>& rate, std::size_t window, std::size_t m) {

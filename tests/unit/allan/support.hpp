@@ -1,10 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <random>
 #include <vector>
 
 namespace vibrig::test {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 inline std::vector<double> white(std::size_t n, double sigma, std::uint64_t seed) {
     std::mt19937_64 generator(seed);

@@ -30,7 +30,7 @@ void leave_stale(const std::string& path) {
     ::close(fd);
 }
 
-std::string error_of(const std::string& path) {
+std::string refusal_of(const std::string& path) {
     try {
         const SocketFile file(path);
     } catch (const ServeError& error) {
@@ -53,7 +53,7 @@ TEST(SocketFile, LeavesALiveDaemonAlone) {
     const std::string path = folder.file("s");
     FakeSource source;
     const StatusServer server(source, path);
-    EXPECT_EQ(error_of(path), "another vibrigd answers at " + path);
+    EXPECT_EQ(refusal_of(path), "another vibrigd answers at " + path);
     EXPECT_EQ(status_of(get(path, "/healthz")), 200);
 }
 
@@ -61,19 +61,19 @@ TEST(SocketFile, NeverRemovesAFileThatIsNoSocket) {
     const TemporaryFolder folder;
     const std::string path = folder.file("precious");
     std::ofstream(path) << "data";
-    EXPECT_NE(error_of(path).find("is no socket"), std::string::npos);
+    EXPECT_NE(refusal_of(path).find("is no socket"), std::string::npos);
     EXPECT_TRUE(std::filesystem::exists(path));
     std::filesystem::create_symlink(path, folder.file("link"));
-    EXPECT_NE(error_of(folder.file("link")).find("is no socket"), std::string::npos);
+    EXPECT_NE(refusal_of(folder.file("link")).find("is no socket"), std::string::npos);
 }
 
 TEST(SocketFile, NamesThePathAndTheCause) {
-    EXPECT_NE(error_of("").find("server.socket: found ''"), std::string::npos);
-    EXPECT_NE(error_of("/tmp/" + std::string(200, 'x')).find("205 bytes"), std::string::npos);
+    EXPECT_NE(refusal_of("").find("server.socket: found ''"), std::string::npos);
+    EXPECT_NE(refusal_of("/tmp/" + std::string(200, 'x')).find("205 bytes"), std::string::npos);
     const std::string nowhere = "/nonexistent-folder/vibrigd.sock";
-    EXPECT_NE(error_of(nowhere).find(nowhere + ": cannot open its folder: No such file"),
+    EXPECT_NE(refusal_of(nowhere).find(nowhere + ": cannot open its folder: No such file"),
               std::string::npos)
-        << error_of(nowhere);
+        << refusal_of(nowhere);
 }
 
 TEST(SocketFile, IsForUserAndGroupOnlyAndGoesWithItsOwner) {
