@@ -138,6 +138,7 @@ ModbusLink::Connection ModbusLink::connect(std::string& why) {
 }
 
 ModbusLink::Connection ModbusLink::connect_tcp(std::string& why) {
+    // Once: a lookup may hang for long, and none may stand between a stop and the shaker.
     if (!addresses_) {
         addrinfo hints{};
         hints.ai_family = AF_UNSPEC;
@@ -158,7 +159,6 @@ ModbusLink::Connection ModbusLink::connect_tcp(std::string& why) {
         result = connect_address(*address, why);
         if (result != Connection::failed) return result;
     }
-    addresses_.reset();  // the name may have moved
     return result;
 }
 

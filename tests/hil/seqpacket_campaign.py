@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A campaign over the seqpacket bus on the rig's clock, with programs built under a sanitizer.
+"""Campaigns over the seqpacket bus on the rig's clock, with programs built under a sanitizer.
 
 usage: seqpacket_campaign.py PROGRAMS
 """
@@ -14,30 +14,58 @@ import rig as r  # noqa: E402
 SHORT = {"name": "sanitized", "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 20.0}
 
 
+def campaign(checks, programs, folder):
+    """A whole one, and the ends of both programs."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        commands = start(rig)
+        last = rig.wait_for_state(("finished", "aborted", "tripped"), 90)
+        checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
+                     f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}")
+        r.check_balances(checks, rig)
+        path, _ = rig.result()
+        checks.check(path is not None, "there is a result.json")
+        checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrigd with status 0")
+        checks.equal(rig.plant.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrig-plant with status 0")
+        for child in (rig.daemon, rig.plant):
+            checks.check(not r.SANITIZER.search(child.text()), f"the sanitizer has nothing on {child.name}",
+                         child.text()[-4000:])
+    finally:
+        rig.stop()
+
+
+def end_without_rig(checks, programs, folder):
+    """The rig dies, its clock with it, at the moment the daemon is told to end while the table shakes."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        start(rig)
+        last = rig.wait_for_state(("recording",), 60)
+        checks.check(last is not None and last["campaign"]["state"] == "recording", "another campaign records",
+                     r.state_of(last))
+        rig.plant.process.kill()
+        checks.equal(rig.daemon.end(signal.SIGTERM, timeout=60), 1,
+                     "SIGTERM ends vibrigd by itself with status 1 when the rig is dead: the stop was not read back")
+        checks.check("its watchdog stops it" in rig.daemon.text(), "and it says so", rig.logs())
+        checks.check(not r.SANITIZER.search(rig.daemon.text()), "the sanitizer has nothing on that end",
+                     rig.daemon.text()[-4000:])
+    finally:
+        rig.stop()
+
+
+def start(rig):
+    rig.start_plant("--seed", "3")
+    rig.configure(SHORT)
+    rig.start_daemon()
+    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+    return [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    with tempfile.TemporaryDirectory() as folder:
-        rig = r.Rig(programs, "seqpacket", "rig", folder)
-        try:
-            rig.start_plant("--seed", "3")
-            rig.configure(SHORT)
-            rig.start_daemon()
-            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
-            commands = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
-            last = rig.wait_for_state(("finished", "aborted", "tripped"), 90)
-            checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
-                         f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}")
-            r.check_balances(checks, rig)
-            path, _ = rig.result()
-            checks.check(path is not None, "there is a result.json")
-            checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrigd with status 0")
-            checks.equal(rig.plant.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrig-plant with status 0")
-            for child in (rig.daemon, rig.plant):
-                checks.check(not r.SANITIZER.search(child.text()), f"the sanitizer has nothing on {child.name}",
-                             child.text()[-4000:])
-        finally:
-            rig.stop()
+    for part in (campaign, end_without_rig):
+        with tempfile.TemporaryDirectory() as folder:
+            part(checks, programs, folder)
     return checks.end()
 
 
