@@ -7,6 +7,8 @@ namespace {
 
 /// So many gated samples in a row mean that the angles, not the samples, are wrong.
 constexpr int kGatedBeforeRestart = 5;
+/// Longer gaps start the angles afresh: one step over them would be too coarse.
+constexpr double kLongestGap_s = 1.0;
 
 void copy_scaled(const Eigen::Matrix3d& m, double scale, double (&out)[3][3]) noexcept {
     for (std::size_t r = 0; r < 3; ++r) {
@@ -69,6 +71,8 @@ StepResult DriftFilter::step(double time_s, const Eigen::Vector3d& angles_rad,
                              double kappa) noexcept {
     StepResult result;
     UdFilter::Vector3 z{};
+    // Readings without good angles leave a gap here that the caller does not see.
+    if (started_ && time_s - time_s_ > kLongestGap_s) begin_dwell();
     if (!started_) {
         for (std::size_t k = 0; k < 3; ++k) {
             z[k] = wrap(angles_rad[static_cast<Eigen::Index>(k)]) * kArcsecPerRad;

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kForceTolerance = 0.02;     ///< of 1 g, spec section 6.3 of the method
 constexpr double kRejectedTolerance = 0.01;  ///< of the samples
+constexpr double kLevelTolerance = 0.1;      ///< change of kappa within a dwell
 
 }  // namespace
 
@@ -36,6 +37,11 @@ void DwellRecord::count(const StepResult& step) noexcept {
         case StepOutcome::buffered:
             break;
     }
+}
+
+void DwellRecord::note_level(double kappa) noexcept {
+    least_kappa = least_kappa > 0 ? std::min(least_kappa, kappa) : kappa;
+    largest_kappa = std::max(largest_kappa, kappa);
 }
 
 DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
@@ -68,6 +74,9 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("no usable specific force", true);
     } else if (!(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
         flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
+    } else if (r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
+        // The level lags behind by its window: second-order terms would take up the difference.
+        flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
     } else if (s.kappa > 1.0 && r.period_s > 0 &&
                VibrationLevel::excluded(settings.frequency_hz, r.period_s, window_s)) {
         flag(
@@ -80,6 +89,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
             "vibration.frequency_hz is close to a third of the sample rate: a second harmonic of "
             "the shaker falsifies the level",
             false);
+    } else if (r.stuck > 0) {
+        flag("a resolver stood still", false);
     } else if (s.rejected > kRejectedTolerance * s.samples) {
         flag("more than 1 % of the samples rejected", false);
     }

@@ -16,8 +16,11 @@ struct DwellRecord {
     double level_samples = 0, kappa_sum = 0, mean_force_sum = 0, frequency_sum = 0,
            frequency_samples = 0;
     double period_s = 0, span_s = 0;
+    double least_kappa = 0, largest_kappa = 0;  ///< of the streaming level; 0: none yet
+    std::uint32_t stuck = 0;                    ///< samples with a resolver that stands still
 
     void count(const StepResult& step) noexcept;
+    void note_level(double kappa) noexcept;
 };
 
 /// Summary of an ended dwell; `rejected` tells whether its data must be taken out of the filter

@@ -36,6 +36,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
       kinematics_(s),
       accelerometer_zero_(s.accelerometer_zero_g[0], s.accelerometer_zero_g[1],
                           s.accelerometer_zero_g[2]),
+      stuck_(s),
       buffer_(VibrationLevel::kFirstWindow_s, kBufferCapacity),
       level_(s.level_window_s, s.accelerometer_g, s.frequency_hz),
       paper_(s.frequency_hz, s.forgetting) {
@@ -82,6 +83,7 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     record_.info = dwell;
     buffer_.clear();
     primed_ = false;
+    stuck_.clear();
     bad_times_in_a_row_ = 0;
     active_ = filter_of(dwell.run);
     if (active_ == nullptr) {
@@ -131,7 +133,12 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         end_stretch();
         active_->filter.begin_dwell();
     }
-    return accept(prepare(measurement));
+    Reading reading = prepare(measurement);
+    if (reading.angles_good && stuck_.stuck(measurement.angle_rad)) {
+        reading.angles_good = false;
+        ++record_.stuck;
+    }
+    return accept(reading);
 }
 
 StepResult Identification::Impl::accept(const Reading& reading) noexcept {
@@ -177,6 +184,7 @@ StepResult Identification::Impl::replay() noexcept {
     primed_ = 2 * good >= buffer_.readings().size();
     StepResult step;
     if (primed_) {
+        record_.note_level(level_.kappa());
         for (const Reading& reading : buffer_.readings()) step = through_filter(reading);
     } else {
         step.outcome = StepOutcome::bad_force;
@@ -195,6 +203,7 @@ void Identification::Impl::to_level(const Reading& reading) noexcept {
     } else {
         level_.add_missing();
     }
+    record_.note_level(level_.kappa());
 }
 
 StepResult Identification::Impl::through_filter(const Reading& reading) noexcept {

@@ -10,6 +10,7 @@
 #include "estimator/identification.hpp"
 #include "estimator/observability.hpp"
 #include "estimator/paper_level.hpp"
+#include "estimator/stuck_detector.hpp"
 #include "estimator/two_step.hpp"
 #include "estimator/vibration_level.hpp"
 
@@ -76,6 +77,7 @@ struct Identification::Impl {
     Kinematics kinematics_;
     Eigen::Matrix3d accelerometer_matrix_;
     Eigen::Vector3d accelerometer_zero_;
+    StuckDetector stuck_;
     DwellBuffer buffer_;
     VibrationLevel level_;
     PaperLevel paper_;

@@ -28,6 +28,7 @@ struct Entry {
     Reproduction (*run)(const ReproduceOptions&);
 };
 constexpr std::array kEntries{
+    Entry{"tang2009", reproduce_tang2009},
     Entry{"allan", reproduce_allan},
 };
 
@@ -127,9 +128,11 @@ void add_reproduce(CLI::App& app, int& exit_code) {
         ->check(CLI::IsMember(names));
     command->add_option("--seeds", options->reproduce.seeds, "Monte-Carlo runs of each study")
         ->check(CLI::Range(std::size_t{2}, std::size_t{100000}));
+    command->add_option("--plot", options->reproduce.plot,
+                        "folder for charts, where there is something to see (SVG)");
     command->add_flag("--json", options->json, "print the result as JSON");
     command->footer(
-        "Example: vibrig reproduce allan --seeds 100\n"
+        "Example: vibrig reproduce tang2009 --seeds 32 --plot charts\n"
         "Exit codes: 0 everything agrees, 1 something differs (marked), 2 bad usage.");
     command->callback([options, &exit_code] {
         exit_code = run(options->name, options->reproduce, options->json);

@@ -9,6 +9,7 @@ namespace vibrig::tool {
 
 struct ReproduceOptions {
     std::size_t seeds = 0;  ///< Monte-Carlo runs; 0: what the table was made with
+    std::string plot = {};  ///< folder for charts; empty: none
 };
 
 struct ReproducedRow {
@@ -28,5 +29,6 @@ struct Reproduction {
 
 // One function for each name in the table of reproduce.cpp.
 [[nodiscard]] Reproduction reproduce_allan(const ReproduceOptions& options);
+[[nodiscard]] Reproduction reproduce_tang2009(const ReproduceOptions& options);
 
 }  // namespace vibrig::tool

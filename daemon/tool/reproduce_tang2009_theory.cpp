@@ -18,6 +18,7 @@ namespace {
 
 using Complex = std::complex<double>;
 using plant::Vec3;
+using plant::operator*;
 
 constexpr double kFrequency = 15;
 constexpr double kOmega = 2 * std::numbers::pi * kFrequency;
@@ -69,8 +70,7 @@ Integrated integrate(const Mount& m) {
     const Complex l1 = -m.k1 / 2 + root, l2 = -m.k1 / 2 - root;
     const double forced = a0 / (kOmega * kOmega);
     // The table starts with the velocity -1/w of Y = -sin wt / w^2; the platform is at rest.
-    const Complex c1 =
-        (a0 / kOmega * std::cos(phi) - l2 * (forced * std::sin(phi))) / (l1 - l2);
+    const Complex c1 = (a0 / kOmega * std::cos(phi) - l2 * (forced * std::sin(phi))) / (l1 - l2);
     const Complex c2 = forced * std::sin(phi) - c1;
 
     Integrated result{};
@@ -161,7 +161,8 @@ void add_transmission(std::vector<ReproducedRow>& rows) {
         const Mount mount = Mount::of(natural, damping);
         const Response formula = closed_form(mount);
         const Integrated numeric = integrate(mount);
-        const std::string name = text("eqs 3-7, mount of %.1f Hz, damping %.1f: ", natural, damping);
+        const std::string name =
+            text("eqs 3-7, mount of %.1f Hz, damping %.1f: ", natural, damping);
         rows.push_back({name + "a0/a at 15 Hz", text("%.6f (eq. 3)", formula.ratio),
                         text("%.6f (eq. 1 integrated)", numeric.steady.ratio),
                         std::abs(numeric.steady.ratio - formula.ratio) < 1e-5});
@@ -190,8 +191,10 @@ void add_level_errors(std::vector<ReproducedRow>& rows) {
     }
     rows.push_back({"section 3.5, their sum: a common scale error counts twice", "16",
                     text("%.3f", sum), std::abs(sum - 14) < 0.05});
-    rows.push_back({"section 3.5, the same per misalignment E_xy + E_yx", "-1",
-                    text("%.3f", 0.5 * (propagated(0, 1) + propagated(1, 0))), {}});
+    rows.push_back({"section 3.5, the same per misalignment E_xy + E_yx",
+                    "-1",
+                    text("%.3f", 0.5 * (propagated(0, 1) + propagated(1, 0))),
+                    {}});
 
     constexpr int kDraws = 12;
     constexpr double kScale = 1e-4, kBias_g = 1e-4, kMisalignment = 50 / 206264.80625;

@@ -109,8 +109,8 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
     const double lsb = 2 * 180 * kRad / 1048576.0;
     const double dt = plan.period_s;
     const double walk = 60 * random_walk_deg_per_rt_h * std::sqrt(dt);  // arcsec per step
-    const Shaking shaking{plan.amplitude_g, plan.second_harmonic,
-                          2 * 180 * kRad * plan.frequency_hz};
+    Shaking shaking{plan.amplitude_g, plan.second_harmonic, 2 * 180 * kRad * plan.frequency_hz};
+    const bool late = plan.info.run == 1 && plan.info.position == plan.late_position;
     const double start = uniform_(random_);
     Vec angle{plan.angles_deg[0] * kRad, plan.angles_deg[1] * kRad, plan.angles_deg[2] * kRad};
 
@@ -118,6 +118,8 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
     const auto steps = static_cast<int>(std::lround(plan.duration_s / dt));
     for (int n = 0; n < steps; ++n) {
         const double t = start + n * dt;
+        shaking.a = plan.amplitude_g * (1 + plan.amplitude_drift * n / steps);
+        if (late && n * dt < plan.late_s) shaking.a = 0;
         const Mat c = to_platform(angle);
         const Vec u = times(c, Vec{0, 1, 0});
         Measurement m;
@@ -130,6 +132,7 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
             m.angle_rad[k] = reading - turn * std::floor(reading / turn);
             m.force_g[k] = plan.force_scale * u[k] * (1 + shaking.at(t)) + force_noise_g * gauss();
         }
+        if (spoil) spoil(plan.info, n, m);
         if (uniform_(random_) >= plan.lost_probability) to.add(m);
 
         const std::array<double, 2> k12 = shaking.means(t, dt);

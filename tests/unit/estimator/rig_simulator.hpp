@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <random>
 
 #include "estimator/identification.hpp"
@@ -26,6 +27,9 @@ struct SimulatedDwell {
     double spike_probability = 0;  ///< per angle, 0.5 deg
     double lost_probability = 0;   ///< per sample
     double force_scale = 1;
+    double amplitude_drift = 0;  ///< relative growth of the amplitude over the dwell
+    double late_s = 0;           ///< the vibration starts so late ...
+    int late_position = 0;       ///< ... in this position of the first run
 };
 
 /// A rig of its own: up = +y, cyclic gyro axes, drift sign -1, latitude 45.75 deg, written a second
@@ -38,6 +42,8 @@ class RigSimulator {
     std::array<double, kParameters> truth = kTable2;
     double resolver_arcsec = 5, random_walk_deg_per_rt_h = 0.001, force_noise_g = 1e-4;
     bool quantise = true;
+    /// May change the measurement with this number in its dwell before it is fed.
+    std::function<void(const DwellInfo&, int, Measurement&)> spoil;
 
     /// Feeds one dwell, from begin_dwell to end_dwell.
     DwellSummary dwell(Identification& to, const SimulatedDwell& plan);

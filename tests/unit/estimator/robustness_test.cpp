@@ -1,0 +1,137 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "estimator/identification.hpp"
+#include "tests/unit/estimator/rig_simulator.hpp"
+
+// What goes wrong on a rig must be flagged and counted, and the coefficients stay within 4 sigma or
+// are marked bad: never a silent wrong number.
+
+namespace vibrig::estimator::testing {
+namespace {
+
+constexpr std::uint64_t kSeed = 40;
+
+/// Two levels over Table 1, dwells of 40 s; `spoil` may change every measurement.
+struct Campaign {
+    using Spoil = std::function<void(const DwellInfo&, int sample, Measurement&)>;
+
+    RigSimulator rig{kSeed};
+    SimulatedDwell plan;
+
+    Campaign() { plan.duration_s = 40; }
+
+    Result run(const Spoil& spoil) {
+        Identification identification{Settings{}};
+        rig.spoil = spoil;
+        rig.campaign(identification, {6.0, 14.0 / 3.0}, plan);
+        return identification.result();
+    }
+};
+
+void expect_within_four_sigma(const Result& result) {
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        if (!result.observable[i]) continue;
+        EXPECT_LT(std::abs(result.value[i] - kTable2[i]), 4 * result.sigma[i])
+            << parameter_names()[i];
+    }
+}
+
+std::size_t flagged(const Result& result) {
+    return static_cast<std::size_t>(std::count_if(result.dwells.begin(), result.dwells.end(),
+                                                  [](const DwellSummary& d) { return d.flagged; }));
+}
+
+TEST(Robustness, OnePercentOfOutliersOfTenSigmaIsGatedAndCounted) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN 1 % of the samples with an angle off by 10 sigma
+    int spoiled = 0;
+    const Result result = Campaign().run([&](const DwellInfo&, int n, Measurement& m) {
+        if (n % 100 != 50) return;
+        m.angle_rad[static_cast<std::size_t>(n / 100) % 3] += 50.0 / 206264.80625;
+        ++spoiled;
+    });
+    // THEN nearly all of them are rejected (10 sigma plus noise of 1 sigma against a gate of 5) and
+    // the answer holds
+    EXPECT_GE(result.rejected, static_cast<std::uint64_t>(0.99 * spoiled));
+    EXPECT_LE(result.rejected, static_cast<std::uint64_t>(1.2 * spoiled));
+    expect_within_four_sigma(result);
+}
+
+TEST(Robustness, AStuckResolverIsSeenInTheDwellWhereItSticks) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN an outer resolver that shows one value from the middle of a dwell on
+    double held = 0;
+    const Result result = Campaign().run([&](const DwellInfo& dwell, int n, Measurement& m) {
+        if (dwell.run != 1 || dwell.position != 6 || n < 800) return;
+        if (n == 800) held = m.angle_rad[0];
+        m.angle_rad[0] = held;
+    });
+    // THEN that dwell is flagged and named, and the coefficients are right or marked
+    ASSERT_GE(result.dwells.size(), 6U);
+    EXPECT_TRUE(result.dwells[5].flagged) << "rejected " << result.dwells[5].rejected;
+    EXPECT_EQ(flagged(result), 1U);
+    const bool named = std::any_of(result.warnings.begin(), result.warnings.end(), [](auto& text) {
+        return text.find("run 1 position 6") != std::string::npos;
+    });
+    EXPECT_TRUE(named);
+    expect_within_four_sigma(result);
+}
+
+TEST(Robustness, AnglesMayPassThroughZeroAndThreeHundredAndSixtyDegrees) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN encoders in [0, 360) at positions with angles of zero, crossed by noise and drift
+    int wraps = 0;
+    double before = 0;
+    const Result result = Campaign().run([&](const DwellInfo&, int n, Measurement& m) {
+        if (n > 0 && std::abs(m.angle_rad[0] - before) > 3) ++wraps;
+        before = m.angle_rad[0];
+    });
+    // THEN the reading jumps by a turn often and nothing notices
+    EXPECT_GT(wraps, 3);
+    EXPECT_LE(result.rejected, 5U);
+    expect_within_four_sigma(result);
+}
+
+TEST(Robustness, ASaturatedAccelerometerIsNotTakenForALowerLevel) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN accelerometers that stop at 5 g while the platform feels 7
+    const Result result = Campaign().run([&](const DwellInfo& dwell, int, Measurement& m) {
+        if (dwell.run != 1) return;
+        for (double& f : m.force_g) f = std::clamp(f, -5.0, 5.0);
+    });
+    // THEN the eight positions with an axis along the vertical are refused, since gravity does not
+    // come out as 1 g; with 45 deg between no axis reaches its limit
+    EXPECT_EQ(flagged(result), 8U);
+    expect_within_four_sigma(result);
+}
+
+TEST(Robustness, AnAmplitudeThatDriftsByTwoPercentIsFollowed) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    Campaign campaign;
+    campaign.plan.amplitude_drift = 0.02;
+    const Result result = campaign.run({});
+    expect_within_four_sigma(result);
+    EXPECT_LE(result.rejected, 5U);
+}
+
+TEST(Robustness, ADwellWhoseVibrationStartsLateIsTakenOut) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN a dwell whose vibration starts after 10 s
+    Campaign campaign;
+    campaign.plan.late_s = 10;
+    campaign.plan.late_position = 4;
+    const Result result = campaign.run({});
+    // THEN it is flagged, counted and not used
+    EXPECT_TRUE(result.dwells[3].flagged);
+    EXPECT_EQ(result.dwells[3].rejected, result.dwells[3].samples);
+    EXPECT_EQ(flagged(result), 1U);
+    expect_within_four_sigma(result);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::testing
