@@ -184,7 +184,8 @@ StepResult Identification::Impl::replay() noexcept {
     primed_ = 2 * good >= buffer_.readings().size();
     StepResult step;
     if (primed_) {
-        record_.note_level(level_.kappa());
+        // A few samples tell no level that could be compared with another.
+        if (buffer_.full()) record_.note_level(level_.kappa());
         for (const Reading& reading : buffer_.readings()) step = through_filter(reading);
     } else {
         step.outcome = StepOutcome::bad_force;

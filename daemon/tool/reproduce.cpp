@@ -53,7 +53,10 @@ std::string table(const Reproduction& reproduction) {
     out << reproduction.name << ": " << reproduction.title << "\n\n";
     line("item", "published", "computed", "");
     for (const ReproducedRow& row : reproduction.rows) {
-        line(row.item, row.published, row.computed, row.agrees.value_or(true) ? "" : "  DIFFERS");
+        line(row.item, row.published, row.computed,
+             !row.agrees   ? ""
+             : *row.agrees ? "  pass"
+                           : "  FAIL");
     }
     for (const std::string& note : reproduction.notes) {
         out << "note: " << note << '\n';

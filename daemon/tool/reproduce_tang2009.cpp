@@ -164,18 +164,16 @@ void demand_at_least(std::vector<ReproducedRow>& rows, const std::string& item, 
     rows.push_back({item, text("at least %.4g", limit), text("%.4g", value), value >= limit});
 }
 
-/// The same for what was drawn: it fails when chance does not explain the difference.
+/// The same for what was drawn, over the seeds that were run; chance is shown and excuses nothing.
 void demand_at_most(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
                     double limit) {
     rows.push_back({item, text("at most %.4g", limit),
-                    text("%.4g +- %.2g", drawn.value, drawn.chance),
-                    drawn.value - drawn.chance <= limit});
+                    text("%.4g +- %.2g", drawn.value, drawn.chance), drawn.value <= limit});
 }
 void demand_at_least(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
                      double limit) {
     rows.push_back({item, text("at least %.4g", limit),
-                    text("%.4g +- %.2g", drawn.value, drawn.chance),
-                    drawn.value + drawn.chance >= limit});
+                    text("%.4g +- %.2g", drawn.value, drawn.chance), drawn.value >= limit});
 }
 
 void add_findings(const Study& study, std::vector<ReproducedRow>& rows) {
@@ -272,11 +270,16 @@ Reproduction reproduce_tang2009(const ReproduceOptions& options) {
              "sigma.",
              seeds, seeds));
     result.notes.emplace_back(
-        "A number with +- is an average over the seeds and what chance allows it (95 %); a demand "
-        "fails only beyond that.");
+        "A demand is judged by the rms over the seeds that were run; +- behind it is what chance "
+        "alone may move it by (95 %), so that few seeds may miss it without meaning anything.");
     result.notes.emplace_back(
         "Levels are peak accelerations of the platform in the first run; the numbers of Table 2 "
         "themselves imply the doubled ones, so it is compared with those.");
+    result.notes.emplace_back(
+        "The two-step route at 12 g depends on the phase of the vibration where a dwell begins: "
+        "eq. "
+        "13 over the first samples is wrong by up to two orders of magnitude and the filter learns "
+        "from it.");
     result.notes.emplace_back(
         "Trial 3: at one level bias and squares are not separable (identify reports the "
         "combinations instead); what is shown is what a filter is left with.");
