@@ -19,7 +19,7 @@ using tang2009::Outcome;
 using tang2009::Study;
 using tang2009::truth;
 
-constexpr std::size_t kSeeds = 4;
+constexpr std::size_t kSeeds = 16;
 /// Fewer seeds than this say nothing about a ratio to the bound of a few per cent.
 constexpr std::size_t kSeedsForBound = 32;
 
