@@ -17,6 +17,11 @@ constexpr double kLevelTolerance = 0.1;      ///< change of kappa within a dwell
 void DwellRecord::count(const StepResult& step) noexcept {
     switch (step.outcome) {
         case StepOutcome::used:
+            for (std::size_t k = 0; k < 3; ++k) {
+                const double innovation = step.innovation_arcsec[k];
+                innovation_square += innovation * innovation;
+                if (last_used) innovation_product += innovation * last_innovation[k];
+            }
             nis_sum += step.nis;
             ++nis_count;
             ++used;
@@ -37,6 +42,8 @@ void DwellRecord::count(const StepResult& step) noexcept {
         case StepOutcome::buffered:
             break;
     }
+    last_used = step.outcome == StepOutcome::used;
+    last_innovation = step.innovation_arcsec;
 }
 
 void DwellRecord::note_level(double kappa) noexcept {
@@ -60,6 +67,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     s.amplitude_g = std::sqrt(2.0 * std::max(0.0, s.kappa - 1.0));
     s.frequency_hz = r.frequency_samples > 0 ? r.frequency_sum / r.frequency_samples : 0.0;
     s.nis_per_dof = r.nis_count > 0 ? r.nis_sum / (3.0 * r.nis_count) : 0.0;
+    s.innovation_correlation =
+        r.innovation_square > 0 ? r.innovation_product / r.innovation_square : 0.0;
 
     const auto flag = [&](const char* reason, bool reject) {
         s.flagged = true;

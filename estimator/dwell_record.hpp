@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "estimator/identification.hpp"
@@ -12,6 +13,10 @@ struct DwellRecord {
     std::uint32_t samples = 0, used = 0, rejected = 0, reinitialised = 0;
     double nis_sum = 0;
     std::uint32_t nis_count = 0;
+    /// Sums of products of innovations with themselves and with those one sample before.
+    double innovation_square = 0, innovation_product = 0;
+    std::array<double, 3> last_innovation{};
+    bool last_used = false;
     // Over the stretches of the dwell between gaps of more than 1 s, weighted by their samples.
     double level_samples = 0, kappa_sum = 0, mean_force_sum = 0, frequency_sum = 0,
            frequency_samples = 0;

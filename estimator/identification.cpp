@@ -91,6 +91,7 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
         return;
     }
     active_->saved = active_->filter.state();
+    active_->batch.begin_dwell();
     active_->filter.begin_dwell();
     begin_paper_level();
 }
@@ -216,6 +217,13 @@ StepResult Identification::Impl::through_filter(const Reading& reading) noexcept
         const double kappa = settings.method == Method::joint ? level_.kappa() : paper_.kappa();
         step = active_->filter.step(reading.time_s, reading.angles, kappa);
         innovation_arcsec_ = step.innovation_arcsec;
+        if (step.outcome == StepOutcome::initialised ||
+            step.outcome == StepOutcome::reinitialised) {
+            active_->batch.start(reading.time_s, reading.angles);
+        } else {
+            active_->batch.step(reading.time_s, reading.angles, kappa,
+                                step.outcome == StepOutcome::used);
+        }
     }
     record_.count(step);
     if (step.outcome == StepOutcome::used && !reading.force_good)
@@ -253,6 +261,7 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             verdict.summary.kappa = paper_.kappa();
             verdict.summary.amplitude_g = paper_.amplitude_g();
         }
+        active_->batch.end_dwell(!verdict.rejected);
         if (verdict.rejected) {
             active_->filter.restore(active_->saved);
         } else {

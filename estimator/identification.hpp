@@ -106,6 +106,7 @@ struct DwellSummary {
     double frequency_hz = 0;  ///< lock-in; 0 at rest
     double mean_force_g = 0;  ///< W{fu}; 1 within 2 % or the dwell is rejected
     double nis_per_dof = 0;
+    double innovation_correlation = 0;  ///< from one sample to the next; 0 when noise is white
     bool flagged =
         false;  ///< more than 1 % rejected, or vertical force not 1 g, or excluded frequency
     const char* reason = "";  ///< static text; empty when not flagged
@@ -136,6 +137,16 @@ struct Combination {
     double value = 0, sigma = 0;
 };
 
+/// Agreement of the filter with an independent batch least squares over the same readings.
+struct CrossCheck {
+    static constexpr double kLimit = 0.05;  ///< of a standard deviation
+    bool done = false;
+    double largest = 0;       ///< difference of all that is determined, in standard deviations
+    std::string coefficient;  ///< where: a name, or the first of a combination
+
+    [[nodiscard]] bool agrees() const noexcept { return largest <= kLimit; }
+};
+
 struct Result {
     std::array<double, kParameters> value{};
     std::array<double, kParameters> sigma{};
@@ -149,6 +160,7 @@ struct Result {
     double nis_per_dof = 0;
     std::uint64_t samples = 0, rejected = 0;
     std::vector<DwellSummary> dwells;
+    CrossCheck cross_check;
     std::vector<std::string> warnings;
 };
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "estimator/batch_solver.hpp"
 #include "estimator/drift_filter.hpp"
 #include "estimator/dwell_buffer.hpp"
 #include "estimator/dwell_record.hpp"
@@ -21,11 +22,12 @@ namespace vibrig::estimator {
 struct RunFilter {
     DriftFilter filter;
     UdFilter saved;     ///< as it was when the dwell began
+    BatchSolver batch;  ///< of the same readings, to check the filter's answer
     KappaSpread kappa;  ///< of the dwells it keeps
     int run = 0;        ///< two-step route only; 0: not yet taken
 
     RunFilter(const Settings& settings, const ParameterArray& sigma)
-        : filter(settings, sigma), saved(filter.state()) {}
+        : filter(settings, sigma), saved(filter.state()), batch(settings, sigma) {}
 };
 
 /// Values and covariance in filter order, and what of them means something.
@@ -45,6 +47,9 @@ struct Identification::Impl {
     [[nodiscard]] Result result() const;
 
     void solve(Solution& out) const noexcept;
+    /// Compares the solution with that of the batches.
+    [[nodiscard]] CrossCheck cross_check(const std::vector<Combination>& combinations) const;
+    [[nodiscard]] bool batch_solution(RunSolution& out) const noexcept;
     [[nodiscard]] bool two_runs() const noexcept;
 
     Settings settings;

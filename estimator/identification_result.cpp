@@ -77,6 +77,15 @@ std::vector<std::string> dwell_warnings(const std::vector<DwellSummary>& dwells)
                                " per degree of freedom, expected 1 within " + std::to_string(band) +
                                ": check the noise settings");
         }
+        // Three axes a sample; 4 standard deviations of a correlation of white noise.
+        const double white = std::max(0.1, 4.0 / std::sqrt(3.0 * d.used));
+        if (std::abs(d.innovation_correlation) > white) {
+            warnings.push_back(dwell_name(d) + "innovations are correlated by " +
+                               std::to_string(d.innovation_correlation) +
+                               " from one sample to the next, expected 0 within " +
+                               std::to_string(white) +
+                               ": the noise of the readings is not white, sigma is too small");
+        }
     }
     return warnings;
 }
@@ -125,6 +134,48 @@ void Identification::Impl::solve(Solution& out) const noexcept {
     out.found = observability(joined.covariance, prior, spread);
 }
 
+bool Identification::Impl::batch_solution(RunSolution& out) const noexcept {
+    if (settings.method == Method::joint) {
+        return filters[0].kappa.dwells > 0 && filters[0].batch.solve(out.value, out.covariance);
+    }
+    RunSolution first, second;
+    first.kappa = filters[0].kappa.mean;
+    second.kappa = filters[1].kappa.mean;
+    return two_runs() && !refused_run && filters[0].batch.solve(first.value, first.covariance) &&
+           filters[1].batch.solve(second.value, second.covariance) && recover(first, second, out);
+}
+
+CrossCheck Identification::Impl::cross_check(const std::vector<Combination>& combinations) const {
+    CrossCheck check;
+    RunSolution batch;
+    if (!batch_solution(batch)) return check;
+    const auto compare = [&check](const std::string& name, double difference, double sigma) {
+        // Written so that what is not a number is the largest difference there is.
+        const double in_sigma = std::abs(difference) / sigma;
+        check.done = true;
+        if (in_sigma <= check.largest) return;
+        check.largest = std::isfinite(in_sigma) ? in_sigma : std::numeric_limits<double>::max();
+        check.coefficient = name;
+    };
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t a = internal_of(i);
+        if (!solution.found.observable[a]) continue;
+        const auto k = static_cast<Eigen::Index>(a);
+        compare(parameter_names()[i], batch.value[a] - solution.value[a],
+                std::sqrt(solution.covariance(k, k)));
+    }
+    for (const Combination& combination : combinations) {
+        double value = 0;
+        for (const auto& [name, weight] : combination.weights) {
+            for (std::size_t i = 0; i < kParameters; ++i) {
+                if (name == parameter_names()[i]) value += weight * batch.value[internal_of(i)];
+            }
+        }
+        compare(combination.weights.front().first, value - combination.value, combination.sigma);
+    }
+    return check;
+}
+
 Result Identification::Impl::result() const {
     Result out;
     const double none = std::numeric_limits<double>::quiet_NaN();
@@ -156,6 +207,13 @@ Result Identification::Impl::result() const {
     }
     if (std::string text = unobservable_warning(out.observable); !text.empty()) {
         out.warnings.push_back(std::move(text));
+    }
+    out.cross_check = cross_check(out.combinations);
+    if (out.cross_check.done && !out.cross_check.agrees()) {
+        out.warnings.push_back("a batch least squares over the same readings puts " +
+                               out.cross_check.coefficient + " off by " +
+                               std::to_string(out.cross_check.largest) + " sigma, expected " +
+                               std::to_string(CrossCheck::kLimit) + " at most");
     }
     if (dwells_not_kept > 0) {
         out.warnings.push_back(std::to_string(dwells_not_kept) +

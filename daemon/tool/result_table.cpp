@@ -95,6 +95,12 @@ std::string result_table(const estimator::Result& result) {
     text += "samples " + std::to_string(result.samples) + ", rejected " +
             std::to_string(result.rejected) + ", NIS per degree of freedom " +
             number("%.4f", result.nis_per_dof) + "\n";
+    if (const estimator::CrossCheck& check = result.cross_check; check.done) {
+        text += "batch least squares over the same readings: largest difference " +
+                number("%.2g", check.largest) + " sigma (" + check.coefficient + "), " +
+                (check.agrees() ? "agrees" : "DISAGREES") + " (limit " +
+                number("%g", estimator::CrossCheck::kLimit) + ")\n";
+    }
     if (!all_observable(result)) {
         text += "\n" + not_observable(result);
     }
