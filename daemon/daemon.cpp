@@ -14,6 +14,7 @@
 
 #include "daemon/tool/result_json.hpp"
 #include "daemon/version.hpp"
+#include "estimator/plan_report.hpp"
 
 namespace vibrig {
 
@@ -97,6 +98,8 @@ Daemon::Daemon(configuration::Loaded loaded)
                identification_ = estimator::Identification(configuration_.estimator);
                const std::lock_guard lock(mutex_);
                result_ = {};
+               for (const std::string& line : check_plan(configuration_))
+                   log(Severity::warning, "campaign", line);
            },
            [this](bool complete) { to_write_ = complete ? ToWrite::complete : ToWrite::partial; },
            [this](Severity severity, const std::string& text) {
@@ -110,6 +113,14 @@ void Daemon::check_bindings(const configuration::Configuration& configuration) {
     boost::asio::io_context io;
     const auto port = drivers::make_can_port(io, configuration.can);
     const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port);
+}
+
+std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
+    const campaign::Settings& campaign = configuration.campaign;
+    return estimator::plan_warnings(estimator::report_plan(
+        configuration.estimator,
+        estimator::campaign_plan(configuration.estimator, campaign.positions_deg, campaign.table_g,
+                                 campaign.dwell_s)));
 }
 
 Daemon::~Daemon() {

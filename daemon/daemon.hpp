@@ -39,6 +39,9 @@ class Daemon final : public StatusSource {
     explicit Daemon(configuration::Loaded loaded);
     /// Throws DbcError or BindingError when the configured messages cannot be bound; opens nothing.
     static void check_bindings(const configuration::Configuration& configuration);
+    /// What the campaign's positions and levels would leave undetermined; empty if nothing.
+    [[nodiscard]] static std::vector<std::string> check_plan(
+        const configuration::Configuration& configuration);
     ~Daemon() override;
 
     /// Starts the threads; throws CanError.

@@ -11,6 +11,7 @@
 #include "daemon/daemon.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
+#include "estimator/instruction_set.hpp"
 
 namespace {
 
@@ -67,6 +68,10 @@ int main(int argc, char** argv) {
                  "validate, print the effective configuration with units and origins, and end");
     app.add_flag("--schema", schema,
                  "print every key with type, unit, default and bounds, and end");
+    std::string instruction_set = "auto";
+    app.add_option("--instruction-set", instruction_set,
+                   "of the filter: auto (the best), or one of this processor's")
+        ->envname("VIBRIG_INSTRUCTION_SET");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -81,6 +86,7 @@ int main(int argc, char** argv) {
     std::signal(SIGPIPE, SIG_IGN);
 
     try {
+        vibrig::estimator::use_instruction_set(instruction_set);
         if (schema) {
             std::cout << vibrig::configuration::format_schema();
             return 0;
@@ -89,6 +95,9 @@ int main(int argc, char** argv) {
         if (check) {
             vibrig::Daemon::check_bindings(loaded.configuration);
             std::cout << vibrig::configuration::format_effective(loaded);
+            for (const std::string& line : vibrig::Daemon::check_plan(loaded.configuration)) {
+                std::cerr << "warning: campaign: " << line << '\n';
+            }
             return 0;
         }
         set_up_log(loaded.configuration);

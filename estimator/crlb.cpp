@@ -38,6 +38,21 @@ Matrix3x30 sensitivity(const Kinematics& kinematics, const DriftModel& model,
     return g;
 }
 
+Covariance information_in_prior_units(const Settings& settings,
+                                      const std::vector<PlannedDwell>& plan,
+                                      const ParameterArray& nominal, const ParameterArray& prior,
+                                      double period_s) {
+    const Kinematics kinematics(settings);
+    const DriftModel model(settings);
+    const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> scale(prior.data());
+    Covariance information = Covariance::Zero();
+    for (const PlannedDwell& dwell : plan) {
+        const Matrix3x30 g = sensitivity(kinematics, model, dwell, nominal) * scale.asDiagonal();
+        information += g.transpose() * g / rate_variance(settings, dwell.duration_s, period_s);
+    }
+    return information;
+}
+
 }  // namespace
 
 double rate_variance(const Settings& settings, double duration_s, double period_s) {
@@ -62,18 +77,13 @@ std::array<double, kParameters> predicted_sigma(const Settings& settings,
                                                 const std::array<double, kParameters>& nominal,
                                                 double period_s) {
     check(settings);
-    const Kinematics kinematics(settings);
-    const DriftModel model(settings);
     ParameterArray in_order{};
     for (std::size_t i = 0; i < kParameters; ++i) in_order[internal_of(i)] = nominal[i];
 
     const ParameterArray prior = prior_sigma(settings);
     const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> scale(prior.data());
-    Covariance information = Covariance::Zero();
-    for (const PlannedDwell& dwell : plan) {
-        const Matrix3x30 g = sensitivity(kinematics, model, dwell, in_order) * scale.asDiagonal();
-        information += g.transpose() * g / rate_variance(settings, dwell.duration_s, period_s);
-    }
+    const Covariance information =
+        information_in_prior_units(settings, plan, in_order, prior, period_s);
     const Eigen::SelfAdjointEigenSolver<Covariance> eigen(information);
     const double least = kNoInformation * eigen.eigenvalues().maxCoeff();
     std::array<double, kParameters> sigma{};
@@ -92,6 +102,18 @@ std::array<double, kParameters> predicted_sigma(const Settings& settings,
         sigma[i] = scale[row] * std::sqrt(variance);
     }
     return sigma;
+}
+
+Covariance planned_covariance(const Settings& settings, const std::vector<PlannedDwell>& plan,
+                              double period_s) {
+    check(settings);
+    const ParameterArray prior = prior_sigma(settings);
+    const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> scale(prior.data());
+    const Covariance information =
+        information_in_prior_units(settings, plan, ParameterArray{}, prior, period_s) +
+        Covariance::Identity();
+    return scale.asDiagonal() * Covariance(information.llt().solve(Covariance::Identity())) *
+           scale.asDiagonal();
 }
 
 }  // namespace vibrig::estimator

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <vector>
 
@@ -23,5 +24,10 @@ struct PlannedDwell {
 [[nodiscard]] std::array<double, kParameters> predicted_sigma(
     const Settings& settings, const std::vector<PlannedDwell>& plan,
     const std::array<double, kParameters>& nominal, double period_s = 0.025);
+
+/// Covariance of the coefficients, filter order, that the prior and such a plan leave, for a
+/// nominal platform that does not turn.
+[[nodiscard]] Eigen::Matrix<double, kParameters, kParameters> planned_covariance(
+    const Settings& settings, const std::vector<PlannedDwell>& plan, double period_s = 0.025);
 
 }  // namespace vibrig::estimator

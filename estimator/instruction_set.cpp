@@ -1,6 +1,9 @@
 #include "estimator/instruction_set.hpp"
 
 #include <array>
+#include <string>
+
+#include "estimator/identification.hpp"
 
 namespace vibrig::estimator {
 namespace {
@@ -47,6 +50,14 @@ const Entry*& chosen() noexcept {
 
 std::string_view instruction_set() noexcept { return chosen()->name; }
 
+std::string_view compiler() noexcept {
+#ifdef __clang__
+    return "clang++ " __clang_version__;
+#else
+    return "g++ " __VERSION__;
+#endif
+}
+
 std::vector<std::string_view> instruction_sets() {
     std::vector<std::string_view> names;
     for (const Entry& entry : kEntries) {
@@ -67,6 +78,14 @@ bool force_instruction_set(std::string_view name) noexcept {
         }
     }
     return false;
+}
+
+void use_instruction_set(std::string_view name) {
+    if (force_instruction_set(name)) return;
+    std::string known = "auto";
+    for (const std::string_view other : instruction_sets()) known += ", " + std::string(other);
+    throw SettingsError("instruction set: found \"" + std::string(name) + "\", expected " + known +
+                        " on this processor");
 }
 
 const UdKernel& ud_kernel() noexcept { return *chosen()->kernel; }

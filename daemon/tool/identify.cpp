@@ -16,6 +16,7 @@
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
 #include "estimator/identification.hpp"
+#include "estimator/instruction_set.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -83,9 +84,11 @@ std::vector<RecordingRow> read(const std::string& path) {
     return proto::read_recording(path);
 }
 
-int run(const std::string& recording, const std::string& config, bool json) {
+int run(const std::string& recording, const std::string& config, const std::string& instruction_set,
+        bool json) {
     estimator::Result result;
     try {
+        estimator::use_instruction_set(instruction_set);
         const estimator::Settings settings =
             configuration::load(config, false).configuration.estimator;
         result = identify(read(recording), settings);
@@ -108,6 +111,7 @@ void add_identify(CLI::App& app, int& exit_code) {
     struct Options {
         std::string recording;
         std::string config;
+        std::string instruction_set = "auto";
         bool json = false;
     };
     auto options = std::make_shared<Options>();
@@ -120,13 +124,18 @@ void add_identify(CLI::App& app, int& exit_code) {
         ->required();
     command->add_option("--config", options->config,
                         "configuration file (TOML); without it all defaults apply");
+    command
+        ->add_option("--instruction-set", options->instruction_set,
+                     "of the filter: auto (the best), or one of this processor's")
+        ->envname("VIBRIG_INSTRUCTION_SET");
     command->add_flag("--json", options->json, "print the result as JSON");
     command->footer(
         "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
         "Exit codes: 0 all 30 coefficients are determined, 1 some are not observable (the result "
         "names\nthem and the combinations that are determined), 2 bad usage or input.");
     command->callback([options, &exit_code] {
-        exit_code = run(options->recording, options->config, options->json);
+        exit_code =
+            run(options->recording, options->config, options->instruction_set, options->json);
     });
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "estimator/instruction_set.hpp"
+
 namespace vibrig::tool {
 
 namespace {
@@ -86,6 +88,8 @@ std::string result_json(const estimator::Result& result) {
                                             {"limit_sigma", estimator::CrossCheck::kLimit},
                                             {"agrees", check.agrees()}}
                                      : Json(nullptr);
+    root["instruction_set"] = estimator::instruction_set();
+    root["compiler"] = estimator::compiler();
     root["warnings"] = result.warnings;
     // A warning may carry bytes of a file; a broken sequence must not cost the result.
     return root.dump(-1, ' ', false, Json::error_handler_t::replace);

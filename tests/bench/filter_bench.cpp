@@ -6,6 +6,7 @@
 #include <string>
 
 #include "estimator/drift_filter.hpp"
+#include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
 #include "estimator/ud_filter.hpp"
 #include "tests/bench/dense_filter.hpp"
@@ -98,6 +99,27 @@ void whole_step(benchmark::State& state, const std::string& instruction_set) {
             filter.step(0.025 * static_cast<double>(n), {noise, -noise, noise}, 19));
     }
 }
+
+/// Everything a sample of a campaign costs: level, filter, batch cross-check.
+void identify(benchmark::State& state) {
+    estimator::Identification identification{estimator::Settings{}};
+    constexpr std::uint64_t kDwell = 4000;
+    std::array<double, 8> level{};
+    for (std::size_t i = 0; i < level.size(); ++i) {
+        level[i] = 1 + 6 * std::sin(0.75 * 3.14159265358979 * static_cast<double>(i));
+    }
+    std::uint64_t n = 0;
+    for (auto _ : state) {
+        if (n % kDwell == 0) identification.begin_dwell({});
+        const double noise = 1e-5 * (static_cast<double>(n % 7) - 3);
+        estimator::Measurement m;
+        m.time_s = 0.025 * static_cast<double>(n++ % kDwell);
+        m.angle_rad = {noise, -noise, noise};
+        m.force_g = {0, level[n % 8], 0};
+        benchmark::DoNotOptimize(identification.add(m));
+    }
+}
+BENCHMARK(identify)->Name("identify_sample");
 
 }  // namespace
 }  // namespace vibrig::bench

@@ -103,6 +103,16 @@ const std::array<double, kParameters> kTable2{
     -1, 1,  1,  -1, -0.03, -0.03, 0.03,  -0.03, 0.03,  0.03,   //
     1,  -1, -1, 1,  0.03,  0.03,  -0.03, 0.03,  -0.03, -0.03};
 
+double RigSimulator::averaged(History& history, std::size_t axis, std::size_t n,
+                              std::size_t count) {
+    if (count == 1) return gauss();
+    std::array<double, kMostAveraged>& draws = history[axis];
+    draws[n % count] = gauss();
+    double sum = 0;
+    for (std::size_t i = 0; i < count; ++i) sum += draws[i] / static_cast<double>(count);
+    return sum;
+}
+
 DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan) {
     const double omega = 15.041067, latitude = 45.75 * kRad;
     const Vec earth{omega * std::cos(latitude), omega * std::sin(latitude), 0};
@@ -125,7 +135,9 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
         Measurement m;
         m.time_s = n * dt;
         for (std::size_t k = 0; k < 3; ++k) {
-            double reading = angle[k] + resolver_arcsec / kArcsec * gauss();
+            double reading = angle[k] + resolver_arcsec / kArcsec *
+                                            averaged(encoder_noise_, k, static_cast<std::size_t>(n),
+                                                     encoder_average);
             if (uniform_(random_) < plan.spike_probability) reading += 0.5 * kRad;
             if (quantise) reading = lsb * std::round(reading / lsb);
             const double turn = 360 * kRad;
@@ -139,7 +151,9 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
         const Vec drift = gyro_drift(u, k12[0], k12[1], truth);
         const Vec we = times(c, earth);
         Vec turn{};  // arcsec
-        for (std::size_t j = 0; j < 3; ++j) turn[j] = dt * (-drift[j] - we[j]) + walk * gauss();
+        for (std::size_t j = 0; j < 3; ++j)
+            turn[j] = dt * (-drift[j] - we[j]) +
+                      walk * averaged(gyro_noise_, j, static_cast<std::size_t>(n), gyro_average);
         const Vec change = angle_rates(angle, turn);
         for (std::size_t k = 0; k < 3; ++k) angle[k] += change[k] / kArcsec;
     }

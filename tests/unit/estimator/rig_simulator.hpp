@@ -42,6 +42,9 @@ class RigSimulator {
     std::array<double, kParameters> truth = kTable2;
     double resolver_arcsec = 5, random_walk_deg_per_rt_h = 0.001, force_noise_g = 1e-4;
     bool quantise = true;
+    /// Noise as the running mean of so many draws: of the encoders (which makes it smaller) and of
+    /// the gyros (Tang et al. 2009, eq. 9; the walk over long times stays).
+    std::size_t encoder_average = 1, gyro_average = 1;
     /// May change the measurement with this number in its dwell before it is fed.
     std::function<void(const DwellInfo&, int, Measurement&)> spoil;
 
@@ -51,8 +54,14 @@ class RigSimulator {
     void campaign(Identification& to, std::array<double, 2> amplitudes_g, SimulatedDwell plan = {});
 
   private:
-    double gauss() { return normal_(random_); }
+    static constexpr std::size_t kMostAveraged = 16;
+    using History = std::array<std::array<double, kMostAveraged>, 3>;
 
+    double gauss() { return normal_(random_); }
+    /// Running mean of `count` draws.
+    double averaged(History& history, std::size_t axis, std::size_t n, std::size_t count);
+
+    History encoder_noise_{}, gyro_noise_{};
     std::mt19937_64 random_;
     std::normal_distribution<double> normal_;
     std::uniform_real_distribution<double> uniform_;

@@ -110,6 +110,70 @@ TEST(Robustness, ASaturatedAccelerometerIsNotTakenForALowerLevel) {
     expect_within_four_sigma(result);
 }
 
+TEST(Robustness, AnAccelerometerThatSticksIsNotTakenForALowerLevel) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN the accelerometer along the vertical showing one value from the middle of a dwell on,
+    // another one from the start, and one showing nothing at all
+    double held = 0;
+    const Result result = Campaign().run([&](const DwellInfo& dwell, int n, Measurement& m) {
+        if (dwell.run != 1) return;
+        if (dwell.position == 1 && n == 800) held = m.force_g[1];
+        if (dwell.position == 1 && n > 800) m.force_g[1] = held;
+        if (dwell.position == 3) m.force_g[0] = 1.5;
+        if (dwell.position == 4) m.force_g[1] = 0;
+    });
+    // THEN the three dwells are taken out and counted
+    for (const std::size_t dwell : {0U, 2U, 3U}) {
+        EXPECT_TRUE(result.dwells[dwell].flagged) << dwell;
+        EXPECT_EQ(result.dwells[dwell].rejected, result.dwells[dwell].samples) << dwell;
+    }
+    EXPECT_EQ(flagged(result), 3U);
+    expect_within_four_sigma(result);
+}
+
+TEST(Robustness, ResolversThatAllStandStillAreAQuietSourceNotAStuckOne) {
+    // GIVEN readings without any noise, of a platform that does not move
+    Identification identification{Settings{}};
+    identification.begin_dwell({});
+    for (int n = 0; n < 400; ++n) {
+        Measurement m;
+        m.time_s = 0.025 * n;
+        m.force_g = {0, 1, 0};
+        identification.add(m);
+    }
+    // THEN nobody calls them stuck
+    const DwellSummary summary = identification.end_dwell();
+    EXPECT_EQ(summary.rejected, 0U);
+    EXPECT_FALSE(summary.flagged) << summary.reason;
+}
+
+TEST(Robustness, EncodersThatAverageAreToldByTheCorrelationOfTheirNoise) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN encoders that show the running mean of their last 8 readings, and settings that take
+    // this for white noise of the same size
+    Settings settings;
+    settings.resolver_arcsec = 5 / std::sqrt(8.0);
+    Identification identification(settings);
+    RigSimulator rig(kSeed);
+    rig.encoder_average = 8;
+    SimulatedDwell plan;
+    plan.duration_s = 40;
+    rig.campaign(identification, {6.0, 14.0 / 3.0}, plan);
+    const Result result = identification.result();
+    // THEN every dwell is told, and sigma is too small by not much: below 1.17
+    EXPECT_EQ(std::count_if(result.warnings.begin(), result.warnings.end(),
+                            [](auto& text) { return text.find("not white") != text.npos; }),
+              28);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        EXPECT_LT(std::abs(result.value[i] - kTable2[i]), 4 * 1.17 * result.sigma[i])
+            << parameter_names()[i];
+    }
+    // and white noise is not told
+    for (const std::string& text : Campaign().run({}).warnings) {
+        EXPECT_EQ(text.find("not white"), std::string::npos) << text;
+    }
+}
+
 TEST(Robustness, AnAmplitudeThatDriftsByTwoPercentIsFollowed) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     Campaign campaign;

@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "estimator/plan_report.hpp"
+#include "tests/unit/estimator/rig_simulator.hpp"
+
+namespace vibrig::estimator::testing {
+namespace {
+
+constexpr std::uint64_t kCrossSeed = 60;
+
+bool told(const Result& result, const std::string& words) {
+    return std::any_of(result.warnings.begin(), result.warnings.end(),
+                       [&](const std::string& text) { return text.find(words) != text.npos; });
+}
+
+Result identified(const Settings& settings, std::array<double, 2> levels_g,
+                  const decltype(RigSimulator::spoil)& spoil = {}) {
+    Identification identification(settings);
+    RigSimulator rig(kCrossSeed);
+    rig.spoil = spoil;
+    SimulatedDwell plan;
+    plan.duration_s = 20;
+    plan.lost_probability = 0.01;
+    plan.spike_probability = 0.001;
+    rig.campaign(identification, levels_g, plan);
+    // The inner gimbal leans: gyro noise is not isotropic in the gimbal angles then.
+    plan.info = {2, 15, -1};
+    plan.amplitude_g = levels_g[1];
+    plan.angles_deg = {20, 40, -30};
+    rig.dwell(identification, plan);
+    return identification.result();
+}
+
+TEST(CrossCheck, TheBatchAgreesWithTheFilterOnEitherRouteAndAtOneLevel) {
+    SCOPED_TRACE("seed " + std::to_string(kCrossSeed));
+    Settings joint, two_step;
+    two_step.method = Method::two_step;
+    // GIVEN campaigns with gaps and spikes WHEN they are identified
+    for (const Result& result : {identified(joint, {6, 14.0 / 3}), identified(two_step, {6, 4}),
+                                 identified(joint, {6, 6}), identified(joint, {6, 0})}) {
+        // THEN the batch was done, differs from the filter by rounding and linearisation only and
+        // nobody is warned
+        EXPECT_TRUE(result.cross_check.done);
+        EXPECT_GT(result.cross_check.largest, 0) << "two ways never agree to the last bit";
+        EXPECT_LE(result.cross_check.largest, CrossCheck::kLimit) << result.cross_check.coefficient;
+        EXPECT_FALSE(told(result, "batch least squares"));
+    }
+}
+
+TEST(CrossCheck, ADisagreementNamesItsCoefficient) {
+    SCOPED_TRACE("seed " + std::to_string(kCrossSeed));
+    // GIVEN a gate that lets everything in and angles off by 20 deg now and then, which tilt the
+    // vertical of the batch but not that of the filter
+    Settings settings;
+    settings.gate_nis = 1e9;
+    const Result result =
+        identified(settings, {6, 14.0 / 3}, [](const DwellInfo&, int n, Measurement& m) {
+            if (n % 100 == 50) m.angle_rad[0] += 0.35;
+        });
+    // THEN the warning names the coefficient that differs most
+    EXPECT_FALSE(result.cross_check.agrees());
+    EXPECT_TRUE(told(result, "puts " + result.cross_check.coefficient + " off by"));
+}
+
+TEST(CrossCheck, WithoutDataNothingIsCompared) {
+    EXPECT_FALSE(Identification(Settings{}).result().cross_check.done);
+}
+
+std::vector<std::array<double, 3>> positions(std::size_t count) {
+    return {kTable1.begin(), kTable1.begin() + static_cast<std::ptrdiff_t>(count)};
+}
+
+TEST(PlanReport, TwoLevelsOverTable1DetermineEverythingAsAccuratelyAsTheBound) {
+    const Settings settings;
+    const auto plan = campaign_plan(settings, positions(14), {9, 7}, 100);
+    const PlanReport report = report_plan(settings, plan);
+    const auto bound = predicted_sigma(settings, plan, std::array<double, kParameters>{});
+    EXPECT_TRUE(plan_warnings(report).empty());
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        EXPECT_TRUE(report.observable[i]) << parameter_names()[i];
+        EXPECT_NEAR(report.sigma[i] / bound[i], 1, 1e-3) << parameter_names()[i];
+    }
+}
+
+TEST(PlanReport, OneLevelIsToldByNameWithTheCombinationBeforeAndAfterTheRun) {
+    // GIVEN one level: kappa = 19 with 9 g at the table
+    Settings settings;
+    settings.transmission = 2.0 / 3.0;
+    const PlanReport report =
+        report_plan(settings, campaign_plan(settings, positions(14), {9, 9}, 20));
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t place = i % 10;
+        EXPECT_EQ(report.observable[i], place != 0 && (place < 4 || place > 6));
+    }
+    // THEN the plan is told by the names and sums that the result of such a run has
+    const Result result = identified(settings, {6, 6});
+    EXPECT_EQ(report.observable, result.observable);
+    ASSERT_EQ(report.combinations.size(), result.combinations.size());
+    ASSERT_FALSE(report.combinations.empty());
+    for (std::size_t k = 0; k < report.combinations.size(); ++k) {
+        const auto& before = report.combinations[k].weights;
+        const auto& after = result.combinations[k].weights;
+        ASSERT_EQ(before.size(), after.size());
+        for (std::size_t w = 0; w < before.size(); ++w) {
+            EXPECT_EQ(before[w].first, after[w].first);
+            EXPECT_NEAR(before[w].second, after[w].second, 1e-3 * std::abs(after[w].second));
+        }
+    }
+    const std::vector<std::string> lines = plan_warnings(report);
+    EXPECT_NE(lines.at(0).find("D_Fx"), std::string::npos);
+    EXPECT_NE(lines.at(1).find("determined is D_Fx + 19 D_OOx"), std::string::npos) << lines.at(1);
+}
+
+TEST(PlanReport, PositionsThatAreTooFewOrAnUnsuitableVerticalAreTold) {
+    Settings settings;
+    const auto undetermined = [](const PlanReport& report) {
+        return std::count(report.observable.begin(), report.observable.end(), false);
+    };
+    const PlanReport few =
+        report_plan(settings, campaign_plan(settings, positions(3), {9, 0}, 100));
+    EXPECT_GT(undetermined(few), 0);
+    EXPECT_FALSE(plan_warnings(few).empty());
+    // Table 1 with x up never tilts the vertical out of one plane: 5 of 10 directions for each
+    // gyro at one level, so most coefficients are in some undetermined direction.
+    settings.up = {0, 1};
+    const PlanReport lying =
+        report_plan(settings, campaign_plan(settings, positions(14), {9, 0}, 100));
+    EXPECT_GE(undetermined(lying), 9);
+    // and with z up the product of the platform's x and y is never excited
+    settings.up = {2, 1};
+    EXPECT_GE(
+        undetermined(report_plan(settings, campaign_plan(settings, positions(14), {9, 0}, 100))),
+        3);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::testing
