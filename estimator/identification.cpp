@@ -10,7 +10,7 @@ namespace vibrig::estimator {
 namespace {
 
 /// A longer gap is treated as a change of position: the angles start afresh.
-constexpr double kLongestGap_s = 1.0;
+constexpr double kLongestPause_s = 1.0;
 /// So many stamps in a row before the newest accepted one mean that that one was wrong.
 constexpr int kBadTimesBeforeRestart = 5;
 constexpr auto kBufferCapacity =
@@ -130,7 +130,7 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         }
     }
     bad_times_in_a_row_ = 0;
-    if (!first && (restart || dt > kLongestGap_s)) {
+    if (!first && (restart || dt > kLongestPause_s)) {
         end_stretch();
         active_->filter.begin_dwell();
     }

@@ -19,7 +19,7 @@ using tang2009::Outcome;
 using tang2009::Study;
 using tang2009::truth;
 
-constexpr std::size_t kSeeds = 16;
+constexpr std::size_t kRigs = 16;
 /// Fewer seeds than this say nothing about a ratio to the bound of a few per cent.
 constexpr std::size_t kSeedsForBound = 32;
 
@@ -95,7 +95,7 @@ Drawn drawn_ratio(const Study& study, tang2009::Route above, tang2009::Route bel
     return {value, value * 1.96 * std::sqrt(variance) / 2};
 }
 
-std::string levels(const Study& study) { return text("%.4g g", study.platform_g(9)); }
+std::string levels(const Study& study) { return formatted("%.4g g", study.platform_g(9)); }
 
 void add_coefficients(const std::vector<Study>& studies, std::vector<ReproducedRow>& rows) {
     using enum tang2009::Route;
@@ -110,15 +110,16 @@ void add_coefficients(const std::vector<Study>& studies, std::vector<ReproducedR
                 const Outcome& joint = seed[routes[trial][1]];
                 computed += (computed.empty() ? "" : "; ") + levels(study) + ": ";
                 if (trial < 2) {
-                    computed += text(small ? "two-step %.5f, " : "two-step %.4f, ",
-                                     seed[routes[trial][0]].value[i]);
+                    computed += formatted(small ? "two-step %.5f, " : "two-step %.4f, ",
+                                          seed[routes[trial][0]].value[i]);
                 }
-                computed += text(small ? "%s %.5f +- %.5f" : "%s %.4f +- %.4f",
-                                 trial < 2 ? "joint" : "one level", joint.value[i], joint.sigma[i]);
+                computed +=
+                    formatted(small ? "%s %.5f +- %.5f" : "%s %.4f +- %.4f",
+                              trial < 2 ? "joint" : "one level", joint.value[i], joint.sigma[i]);
             }
-            rows.push_back({text("Table 2, trial %zu, %s (truth %g)", trial + 1,
-                                 estimator::parameter_names()[i], truth()[i]),
-                            text("%.4f", kTable2[trial][i]),
+            rows.push_back({formatted("Table 2, trial %zu, %s (truth %g)", trial + 1,
+                                      estimator::parameter_names()[i], truth()[i]),
+                            formatted("%.4f", kTable2[trial][i]),
                             computed,
                             {}});
         }
@@ -146,8 +147,8 @@ void add_errors(const std::vector<Study>& studies, std::vector<ReproducedRow>& r
                                    : rms(kTable2[static_cast<std::size_t>(line.trial)], group);
                 rows.push_back({"rms relative error, %, " + levels(study) + ", " + line.name +
                                     ", " + group.name,
-                                line.trial < 0 ? "-" : text("%.2f", published),
-                                text("%.3f", rms(study, line.route, group)),
+                                line.trial < 0 ? "-" : formatted("%.2f", published),
+                                formatted("%.3f", rms(study, line.route, group)),
                                 {}});
             }
         }
@@ -157,23 +158,25 @@ void add_errors(const std::vector<Study>& studies, std::vector<ReproducedRow>& r
 /// A demand on one number; which side is the good one is told by the sign.
 void demand_at_most(std::vector<ReproducedRow>& rows, const std::string& item, double value,
                     double limit) {
-    rows.push_back({item, text("at most %.4g", limit), text("%.4g", value), value <= limit});
+    rows.push_back(
+        {item, formatted("at most %.4g", limit), formatted("%.4g", value), value <= limit});
 }
 void demand_at_least(std::vector<ReproducedRow>& rows, const std::string& item, double value,
                      double limit) {
-    rows.push_back({item, text("at least %.4g", limit), text("%.4g", value), value >= limit});
+    rows.push_back(
+        {item, formatted("at least %.4g", limit), formatted("%.4g", value), value >= limit});
 }
 
 /// The same for what was drawn, over the seeds that were run; chance is shown and excuses nothing.
 void demand_at_most(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
                     double limit) {
-    rows.push_back({item, text("at most %.4g", limit),
-                    text("%.4g +- %.2g", drawn.value, drawn.chance), drawn.value <= limit});
+    rows.push_back({item, formatted("at most %.4g", limit),
+                    formatted("%.4g +- %.2g", drawn.value, drawn.chance), drawn.value <= limit});
 }
 void demand_at_least(std::vector<ReproducedRow>& rows, const std::string& item, const Drawn& drawn,
                      double limit) {
-    rows.push_back({item, text("at least %.4g", limit),
-                    text("%.4g +- %.2g", drawn.value, drawn.chance), drawn.value >= limit});
+    rows.push_back({item, formatted("at least %.4g", limit),
+                    formatted("%.4g +- %.2g", drawn.value, drawn.chance), drawn.value >= limit});
 }
 
 void add_findings(const Study& study, std::vector<ReproducedRow>& rows) {
@@ -212,15 +215,16 @@ void add_statistics(const Study& study, std::vector<ReproducedRow>& rows) {
     const std::string at = levels(study) + ", joint, trial 1: ";
     // 95 % bands; 112 000 samples of three axes in each seed.
     const double nees_band = 1.96 * std::sqrt(60 / n), nis_band = 1.96 * std::sqrt(2 / (336e3 * n));
-    rows.push_back({at + "mean NEES of 30", text("30 +- %.2f (95 %%)", nees_band),
-                    text("%.2f", nees), std::abs(nees - 30) <= nees_band});
-    rows.push_back({at + "mean NIS per degree of freedom", text("1 +- %.5f (95 %%)", nis_band),
-                    text("%.5f", nis), std::abs(nis - 1) <= nis_band});
+    rows.push_back({at + "mean NEES of 30", formatted("30 +- %.2f (95 %%)", nees_band),
+                    formatted("%.2f", nees), std::abs(nees - 30) <= nees_band});
+    rows.push_back({at + "mean NIS per degree of freedom", formatted("1 +- %.5f (95 %%)", nis_band),
+                    formatted("%.5f", nis), std::abs(nis - 1) <= nis_band});
     demand_at_most(rows, at + "largest difference of sigma from the Cramer-Rao bound", off, 0.01);
-    rows.push_back(
-        {at + "rms of error over Cramer-Rao bound", "at most 1.05", text("%.3f", std::sqrt(ratio)),
-         study.seeds.size() < kSeedsForBound ? std::nullopt
-                                             : std::optional<bool>(std::sqrt(ratio) <= 1.05)});
+    rows.push_back({at + "rms of error over Cramer-Rao bound", "at most 1.05",
+                    formatted("%.3f", std::sqrt(ratio)),
+                    study.seeds.size() < kSeedsForBound
+                        ? std::nullopt
+                        : std::optional<bool>(std::sqrt(ratio) <= 1.05)});
 }
 
 void add_acceptance(const Study& stated, const Study& doubled, std::vector<ReproducedRow>& rows) {
@@ -242,9 +246,9 @@ void add_acceptance(const Study& stated, const Study& doubled, std::vector<Repro
     for (const Study* study : {&stated, &doubled}) {
         for (const auto& [two_step, joint, trial] :
              {std::tuple{kTwoStep1, kJoint1, 1}, std::tuple{kTwoStep2, kJoint2, 2}}) {
-            demand_at_most(rows,
-                           levels(*study) + text(": trial %d, joint over two-step, all 30", trial),
-                           rms(*study, joint, kAll) / rms(*study, two_step, kAll), 1);
+            demand_at_most(
+                rows, levels(*study) + formatted(": trial %d, joint over two-step, all 30", trial),
+                rms(*study, joint, kAll) / rms(*study, two_step, kAll), 1);
         }
     }
 }
@@ -252,7 +256,7 @@ void add_acceptance(const Study& stated, const Study& doubled, std::vector<Repro
 }  // namespace
 
 Reproduction reproduce_tang2009(const ReproduceOptions& options) {
-    const std::size_t seeds = options.seeds > 0 ? options.seeds : kSeeds;
+    const std::size_t seeds = options.seeds > 0 ? options.seeds : kRigs;
     const std::vector<Study> studies = tang2009::run_studies({1.0, 2.0}, seeds);
     Reproduction result;
     result.name = "tang2009";
@@ -265,10 +269,10 @@ Reproduction reproduce_tang2009(const ReproduceOptions& options) {
     tang2009::add_level_errors(result.rows);
     add_acceptance(studies[0], studies[1], result.rows);
     for (const Study& study : studies) add_statistics(study, result.rows);
-    result.notes.push_back(
-        text("%zu simulated rigs (seeds 1 to %zu); single values are those of seed 1, +- is one "
-             "sigma.",
-             seeds, seeds));
+    result.notes.push_back(formatted(
+        "%zu simulated rigs (seeds 1 to %zu); single values are those of seed 1, +- is one "
+        "sigma.",
+        seeds, seeds));
     result.notes.emplace_back(
         "A demand is judged by the rms over the seeds that were run; +- behind it is what chance "
         "alone may move it by (95 %), so that few seeds may miss it without meaning anything.");

@@ -162,18 +162,18 @@ void add_transmission(std::vector<ReproducedRow>& rows) {
         const Response formula = closed_form(mount);
         const Integrated numeric = integrate(mount);
         const std::string name =
-            text("eqs 3-7, mount of %.1f Hz, damping %.1f: ", natural, damping);
-        rows.push_back({name + "a0/a at 15 Hz", text("%.6f (eq. 3)", formula.ratio),
-                        text("%.6f (eq. 1 integrated)", numeric.steady.ratio),
+            formatted("eqs 3-7, mount of %.1f Hz, damping %.1f: ", natural, damping);
+        rows.push_back({name + "a0/a at 15 Hz", formatted("%.6f (eq. 3)", formula.ratio),
+                        formatted("%.6f (eq. 1 integrated)", numeric.steady.ratio),
                         std::abs(numeric.steady.ratio - formula.ratio) < 1e-5});
         rows.push_back({name + "phase, rad",
-                        text("%.4f (eq. 4 as printed), %.4f (corrected)", phase_as_printed(mount),
-                             formula.phase),
-                        text("%.4f", numeric.steady.phase),
+                        formatted("%.4f (eq. 4 as printed), %.4f (corrected)",
+                                  phase_as_printed(mount), formula.phase),
+                        formatted("%.4f", numeric.steady.phase),
                         std::abs(std::remainder(numeric.steady.phase - formula.phase,
                                                 2 * std::numbers::pi)) < 1e-4});
         rows.push_back({name + "transient X(t), largest difference / amplitude",
-                        "0 (eqs 5-7 corrected)", text("%.1e", numeric.transient_error),
+                        "0 (eqs 5-7 corrected)", formatted("%.1e", numeric.transient_error),
                         numeric.transient_error < 1e-4});
     }
 }
@@ -185,15 +185,16 @@ void add_level_errors(std::vector<ReproducedRow>& rows) {
     for (std::size_t k = 0; k < 3; ++k) {
         const double value = propagated(k, k);
         sum += value;
-        rows.push_back({text("section 3.5, 7 x error of a0 per scale error of %s", axis[k]),
-                        text("%.0f%s", published[k], k == 2 ? " (6: they must sum to 14)" : ""),
-                        text("%.3f", value), std::abs(value - corrected[k]) < 0.02});
+        rows.push_back(
+            {formatted("section 3.5, 7 x error of a0 per scale error of %s", axis[k]),
+             formatted("%.0f%s", published[k], k == 2 ? " (6: they must sum to 14)" : ""),
+             formatted("%.3f", value), std::abs(value - corrected[k]) < 0.02});
     }
     rows.push_back({"section 3.5, their sum: a common scale error counts twice", "16",
-                    text("%.3f", sum), std::abs(sum - 14) < 0.05});
+                    formatted("%.3f", sum), std::abs(sum - 14) < 0.05});
     rows.push_back({"section 3.5, the same per misalignment E_xy + E_yx",
                     "-1",
-                    text("%.3f", 0.5 * (propagated(0, 1) + propagated(1, 0))),
+                    formatted("%.3f", 0.5 * (propagated(0, 1) + propagated(1, 0))),
                     {}});
 
     constexpr int kDraws = 12;
@@ -220,8 +221,8 @@ void add_level_errors(std::vector<ReproducedRow>& rows) {
     eq13 = std::sqrt(eq13 / n);
     projection = std::sqrt(projection / n);
     rows.push_back({"rms error of kappa, %, with scale 1e-4, misalignment 50 arcsec, bias 1e-4 g",
-                    text("%.4f (eqs 12-13)", 100 * eq13),
-                    text("%.4f (projection on the vertical)", 100 * projection),
+                    formatted("%.4f (eqs 12-13)", 100 * eq13),
+                    formatted("%.4f (projection on the vertical)", 100 * projection),
                     projection < 0.5 * eq13});
 }
 

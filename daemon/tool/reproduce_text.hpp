@@ -8,7 +8,7 @@ namespace vibrig::tool {
 
 /// printf into a string.
 template <typename... Values>
-[[nodiscard]] std::string text(const char* format, Values... values) {
+[[nodiscard]] std::string formatted(const char* format, Values... values) {
     std::array<char, 400> out{};
     std::snprintf(out.data(), out.size(), format, values...);
     return out.data();

@@ -1,0 +1,136 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "estimator/identification.hpp"
+#include "estimator/instruction_set.hpp"
+
+// A committed recording and what was once identified from it: when the numbers move, the review
+// shows it. To write them anew: VIBRIG_WRITE_GOLDEN=FILE estimator_test
+// --gtest_filter=GoldenReplay.*
+
+namespace vibrig::estimator::testing {
+namespace {
+
+const std::string kData = VIBRIG_TEST_DATA;
+
+struct GoldenReplay : ::testing::Test {
+    ~GoldenReplay() override { static_cast<void>(force_instruction_set("auto")); }
+};
+
+/// The 14 positions at 9 and 7 g at the table, 2 s each; vibrig-plant record --seed 11 --dwell 2.
+Estimate replay(std::string_view set) {
+    EXPECT_TRUE(force_instruction_set(set));
+    Identification identification{Settings{}};
+    std::ifstream in(kData + "/golden_recording.csv");
+    std::string line;
+    std::getline(in, line);
+    DwellInfo present{0, 0, -1};
+    int rows = 0;
+    while (std::getline(in, line)) {
+        DwellInfo dwell;
+        Measurement m;
+        std::array<double, 3> deg{};
+        if (std::sscanf(line.c_str(), "%lf,%d,%d,%lf,%lf,%lf,%lf,%lf,%lf", &m.time_s, &dwell.run,
+                        &dwell.position, &deg[0], &deg[1], &deg[2], &m.force_g[0], &m.force_g[1],
+                        &m.force_g[2]) != 9) {
+            ADD_FAILURE() << line;
+            break;
+        }
+        for (std::size_t k = 0; k < 3; ++k)
+            m.angle_rad[k] = deg[k] * (3.14159265358979323846 / 180);
+        if (dwell.run != present.run || dwell.position != present.position) {
+            present = dwell;
+            identification.begin_dwell(dwell);
+        }
+        identification.add(m);
+        ++rows;
+    }
+    identification.end_dwell();
+    EXPECT_EQ(rows, 2 * 14 * 80);
+    Estimate estimate;
+    identification.estimate(estimate);
+    return estimate;
+}
+
+struct Golden30 {
+    std::array<double, kParameters> value{}, sigma{};
+};
+
+/// First line: the compiler. Then instruction set, coefficient, value, sigma; hexadecimal.
+std::map<std::string, Golden30> golden(std::string& made_by) {
+    std::map<std::string, Golden30> all;
+    std::ifstream in(kData + "/golden_estimates.txt");
+    std::getline(in, made_by);
+    std::string set, name, value, sigma;
+    while (in >> set >> name >> value >> sigma) {
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            if (name != parameter_names()[i]) continue;
+            all[set].value[i] = std::strtod(value.c_str(), nullptr);
+            all[set].sigma[i] = std::strtod(sigma.c_str(), nullptr);
+        }
+    }
+    return all;
+}
+
+void write_golden(const char* path) {
+    std::ofstream out(path);
+    out << compiler() << '\n';
+    for (const std::string_view set : instruction_sets()) {
+        const Estimate estimate = replay(set);
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            std::array<char, 160> line{};
+            std::snprintf(line.data(), line.size(), "%s %s %a %a\n", std::string(set).c_str(),
+                          parameter_names()[i], estimate.value[i], estimate.sigma[i]);
+            out << line.data();
+        }
+    }
+}
+
+TEST_F(GoldenReplay, IsBitIdenticalWithTheSameCompilerAndInstructionSet) {
+    if (const char* path = std::getenv("VIBRIG_WRITE_GOLDEN")) write_golden(path);
+    std::string made_by;
+    const auto all = golden(made_by);
+    ASSERT_FALSE(all.empty());
+    if (made_by != compiler()) {
+        GTEST_SKIP() << "made by " << made_by << ", this is " << compiler();
+    }
+    // Sines and cosines come from the C library, which has two versions: with and without FMA.
+    const std::vector<std::string_view> sets = instruction_sets();
+    if (all.contains("avx2") && sets.size() == 1) GTEST_SKIP() << "this processor has no FMA";
+    for (const std::string_view set : sets) {
+        const auto found = all.find(std::string(set));
+        if (found == all.end()) continue;
+        SCOPED_TRACE(std::string(set));
+        const Estimate estimate = replay(set);
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            EXPECT_EQ(estimate.value[i], found->second.value[i]) << parameter_names()[i];
+            EXPECT_EQ(estimate.sigma[i], found->second.sigma[i]) << parameter_names()[i];
+        }
+    }
+}
+
+TEST_F(GoldenReplay, IsWithinABillionthOfASigmaWithAnyCompilerAndInstructionSet) {
+    std::string made_by;
+    for (const auto& [made_with, expected] : golden(made_by)) {
+        for (const std::string_view set : instruction_sets()) {
+            SCOPED_TRACE(made_with + " against " + std::string(set));
+            const Estimate estimate = replay(set);
+            for (std::size_t i = 0; i < kParameters; ++i) {
+                EXPECT_LT(std::abs(estimate.value[i] - expected.value[i]), 1e-9 * expected.sigma[i])
+                    << parameter_names()[i];
+                EXPECT_LT(std::abs(estimate.sigma[i] / expected.sigma[i] - 1), 1e-9)
+                    << parameter_names()[i];
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::testing
