@@ -82,6 +82,7 @@ std::string result_json(const estimator::Result& result) {
     root["nis"] = number_if(result.nis_per_dof > 0, result.nis_per_dof);
     root["samples"] = result.samples;
     root["rejected"] = result.rejected;
+    root["warnings"] = result.warnings;
     const estimator::CrossCheck& check = result.cross_check;
     root["cross_check"] = check.done ? Json{{"largest_difference_sigma", number(check.largest)},
                                             {"coefficient", check.coefficient},
@@ -90,7 +91,6 @@ std::string result_json(const estimator::Result& result) {
                                      : Json(nullptr);
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
-    root["warnings"] = result.warnings;
     // A warning may carry bytes of a file; a broken sequence must not cost the result.
     return root.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -45,7 +45,8 @@ std::vector<std::string> keys_of(const Json& object) {
 TEST(ResultJson, HasTheKeysOfTheContractInOrder) {
     const Json root = Json::parse(result_json(complete()));
     EXPECT_THAT(keys_of(root), ElementsAre("parameters", "covariance", "amplitudes", "combinations",
-                                           "nis", "samples", "rejected", "warnings"));
+                                           "nis", "samples", "rejected", "warnings", "cross_check",
+                                           "instruction_set", "compiler"));
     ASSERT_EQ(root["parameters"].size(), 30U);
     EXPECT_THAT(keys_of(root["parameters"][0]),
                 ElementsAre("name", "value", "sigma", "unit", "observable"));
