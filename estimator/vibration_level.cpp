@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/kinematics.hpp"
+
 namespace vibrig::estimator {
 namespace {
 
@@ -78,7 +80,30 @@ void VibrationLevel::refresh() noexcept {
     since_refresh_ = 0;
     const std::size_t n = std::min(filled_, window_);
     const std::size_t begin = (next_ + ring_.size() - n) % ring_.size();
-    kappa_ = kappa_of(hann_means(ring_.data(), ring_.size(), begin, n));
+    HannMeans means = hann_means(ring_.data(), ring_.size(), begin, n);
+    if (n <= 2 * samples_in(kFirstWindow_s, period_s_)) remove_leakage(means, n);
+    kappa_ = kappa_of(means);
+}
+
+void VibrationLevel::remove_leakage(HannMeans& means, std::size_t n) const noexcept {
+    if (!(fit_.amplitude > 0) || fit_age_ < n) return;
+    // Lines that alias on one another are not told apart by the fit.
+    const double span_s = static_cast<double>(n) * period_s_;
+    for (const int order : {2, 3, 4}) {
+        if (excluded(fit_.frequency_hz, period_s_, span_s, order)) return;
+    }
+    double mean = 0, mean_square = 0, weights = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double s = std::sin(kPi * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
+        const double value = fit_.at(static_cast<double>(fit_age_ - n + i) * period_s_);
+        weights += s * s;
+        mean += s * s * value;
+        mean_square += s * s * value * value;
+    }
+    const double lines = fit_.cosine * fit_.cosine + fit_.sine * fit_.sine +
+                         fit_.cosine2 * fit_.cosine2 + fit_.sine2 * fit_.sine2;
+    means.mean -= mean / weights - fit_.mean;
+    means.mean_square -= mean_square / weights - (fit_.mean * fit_.mean + 0.5 * lines);
 }
 
 void VibrationLevel::fit(std::size_t samples) noexcept {

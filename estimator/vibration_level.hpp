@@ -61,6 +61,8 @@ class VibrationLevel {
     void after_push() noexcept;
     void refresh() noexcept;
     void fit(std::size_t samples) noexcept;
+    /// Takes out of short windows what the lines of the fitted vibration leak into the means.
+    void remove_leakage(HannMeans& means, std::size_t n) const noexcept;
     [[nodiscard]] double kappa_of(const HannMeans& means) const noexcept;
 
     double window_s_, noise_g_, nominal_hz_;

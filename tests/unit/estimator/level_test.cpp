@@ -118,7 +118,7 @@ TEST(VibrationLevel, MeetsItsAccuracyAboutTheNominalFrequency) {
         // 2 sigma s sqrt(1.5 / n (kappa - 1) / kappa)
         const double noise = 2e-4 * std::sqrt(1.5 / n * 18 / 19);
         EXPECT_LT(std::sqrt(square), bound) << n << " samples";
-        EXPECT_LT(worst, std::max(2 * bound, 4 * noise)) << n << " samples";
+        EXPECT_LT(worst, std::max(bound, 4 * noise)) << n << " samples";
     }
 }
 
