@@ -81,6 +81,7 @@ Daemon::Daemon(configuration::Loaded loaded)
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
                    {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_}),
       gimbal_(dbc_, configuration_.gimbal, *port_),
+      adaptive_(adaptive_plan(configuration_)),
       campaign_(
           configuration_.campaign,
           {gimbal_, *shaker_, [this] { return acquisition_.view().platform; },
@@ -102,9 +103,21 @@ Daemon::Daemon(configuration::Loaded loaded)
                    log(Severity::warning, "campaign", line);
            },
            [this](bool complete) { to_write_ = complete ? ToWrite::complete : ToWrite::partial; },
-           [this](Severity severity, const std::string& text) {
-               log(severity, "campaign", text);
+           [this](Severity severity, const std::string& text) { log(severity, "campaign", text); },
+           [this](const std::array<double, 3>& here_deg, double elapsed_s) {
+               return next_dwell(here_deg, elapsed_s);
            }}) {}
+
+campaign::Next Daemon::next_dwell(const std::array<double, 3>& here_deg, double elapsed_s) {
+    // Between two dwells the identification is this thread's; the shaker is at rest.
+    const auto decision = adaptive_->next(identification_.covariance(), here_deg, elapsed_s);
+    campaign::Next next;
+    next.more = decision.verdict == plan::AdaptivePlan::Verdict::go_on;
+    next.stop = {decision.run.position_deg, decision.run.table_g};
+    next.left = decision.left;
+    next.words = decision.words;
+    return next;
+}
 
 void Daemon::check_bindings(const configuration::Configuration& configuration) {
     const auto dbc = load_dbc(configuration.dbc);
@@ -117,6 +130,8 @@ void Daemon::check_bindings(const configuration::Configuration& configuration) {
 
 std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
     const campaign::Settings& campaign = configuration.campaign;
+    // Of a plan file and of an adaptive campaign the forecast tells.
+    if (!campaign.stops.empty() || campaign.adaptive) return {};
     return estimator::plan_warnings(estimator::report_plan(
         configuration.estimator,
         estimator::campaign_plan(configuration.estimator, campaign.positions_deg, campaign.table_g,

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign_forecast.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
@@ -76,6 +77,8 @@ class Daemon final : public StatusSource {
     void log(Severity severity, const std::string& source, const std::string& text);
     void take_done_dwells();
     void write_result();
+    [[nodiscard]] campaign::Next next_dwell(const std::array<double, 3>& here_deg,
+                                            double elapsed_s);
     void check_balance(drivers::Time now);
     [[nodiscard]] bool may_feed() const noexcept;
 
@@ -98,6 +101,7 @@ class Daemon final : public StatusSource {
     rt::EstimatorStage estimator_stage_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
+    std::optional<plan::AdaptivePlan> adaptive_;
     campaign::Campaign campaign_;
 
     std::atomic<bool> shut_down_{false};

@@ -7,7 +7,9 @@
 #include <csignal>
 #include <cstring>
 #include <iostream>
+#include <sstream>
 
+#include "daemon/campaign_forecast.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
@@ -95,12 +97,22 @@ int main(int argc, char** argv) {
         if (check) {
             vibrig::Daemon::check_bindings(loaded.configuration);
             std::cout << vibrig::configuration::format_effective(loaded);
+            // As comments: what stands above reads back as a configuration.
+            std::istringstream forecast(vibrig::forecast_campaign(loaded.configuration));
+            for (std::string line; std::getline(forecast, line);) {
+                std::cout << "# " << line << '\n';
+            }
             for (const std::string& line : vibrig::Daemon::check_plan(loaded.configuration)) {
                 std::cerr << "warning: campaign: " << line << '\n';
+            }
+            if (const auto& why = loaded.configuration.campaign.refusal; !why.empty()) {
+                std::cerr << "warning: campaign: will not be armed: " << why << '\n';
             }
             return 0;
         }
         set_up_log(loaded.configuration);
+        spdlog::info("campaign \"{}\": {}", loaded.configuration.campaign.name,
+                     vibrig::forecast_campaign(loaded.configuration));
         return run(std::move(loaded), signals);
     } catch (const std::exception& error) {
         std::cerr << "vibrigd: " << error.what() << '\n';

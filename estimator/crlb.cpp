@@ -72,6 +72,21 @@ double rate_variance(const Settings& settings, double duration_s, double period_
     return prr;
 }
 
+std::vector<double> rate_rows(const Settings& settings, const PlannedDwell& dwell,
+                              const std::array<double, kParameters>& nominal, double period_s) {
+    ParameterArray in_order{};
+    for (std::size_t i = 0; i < kParameters; ++i) in_order[internal_of(i)] = nominal[i];
+    const Matrix3x30 g = sensitivity(Kinematics(settings), DriftModel(settings), dwell, in_order) /
+                         std::sqrt(rate_variance(settings, dwell.duration_s, period_s));
+    std::vector<double> rows;
+    for (Eigen::Index r = 0; r < g.rows(); ++r) {
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            rows.push_back(g(r, static_cast<Eigen::Index>(internal_of(i))));
+        }
+    }
+    return rows;
+}
+
 std::array<double, kParameters> predicted_sigma(const Settings& settings,
                                                 const std::vector<PlannedDwell>& plan,
                                                 const std::array<double, kParameters>& nominal,

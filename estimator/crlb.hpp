@@ -18,6 +18,12 @@ struct PlannedDwell {
 /// Variance of one angle rate, (deg/h)^2, from a dwell whose rate is otherwise unknown.
 [[nodiscard]] double rate_variance(const Settings& settings, double duration_s, double period_s);
 
+/// What one dwell tells, for a plan of dwells: sensitivities of the three angle rates to the
+/// coefficients (order of parameter_names()) over the rates' standard error, row-major 3 x 30.
+[[nodiscard]] std::vector<double> rate_rows(const Settings& settings, const PlannedDwell& dwell,
+                                            const std::array<double, kParameters>& nominal,
+                                            double period_s = 0.025);
+
 /// Cramer-Rao bounds (1 sigma, no prior) of the coefficients for a plan, in the order of
 /// parameter_names(); infinite where the plan does not determine a coefficient. `nominal` (same
 /// order) moves the platform to where it is in the middle of each dwell.

@@ -336,4 +336,16 @@ DwellSummary Identification::end_dwell() noexcept { return impl_->end_dwell(); }
 void Identification::estimate(Estimate& out) const noexcept { impl_->estimate(out); }
 Result Identification::result() const { return impl_->result(); }
 
+std::vector<double> Identification::covariance() const {
+    std::vector<double> rows;
+    rows.reserve(kParameters * kParameters);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            rows.push_back(impl_->solution.covariance(static_cast<Eigen::Index>(internal_of(i)),
+                                                      static_cast<Eigen::Index>(internal_of(j))));
+        }
+    }
+    return rows;
+}
+
 }  // namespace vibrig::estimator

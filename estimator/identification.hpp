@@ -185,6 +185,9 @@ class Identification {
     void estimate(Estimate& out) const noexcept;
     /// Final result over all ended dwells. Allocates; does not change the filter.
     [[nodiscard]] Result result() const;
+    /// Of the coefficients after the last ended dwell, 30 x 30 row-major in the order of
+    /// parameter_names(), whether or not they are observable. Allocates.
+    [[nodiscard]] std::vector<double> covariance() const;
 
   private:
     struct Impl;

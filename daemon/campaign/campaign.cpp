@@ -25,6 +25,8 @@ constexpr Time kDoneGrace = 2 * kSecond;
 constexpr double kAtRestG = 1e-9;
 // Read back against commanded; a register resolves 1 mHz.
 constexpr double kFrequencyToleranceHz = 0.01;
+// A flagged dwell of an adaptive campaign is repeated so often at most.
+constexpr int kMostRepeats = 2;
 // A status older than this is no status.
 constexpr Time kPlatformDeadline = kSecond;
 
@@ -48,7 +50,55 @@ rt::Guard guard_in(State state) {
 }  // namespace
 
 Campaign::Campaign(const Settings& settings, Ports ports)
-    : settings_(settings), ports_(std::move(ports)) {}
+    : settings_(settings), ports_(std::move(ports)) {
+    plan_stops();
+}
+
+void Campaign::add_stop(const Stop& stop) {
+    const auto level = std::ranges::find(levels_, stop.table_g);
+    const auto run = level - levels_.begin();
+    if (level == levels_.end()) levels_.push_back(stop.table_g);
+    stops_.push_back({stop, static_cast<int>(run) + 1, static_cast<int>(stops_.size()) + 1});
+}
+
+void Campaign::plan_stops() {
+    stops_.clear();
+    levels_.clear();
+    at_ = 0;
+    repeats_ = 0;
+    for (const Stop& stop : settings_.stops) add_stop(stop);
+    if (settings_.stops.empty() && !settings_.adaptive) {
+        for (std::size_t run = 0; run < settings_.table_g.size(); ++run) {
+            for (std::size_t k = 0; k < settings_.positions_deg.size(); ++k) {
+                stops_.push_back({{settings_.positions_deg[k], settings_.table_g[run]},
+                                  static_cast<int>(run) + 1,
+                                  static_cast<int>(k) + 1});
+            }
+        }
+    }
+    expected_ = stops_.size();
+}
+
+bool Campaign::choose_next(Time now) {
+    if (!settings_.adaptive) return at_ < stops_.size();
+    const bool begun = at_ > 0;
+    if (begun && dwells_.back().flagged && repeats_ < kMostRepeats) {
+        ++repeats_;
+        const Stop again = stops_[at_ - 1].stop;
+        ports_.event(Severity::warning, "flagged dwell: the position is repeated");
+        add_stop(again);
+        expected_ = std::max(expected_, stops_.size());
+        return true;
+    }
+    repeats_ = 0;
+    const auto here = begun ? stops_[at_ - 1].stop.position_deg : std::array<double, 3>{};
+    const Next next = ports_.next(here, drivers::to_seconds(now - started_));
+    ports_.event(Severity::info, next.words);
+    if (!next.more) return false;
+    add_stop(next.stop);
+    expected_ = at_ + next.left;
+    return true;
+}
 
 bool Campaign::active() const {
     return state_ == State::waiting || state_ == State::slewing || state_ == State::ramping ||
@@ -93,20 +143,22 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (active()) return refuse("a campaign is running");
             if (state_ == State::tripped)
                 return refuse("tripped (" + reason_ + "): acknowledge it first");
+            if (!settings_.refusal.empty()) return refuse(settings_.refusal);
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             reason_.clear();
             enter(State::armed, now);
-            return accept(fmt::format("armed up to {:g} g at the table",
-                                      *std::ranges::max_element(settings_.table_g)));
+            return accept(fmt::format(
+                "armed up to {:g} g at the table",
+                *std::ranges::max_element(levels_.empty() ? settings_.table_g : levels_)));
         case Kind::start:
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
             ports_.begin();
-            place_ = {};
             positions_done_ = 0;
             dwells_.clear();
+            plan_stops();
             temperatures_.clear();
             pause_asked_ = false;
             started_ = now;
@@ -135,10 +187,9 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
 Time Campaign::step(Time now) {
     for (;;) {
         const State before = state_;
-        const Place place = place_;
+        const std::size_t at = at_;
         const Time next = step_once(now);
-        if (state_ == before && place.position == place_.position && place.run == place_.run)
-            return next;
+        if (state_ == before && at == at_) return next;
     }
 }
 
@@ -225,12 +276,15 @@ void Campaign::start_position(Time now) {
         }
         return;
     }
-    const auto& angle = settings_.positions_deg[place_.position];
+    if (at_ == stops_.size() && !choose_next(now)) {
+        armed_by_.clear();
+        return end(State::aborted, "nothing to do", now);
+    }
+    const auto& angle = here().stop.position_deg;
     ports_.event(
         Severity::info,
-        fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g", place_.run + 1,
-                    settings_.table_g.size(), place_.position + 1, settings_.positions_deg.size(),
-                    angle[0], angle[1], angle[2], table_g()));
+        fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g", here().run,
+                    runs(), here().position, positions(), angle[0], angle[1], angle[2], table_g()));
     enter(State::slewing, now);
 }
 
@@ -244,7 +298,7 @@ Time Campaign::slew(Time now) {
         return now;
     }
     if (!requested_) {
-        ports_.gimbal.slew_to(settings_.positions_deg[place_.position], now);
+        ports_.gimbal.slew_to(here().stop.position_deg, now);
         requested_ = true;
     }
     switch (ports_.gimbal.update(ports_.platform(), now)) {
@@ -309,8 +363,7 @@ Time Campaign::record(Time now) {
         rt::DwellOrder order;
         order.from = dwell_from_;
         order.to = dwell_to_;
-        order.dwell = {static_cast<int>(place_.run) + 1, static_cast<int>(place_.position) + 1,
-                       table_g()};
+        order.dwell = {here().run, here().position, table_g()};
         if (!ports_.order_dwell(order)) abort("the estimator takes no order", now);
         return now + kPoll;
     }
@@ -339,10 +392,7 @@ Time Campaign::record(Time now) {
 
 void Campaign::next_position(Time now) {
     ++positions_done_;
-    if (++place_.position == settings_.positions_deg.size()) {
-        place_.position = 0;
-        ++place_.run;
-    }
+    ++at_;
     enter(State::resting, now);
 }
 
@@ -353,9 +403,9 @@ Time Campaign::rest(Time now) {
         may_move_ = false;
         if (shutting_down_) {
             end(State::aborted, "the daemon is shutting down", now);
-        } else if (place_.run == settings_.table_g.size()) {
-            place_.run = settings_.table_g.size() - 1;
-            place_.position = settings_.positions_deg.size() - 1;
+        } else if (at_ == stops_.size() && at_ > 0 && !choose_next(now)) {
+            --at_;
+            expected_ = stops_.size();
             armed_by_.clear();
             enter(State::finished, now);
             ports_.end(true);
@@ -444,16 +494,15 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.state = state_;
     status.reason = reason_;
     status.armed_by = armed_by_;
-    status.runs = static_cast<int>(settings_.table_g.size());
-    status.positions = static_cast<int>(settings_.positions_deg.size());
+    status.runs = static_cast<int>(runs());
+    status.positions = static_cast<int>(positions());
     status.dwells = dwells_;
-    const auto total =
-        static_cast<double>(settings_.table_g.size() * settings_.positions_deg.size());
+    const auto total = static_cast<double>(std::max<std::size_t>(expected_, 1));
     const bool begun = active() || state_ == State::finished || !dwells_.empty();
-    if (begun && place_.run < settings_.table_g.size()) {
-        status.run = static_cast<int>(place_.run) + 1;
-        status.position = static_cast<int>(place_.position) + 1;
-        status.position_deg = settings_.positions_deg[place_.position];
+    if (begun && at_ < stops_.size()) {
+        status.run = here().run;
+        status.position = here().position;
+        status.position_deg = here().stop.position_deg;
     }
     double done = static_cast<double>(positions_done_);
     if (state_ == State::recording && dwell_to_ > dwell_from_) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <deque>
 #include <functional>
@@ -16,6 +18,14 @@
 
 namespace vibrig::campaign {
 
+/// What an adaptive campaign does next.
+struct Next {
+    bool more = false;  ///< else it ends
+    Stop stop;
+    std::size_t left = 0;  ///< runs, this one included, to be expected
+    std::string words;
+};
+
 /// What a campaign acts on and reports to. All calls come from the control thread.
 struct Ports {
     drivers::Gimbal& gimbal;
@@ -27,6 +37,8 @@ struct Ports {
     std::function<void()> begin;             ///< a new campaign: forget earlier dwells
     std::function<void(bool complete)> end;  ///< write what there is
     std::function<void(Severity, const std::string&)> event;
+    /// Adaptive campaigns: what to do next, at these gimbal angles, so many s after the start.
+    std::function<Next(const std::array<double, 3>& here_deg, double elapsed_s)> next = {};
 };
 
 /// The campaign as a state machine: for each run and position slew, ramp, settle, record, rest.
@@ -48,8 +60,10 @@ class Campaign {
     void fill(StatusData& status, drivers::Time now) const;
 
   private:
-    struct Place {
-        std::size_t run = 0, position = 0;  ///< from 0
+    /// A stop and what the estimator and people call it, from 1.
+    struct NumberedStop {
+        Stop stop;
+        int run = 1, position = 1;
     };
 
     drivers::Time step_once(drivers::Time now);
@@ -66,7 +80,20 @@ class Campaign {
     void leave_dwell();
     [[nodiscard]] std::string not_fit_to_excite() const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading) const;
-    [[nodiscard]] double table_g() const { return settings_.table_g[place_.run]; }
+    void plan_stops();
+    /// Runs and positions per run of a list; of a plan the levels and all its stops.
+    [[nodiscard]] std::size_t runs() const {
+        return listed() ? settings_.table_g.size() : std::max<std::size_t>(levels_.size(), 1);
+    }
+    [[nodiscard]] std::size_t positions() const {
+        return listed() ? settings_.positions_deg.size() : expected_;
+    }
+    [[nodiscard]] bool listed() const { return settings_.stops.empty() && !settings_.adaptive; }
+    void add_stop(const Stop& stop);
+    /// At rest: false when the campaign is at its end.
+    [[nodiscard]] bool choose_next(drivers::Time now);
+    [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
+    [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
 
     Settings settings_;
@@ -74,7 +101,11 @@ class Campaign {
     CampaignState state_ = CampaignState::idle;
     drivers::Time entered_ = 0;  ///< when state_ began
     drivers::Time started_ = 0;  ///< when the campaign began
-    Place place_;
+    std::vector<NumberedStop> stops_;
+    std::size_t at_ = 0;          ///< the stop that is being done
+    std::size_t expected_ = 0;    ///< stops in all, as far as can be foreseen
+    std::vector<double> levels_;  ///< one run each, in order of appearance
+    int repeats_ = 0;             ///< of the present stop, after flagged dwells
     std::string armed_by_;
     std::string reason_;
     bool pause_asked_ = false;

@@ -13,6 +13,7 @@
 #include "daemon/configuration/nearest.hpp"
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
+#include "daemon/plan/plan_file.hpp"
 
 namespace vibrig::configuration {
 
@@ -140,6 +141,22 @@ toml::table parse_toml(const std::string& text, const std::string& name) {
 
 }  // namespace
 
+namespace {
+
+/// The plan's dwells, one by one; its levels stand in for table_g and are checked like them.
+void take_plan(Configuration& c) {
+    c.campaign.table_g.clear();
+    for (const auto& run : plan::read_plan(c.campaign.plan, c.estimator.transmission)) {
+        c.campaign.stops.insert(c.campaign.stops.end(), run.count,
+                                campaign::Stop{run.position_deg, run.table_g});
+        auto& levels = c.campaign.table_g;
+        if (std::find(levels.begin(), levels.end(), run.table_g) == levels.end())
+            levels.push_back(run.table_g);
+    }
+}
+
+}  // namespace
+
 Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     const toml::table table = parse_toml(text, name);
     Loaded loaded;
@@ -153,6 +170,17 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     c.shaker.registers.amplitude.scale *= factor;
     c.shaker.registers.measured_amplitude.scale *= factor;
     c.campaign.frequency_hz = c.estimator.frequency_hz;
+
+    resolve(c.campaign.plan, std::filesystem::path(name).parent_path());
+    if (!c.campaign.plan.empty()) {
+        try {
+            take_plan(c);
+        } catch (const plan::PlanFileError& error) {
+            const auto& places = reader.places();
+            problems.add(places.at("campaign.plan"), "campaign.plan", error.what(),
+                         "a plan for this rig");
+        }
+    }
 
     CrossCheck check(c, reader.places(), problems);
     check.everywhere();

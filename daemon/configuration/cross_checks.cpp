@@ -74,9 +74,27 @@ void CrossCheck::for_daemon() {
                    " with ready_timeout_s " + plain(c_.campaign.ready_timeout_s),
                "a window shorter than the timeout");
     }
+    adaptive();
     set_points_fit();
     limits();
     frequency();
+}
+
+void CrossCheck::adaptive() {
+    if (!sound({"campaign.adaptive"}) || !c_.campaign.adaptive) return;
+    if (!c_.campaign.plan.empty()) {
+        refuse({"campaign.adaptive", "campaign.plan"}, "an adaptive campaign with a plan file",
+               "one of them");
+    }
+    if (!(c_.campaign.target_bias > 0 || c_.campaign.target_linear > 0 ||
+          c_.campaign.target_quadratic > 0)) {
+        refuse({"campaign.adaptive"}, "true without campaign.targets",
+               "a target for bias, linear or quadratic terms");
+    }
+    if (c_.estimator.method != estimator::Method::joint) {
+        refuse({"campaign.adaptive", "estimator.method"}, "true with the two-step route",
+               "estimator.method \"joint\"");
+    }
 }
 
 void CrossCheck::bus() {

@@ -24,6 +24,31 @@ void add_campaign_keys(std::vector<Key>& keys) {
         "campaign.table_g", "g", {0, 1000}, kMostRuns,
         "peak acceleration at the table, one run each; 0: at rest",
         [](C & c) -> auto& { return c.campaign.table_g; }));
+    keys.push_back(text(
+        "campaign.plan", "a file",
+        "plan of `vibrig plan -o`, in place of positions_deg and table_g; empty: none", path_rule,
+        [](C & c) -> auto& { return c.campaign.plan; }));
+    keys.push_back(choice<bool>(
+        "campaign.identify", {{"all", true}, {"what-it-can", false}},
+        "all: a campaign that cannot determine all 30 coefficients is not armed",
+        [](C & c) -> auto& { return c.campaign.identify_all; }));
+    keys.push_back(boolean(
+        "campaign.adaptive",
+        "dwells chosen one by one, at the levels table_g, until the standard "
+        "errors are down to targets",
+        [](C & c) -> auto& { return c.campaign.adaptive; }));
+    keys.push_back(number("campaign.targets.bias", "deg/h", {0, 1000},
+                          "standard error to reach; 0: any",
+                          [](C& c) -> double& { return c.campaign.target_bias; }));
+    keys.push_back(number("campaign.targets.linear", "deg/h/g", {0, 1000},
+                          "standard error to reach; 0: any",
+                          [](C& c) -> double& { return c.campaign.target_linear; }));
+    keys.push_back(number("campaign.targets.quadratic", "deg/h/g^2", {0, 1000},
+                          "standard error to reach; 0: any",
+                          [](C& c) -> double& { return c.campaign.target_quadratic; }));
+    keys.push_back(number("campaign.time_limit_s", "s", {0, 1e7},
+                          "an adaptive campaign ends before it; 0: none",
+                          [](C& c) -> double& { return c.campaign.time_limit_s; }));
     keys.push_back(number("campaign.dwell_s", "s", {2, 86'400}, "recorded at each position",
                           [](C& c) -> double& { return c.campaign.dwell_s; }));
     keys.push_back(number("campaign.settle_s", "s", {2, 3600},

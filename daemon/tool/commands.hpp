@@ -10,6 +10,7 @@ namespace vibrig::tool {
 /// result says no, 2: bad usage or input) and has printed why to standard error.
 void add_identify(CLI::App& app, int& exit_code);
 void add_allan(CLI::App& app, int& exit_code);
+void add_plan(CLI::App& app, int& exit_code);
 void add_reproduce(CLI::App& app, int& exit_code);
 void add_remote(CLI::App& app,
                 int& exit_code);  ///< status, watch, events, arm, start, pause, resume, abort, ack

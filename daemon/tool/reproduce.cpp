@@ -30,6 +30,7 @@ struct Entry {
 constexpr std::array kEntries{
     Entry{"tang2009", reproduce_tang2009},
     Entry{"allan", reproduce_allan},
+    Entry{"dplan", reproduce_dplan},
 };
 
 bool agrees(const Reproduction& reproduction) {

@@ -30,5 +30,6 @@ struct Reproduction {
 // One function for each name in the table of reproduce.cpp.
 [[nodiscard]] Reproduction reproduce_allan(const ReproduceOptions& options);
 [[nodiscard]] Reproduction reproduce_tang2009(const ReproduceOptions& options);
+[[nodiscard]] Reproduction reproduce_dplan(const ReproduceOptions& options);
 
 }  // namespace vibrig::tool

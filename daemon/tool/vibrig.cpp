@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
     int exit_code = 0;
     vibrig::tool::add_identify(app, exit_code);
     vibrig::tool::add_allan(app, exit_code);
+    vibrig::tool::add_plan(app, exit_code);
     vibrig::tool::add_reproduce(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
     try {

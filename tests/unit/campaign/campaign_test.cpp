@@ -61,7 +61,14 @@ struct CampaignTest : testing::Test {
                                 ++ends;
                                 complete = c;
                             },
-                            [this](Severity, const std::string& text) { events.push_back(text); }});
+                            [this](Severity, const std::string& text) { events.push_back(text); },
+                            [this](const std::array<double, 3>& here, double) {
+                                asked_from.push_back(here);
+                                return asked_from.size() <= stops_to_choose.size()
+                                           ? Next{true, stops_to_choose[asked_from.size() - 1], 1,
+                                                  "more"}
+                                           : Next{false, {}, 0, "every target is met"};
+                            }});
     }
 
     CampaignTest() {
@@ -115,11 +122,15 @@ struct CampaignTest : testing::Test {
             estimator::DwellSummary summary;
             summary.run = orders.back().dwell.run;
             summary.position = orders.back().dwell.position;
+            summary.flagged = orders.size() == flagged_order;
             campaign->on_dwell_done(summary);
         }
         campaign->step(now);
     }
     std::size_t reported = 0;
+    std::size_t flagged_order = 0;
+    std::vector<Stop> stops_to_choose;
+    std::vector<std::array<double, 3>> asked_from;
 
     void run_for(double seconds) {
         for (int i = 0; i < static_cast<int>(seconds * 10); ++i) run_rig();
@@ -287,6 +298,53 @@ TEST_F(CampaignTest, ShutsDownByRampingToRestFirst) {
     EXPECT_TRUE(shaker.now.at_rest());
     EXPECT_EQ(shaker.stops, 0) << "ramped down, not cut";
     EXPECT_FALSE(command(Kind::arm).accepted);
+}
+
+TEST_F(CampaignTest, RunsThePlanFilesStopsInTheirOrder) {
+    // GIVEN a plan that changes the level from stop to stop
+    settings.stops = {{{0, 0, 0}, 9}, {{0, 0, 90}, 0}, {{90, 0, 0}, 9}};
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    // THEN the dwells are those, a level is a run, and slews wait for rest
+    ASSERT_EQ(orders.size(), 3U);
+    const std::array<int, 3> runs{1, 2, 1};
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(orders[i].dwell.table_g, settings.stops[i].table_g);
+        EXPECT_EQ(orders[i].dwell.run, runs[i]);
+        EXPECT_EQ(orders[i].dwell.position, static_cast<int>(i) + 1);
+    }
+    EXPECT_FALSE(slewed_while_moving);
+    EXPECT_EQ(status().progress, 1.0);
+}
+
+TEST_F(CampaignTest, AnAdaptiveCampaignRepeatsFlaggedDwellsAndEndsWhenToldTo) {
+    // GIVEN two dwells to be chosen, of which the first is flagged
+    settings.adaptive = true;
+    stops_to_choose = {{{0, 0, 45}, 9}, {{0, 0, 90}, 0}};
+    flagged_order = 1;
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    // THEN the flagged one is done again before the next choice
+    ASSERT_EQ(orders.size(), 3U);
+    EXPECT_EQ(orders[1].dwell.table_g, 9);
+    EXPECT_EQ(orders[2].dwell.table_g, 0);
+    ASSERT_EQ(asked_from.size(), 3U) << "the last answer was to end";
+    EXPECT_EQ(asked_from[1], stops_to_choose[0].position_deg);
+    EXPECT_TRUE(complete);
+    EXPECT_NE(std::ranges::find(events, "every target is met"), events.end());
+    EXPECT_NE(std::ranges::find(events, "flagged dwell: the position is repeated"), events.end());
+}
+
+TEST_F(CampaignTest, WhatCannotIdentifyIsNotArmed) {
+    settings.refusal = "rank 9 of 10";
+    make();
+    const auto reply = command(Kind::arm);
+    EXPECT_FALSE(reply.accepted);
+    EXPECT_EQ(reply.message, "rank 9 of 10");
 }
 
 }  // namespace

@@ -1,0 +1,57 @@
+#include "daemon/campaign_forecast.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/plan/forecast.hpp"
+
+namespace vibrig {
+
+namespace {
+
+double period_s(const configuration::Configuration& c) {
+    return drivers::to_seconds(c.assembler.sample_period);
+}
+
+std::vector<plan::PlannedRun> runs_of(const campaign::Settings& campaign, double transmission) {
+    std::vector<plan::PlannedRun> runs;
+    const auto add = [&](const std::array<double, 3>& position, double table_g) {
+        runs.push_back({position, table_g * transmission, table_g, 1});
+    };
+    for (const auto& stop : campaign.stops) add(stop.position_deg, stop.table_g);
+    if (!runs.empty()) return runs;
+    for (const double table_g : campaign.table_g) {
+        for (const auto& position : campaign.positions_deg) add(position, table_g);
+    }
+    return runs;
+}
+
+}  // namespace
+
+std::optional<plan::AdaptivePlan> adaptive_plan(const configuration::Configuration& c) {
+    if (!c.campaign.adaptive) return std::nullopt;
+    plan::AdaptiveSettings settings;
+    settings.table_g = c.campaign.table_g;
+    settings.target = {c.campaign.target_bias, c.campaign.target_linear,
+                       c.campaign.target_quadratic};
+    settings.timing.dwell_s = c.campaign.dwell_s;
+    settings.timing.settle_s = c.campaign.settle_s;
+    settings.timing.ramp_s = c.campaign.ramp_s;
+    settings.time_limit_s = c.campaign.time_limit_s;
+    settings.period_s = period_s(c);
+    return plan::AdaptivePlan(c.estimator, settings);
+}
+
+std::string forecast_campaign(configuration::Configuration& c) {
+    if (c.campaign.adaptive) return "adaptive campaign: " + adaptive_plan(c)->outlook().words;
+    const auto forecast = plan::forecast(c.estimator, runs_of(c.campaign, c.estimator.transmission),
+                                         c.campaign.dwell_s, period_s(c));
+    std::string text = plan::forecast_table(forecast);
+    if (!forecast.warning.empty()) text += "warning: " + forecast.warning + '\n';
+    if (!forecast.identifies_all) {
+        text += "this campaign does not determine everything: " + forecast.refusal + '\n';
+        if (c.campaign.identify_all) c.campaign.refusal = forecast.refusal;
+    }
+    return text;
+}
+
+}  // namespace vibrig

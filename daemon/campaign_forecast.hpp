@@ -1,0 +1,20 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/plan/adaptive.hpp"
+
+namespace vibrig {
+
+/// The planner of an adaptive campaign; nothing for any other. Throws std::runtime_error if its
+/// levels cannot determine all coefficients.
+[[nodiscard]] std::optional<plan::AdaptivePlan> adaptive_plan(
+    const configuration::Configuration& configuration);
+
+/// What the configured campaign will know at its end, in words. Sets the campaign's refusal if it
+/// cannot determine what is asked.
+[[nodiscard]] std::string forecast_campaign(configuration::Configuration& configuration);
+
+}  // namespace vibrig

@@ -1,0 +1,119 @@
+#include "daemon/plan/adaptive.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "daemon/plan/forecast.hpp"
+#include "estimator/crlb.hpp"
+#include "estimator/parameters.hpp"
+#include "estimator/plan/positions.hpp"
+
+namespace vibrig::plan {
+
+namespace {
+
+/// A plan that needs more is not foreseen to its end.
+constexpr std::size_t kFarthest = 60;
+
+std::size_t kind_of(std::size_t parameter) {
+    const std::size_t term = parameter % 10;
+    return term == 0 ? 0 : term < 4 ? 1 : 2;
+}
+
+constexpr std::array<const char*, 3> kKinds{"bias", "linear", "quadratic"};
+
+}  // namespace
+
+AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSettings& adaptive)
+    : adaptive_(adaptive) {
+    if (!(*std::max_element(adaptive.target.begin(), adaptive.target.end()) > 0)) {
+        throw std::runtime_error(
+            "found an adaptive campaign without targets, expected one at least");
+    }
+    const double dwell_s = adaptive.timing.dwell_s;
+    for (const double table_g : adaptive.table_g) {
+        for (const auto& direction : planning::cube_directions()) {
+            const auto position = planning::position_for(settings.up, direction, {});
+            if (!position) continue;
+            const PlannedRun run{*position, table_g * settings.transmission, table_g, 1};
+            candidates_.push_back(run);
+            experiments_.push_back(
+                {estimator::rate_rows(settings,
+                                      {*position, planning::kappa_of(run.level_g), dwell_s}, {},
+                                      adaptive.period_s),
+                 time_of(run, *position)});
+        }
+    }
+    const Forecast all = forecast(settings, candidates_, dwell_s, adaptive.period_s);
+    if (!all.identifies_all) throw std::runtime_error("adaptive campaign: " + all.refusal);
+    const auto prior = estimator::prior_sigma(settings);
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        target_.push_back(adaptive.target[kind_of(i)]);
+        prior_.push_back(prior[estimator::internal_of(i)]);
+    }
+}
+
+double AdaptivePlan::time_of(const PlannedRun& run, const std::array<double, 3>& here_deg) const {
+    return planning::slew_s(here_deg, run.position_deg, adaptive_.timing) +
+           adaptive_.timing.settle_s + adaptive_.timing.dwell_s +
+           (run.table_g > 0 ? 2 * adaptive_.timing.ramp_s : 0);
+}
+
+AdaptivePlan::Decision AdaptivePlan::outlook() const {
+    return next(planning::covariance_after(prior_, experiments_, {}), {}, 0);
+}
+
+AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
+                                          const std::array<double, 3>& here_deg,
+                                          double elapsed_s) const {
+    Decision decision;
+    const auto plan = planning::augment(covariance, experiments_, target_, kFarthest);
+    std::array<double, 3> worst{};
+    for (std::size_t i = 0; i < target_.size(); ++i) {
+        const double sigma = std::sqrt(covariance[i * target_.size() + i]);
+        worst[kind_of(i)] = std::max(worst[kind_of(i)], sigma);
+    }
+    std::string state = "largest standard errors";
+    std::string unmet;
+    for (std::size_t k = 0; k < worst.size(); ++k) {
+        std::array<char, 80> text{};
+        std::snprintf(text.data(), text.size(), "%s %s %.3g", k == 0 ? "" : ",", kKinds[k],
+                      worst[k]);
+        state += text.data();
+        if (!(adaptive_.target[k] > 0)) continue;
+        std::snprintf(text.data(), text.size(), " (target %.3g)", adaptive_.target[k]);
+        state += text.data();
+        if (worst[k] > adaptive_.target[k])
+            unmet += (unmet.empty() ? "" : ", ") + std::string(kKinds[k]);
+    }
+    if (plan.runs.empty()) {
+        decision.verdict = Verdict::targets_met;
+        decision.words = "every target is met: " + state;
+        return decision;
+    }
+    decision.run = candidates_[plan.runs.front()];
+    decision.left = plan.runs.size();
+    auto at = here_deg;
+    for (const std::size_t j : plan.runs) {
+        decision.left_s += time_of(candidates_[j], at);
+        at = candidates_[j].position_deg;
+    }
+    const bool over = adaptive_.time_limit_s > 0 &&
+                      elapsed_s + time_of(decision.run, here_deg) > adaptive_.time_limit_s;
+    if (over) {
+        decision.verdict = Verdict::time_limit;
+        decision.words = "the time limit has come; targets missed: " + unmet + "; " + state;
+        return decision;
+    }
+    std::array<char, 120> text{};
+    std::snprintf(text.data(), text.size(), "; %s%zu more dwells, %.0f s",
+                  plan.met ? "" : "more than ", decision.left, decision.left_s);
+    decision.words = state + text.data();
+    if (adaptive_.time_limit_s > 0 && elapsed_s + decision.left_s > adaptive_.time_limit_s) {
+        decision.words += ": the time limit will come first";
+    }
+    return decision;
+}
+
+}  // namespace vibrig::plan

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "daemon/plan/plan_file.hpp"
+#include "estimator/identification.hpp"
+#include "estimator/plan/augmentation.hpp"
+#include "estimator/plan/order.hpp"
+
+namespace vibrig::plan {
+
+namespace planning = estimator::plan;
+
+struct AdaptiveSettings {
+    std::vector<double> table_g;     ///< levels to choose from, peak at the table
+    std::array<double, 3> target{};  ///< sigma of bias, linear, quadratic terms; 0: any
+    planning::Timing timing;         ///< of one dwell
+    double time_limit_s = 0;         ///< 0: none
+    double period_s = 0.025;         ///< between samples
+};
+
+/// Chooses a campaign's dwells one by one from the filter's own covariance: the cheapest plan that
+/// still brings every coefficient to its target, of which the most informative dwell is done next.
+/// Candidates are the 26 directions of the cube at every level.
+class AdaptivePlan {
+  public:
+    /// Throws std::runtime_error if the levels cannot determine all coefficients or no target is
+    /// set.
+    AdaptivePlan(const estimator::Settings& settings, const AdaptiveSettings& adaptive);
+
+    enum class Verdict : unsigned char { go_on, targets_met, time_limit };
+    struct Decision {
+        Verdict verdict = Verdict::go_on;
+        PlannedRun run;        ///< next, if it goes on
+        std::size_t left = 0;  ///< dwells to be expected, the next included
+        double left_s = 0;
+        std::string words;  ///< for the log
+    };
+
+    /// `covariance` 30 x 30, row-major, order of parameter_names(); `here` the present gimbal
+    /// angles. Takes some tenths of a second: not for a thread that must answer at once.
+    [[nodiscard]] Decision next(const std::vector<double>& covariance,
+                                const std::array<double, 3>& here_deg, double elapsed_s) const;
+
+    /// Before anything is measured, with the prior of the settings.
+    [[nodiscard]] Decision outlook() const;
+
+  private:
+    [[nodiscard]] double time_of(const PlannedRun& run,
+                                 const std::array<double, 3>& here_deg) const;
+
+    AdaptiveSettings adaptive_;
+    std::vector<PlannedRun> candidates_;
+    std::vector<planning::Experiment> experiments_;
+    std::vector<double> target_, prior_;
+};
+
+}  // namespace vibrig::plan

@@ -1,0 +1,239 @@
+#include "daemon/plan/plan_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+
+#include "proto/text.hpp"
+
+namespace vibrig::plan {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kLargestFile = 16U << 20U;
+constexpr std::size_t kMostRuns = 100'000;
+constexpr double kMostG = 1000;
+constexpr double kMostInner = 80;  // beyond it the gimbals lock
+constexpr double kAgreement = 0.01;
+constexpr double kAtRestG = 1e-9;
+
+std::string number(double value) { return Json(value).dump(); }
+
+[[noreturn]] void refuse(const std::string& place, const std::string& found,
+                         const std::string& expected) {
+    throw PlanFileError(place + ": found " + found + ", expected " + expected);
+}
+
+std::string content_of(const std::string& path) {
+    try {
+        return proto::read_whole_file(path, kLargestFile);
+    } catch (const std::runtime_error& error) {
+        throw PlanFileError(path + ": " + error.what());
+    }
+}
+
+void check_position(const std::array<double, 3>& position, const std::string& place) {
+    for (const double angle : position) {
+        if (!(std::abs(angle) <= 360))
+            refuse(place, number(angle), "an angle from -360 to 360 deg");
+    }
+    if (std::abs(std::remainder(position[1], 360.0)) > kMostInner) {
+        refuse(place, "an inner angle of " + number(position[1]) + " deg",
+               "at most 80: beyond it the gimbals lock");
+    }
+}
+
+/// Levels at the platform and at the table from what the file has of them.
+void join_levels(PlannedRun& run, std::optional<double> level, std::optional<double> table,
+                 double transmission, const std::string& place) {
+    for (const auto& g : {level, table}) {
+        if (g && !(*g >= 0 && *g <= kMostG)) refuse(place, number(*g), "0 to 1000 g");
+    }
+    if (!level && !table) refuse(place, "neither level_g nor table_g", "one of them");
+    run.level_g = level ? *level : *table * transmission;
+    run.table_g = table ? *table : *level / transmission;
+    if (std::abs(run.level_g - run.table_g * transmission) >
+        std::max(kAtRestG, kAgreement * run.level_g)) {
+        refuse(place,
+               number(run.level_g) + " g at the platform with " + number(run.table_g) +
+                   " g at the table",
+               "platform over table to be the transmission " + number(transmission));
+    }
+}
+
+std::optional<double> number_at(const Json& run, const char* key, const std::string& place) {
+    const auto found = run.find(key);
+    if (found == run.end()) return std::nullopt;
+    if (!found->is_number()) refuse(place + "." + key, found->dump(), "a number");
+    return found->get<double>();
+}
+
+PlannedRun from_json(const Json& json, double transmission, const std::string& place) {
+    if (!json.is_object()) refuse(place, json.dump().substr(0, 60), "an object");
+    PlannedRun run;
+    const auto position = json.find("position");
+    if (position == json.end() || !position->is_array() || position->size() != 3 ||
+        !std::all_of(position->begin(), position->end(),
+                     [](const Json& x) { return x.is_number(); })) {
+        refuse(place + ".position",
+               position == json.end() ? "nothing" : position->dump().substr(0, 60),
+               "[alpha, beta, gamma] in deg");
+    }
+    for (std::size_t k = 0; k < 3; ++k) run.position_deg[k] = (*position)[k].get<double>();
+    check_position(run.position_deg, place + ".position");
+    join_levels(run, number_at(json, "level_g", place), number_at(json, "table_g", place),
+                transmission, place);
+    if (const auto count = number_at(json, "count", place)) {
+        if (!(*count >= 1 && *count <= kMostRuns && *count == std::floor(*count))) {
+            refuse(place + ".count", number(*count), "a whole number from 1");
+        }
+        run.count = static_cast<std::size_t>(*count);
+    }
+    return run;
+}
+
+std::vector<PlannedRun> runs_from_json(const std::string& text, const std::string& path,
+                                       double transmission) {
+    Json json;
+    try {
+        json = Json::parse(text);
+    } catch (const Json::exception& error) {
+        throw PlanFileError(path + ": not JSON: " + proto::printable(error.what()));
+    }
+    const auto runs = json.find("runs");
+    if (runs == json.end() || !runs->is_array()) refuse(path, "no array \"runs\"", "a plan");
+    std::vector<PlannedRun> result;
+    for (const Json& run : *runs) {
+        result.push_back(
+            from_json(run, transmission, path + ": runs[" + std::to_string(result.size()) + "]"));
+    }
+    return result;
+}
+
+struct Table {
+    std::vector<std::string> names;
+    std::vector<std::vector<double>> rows;  ///< NaN: empty field
+    std::vector<std::size_t> lines;
+
+    [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const {
+        const auto at = std::find(names.begin(), names.end(), name);
+        if (at == names.end()) return std::nullopt;
+        return static_cast<std::size_t>(at - names.begin());
+    }
+};
+
+std::vector<std::string_view> split(std::string_view line) {
+    std::vector<std::string_view> fields;
+    for (;;) {
+        const std::size_t end = std::min(line.find(','), line.size());
+        std::string_view field = line.substr(0, end);
+        while (!field.empty() &&
+               std::string_view(" \t\r\"").find(field.front()) != std::string::npos)
+            field.remove_prefix(1);
+        while (!field.empty() &&
+               std::string_view(" \t\r\"").find(field.back()) != std::string::npos)
+            field.remove_suffix(1);
+        fields.push_back(field);
+        if (end == line.size()) return fields;
+        line.remove_prefix(end + 1);
+    }
+}
+
+Table read_table(const std::string& text, const std::string& path,
+                 const std::vector<std::string_view>& wanted) {
+    Table table;
+    std::string_view rest = proto::without_byte_order_mark(text);
+    for (std::size_t number = 1; !rest.empty(); ++number) {
+        const std::size_t end = std::min(rest.find('\n'), rest.size());
+        const auto fields = split(rest.substr(0, end));
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        if (fields.size() == 1 && fields[0].empty()) continue;
+        const std::string place = path + ":" + std::to_string(number);
+        if (table.names.empty()) {
+            table.names.assign(fields.begin(), fields.end());
+            for (const auto& name : table.names) {
+                if (std::count(table.names.begin(), table.names.end(), name) > 1)
+                    refuse(place, "column " + proto::printable(name) + " twice", "it once");
+            }
+            continue;
+        }
+        std::vector<double> row(table.names.size(), std::nan(""));
+        for (std::size_t c = 0; c < table.names.size(); ++c) {
+            if (std::find(wanted.begin(), wanted.end(), table.names[c]) == wanted.end()) continue;
+            const std::string_view field = c < fields.size() ? fields[c] : "";
+            if (field.empty() || !proto::read_number(field, row[c]) || !std::isfinite(row[c])) {
+                refuse(place + ": column " + table.names[c],
+                       field.empty() ? "nothing" : "'" + proto::printable(field) + "'", "a number");
+            }
+        }
+        table.rows.push_back(std::move(row));
+        table.lines.push_back(number);
+    }
+    if (table.rows.empty()) refuse(path, "no row after a header", "positions");
+    return table;
+}
+
+std::vector<std::array<double, 3>> positions_of(const Table& table, const std::string& path) {
+    std::vector<std::array<double, 3>> result(table.rows.size());
+    for (std::size_t k = 0; k < 3; ++k) {
+        const auto* name = std::array{"alpha_deg", "beta_deg", "gamma_deg"}[k];
+        const auto column = table.find(name);
+        if (!column) refuse(path + ":1", "no column " + std::string(name), "one");
+        for (std::size_t i = 0; i < result.size(); ++i) result[i][k] = table.rows[i][*column];
+    }
+    for (std::size_t i = 0; i < result.size(); ++i) {
+        check_position(result[i], path + ":" + std::to_string(table.lines[i]));
+    }
+    return result;
+}
+
+std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string& path,
+                                      double transmission) {
+    const Table table = read_table(
+        text, path, {"alpha_deg", "beta_deg", "gamma_deg", "level_g", "table_g", "count"});
+    const auto positions = positions_of(table, path);
+    const auto level = table.find("level_g"), table_g = table.find("table_g"),
+               count = table.find("count");
+    std::vector<PlannedRun> result(positions.size());
+    for (std::size_t i = 0; i < result.size(); ++i) {
+        const std::string place = path + ":" + std::to_string(table.lines[i]);
+        const auto& row = table.rows[i];
+        result[i].position_deg = positions[i];
+        join_levels(result[i], level ? std::optional(row[*level]) : std::nullopt,
+                    table_g ? std::optional(row[*table_g]) : std::nullopt, transmission, place);
+        if (count) {
+            if (!(row[*count] >= 1 && row[*count] <= kMostRuns &&
+                  row[*count] == std::floor(row[*count])))
+                refuse(place + ": column count", number(row[*count]), "a whole number from 1");
+            result[i].count = static_cast<std::size_t>(row[*count]);
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
+std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
+    const std::string text = content_of(path);
+    const std::size_t first = text.find_first_not_of(" \t\r\n");
+    auto runs = first != std::string::npos && text[first] == '{'
+                    ? runs_from_json(text, path, transmission)
+                    : runs_from_csv(text, path, transmission);
+    std::size_t sum = 0;
+    for (const PlannedRun& run : runs) sum += run.count;
+    if (runs.empty() || sum > kMostRuns) {
+        refuse(path, std::to_string(sum) + " runs", "1 to " + std::to_string(kMostRuns));
+    }
+    return runs;
+}
+
+std::vector<std::array<double, 3>> read_positions(const std::string& path) {
+    return positions_of(read_table(content_of(path), path, {"alpha_deg", "beta_deg", "gamma_deg"}),
+                        path);
+}
+
+}  // namespace vibrig::plan

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace vibrig::plan {
+
+/// "file:line: column: found X, expected Y", or the place in a JSON file.
+class PlanFileError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+struct PlannedRun {
+    std::array<double, 3> position_deg{};  ///< outer, inner, azimuth
+    double level_g = 0;                    ///< peak at the platform
+    double table_g = 0;                    ///< peak at the table: what the shaker is told
+    std::size_t count = 1;
+};
+
+/// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; others
+/// ignored), or CSV with the columns alpha_deg, beta_deg, gamma_deg, level_g or table_g, and count
+/// if not 1. Where one level is missing, `transmission` (platform over table) gives it; where both
+/// are there and disagree by more than 1 %, the file is refused. Throws PlanFileError.
+[[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path, double transmission);
+
+/// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError.
+[[nodiscard]] std::vector<std::array<double, 3>> read_positions(const std::string& path);
+
+}  // namespace vibrig::plan

@@ -1,0 +1,193 @@
+#include "estimator/plan/exact.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "estimator/plan/algebra.hpp"
+#include "estimator/plan/evaluation.hpp"
+
+namespace vibrig::estimator::plan {
+
+namespace {
+
+/// An exchange that gains less is rounding.
+constexpr double kLeastFactor = 1e-9;
+constexpr int kRefactor = 20;
+constexpr double kRidge = 1e-6;
+/// Multiply-adds of all starts together, roughly.
+constexpr double kStartsWork = 6e8;
+
+class Fedorov {
+  public:
+    Fedorov(const Matrix& g, Matrix kept) : g_(g), kept_(std::move(kept)) {}
+
+    void start(std::size_t runs, std::mt19937_64& random) {
+        std::uniform_int_distribution<Eigen::Index> any(0, g_.rows() - 1);
+        const auto p = g_.cols();
+        information_ = kept_ + kRidge * Matrix::Identity(p, p);
+        in_plan_.clear();
+        // Half at random, the other half where least is known: rarely singular, never the same.
+        for (std::size_t k = 0; k < runs; ++k) {
+            Eigen::Index i = any(random);
+            if (k >= runs / 2) {
+                inverse_ = information_.llt().solve(Matrix::Identity(p, p));
+                (g_ * inverse_).cwiseProduct(g_).rowwise().sum().maxCoeff(&i);
+            }
+            in_plan_.push_back(i);
+            information_ += g_.row(i).transpose() * g_.row(i);
+        }
+    }
+
+    /// Returns log det; -infinity if the plan is singular.
+    double climb() {
+        for (int swaps = 0;; ++swaps) {
+            if (swaps % kRefactor == 0 && !refactor()) {
+                return -std::numeric_limits<double>::infinity();
+            }
+            if (!swap_best()) break;
+        }
+        return refactor() ? log_det_ : -std::numeric_limits<double>::infinity();
+    }
+
+    [[nodiscard]] Counts counts() const {
+        Counts result(static_cast<std::size_t>(g_.rows()), 0);
+        for (const Eigen::Index i : in_plan_) ++result[static_cast<std::size_t>(i)];
+        return result;
+    }
+
+  private:
+    bool refactor() {
+        information_ = kept_;
+        for (const Eigen::Index i : in_plan_) information_ += g_.row(i).transpose() * g_.row(i);
+        const Eigen::LLT<Matrix> factor(information_);
+        if (factor.info() != Eigen::Success) return false;
+        const Matrix lower = factor.matrixL();
+        if (!(lower.diagonal().minCoeff() > 1e-9)) return false;
+        log_det_ = 2 * lower.diagonal().array().log().sum();
+        inverse_ = factor.solve(Matrix::Identity(g_.cols(), g_.cols()));
+        return true;
+    }
+
+    bool swap_best() {
+        const Matrix gw = g_ * inverse_;
+        const Vector d = gw.cwiseProduct(g_).rowwise().sum();
+        double best = 1 + kLeastFactor;
+        std::size_t out = in_plan_.size();
+        Eigen::Index in = 0;
+        Eigen::Index before = -1;
+        for (std::size_t k = 0; k < in_plan_.size(); ++k) {
+            const Eigen::Index i = in_plan_[k];
+            if (i == before) continue;
+            before = i;
+            const Vector dij = gw * g_.row(i).transpose();
+            Eigen::Index j = 0;
+            const double factor =
+                (1 + d.array() - d[i] - (d[i] * d.array() - dij.array().square())).maxCoeff(&j);
+            if (factor > best) {
+                best = factor;
+                out = k;
+                in = j;
+            }
+        }
+        if (out == in_plan_.size()) return false;
+        // One in, one out, each by Sherman and Morrison's formula.
+        for (const auto& [row, sign] : {std::pair{in, 1.0}, std::pair{in_plan_[out], -1.0}}) {
+            const Vector w = inverse_ * g_.row(row).transpose();
+            inverse_ -= sign / (1 + sign * g_.row(row).dot(w)) * w * w.transpose();
+        }
+        in_plan_[out] = in;
+        std::sort(in_plan_.begin(), in_plan_.end());
+        return true;
+    }
+
+    const Matrix& g_;
+    Matrix kept_, information_, inverse_;
+    std::vector<Eigen::Index> in_plan_;
+    double log_det_ = 0;
+};
+
+}  // namespace
+
+Effort effort_of(const Counts& counts) { return {counts.begin(), counts.end()}; }
+
+Counts exact_design(const Problem& problem, std::size_t runs, const ExactSearch& search) {
+    Vector scale;
+    const Matrix g = scaled_rows(problem, scale);
+    Matrix kept = Matrix::Zero(g.cols(), g.cols());
+    std::size_t done = 0;
+    for (std::size_t i = 0; i < search.done.size(); ++i) {
+        kept += search.done[i] * g.row(at(i)).transpose() * g.row(at(i));
+        if (search.done[i] > 0) ++done;
+    }
+    if (runs + done < problem.coefficients()) {
+        throw PlanError(
+            std::to_string(runs + done) + " runs for " + std::to_string(problem.coefficients()) +
+            " coefficients: " + std::to_string(problem.coefficients()) + " are needed at least");
+    }
+    std::size_t starts = search.starts;
+    if (starts == 0) {
+        const double work = static_cast<double>(g.size()) * static_cast<double>(runs * runs);
+        starts = static_cast<std::size_t>(std::clamp(kStartsWork / work, 20.0, 300.0));
+    }
+    std::mt19937_64 random(search.seed);
+    Fedorov fedorov(g, kept);
+    Counts best;
+    double highest = -std::numeric_limits<double>::infinity();
+    for (std::size_t n = 0; n < starts; ++n) {
+        fedorov.start(runs, random);
+        const double log_det = fedorov.climb();
+        if (log_det > highest + 1e-12) {
+            highest = log_det;
+            best = fedorov.counts();
+        }
+    }
+    if (best.empty()) {
+        const Evaluation all = evaluate(problem, Effort(problem.size(), 1.0));
+        throw PlanError("no plan of " + std::to_string(runs) +
+                        " runs determines all coefficients; over all candidates the rank is " +
+                        std::to_string(all.rank) + " of " + std::to_string(all.coefficients) +
+                        (all.identifies_all() ? "" : ": not determined are " + all.undetermined()));
+    }
+    return best;
+}
+
+Counts round_shares(const Effort& share, std::size_t runs) {
+    const auto support = static_cast<std::size_t>(
+        std::count_if(share.begin(), share.end(), [](double w) { return w > 0; }));
+    if (support == 0) throw PlanError("shares: found none above zero, expected some");
+    const double quota = static_cast<double>(runs) - static_cast<double>(support) / 2;
+    Counts counts(share.size(), 0);
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < share.size(); ++i) {
+        if (share[i] > 0)
+            counts[i] = static_cast<std::size_t>(std::max(0.0, std::ceil(quota * share[i])));
+        sum += counts[i];
+    }
+    const auto pick = [&](auto better, auto ratio, auto allowed) {
+        std::size_t best = share.size();
+        for (std::size_t i = 0; i < share.size(); ++i) {
+            if (share[i] > 0 && allowed(i) &&
+                (best == share.size() || better(ratio(i), ratio(best)))) {
+                best = i;
+            }
+        }
+        return best;
+    };
+    for (; sum < runs; ++sum) {
+        ++counts[pick(
+            std::less<>{}, [&](std::size_t i) { return static_cast<double>(counts[i]) / share[i]; },
+            [](std::size_t) { return true; })];
+    }
+    for (; sum > runs; --sum) {
+        --counts[pick(
+            std::greater<>{},
+            [&](std::size_t i) { return (static_cast<double>(counts[i]) - 1) / share[i]; },
+            [&](std::size_t i) { return counts[i] > 0; })];
+    }
+    return counts;
+}
+
+}  // namespace vibrig::estimator::plan

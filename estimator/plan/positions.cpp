@@ -1,0 +1,147 @@
+#include "estimator/plan/positions.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "estimator/kinematics.hpp"
+
+namespace vibrig::estimator::plan {
+
+namespace {
+
+constexpr double kDeg = std::numbers::pi / 180;
+constexpr double kDust = 1e-9;
+
+/// In (-180, 180], without rounding dust.
+double wrapped_deg(double deg) {
+    double w = std::remainder(deg, 360.0);
+    if (w <= -180 + kDust) w += 360;
+    const double near = std::round(w);
+    return std::abs(w - near) < kDust ? near + 0.0 : w;
+}
+
+bool within(double deg, double low, double high) {
+    for (const double turn : {-360.0, 0.0, 360.0}) {
+        if (deg + turn >= low - kDust && deg + turn <= high + kDust) return true;
+    }
+    return false;
+}
+
+/// Both ways to put the vertical along `d` with as little inner angle as possible.
+std::vector<Vec3> ways(const SignedAxis& up, Vec3 d) {
+    for (double& x : d) x *= up.sign;
+    constexpr double kPole = 1e-12;
+    std::vector<Vec3> result;
+    const double flat = std::hypot(d[0], d[1]);
+    const auto add = [&](double alpha, double beta, double gamma) {
+        result.push_back(
+            {wrapped_deg(alpha / kDeg), wrapped_deg(beta / kDeg), wrapped_deg(gamma / kDeg)});
+    };
+    constexpr double pi = std::numbers::pi;
+    switch (up.axis) {
+        case 0: {  // u = (cg cb, sg cb, -sb): only the inner gimbal leaves the x-y plane
+            const double beta = std::asin(std::clamp(-d[2], -1.0, 1.0));
+            const double gamma = flat > kPole ? std::atan2(d[1], d[0]) : 0;
+            add(0, beta, gamma);
+            add(0, pi - beta, gamma + pi);
+            break;
+        }
+        case 1: {  // inner angle 0: u = (-sg ca, cg ca, sa)
+            const double alpha = std::asin(std::clamp(d[2], -1.0, 1.0));
+            const double gamma = flat > kPole ? std::atan2(-d[0], d[1]) : 0;
+            add(alpha, 0, gamma);
+            add(pi - alpha, 0, gamma + pi);
+            break;
+        }
+        default: {  // inner angle 0: u = (sg sa, -cg sa, ca)
+            const double alpha = std::acos(std::clamp(d[2], -1.0, 1.0));
+            const double gamma = flat > kPole ? std::atan2(d[0], -d[1]) : 0;
+            add(alpha, 0, gamma);
+            add(-alpha, 0, gamma + pi);
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
+Vec3 up_at(const SignedAxis& up, const Vec3& position_deg) {
+    Settings settings;
+    settings.up = up;
+    const Eigen::Vector3d angles(position_deg[0] * kDeg, position_deg[1] * kDeg,
+                                 position_deg[2] * kDeg);
+    const Eigen::Vector3d u = Kinematics(settings).pose(angles).up;
+    return {u[0], u[1], u[2]};
+}
+
+std::vector<Vec3> cube_directions() {
+    std::vector<Vec3> result;
+    for (int kind = 1; kind <= 3; ++kind) {
+        for (int x = 1; x >= -1; --x) {
+            for (int y = 1; y >= -1; --y) {
+                for (int z = 1; z >= -1; --z) {
+                    if (std::abs(x) + std::abs(y) + std::abs(z) != kind) continue;
+                    const double n = std::sqrt(kind);
+                    result.push_back({x / n, y / n, z / n});
+                }
+            }
+        }
+    }
+    return result;
+}
+
+bool GimbalLimits::allow(const Vec3& position_deg) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (!within(position_deg[k], low[k], high[k])) return false;
+    }
+    return std::none_of(forbidden.begin(), forbidden.end(), [&](const Vec3& centre) {
+        double away = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            away = std::max(away, std::abs(std::remainder(position_deg[k] - centre[k], 360.0)));
+        }
+        return away <= forbidden_within;
+    });
+}
+
+std::optional<Vec3> position_for(const SignedAxis& up, const Vec3& direction,
+                                 const GimbalLimits& limits) {
+    for (const Vec3& way : ways(up, direction)) {
+        if (limits.allow(way)) return way;
+    }
+    return std::nullopt;
+}
+
+std::vector<Vec3> position_grid(const SignedAxis& up, double step_deg, const GimbalLimits& limits) {
+    std::vector<Vec3> result;
+    std::set<std::array<long, 3>> seen;
+    const auto angles = [&](std::size_t k) {
+        std::vector<double> list;
+        for (double a = 0; a < 180 + kDust; a += step_deg) {
+            if (within(a, limits.low[k], limits.high[k])) list.push_back(wrapped_deg(a));
+            if (a > 0 && a < 180 - kDust && within(-a, limits.low[k], limits.high[k])) {
+                list.push_back(wrapped_deg(-a));
+            }
+        }
+        return list;
+    };
+    // Inner angle zero first: of several ways to one vertical the simplest is kept.
+    for (const double beta : angles(1)) {
+        for (const double alpha : angles(0)) {
+            for (const double gamma : angles(2)) {
+                const Vec3 position{alpha, beta, gamma};
+                if (!limits.allow(position)) continue;
+                const Vec3 u = up_at(up, position);
+                if (seen.insert({std::lround(u[0] * 1e6), std::lround(u[1] * 1e6),
+                                 std::lround(u[2] * 1e6)})
+                        .second) {
+                    result.push_back(position);
+                }
+            }
+        }
+    }
+    return result;
+}
+
+}  // namespace vibrig::estimator::plan

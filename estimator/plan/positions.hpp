@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "estimator/identification.hpp"
+#include "estimator/plan/model.hpp"
+
+namespace vibrig::estimator::plan {
+
+/// Direction of the vertical in platform axes at outer, inner, azimuth angles in deg.
+[[nodiscard]] Vec3 up_at(const SignedAxis& up, const Vec3& position_deg);
+
+/// Faces, edges and corners of the cube: 6 + 12 + 8 unit vectors.
+[[nodiscard]] std::vector<Vec3> cube_directions();
+
+/// What the gimbals may do, all in deg. A limit holds for the angle in (-180, 180] as well as for
+/// the same angle a turn further.
+struct GimbalLimits {
+    Vec3 low{-360, -80, -360};
+    Vec3 high{360, 80, 360};
+    std::vector<Vec3> forbidden;   ///< centres
+    double forbidden_within = 10;  ///< largest of the three angle differences
+
+    [[nodiscard]] bool allow(const Vec3& position_deg) const;
+};
+
+/// Gimbal angles with the vertical along `direction`, the inner angle zero if that is possible;
+/// nothing if the limits leave none.
+[[nodiscard]] std::optional<Vec3> position_for(const SignedAxis& up, const Vec3& direction,
+                                               const GimbalLimits& limits);
+
+/// All combinations of angles `step_deg` apart within the limits whose verticals differ.
+[[nodiscard]] std::vector<Vec3> position_grid(const SignedAxis& up, double step_deg,
+                                              const GimbalLimits& limits);
+
+}  // namespace vibrig::estimator::plan

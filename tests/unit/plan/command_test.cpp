@@ -1,0 +1,182 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "daemon/plan/plan_file.hpp"
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kTable1 =
+    "alpha_deg,beta_deg,gamma_deg\n0,0,0\n0,0,45\n0,0,90\n0,0,180\n180,0,45\n45,0,0\n45,0,90\n"
+    "90,0,90\n90,0,180\n180,0,270\n270,0,0\n270,0,90\n-45,0,0\n-45,0,90\n";
+
+/// Runs the real program in a folder of its own.
+class PlanCommand : public ::testing::Test {
+  protected:
+    PlanCommand() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~PlanCommand() override { std::filesystem::remove_all(folder_); }
+
+    int vibrig(const std::string& arguments) {
+        const std::string command =
+            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        out = content_of("out");
+        error = content_of("error");
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    }
+    Json json() const { return Json::parse(out); }
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+    std::string content_of(const std::string& name) const {
+        std::ostringstream text;
+        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
+        return text.str();
+    }
+
+    std::filesystem::path folder_;
+    std::string out;
+    std::string error;
+};
+
+TEST_F(PlanCommand, MakesPlansWhoseFileComesBackUnchanged) {
+    // WHEN a plan is made, with picture and file
+    ASSERT_EQ(vibrig("plan --runs 20 --json -o plan.json --plot sphere.svg"), 0) << error;
+    const Json plan = json();
+    // THEN it has the keys of the contract
+    EXPECT_GE(plan["d_efficiency"], 0.985);
+    EXPECT_LE(plan["bound"], plan["d_efficiency"]);
+    EXPECT_EQ(plan["rank"], 10);
+    EXPECT_EQ(plan["standard_errors"].size(), 30U);
+    std::size_t count = 0;
+    for (const Json& run : plan["runs"]) {
+        count += run["count"].get<std::size_t>();
+        EXPECT_NEAR(run["level_g"].get<double>(), run["table_g"].get<double>() * 0.6667, 1e-9);
+        EXPECT_EQ(run["position"][1], 0.0);
+    }
+    EXPECT_EQ(count, 20U);
+    EXPECT_GT(plan["duration_s"], 2000.0);
+    EXPECT_NE(content_of("sphere.svg").find("<svg"), std::string::npos);
+    // AND judged from its file it is the same plan
+    ASSERT_EQ(vibrig("plan --evaluate plan.json --levels 0,2,4,4.667,6 --json"), 0) << error;
+    EXPECT_NEAR(json()["d_efficiency"], plan["d_efficiency"].get<double>(), 1e-9);
+    EXPECT_NEAR(json()["duration_s"], plan["duration_s"].get<double>(), 1e-6);
+    EXPECT_EQ(json()["runs"], plan["runs"]);
+    // AND so it is for vibrigd
+    const auto runs = vibrig::plan::read_plan((folder_ / "plan.json").string(), 0.6667);
+    EXPECT_EQ(runs.size(), plan["runs"].size());
+    EXPECT_THROW(static_cast<void>(vibrig::plan::read_plan((folder_ / "plan.json").string(), 0.9)),
+                 vibrig::plan::PlanFileError)
+        << "another transmission than the file's";
+}
+
+TEST_F(PlanCommand, JudgesPositionLists) {
+    // GIVEN the 14 positions of Tang et al. 2009, table 1
+    write("table1.csv", kTable1);
+    // THEN at 6 and 4.667 g: rank 10, and against the free choice 0.581 with y up
+    ASSERT_EQ(vibrig("plan --positions table1.csv --levels 6,4.667 --json"), 0) << error;
+    EXPECT_EQ(json()["rank"], 10);
+    EXPECT_NEAR(json()["vertical_axes"][1]["d_efficiency"], 0.581, 5e-4);
+    EXPECT_EQ(json()["vertical_axes"][0]["rank"], 6);
+    EXPECT_EQ(json()["vertical_axes"][2]["rank"], 9);
+    EXPECT_NEAR(json()["standard_errors"]["D_Fx"], 0.006, 1e-4);
+    // AND at one level it is refused by name, with a remedy
+    EXPECT_EQ(vibrig("plan --positions table1.csv --levels 6 --json"), 1);
+    EXPECT_EQ(json()["rank"], 9);
+    EXPECT_EQ(json()["d_efficiency"], 0.0);
+    EXPECT_EQ(json()["undetermined"], (Json{"D0", "D11", "D22", "D33"}));
+    EXPECT_TRUE(json()["standard_errors"]["D_Fx"].is_null());
+    EXPECT_NE(error.find("cheapest remedy"), std::string::npos) << error;
+    // AND so is z up
+    write("z.toml", "platform.up = \"+z\"\n");
+    EXPECT_EQ(vibrig("plan --positions table1.csv --levels 6,4.667 --config z.toml"), 1);
+    EXPECT_NE(error.find("D12 not at all (D_IOx"), std::string::npos) << error;
+}
+
+TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
+    ASSERT_EQ(vibrig("plan --runs 14 --outer -60,60 --azimuth -100,100 --levels 0,6 --json"), 0)
+        << error;
+    for (const Json& run : json()["runs"]) {
+        EXPECT_LE(std::abs(run["position"][0].get<double>()), 60.0);
+        EXPECT_LE(std::abs(run["position"][2].get<double>()), 100.0);
+    }
+    // Noise that grows with the level moves effort to rest
+    ASSERT_EQ(vibrig("plan --runs 28 --levels 0,6 --noise-per-g 1 --json"), 0) << error;
+    EXPECT_LT(json()["optimal_shares"][0]["share"], 0.5);
+    EXPECT_GT(json()["optimal_shares"][0]["share"], 0.1432);
+    // Targets, reached
+    ASSERT_EQ(vibrig("plan --levels 0,6 --targets 0.008,0.004,0.0006 --time-costs --json"), 0)
+        << error;
+    for (const auto& [name, sigma] : json()["standard_errors"].items()) {
+        const double target = name[2] == 'F' ? 0.008 : name.size() == 4 ? 0.004 : 0.0006;
+        EXPECT_LE(sigma.get<double>(), target * 1.001) << name;
+    }
+    EXPECT_LE(json()["run_count"], 20);
+    EXPECT_EQ(vibrig("plan --levels 0,6 --targets 0.0001,0,0 --runs 12"), 1) << "out of reach";
+    // Both orders
+    for (const char* order : {"travel", "random"}) {
+        ASSERT_EQ(vibrig(std::string("plan --runs 20 --json --order ") + order), 0) << error;
+        EXPECT_EQ(json()["run_count"], 20);
+    }
+    // Runs done already are kept: the rest completes them
+    ASSERT_EQ(vibrig("plan --runs 12 --levels 0,6 -o done.json"), 0) << error;
+    ASSERT_EQ(vibrig("plan --runs 4 --levels 0,6 --done done.json --json"), 0) << error;
+    EXPECT_EQ(json()["run_count"], 4);
+    EXPECT_EQ(json()["rank"], 10);
+}
+
+TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
+    write("nan.csv", "alpha_deg,beta_deg,gamma_deg\n0,0,0\n0,nan,0\n");
+    write("lock.csv", "alpha_deg,beta_deg,gamma_deg\n0,85,0\n");
+    write("short.csv", "alpha_deg,beta_deg\n0,0\n");
+    write("empty.csv", "");
+    write("bad.json", "{\"runs\":[{\"position\":[0,0],\"level_g\":6}]}");
+    write("cut.json", "{\"runs\":[{\"posi");
+    write("levels.json", "{\"runs\":[{\"position\":[0,0,0],\"level_g\":6,\"table_g\":6}]}");
+    write("limit.toml", "shaker.limits.acceleration_g = 5\n");
+    struct Case {
+        const char* arguments;
+        const char* words;
+    };
+    for (const Case& c :
+         {Case{"--runs 9", "9 runs for 10 coefficients: 10 are needed"},
+          Case{"--levels 0,-1", "--levels: found -1"}, Case{"--levels 0,nan", "--levels: found"},
+          Case{"--positions nan.csv", "nan.csv:3: column beta_deg: found 'nan'"},
+          Case{"--positions lock.csv", "lock.csv:2"},
+          Case{"--positions short.csv", "no column gamma_deg"},
+          Case{"--positions empty.csv", "empty.csv"}, Case{"--positions none.csv", "none.csv"},
+          Case{"--evaluate bad.json", "runs[0].position"}, Case{"--evaluate cut.json", "not JSON"},
+          Case{"--evaluate levels.json", "transmission 0.6667"},
+          Case{"--levels 0,6 --config limit.toml", "shaker.limits.acceleration_g"},
+          Case{"--inner 30,20", "gimbal limits"},
+          Case{"--outer 1,2 --azimuth 1,2", "leave no position"},
+          Case{"--without D99", "--without: found \"D99\""}}) {
+        EXPECT_EQ(vibrig(std::string("plan ") + c.arguments), 2) << c.arguments << out << error;
+        EXPECT_NE(error.find(c.words), std::string::npos) << c.arguments << ": " << error;
+    }
+}
+
+TEST_F(PlanCommand, ReproducesThePublishedTables) {
+    EXPECT_EQ(vibrig("reproduce dplan --json"), 0) << out << error;
+    std::size_t compared = 0;
+    const Json result = json();
+    for (const Json& row : result["reproductions"][0]["rows"]) {
+        if (row["agrees"].is_null()) continue;
+        EXPECT_TRUE(row["agrees"].get<bool>()) << row.dump();
+        ++compared;
+    }
+    EXPECT_GT(compared, 40U);
+}
+
+}  // namespace
