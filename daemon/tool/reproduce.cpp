@@ -31,6 +31,7 @@ constexpr std::array kEntries{
     Entry{"tang2009", reproduce_tang2009},
     Entry{"allan", reproduce_allan},
     Entry{"dplan", reproduce_dplan},
+    Entry{"zha2019", reproduce_zha2019},
 };
 
 bool agrees(const Reproduction& reproduction) {

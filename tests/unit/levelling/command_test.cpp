@@ -1,0 +1,114 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace {
+
+using Json = nlohmann::json;
+
+std::string content_of(const std::filesystem::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+}
+
+/// Runs the real program in a folder of its own.
+class LevelCommand : public ::testing::Test {
+  protected:
+    LevelCommand() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~LevelCommand() override { std::filesystem::remove_all(folder_); }
+
+    int vibrig(const std::string& arguments) {
+        const std::string command =
+            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        out = content_of(folder_ / "out");
+        error = content_of(folder_ / "error");
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    }
+    Json json(const std::string& arguments, int code) {
+        EXPECT_EQ(vibrig(arguments + " --json"), code) << arguments << ": " << error << out;
+        return Json::parse(out, nullptr, false);
+    }
+    void expect_refusal(const std::string& arguments, const std::string& words) {
+        EXPECT_EQ(vibrig(arguments), 2) << arguments << "\n" << out << error;
+        EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
+    }
+
+    std::filesystem::path folder_;
+    std::string out;
+    std::string error;
+};
+
+TEST_F(LevelCommand, DesignsGainsWithTheirNoise) {
+    const Json result = json("level design --settling 600 --period 1 --reference-noise 0.2", 0);
+    // Zha et al. 2019, eqs. 11-14 at sigma t = 5.25
+    const double sigma = result["sigma"];
+    EXPECT_NEAR(sigma * 600, 5.25, 5e-3);
+    EXPECT_NEAR(result["gains"]["K1"].get<double>(), 3 * sigma, 1e-9);
+    EXPECT_EQ(result["roots"].size(), 3U);
+    EXPECT_NEAR(result["longest_period_s"].get<double>(), 0.05 / sigma, 1e-9);
+    EXPECT_EQ(result["noise"]["dominant"], "reference velocity");
+    EXPECT_EQ(vibrig("level design --plot response.svg"), 0) << error;
+    EXPECT_NE(content_of(folder_ / "response.svg").find("<svg"), std::string::npos);
+    EXPECT_NE(out.find("Routh"), std::string::npos);
+    // A tolerance below the noise says no.
+    EXPECT_EQ(vibrig("level design --accelerometer-noise 1e-2 --tolerance 0.05"), 1);
+    EXPECT_NE(out.find("cannot settle"), std::string::npos);
+}
+
+TEST_F(LevelCommand, SimulatesAStart) {
+    const std::string drift = " --drift 2,-3 --zero 0.1,0 --seed 4 --duration 400";
+    const Json result = json("level simulate --tolerance 0.2" + drift, 0);
+    EXPECT_EQ(result["verdict"], "settled");
+    EXPECT_LT(result["settled_s"], 130);
+    EXPECT_NEAR(result["drift_deg_h"][0], 2, 0.05);
+    EXPECT_NEAR(result["drift_deg_h"][1], -3, 0.05);
+    EXPECT_NEAR(result["tilt_arcmin"][0], -0.34378, 0.02);
+    EXPECT_EQ(vibrig("level simulate --plot charts"), 0) << error;
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / "tilt.svg"));
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / "rate.svg"));
+    const Json undamped = json("level simulate --network undamped --tilt 1,1 --duration 5000", 0);
+    EXPECT_GT(undamped["tilt_deviation_arcmin"], 0.5);
+    const Json many = json("level simulate --tolerance 0.2 --window 10 --step 2 --runs 50", 0);
+    EXPECT_EQ(many["settled"], 50);
+    EXPECT_EQ(many["false"], 0);
+    // Six degrees are not for this loop; a loop given no time has not settled.
+    EXPECT_EQ(vibrig("level simulate --tilt 400,0"), 1);
+    EXPECT_NE(out.find("coarse levelling first"), std::string::npos);
+    EXPECT_EQ(vibrig("level simulate --duration 20"), 1);
+}
+
+TEST_F(LevelCommand, RefusesBadInput) {
+    expect_refusal("level design --damping 1.5", "damping ratio xi: 1.5, expected between 0 and 1");
+    expect_refusal("level design --settling 60 --period 1",
+                   "sample period 1 s is too long for a 60 s levelling: at most 0.57 s");
+    expect_refusal("level design --gains 0.0264,10,0.904", "K2 must be above 33.24");
+    expect_refusal("level simulate --gains 1,2", "--gains");
+    expect_refusal("level simulate --slow 1,1,5", "K1 (1 + K2) > K3");
+    expect_refusal("level simulate --duration 1e9", "expected at most 2e7");
+    expect_refusal("level simulate --network best", "best");
+    expect_refusal("level design --plot no/such/folder/x.svg", "no/such/folder/x.svg");
+    expect_refusal("level", "subcommand");
+}
+
+TEST_F(LevelCommand, ReproducesTheTable) {
+    const Json result = json("reproduce zha2019 --seeds 2", 0)["reproductions"][0];
+    EXPECT_TRUE(result["agrees"].get<bool>());
+    bool erratum = false;
+    for (const Json& row : result["rows"]) {
+        erratum = erratum || (row["item"] == "K2" && row["published"] == "156.063" &&
+                              row["computed"].get<std::string>().find("202.5") == 0);
+    }
+    EXPECT_TRUE(erratum) << out;
+}
+
+}  // namespace
