@@ -1,0 +1,432 @@
+#include "estimator/zeros/calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/zeros/observability.hpp"
+#include "estimator/zeros/zero_filter.hpp"
+
+namespace vibrig::estimator::zeros {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kDeg = kPi / 180;
+constexpr double kDegPerHour = kDeg / 3600;
+constexpr double kLongestGap_s = 0.5;
+constexpr std::size_t kGapsAllowed = 3;
+constexpr double kNoMotion_s = 60;
+constexpr double kRateTolerance = 0.1;
+constexpr double kSlowest_deg_s = 0.1;  // below it the read-out's noise hides the rate
+constexpr double kLargestZero_mg = 10;
+constexpr std::size_t kBlock = 60;
+constexpr std::array kAxisNames{"x", "y", "z"};
+
+template <typename... Values>
+std::string text(const char* format, Values... values) {
+    std::array<char, 320> out{};
+    std::snprintf(out.data(), out.size(), format, values...);
+    return out.data();
+}
+
+/// Wilson and Hilferty; z in standard deviations.
+double chi_square(double freedom, double z) {
+    const double k = 2 / (9 * freedom);
+    return freedom * std::pow(1 - k + z * std::sqrt(k), 3);
+}
+
+Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+void check(const CalibrationSettings& s) {
+    const auto require = [](bool good, const char* name, double value, const char* expected) {
+        if (!good) throw ZeroError(text("%s: %g, expected %s", name, value, expected));
+    };
+    s.plan.check();
+    require(std::abs(s.site.latitude_rad) < 89 * kDeg, "latitude", s.site.latitude_rad / kDeg,
+            "degrees, -89 to 89");
+    require(s.site.gravity_mps2 > 0 && std::isfinite(s.site.gravity_mps2), "gravity",
+            s.site.gravity_mps2, "m/s^2, more than 0");
+    require(s.update_s > 0 && s.update_s <= 10, "update interval", s.update_s,
+            "s, more than 0, at most 10");
+    const Noise& n = s.noise;
+    for (const auto& [name, value] :
+         {std::pair{"velocity reference noise", n.velocity_reference},
+          std::pair{"position reference noise", n.position_reference}}) {
+        require(value > 0 && std::isfinite(value), name, value, "more than 0");
+    }
+    for (const auto& [name, value] : {std::pair{"angle random walk", n.angle_random_walk},
+                                      std::pair{"velocity random walk", n.velocity_random_walk},
+                                      std::pair{"gyro drift", n.gyro_drift},
+                                      std::pair{"accelerometer drift", n.accelerometer_drift},
+                                      std::pair{"scale factor uncertainty", n.scale_factor}}) {
+        require(value >= 0 && std::isfinite(value), name, value, "0 or more");
+    }
+    for (const double value : s.lever_arm_m) {
+        require(std::abs(value) <= 10, "lever arm", value, "m, at most 10");
+    }
+    for (const double value : s.target_mg) {
+        require(value > 0 && std::isfinite(value), "target", value, "mg, more than 0");
+    }
+    if (!s.allow_unobservable) check_observable(s.plan, s.site);
+}
+
+}  // namespace
+
+struct Calibration::Impl {
+    explicit Impl(const CalibrationSettings& s) : settings(s) {}
+
+    CalibrationSettings settings;
+    std::optional<ZeroFilter> filter;
+    std::vector<CalibrationTrace> trace;
+    std::array<std::optional<double>, 3> converged_s;
+    std::array<double, 3> movement{};
+    InnovationStatistic innovation;
+    std::vector<std::string> problems, notes;
+    bool given_up = false;
+
+    double begin_s = 0, last_s = 0, period_s = 0, update_at_s = 0;
+    Eigen::Vector3d last_turn = Eigen::Vector3d::Zero(), last_velocity = Eigen::Vector3d::Zero();
+    std::size_t samples = 0, updates = 0, gaps = 0;
+
+    // within the update interval
+    double turned_rad = 0, interval_s = 0, azimuth_rad = 0, azimuth_before = 0;
+    bool has_azimuth = false;
+    std::size_t count = 0;
+    Eigen::Vector3d force_sum = Eigen::Vector3d::Zero(), force_squares = Eigen::Vector3d::Zero();
+    double rate_before = 0, still_since_s = 0;
+    int off_rate = 0;
+
+    Eigen::Vector3d reference_velocity = Eigen::Vector3d::Zero();
+    Eigen::Vector3d reference_position = Eigen::Vector3d::Zero();
+
+    // innovations of the current block
+    double nis_sum = 0;
+    Eigen::Matrix<double, 6, 1> ratio_sum = Eigen::Matrix<double, 6, 1>::Zero();
+    std::size_t in_block = 0;
+
+    [[nodiscard]] double to_mg() const { return 1e3 / settings.site.gravity_mps2; }
+
+    bool give_up(std::string why) {
+        problems.push_back(std::move(why));
+        given_up = true;
+        return false;
+    }
+
+    void begin(const Increment& in) {
+        has_azimuth = std::isfinite(in.azimuth_rad);
+        const double azimuth =
+            has_azimuth ? in.azimuth_rad : settings.plan.targets_deg.front() * kDeg;
+        filter.emplace(settings, azimuth);
+        azimuth_rad = azimuth_before = azimuth;
+        begin_s = last_s = still_since_s = in.time_s;
+        update_at_s = begin_s + settings.update_s;
+        samples = 1;
+    }
+
+    /// What is wrong with a sample; empty if nothing.
+    [[nodiscard]] std::string fault_of(const Increment& in, double dt) const {
+        for (std::size_t i = 0; i < 3; ++i) {
+            if (!std::isfinite(in.turn_rad[i])) {
+                return text("gyro %s is not a number at %.3f s", kAxisNames[i], in.time_s);
+            }
+            if (!std::isfinite(in.velocity_mps[i])) {
+                return text("accelerometer %s is not a number at %.3f s", kAxisNames[i], in.time_s);
+            }
+            if (period_s > 0 && std::abs(in.velocity_mps[i]) >=
+                                    settings.saturation_g * settings.site.gravity_mps2 * dt) {
+                return text("accelerometer %s saturated (%.4g g) at %.3f s", kAxisNames[i],
+                            in.velocity_mps[i] / dt / settings.site.gravity_mps2, in.time_s);
+            }
+        }
+        return "";
+    }
+
+    /// Bridges time without data with the last motion, and trusts the attitude less for it.
+    bool bridge(double gap_s, const std::string& why) {
+        if (gap_s > 1.5 * period_s || !why.empty()) {
+            const double part = period_s > 0 ? gap_s / period_s : 1;
+            filter->advance(last_turn * part, last_velocity * part, gap_s);
+            const double turn = settings.plan.rate_deg_s * kDeg * gap_s;
+            if (gap_s > kLongestGap_s) {
+                filter->loosen(settings.initial.tilt_deg * kDeg + turn,
+                               settings.initial.velocity_mps, settings.initial.position_m);
+            } else {
+                filter->loosen(turn, 0.01 * settings.site.gravity_mps2 * gap_s, 0);
+            }
+        }
+        if (why.empty() && gap_s <= kLongestGap_s) {
+            return true;
+        }
+        ++gaps;
+        const std::string found =
+            why.empty() ? text("no increments for %.3g s until %.3f s", gap_s, last_s + gap_s)
+                        : why;
+        if (gaps > kGapsAllowed) {
+            return give_up(
+                text("given up: more than %zu gaps; the last: %s", kGapsAllowed, found.c_str()));
+        }
+        notes.push_back(found);
+        return true;
+    }
+
+    bool watch_motion(double now_s) {
+        const double moved =
+            has_azimuth ? std::remainder(azimuth_rad - azimuth_before, 2 * kPi) : turned_rad;
+        const double rate = moved / interval_s / kDeg;
+        azimuth_before = azimuth_rad;
+        const double planned = settings.plan.rate_deg_s;
+        if (!settings.plan.turns() || planned < kSlowest_deg_s) return true;
+        if (std::abs(rate) > 0.2 * planned) still_since_s = now_s;
+        if (now_s - still_since_s >= kNoMotion_s) {
+            return give_up(
+                text("azimuth has not turned for %.0f s: x and y zeros cannot be told from tilt "
+                     "(rank 12 of 15)",
+                     now_s - still_since_s));
+        }
+        const bool steady =
+            std::abs(rate) > 0.2 * planned && std::abs(rate - rate_before) < 0.05 * std::abs(rate);
+        off_rate = steady && std::abs(std::abs(rate) - planned) > kRateTolerance * planned
+                       ? off_rate + 1
+                       : 0;
+        rate_before = rate;
+        if (off_rate >= 3) {
+            return give_up(
+                text("azimuth turns at %.4g deg/s at %.3f s, commanded %.4g deg/s: more "
+                     "than 10 %% off",
+                     std::abs(rate), now_s, planned));
+        }
+        return true;
+    }
+
+    bool watch_vibration(double now_s) {
+        const double n = static_cast<double>(count);
+        if (count < 2) return true;
+        const Eigen::Vector3d mean = force_sum / n;
+        const Eigen::Vector3d variance = force_squares / n - mean.cwiseAbs2();
+        Eigen::Index worst = 0;
+        const double level =
+            std::sqrt(std::max(0.0, variance.maxCoeff(&worst))) / settings.site.gravity_mps2;
+        if (level <= settings.vibration_limit_g) return true;
+        return give_up(text(
+            "shaker must be off during zero calibration: vibration of %.3g g (1 "
+            "sigma) on %s at %.3f s, limit %.3g g",
+            level, kAxisNames[static_cast<std::size_t>(worst)], now_s, settings.vibration_limit_g));
+    }
+
+    void account(const ZeroFilter::Innovation& found) {
+        nis_sum += found.nis;
+        ratio_sum += found.ratio;
+        if (++in_block < kBlock) return;
+        const double n = static_cast<double>(kBlock);
+        constexpr double k999 = 3.2905;
+        innovation.mean_nis = nis_sum / n;
+        innovation.low = chi_square(6 * n, -k999) / n;
+        innovation.high = chi_square(6 * n, k999) / n;
+        ++innovation.blocks;
+        if (innovation.mean_nis < innovation.low || innovation.mean_nis > innovation.high) {
+            ++innovation.outside;
+        }
+        for (std::size_t i = 0; i < 3; ++i) {
+            innovation.velocity_ratio[i] = ratio_sum[static_cast<Eigen::Index>(i)] / n;
+            innovation.position_ratio[i] = ratio_sum[static_cast<Eigen::Index>(i + 3)] / n;
+        }
+        nis_sum = 0;
+        ratio_sum.setZero();
+        in_block = 0;
+    }
+
+    bool update(double now_s) {
+        if (!watch_motion(now_s) || !watch_vibration(now_s)) return false;
+        account(filter->update(reference_velocity, reference_position));
+        ++updates;
+        CalibrationTrace point{now_s - begin_s, {}, {}};
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto k = static_cast<Eigen::Index>(i);
+            point.zero_mg[i] = filter->zero()[k] * to_mg();
+            point.sigma_mg[i] =
+                std::sqrt(filter->covariance()(kAccelerometer + k, kAccelerometer + k)) * to_mg();
+        }
+        trace.push_back(point);
+        watch_convergence(point);
+        for (std::size_t i = 0; i < 3; ++i) {
+            if (point.sigma_mg[i] < 1 && std::abs(point.zero_mg[i]) > kLargestZero_mg) {
+                return give_up(
+                    text("zero of accelerometer %s is %.4g mg, outside the small-error range of "
+                         "%.0f mg: level first",
+                         kAxisNames[i], point.zero_mg[i], kLargestZero_mg));
+            }
+        }
+        interval_s = turned_rad = 0;
+        count = 0;
+        force_sum.setZero();
+        force_squares.setZero();
+        return true;
+    }
+
+    void watch_convergence(const CalibrationTrace& now) {
+        const double sweep = settings.plan.sweep_s();
+        const auto first = std::partition_point(
+            trace.begin(), trace.end(),
+            [&](const CalibrationTrace& p) { return p.time_s < now.time_s - sweep - 1e-9; });
+        const bool whole = now.time_s >= sweep - 1e-9 || sweep >= settings.plan.duration_s;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto [low, high] = std::minmax_element(
+                first, trace.end(),
+                [&](const auto& a, const auto& b) { return a.zero_mg[i] < b.zero_mg[i]; });
+            movement[i] = high->zero_mg[i] - low->zero_mg[i];
+            const bool good = whole && now.sigma_mg[i] < settings.target_mg[i] &&
+                              movement[i] < settings.target_mg[i];
+            if (!good) {
+                converged_s[i].reset();
+            } else if (!converged_s[i]) {
+                converged_s[i] = now.time_s;
+            }
+        }
+    }
+
+    bool add(const Increment& in) {
+        if (given_up) return false;
+        if (!std::isfinite(in.time_s)) {
+            return give_up(text("time of increment %zu is not a number", samples + 1));
+        }
+        if (!filter) {
+            begin(in);
+            return true;
+        }
+        const double dt = in.time_s - last_s;
+        if (!(dt > 0)) {
+            return give_up(
+                text("time goes from %.6f s to %.6f s, expected it to grow", last_s, in.time_s));
+        }
+        const std::string fault = fault_of(in, period_s > 0 ? period_s : dt);
+        if (!fault.empty()) {
+            if (!bridge(dt, fault)) return false;
+        } else {
+            if (period_s == 0) period_s = dt;
+            const double gap = dt - period_s;
+            const bool whole = gap <= 0.5 * period_s;
+            if (!whole && !bridge(gap, "")) return false;
+            const double step = whole ? dt : period_s;
+            last_turn = vector(in.turn_rad);
+            last_velocity = vector(in.velocity_mps);
+            filter->advance(last_turn, last_velocity, step);
+            const Eigen::Vector3d force = last_velocity / step;
+            force_sum += force;
+            force_squares += force.cwiseAbs2();
+            turned_rad += (settings.inverted ? -1 : 1) * last_turn[2];
+            ++count;
+        }
+        if (std::isfinite(in.azimuth_rad)) azimuth_rad = in.azimuth_rad;
+        reference_velocity = vector(in.reference_velocity_mps);
+        reference_position = vector(in.reference_position_m);
+        interval_s += dt;
+        last_s = in.time_s;
+        ++samples;
+        if (in.time_s >= update_at_s - 0.25 * period_s) {
+            update_at_s += settings.update_s;
+            if (update_at_s <= in.time_s) update_at_s = in.time_s + settings.update_s;
+            return update(in.time_s);
+        }
+        return true;
+    }
+
+    void judge(CalibrationResult& r) const {
+        r.problems = problems;
+        if (updates == 0) {
+            r.problems.emplace_back("no increments: nothing to calibrate with");
+            return;
+        }
+        for (std::size_t i = 0; !given_up && i < 3; ++i) {
+            if (r.axis[i].converged_s) continue;
+            const bool sigma = trace.back().sigma_mg[i] >= settings.target_mg[i];
+            r.problems.push_back(text(
+                "%s has not converged after %.0f s: standard deviation %.3g mg, moved %.3g mg "
+                "within the last sweep, target %.3g mg; %s",
+                kAxisNames[i], r.time_s, trace.back().sigma_mg[i], r.axis[i].movement_mg,
+                settings.target_mg[i],
+                sigma ? "lengthen the run by more sweeps"
+                      : "lengthen the run until a whole sweep has passed, and wait for the unit to "
+                        "be warm"));
+        }
+        const InnovationStatistic& v = innovation;
+        const bool last_outside = v.blocks > 0 && (v.mean_nis < v.low || v.mean_nis > v.high);
+        if (!last_outside && v.outside < 2) return;
+        const bool large = v.mean_nis > 6;
+        double worst = 0;
+        std::string row;
+        for (std::size_t i = 0; i < 3; ++i) {
+            constexpr std::array kDirections{"east", "north", "up"};
+            for (const auto& [name, ratio] : {std::pair{"velocity", v.velocity_ratio[i]},
+                                              std::pair{"position", v.position_ratio[i]}}) {
+                const double off = large ? ratio : 1 / std::max(ratio, 1e-12);
+                if (off > worst) {
+                    worst = off;
+                    row = text("%s %s, squares %.3g of what is expected", name, kDirections[i],
+                               ratio);
+                }
+            }
+        }
+        r.problems.push_back(
+            text("innovations not consistent: mean of 60 normalised squares %.3g, "
+                 "expected %.3g to %.3g (%zu of %zu blocks outside); most: %s",
+                 v.mean_nis, v.low, v.high, v.outside, v.blocks, row.c_str()));
+    }
+
+    [[nodiscard]] CalibrationResult result() const {
+        CalibrationResult r;
+        r.innovation = innovation;
+        r.updates = updates;
+        r.gaps = gaps;
+        r.notes = notes;
+        r.time_s = last_s - begin_s;
+        const double scale_mg = settings.noise.scale_factor * 1e3;
+        if (filter) {
+            for (std::size_t i = 0; i < 3; ++i) {
+                const auto k = static_cast<Eigen::Index>(i);
+                for (std::size_t j = 0; j < 3; ++j) {
+                    r.covariance_mg2[i][j] =
+                        filter->covariance()(kAccelerometer + k,
+                                             kAccelerometer + static_cast<Eigen::Index>(j)) *
+                        to_mg() * to_mg();
+                }
+                AxisResult& axis = r.axis[i];
+                axis.zero_mg = filter->zero()[k] * to_mg();
+                axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                // At rest the vertical accelerometer shows its zero plus 1 g times its scale error.
+                if (i == 2) r.covariance_mg2[2][2] += scale_mg * scale_mg;
+                axis.sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                axis.movement_mg = movement[i];
+                axis.converged_s = converged_s[i];
+                r.gyro_bias_deg_h[i] = filter->gyro_bias()[k] / kDegPerHour;
+                r.gyro_sigma_deg_h[i] =
+                    std::sqrt(filter->covariance()(kGyro + k, kGyro + k)) / kDegPerHour;
+            }
+        }
+        judge(r);
+        r.valid = r.problems.empty();
+        return r;
+    }
+};
+
+Calibration::Calibration(const CalibrationSettings& settings)
+    : impl_((check(settings), std::make_unique<Impl>(settings))) {}
+Calibration::~Calibration() = default;
+Calibration::Calibration(Calibration&&) noexcept = default;
+Calibration& Calibration::operator=(Calibration&&) noexcept = default;
+
+bool Calibration::add(const Increment& increment) { return impl_->add(increment); }
+bool Calibration::given_up() const noexcept { return impl_->given_up; }
+CalibrationResult Calibration::result() const { return impl_->result(); }
+const std::vector<CalibrationTrace>& Calibration::trace() const noexcept { return impl_->trace; }
+
+ZeroAndScale separate(const AxisResult& up, const AxisResult& down) noexcept {
+    // Up shows b + s g, down b - s g.
+    ZeroAndScale r;
+    r.zero_mg = 0.5 * (up.zero_mg + down.zero_mg);
+    r.scale = 0.5e-3 * (up.zero_mg - down.zero_mg);
+    r.zero_sigma_mg = 0.5 * std::hypot(up.filter_sigma_mg, down.filter_sigma_mg);
+    r.scale_sigma = 1e-3 * r.zero_sigma_mg;
+    return r;
+}
+
+}  // namespace vibrig::estimator::zeros

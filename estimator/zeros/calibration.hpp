@@ -1,0 +1,121 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/zeros/slew_plan.hpp"
+
+namespace vibrig::estimator::zeros {
+
+inline constexpr double kMicro = 1e-6;
+using Triple = std::array<double, 3>;
+
+struct Noise {
+    double angle_random_walk = 0.01;     ///< deg/sqrt(h)
+    double velocity_random_walk = 2e-5;  ///< g/sqrt(Hz)
+    double velocity_reference = 0.005;   ///< m/s, per update
+    double position_reference = 0.01;    ///< m, per update
+    double gyro_drift = 0;               ///< of the biases, deg/h per sqrt(h)
+    double accelerometer_drift = 0;      ///< of the zeros, mg per sqrt(h)
+    double scale_factor = 100 * kMicro;  ///< of the vertical accelerometer, not known better
+};
+
+/// Before the first update, 1 sigma.
+struct Initial {
+    double tilt_deg = 1, azimuth_deg = 1;
+    double velocity_mps = 0.1, position_m = 1;
+    double gyro_bias_deg_h = 0.2, zero_mg = 5;
+};
+
+struct CalibrationSettings {
+    Site site;
+    SlewPlan plan;
+    Noise noise;
+    Initial initial;
+    Triple lever_arm_m{};  ///< from the azimuth axis to the unit, body axes
+    double update_s = 1;
+    Triple target_mg{0.15, 0.05, 0.01};
+    double saturation_g = 10;         ///< of an accelerometer
+    double vibration_limit_g = 0.01;  ///< standard deviation within a second
+    bool inverted = false;            ///< platform z down instead of up
+    bool allow_unobservable = false;  ///< for a control run at rest
+};
+
+/// Over the time since the last one.
+struct Increment {
+    double time_s = 0;
+    Triple turn_rad{};
+    Triple velocity_mps{};
+    double azimuth_rad = 0;           ///< read-out, positive about up; NaN: none
+    Triple reference_velocity_mps{};  ///< of the azimuth axis, east north up; 0 on the rig
+    Triple reference_position_m{};
+};
+
+struct AxisResult {
+    double zero_mg = 0;   ///< z: zero plus scale error times 1 g
+    double sigma_mg = 0;  ///< of what is called zero, z: with the scale's share
+    double filter_sigma_mg = 0;
+    double movement_mg = 0;  ///< of the estimate within the last sweep
+    std::optional<double> converged_s;
+};
+
+struct InnovationStatistic {
+    double mean_nis = 0;  ///< of the last whole block of 60 updates, 6 when consistent
+    double low = 0, high = 0;
+    std::size_t blocks = 0, outside = 0;
+    Triple velocity_ratio{}, position_ratio{};  ///< of squares to expected squares, last block
+};
+
+struct CalibrationResult {
+    std::array<AxisResult, 3> axis;
+    Triple gyro_bias_deg_h{};
+    Triple gyro_sigma_deg_h{};
+    std::array<Triple, 3> covariance_mg2{};  ///< of the zeros, z with the scale's share
+    InnovationStatistic innovation;
+    double time_s = 0;
+    std::size_t updates = 0, gaps = 0;
+    bool valid = false;
+    std::vector<std::string> problems;  ///< why not
+    std::vector<std::string> notes;
+};
+
+/// A point of the history, one per update.
+struct CalibrationTrace {
+    double time_s = 0;
+    Triple zero_mg{};
+    Triple sigma_mg{};
+};
+
+/// The 15-state filter in closed loop over the strapdown mechanisation, with the checks of its
+/// input. The constructor throws ZeroError if the plan cannot work.
+class Calibration {
+  public:
+    explicit Calibration(const CalibrationSettings& settings);
+    ~Calibration();
+    Calibration(Calibration&&) noexcept;
+    Calibration& operator=(Calibration&&) noexcept;
+
+    /// False once the run has been given up.
+    bool add(const Increment& increment);
+    [[nodiscard]] bool given_up() const noexcept;
+    [[nodiscard]] CalibrationResult result() const;
+    [[nodiscard]] const std::vector<CalibrationTrace>& trace() const noexcept;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Two runs, z up and z down: zero and scale of the z accelerometer apart.
+struct ZeroAndScale {
+    double zero_mg = 0, zero_sigma_mg = 0;
+    double scale = 0, scale_sigma = 0;  ///< 1
+};
+[[nodiscard]] ZeroAndScale separate(const AxisResult& up, const AxisResult& down) noexcept;
+
+}  // namespace vibrig::estimator::zeros

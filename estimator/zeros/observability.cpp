@@ -1,0 +1,147 @@
+#include "estimator/zeros/observability.hpp"
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/zeros/error_model.hpp"
+
+namespace vibrig::estimator::zeros {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kRankLimit = 1e-10;
+constexpr double kWeakest = 1e-5;
+constexpr double kNamed = 0.3;
+constexpr double kTimeScale_s = 30;
+
+StateVector scales(const Site& site) {
+    StateVector s;
+    const double metre = 1 / site.radius_m;
+    const double rate = 0.1 * kPi / 180 / 3600;
+    const double force = 1e-3 * site.gravity_mps2;
+    s << 1e-3, 1e-3, 1e-3, 1, 1, 1, metre, metre / std::cos(site.latitude_rad), 1, rate, rate, rate,
+        force, force, force;
+    return s;
+}
+
+/// A basis with as many zeros as it can have, so that its vectors can be named.
+Eigen::MatrixXd sparse_basis(Eigen::MatrixXd v) {
+    std::array<bool, kStates> used{};
+    for (Eigen::Index k = 0; k < v.cols(); ++k) {
+        Eigen::Index pivot = -1;
+        for (Eigen::Index i = 0; i < v.rows(); ++i) {
+            if (!used[static_cast<std::size_t>(i)] &&
+                (pivot < 0 || std::abs(v(i, k)) > std::abs(v(pivot, k)))) {
+                pivot = i;
+            }
+        }
+        used[static_cast<std::size_t>(pivot)] = true;
+        const Eigen::VectorXd column = v.col(k) / v(pivot, k);
+        v.col(k) = column;
+        for (Eigen::Index other = 0; other < v.cols(); ++other) {
+            if (other != k) {
+                const double factor = v(pivot, other);
+                v.col(other) -= factor * column;
+            }
+        }
+    }
+    for (Eigen::Index k = 0; k < v.cols(); ++k) {
+        const double norm = v.col(k).norm();
+        v.col(k) /= norm;
+    }
+    return v;
+}
+
+}  // namespace
+
+bool Observability::sufficient() const noexcept {
+    return rank == kStates && singular[kStates - 1] >= kWeakest;
+}
+
+std::string Observability::unobservable() const {
+    std::string text;
+    for (const auto& vector : null_vectors) {
+        std::string names;
+        for (std::size_t i = 0; i < vector.size(); ++i) {
+            if (std::abs(vector[i]) > kNamed) {
+                names += (names.empty() ? "" : " with ") + std::string(kStateNames[i]);
+            }
+        }
+        text += (text.empty() ? "" : "; ") + names;
+    }
+    return text;
+}
+
+Observability observability(const std::vector<double>& azimuths_deg, const Site& site) {
+    const StateVector scale = scales(site);
+    const MeasurementMatrix h = measurement_matrix(site) * scale.asDiagonal();
+    Eigen::MatrixXd som(90 * static_cast<Eigen::Index>(azimuths_deg.size()), kStates);
+    Eigen::Index row = 0;
+    for (const double azimuth : azimuths_deg) {
+        const double psi = azimuth * kPi / 180;
+        Eigen::Matrix3d c;
+        c << std::cos(psi), -std::sin(psi), 0, std::sin(psi), std::cos(psi), 0, 0, 0, 1;
+        const StateMatrix a = kTimeScale_s * (scale.cwiseInverse().asDiagonal() *
+                                              error_dynamics(c, {0, 0, site.gravity_mps2}, site) *
+                                              scale.asDiagonal());
+        MeasurementMatrix power = h;
+        for (int i = 0; i < kStates; ++i) {
+            som.middleRows<6>(row) = power;
+            row += 6;
+            power = (power * a).eval();
+        }
+    }
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(som, Eigen::ComputeThinV);
+    const Eigen::VectorXd& s = svd.singularValues();
+    const Eigen::MatrixXd& v = svd.matrixV();
+    Observability result;
+    for (Eigen::Index i = 0; i < kStates; ++i) {
+        result.singular[static_cast<std::size_t>(i)] = s[i];
+        result.rank += s[i] > kRankLimit * s[0] ? 1 : 0;
+    }
+    const Eigen::Index missing = kStates - result.rank;
+    for (Eigen::Index j = 0; j < kStates; ++j) {
+        double row_norm = 0;
+        for (Eigen::Index k = 0; k < result.rank; ++k) {
+            row_norm += v(j, k) * v(j, k) / (s[k] * s[k]);
+        }
+        const bool lost = v.row(j).tail(missing).squaredNorm() > 1e-6;
+        result.degree[static_cast<std::size_t>(j)] = lost ? 0 : 1 / std::sqrt(row_norm);
+    }
+    const Eigen::Index weak =
+        missing > 0 ? missing : static_cast<Eigen::Index>(s[kStates - 1] < kWeakest);
+    const Eigen::MatrixXd basis = sparse_basis(v.rightCols(weak));
+    for (Eigen::Index k = 0; k < weak; ++k) {
+        std::array<double, kStates> vector{};
+        for (Eigen::Index i = 0; i < kStates; ++i) {
+            vector[static_cast<std::size_t>(i)] = basis(i, k);
+        }
+        result.null_vectors.push_back(vector);
+    }
+    return result;
+}
+
+void check_observable(const SlewPlan& plan, const Site& site) {
+    plan.check();
+    const Observability found = observability(plan.segments_deg(), site);
+    if (found.sufficient()) {
+        return;
+    }
+    std::array<char, 160> text{};
+    if (found.rank < kStates) {
+        std::snprintf(text.data(), text.size(),
+                      "slew plan: rank %d of 15, x and y zeros cannot be told from tilt; not "
+                      "observable: ",
+                      found.rank);
+    } else {
+        std::snprintf(
+            text.data(), text.size(),
+            "slew plan: smallest singular value %.2g of the scaled system, expected at least "
+            "%.0e; hardly observable: ",
+            found.singular[kStates - 1], kWeakest);
+    }
+    throw ZeroError(text.data() + found.unobservable());
+}
+
+}  // namespace vibrig::estimator::zeros

@@ -1,0 +1,122 @@
+#include "estimator/zeros/simulation.hpp"
+
+#include <cmath>
+#include <random>
+
+#include "estimator/zeros/strapdown.hpp"
+
+namespace vibrig::estimator::zeros {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kDeg = kPi / 180;
+
+Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+}  // namespace
+
+struct UnitSimulation::Impl {
+    CalibrationSettings settings;
+    UnitErrors errors;
+    double period_s;
+    double real_rate;
+    std::mt19937_64 generator;
+    std::normal_distribution<double> normal{};
+    std::size_t k = 0;
+    Eigen::Matrix3d c = Eigen::Matrix3d::Identity();  ///< true, body to navigation
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+
+    [[nodiscard]] double azimuth(double t) const {
+        return settings.plan.azimuth_deg(t * real_rate) * kDeg;
+    }
+    [[nodiscard]] Eigen::Matrix3d attitude(double t) const {
+        const double psi = azimuth(t) + errors.azimuth_deg * kDeg;
+        Eigen::Matrix3d turned =
+            rotation({errors.tilt_east_deg * kDeg, errors.tilt_north_deg * kDeg, 0}) *
+            rotation({0, 0, psi});
+        if (settings.inverted) {
+            turned.col(1) *= -1;
+            turned.col(2) *= -1;
+        }
+        return turned;
+    }
+    /// Of the unit at its lever arm, by central difference over the motion of the axis.
+    [[nodiscard]] Eigen::Vector3d unit_velocity(double t) const {
+        constexpr double kHalf = 1e-4;
+        const Eigen::Vector3d lever = vector(settings.lever_arm_m);
+        return (attitude(t + kHalf) - attitude(t - kHalf)) * lever / (2 * kHalf);
+    }
+    Eigen::Vector3d noise(double sigma) {
+        const double x = normal(generator);
+        const double y = normal(generator);
+        return Eigen::Vector3d(x, y, normal(generator)) * sigma;
+    }
+    Increment next() {
+        const double t = static_cast<double>(k++) * period_s;
+        Increment in;
+        in.time_s = t;
+        in.azimuth_rad = azimuth(t);
+        if (k == 1) {
+            c = attitude(0);
+            velocity = unit_velocity(0);
+            return in;
+        }
+        const Site& site = settings.site;
+        const Eigen::Matrix3d c1 = attitude(t);
+        const Eigen::Vector3d v1 = unit_velocity(t);
+        const Eigen::Vector3d w = earth_rate(site);
+        // The turn from c to c1 seen from space, in body axes: constant within the interval.
+        const Eigen::Matrix3d relative = c.transpose() * rotation(w * period_s) * c1;
+        Eigen::Vector3d turn(relative(2, 1) - relative(1, 2), relative(0, 2) - relative(2, 0),
+                             relative(1, 0) - relative(0, 1));
+        const double sine = 0.5 * turn.norm();
+        turn *= sine > 1e-12 ? std::asin(std::min(1.0, sine)) / (2 * sine) : 0.5;
+        const double wt = 2 * kPi * 15;
+        const double shaken = errors.vibration_g * site.gravity_mps2 / wt *
+                              (std::cos(wt * (t - period_s)) - std::cos(wt * t));
+        const Eigen::Vector3d in_navigation =
+            v1 - velocity + Eigen::Vector3d(0, 0, site.gravity_mps2 * period_s + shaken) +
+            2 * w.cross(0.5 * (v1 + velocity)) * period_s;
+        const Eigen::Matrix3d middle = rotation(-0.5 * period_s * w) * c * rotation(0.5 * turn);
+        Eigen::Vector3d dv = middle.transpose() * in_navigation;
+        dv += vector(errors.scale).cwiseProduct(dv) +
+              vector(errors.zero_mg) * (1e-3 * site.gravity_mps2 * period_s);
+        turn += vector(errors.gyro_bias_deg_h) * (kDeg / 3600 * period_s);
+        const double root = std::sqrt(period_s);
+        turn += noise(settings.noise.angle_random_walk * kDeg / 60 * root);
+        dv += noise(settings.noise.velocity_random_walk * site.gravity_mps2 * root);
+        for (std::size_t i = 0; i < 3; ++i) {
+            in.turn_rad[i] = turn[static_cast<Eigen::Index>(i)];
+            in.velocity_mps[i] = dv[static_cast<Eigen::Index>(i)];
+        }
+        const Eigen::Vector3d dv_ref = noise(settings.noise.velocity_reference);
+        const Eigen::Vector3d dp_ref = noise(settings.noise.position_reference);
+        for (std::size_t i = 0; i < 3; ++i) {
+            in.reference_velocity_mps[i] = dv_ref[static_cast<Eigen::Index>(i)];
+            in.reference_position_m[i] = dp_ref[static_cast<Eigen::Index>(i)];
+        }
+        c = c1;
+        velocity = v1;
+        return in;
+    }
+};
+
+UnitSimulation::UnitSimulation(const CalibrationSettings& settings, const UnitErrors& errors,
+                               double period_s, std::uint64_t seed, double real_rate)
+    : impl_(std::make_unique<Impl>(
+          Impl{settings, errors, period_s, real_rate, std::mt19937_64(seed)})) {}
+UnitSimulation::~UnitSimulation() = default;
+UnitSimulation::UnitSimulation(UnitSimulation&&) noexcept = default;
+Increment UnitSimulation::next() { return impl_->next(); }
+
+Calibration simulate(const CalibrationSettings& settings, const UnitErrors& errors, double period_s,
+                     std::uint64_t seed) {
+    Calibration calibration(settings);
+    UnitSimulation unit(settings, errors, period_s, seed);
+    const auto steps = static_cast<std::size_t>(std::llround(settings.plan.duration_s / period_s));
+    for (std::size_t k = 0; k <= steps && calibration.add(unit.next()); ++k) {
+    }
+    return calibration;
+}
+
+}  // namespace vibrig::estimator::zeros

@@ -1,0 +1,140 @@
+#include "estimator/zeros/zero_filter.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace vibrig::estimator::zeros {
+namespace {
+
+constexpr double kDeg = 3.14159265358979323846 / 180;
+constexpr double kDegPerHour = kDeg / 3600;
+constexpr double kDegPerRootHour = kDeg / 60;  // rad/sqrt(s)
+/// The attitude of the error model may turn by so little (0.5 deg at 5 deg/s) before its matrix is
+/// taken anew.
+constexpr double kPart_s = 0.1;
+
+Eigen::Matrix3d level_attitude(double azimuth, bool inverted) {
+    Eigen::Matrix3d c;
+    c << std::cos(azimuth), -std::sin(azimuth), 0, std::sin(azimuth), std::cos(azimuth), 0, 0, 0, 1;
+    if (inverted) {
+        c.col(1) *= -1;
+        c.col(2) *= -1;
+    }
+    return c;
+}
+
+Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+}  // namespace
+
+ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
+    : settings_(settings),
+      lever_(vector(settings.lever_arm_m)),
+      strapdown_(settings.site, level_attitude(azimuth_rad, settings.inverted),
+                 level_attitude(azimuth_rad, settings.inverted) * lever_),
+      h_(measurement_matrix(settings.site)) {
+    const Initial& start = settings.initial;
+    const Site& site = settings.site;
+    const double metre = start.position_m / site.radius_m;
+    StateVector sigma;
+    sigma << start.tilt_deg * kDeg, start.tilt_deg * kDeg, start.azimuth_deg * kDeg,
+        Eigen::Vector3d::Constant(start.velocity_mps), metre, metre / std::cos(site.latitude_rad),
+        start.position_m, Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
+        Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2);
+    p_ = sigma.cwiseAbs2().asDiagonal();
+}
+
+void ZeroFilter::advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& velocity,
+                         double dt_s) {
+    const Eigen::Vector3d true_turn = turn - gyro_bias_ * dt_s;
+    const Eigen::Vector3d true_velocity = velocity - zero_ * dt_s;
+    const Eigen::Matrix3d before = strapdown_.c();
+    strapdown_.advance(true_turn, true_velocity, dt_s);
+    rate_ = true_turn / dt_s;
+    const Eigen::Matrix3d middle = 0.5 * (before + strapdown_.c());
+    mean_c_ += middle * dt_s;
+    mean_f_ += middle * true_velocity;
+    part_s_ += dt_s;
+    if (part_s_ >= kPart_s) {
+        propagate();
+    }
+}
+
+void ZeroFilter::propagate() {
+    if (part_s_ <= 0) {
+        return;
+    }
+    const StateMatrix a =
+        part_s_ * error_dynamics(mean_c_ / part_s_, mean_f_ / part_s_, settings_.site);
+    const StateMatrix step = StateMatrix::Identity() + a + 0.5 * a * a;
+    phi_ = (step * phi_).eval();
+    since_update_s_ += part_s_;
+    part_s_ = 0;
+    mean_c_.setZero();
+    mean_f_.setZero();
+}
+
+void ZeroFilter::loosen(double tilt, double velocity, double position) {
+    propagate();
+    const double metre = position / settings_.site.radius_m;
+    StateVector sigma = StateVector::Zero();
+    sigma.segment<3>(kPhi).setConstant(tilt);
+    sigma.segment<3>(kVelocity).setConstant(velocity);
+    sigma.segment<3>(kPosition) << metre, metre / std::cos(settings_.site.latitude_rad), position;
+    // Errors of now, seen from the last update: the propagation is near enough to identity.
+    p_ += StateMatrix(sigma.cwiseAbs2().asDiagonal());
+}
+
+ZeroFilter::Innovation ZeroFilter::update(const Eigen::Vector3d& velocity,
+                                          const Eigen::Vector3d& position) {
+    propagate();
+    const Noise& noise = settings_.noise;
+    const double t = since_update_s_;
+    const double turn = noise.angle_random_walk * kDegPerRootHour;
+    const double force = noise.velocity_random_walk * settings_.site.gravity_mps2;
+    const double gyro = noise.gyro_drift * kDegPerHour / 60;
+    const double zero = noise.accelerometer_drift * 1e-3 * settings_.site.gravity_mps2 / 60;
+    StateVector q = StateVector::Zero();
+    q.segment<3>(kPhi).setConstant(turn * turn * t);
+    q.segment<3>(kVelocity).setConstant(force * force * t);
+    q.segment<3>(kGyro).setConstant(gyro * gyro * t);
+    q.segment<3>(kAccelerometer).setConstant(zero * zero * t);
+    p_ = (phi_ * p_ * phi_.transpose()).eval();
+    p_ += StateMatrix(q.asDiagonal());
+    phi_.setIdentity();
+    since_update_s_ = 0;
+
+    // The unit turns about the axis; relative to the Earth by what the gyros say without it.
+    const Eigen::Matrix3d& c = strapdown_.c();
+    const Eigen::Vector3d rate = rate_ - c.transpose() * earth_rate(settings_.site);
+    Eigen::Matrix<double, 6, 1> z;
+    z << strapdown_.velocity() - velocity - c * rate.cross(lever_),
+        strapdown_.position() - position - c * lever_;
+    Eigen::Matrix<double, 6, 1> r;
+    r << Eigen::Vector3d::Constant(noise.velocity_reference * noise.velocity_reference),
+        Eigen::Vector3d::Constant(noise.position_reference * noise.position_reference);
+    using Square = Eigen::Matrix<double, 6, 6>;
+    const Eigen::Matrix<double, kStates, 6> ph = p_ * h_.transpose();
+    Square s = h_ * ph;
+    s.diagonal() += r;
+    const Eigen::LLT<Square> llt(s);
+    const Eigen::Matrix<double, kStates, 6> gain = llt.solve(ph.transpose()).transpose();
+    Innovation innovation;
+    innovation.nis = z.dot(llt.solve(z));
+    innovation.ratio = z.cwiseAbs2().cwiseQuotient(s.diagonal());
+    const StateVector x = gain * z;
+    // Joseph's form keeps the covariance symmetric and positive.
+    const StateMatrix rest = StateMatrix::Identity() - gain * h_;
+    p_ = (rest * p_ * rest.transpose()).eval() + gain * r.asDiagonal() * gain.transpose();
+    p_ = (0.5 * (p_ + p_.transpose())).eval();
+
+    const double radius = settings_.site.radius_m;
+    strapdown_.correct(x.segment<3>(kPhi), x.segment<3>(kVelocity),
+                       {x[kPosition + 1] * radius * std::cos(settings_.site.latitude_rad),
+                        x[kPosition] * radius, x[kPosition + 2]});
+    gyro_bias_ += x.segment<3>(kGyro);
+    zero_ += x.segment<3>(kAccelerometer);
+    return innovation;
+}
+
+}  // namespace vibrig::estimator::zeros

@@ -1,0 +1,45 @@
+#pragma once
+
+#include "estimator/zeros/calibration.hpp"
+#include "estimator/zeros/strapdown.hpp"
+
+namespace vibrig::estimator::zeros {
+
+/// The Kalman filter on the error model around a strapdown mechanisation, in closed loop: after
+/// each update the state is taken off attitude, velocity, position and biases.
+class ZeroFilter {
+  public:
+    ZeroFilter(const CalibrationSettings& settings, double azimuth_rad);
+
+    void advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& velocity, double dt_s);
+    /// Forgets attitude, velocity and position to this extent (1 sigma): rad, m/s, m.
+    void loosen(double tilt, double velocity, double position);
+
+    struct Innovation {
+        double nis = 0;
+        Eigen::Matrix<double, 6, 1> ratio;  ///< square of each row over its expected square
+    };
+    /// Velocity and position of the azimuth axis are known.
+    Innovation update(const Eigen::Vector3d& velocity, const Eigen::Vector3d& position);
+
+    [[nodiscard]] const Eigen::Vector3d& gyro_bias() const noexcept { return gyro_bias_; }
+    [[nodiscard]] const Eigen::Vector3d& zero() const noexcept { return zero_; }
+    [[nodiscard]] const StateMatrix& covariance() const noexcept { return p_; }
+
+  private:
+    void propagate();
+
+    const CalibrationSettings settings_;
+    Eigen::Vector3d lever_;
+    Strapdown strapdown_;
+    Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();  ///< rad/s
+    Eigen::Vector3d zero_ = Eigen::Vector3d::Zero();       ///< m/s^2
+    Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();       ///< last, rad/s
+    StateMatrix p_, phi_ = StateMatrix::Identity();
+    Eigen::Matrix3d mean_c_ = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d mean_f_ = Eigen::Vector3d::Zero();
+    double part_s_ = 0, since_update_s_ = 0;
+    MeasurementMatrix h_;
+};
+
+}  // namespace vibrig::estimator::zeros
