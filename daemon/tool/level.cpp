@@ -16,11 +16,12 @@
 #include <vector>
 
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
 #include "estimator/levelling/simulation.hpp"
 
-namespace vibrig::tool {
+namespace vibrig::tool::level_command {
 
 namespace {
 
@@ -29,9 +30,6 @@ using Json = nlohmann::ordered_json;
 using levelling::kArcmin;
 using levelling::kDegPerHour;
 using levelling::Pair;
-
-constexpr int kSaysNo = 1;
-constexpr int kBadInput = 2;
 
 /// As typed; angles in arcmin, rates in deg/h.
 struct Options {
@@ -194,7 +192,7 @@ int run_design(const Options& options) {
             std::cout << "note: " << leveller.message() << '\n';
         }
     }
-    return leveller.verdict() == levelling::Verdict::cannot_settle ? kSaysNo : 0;
+    return leveller.verdict() == levelling::Verdict::cannot_settle ? kNo : 0;
 }
 
 levelling::Scenario scenario_of(const Options& options) {
@@ -323,7 +321,7 @@ int run_many(const Options& options) {
                          at(0.5), at(0.95), at(1), worst_tilt / kArcmin,
                          leveller.tolerance() / kArcmin);
     }
-    return good ? 0 : kSaysNo;
+    return good ? 0 : kNo;
 }
 
 int run_simulate(const Options& options) {
@@ -372,7 +370,7 @@ int run_simulate(const Options& options) {
             }
         }
     }
-    return fast && run.settled_s < 0 ? kSaysNo : 0;
+    return fast && run.settled_s < 0 ? kNo : 0;
 }
 
 int guarded(int (*run)(const Options&), const Options& options) {
@@ -445,11 +443,16 @@ void add_simulate_options(CLI::App& command, Options& o) {
 
 }  // namespace
 
+}  // namespace vibrig::tool::level_command
+
+namespace vibrig::tool {
+
 void add_level(CLI::App& app, int& exit_code) {
+    using namespace level_command;
     CLI::App* command = app.add_subcommand("level", "The levelling loop: gains, simulated starts");
     command->require_subcommand(1);
     command->footer("Example: vibrig level simulate --tilt 30,-20 --plot tilt.svg");
-    auto options = std::make_shared<Options>();
+    auto options = std::make_shared<level_command::Options>();
     CLI::App* design = command->add_subcommand(
         "design", "Gains from settling time, residual and damping ratio; noise budget");
     add_design_options(*design, *options);

@@ -32,6 +32,7 @@ constexpr std::array kEntries{
     Entry{"allan", reproduce_allan},
     Entry{"dplan", reproduce_dplan},
     Entry{"zha2019", reproduce_zha2019},
+    Entry{"accelerometer", reproduce_accelerometer},
 };
 
 bool agrees(const Reproduction& reproduction) {

@@ -31,6 +31,7 @@ struct Reproduction {
 [[nodiscard]] Reproduction reproduce_allan(const ReproduceOptions& options);
 [[nodiscard]] Reproduction reproduce_tang2009(const ReproduceOptions& options);
 [[nodiscard]] Reproduction reproduce_dplan(const ReproduceOptions& options);
+[[nodiscard]] Reproduction reproduce_accelerometer(const ReproduceOptions& options);
 [[nodiscard]] Reproduction reproduce_zha2019(const ReproduceOptions& options);
 
 }  // namespace vibrig::tool

@@ -8,7 +8,7 @@
 #include "daemon/tool/reproduce.hpp"
 #include "estimator/levelling/simulation.hpp"
 
-namespace vibrig::tool {
+namespace vibrig::tool::zha2019 {
 
 namespace {
 
@@ -168,9 +168,7 @@ void add_noisy_reference(Reproduction& table, std::size_t seeds) {
     }
 }
 
-}  // namespace
-
-Reproduction reproduce_zha2019(const ReproduceOptions& options) {
+Reproduction reproduction(const ReproduceOptions& options) {
     Reproduction table;
     table.name = "zha2019";
     table.title = "fast damping with an external velocity reference";
@@ -196,4 +194,10 @@ Reproduction reproduce_zha2019(const ReproduceOptions& options) {
     return table;
 }
 
-}  // namespace vibrig::tool
+}  // namespace
+
+}  // namespace vibrig::tool::zha2019
+
+vibrig::tool::Reproduction vibrig::tool::reproduce_zha2019(const ReproduceOptions& options) {
+    return zha2019::reproduction(options);
+}

@@ -5,14 +5,12 @@
 #include <cstdio>
 
 #include "estimator/zeros/observability.hpp"
+#include "estimator/zeros/units.hpp"
 #include "estimator/zeros/zero_filter.hpp"
 
 namespace vibrig::estimator::zeros {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDeg = kPi / 180;
-constexpr double kDegPerHour = kDeg / 3600;
 constexpr double kLongestGap_s = 0.5;
 constexpr std::size_t kGapsAllowed = 3;
 constexpr double kNoMotion_s = 60;
@@ -22,22 +20,13 @@ constexpr double kLargestZero_mg = 10;
 constexpr std::size_t kBlock = 60;
 constexpr std::array kAxisNames{"x", "y", "z"};
 
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-    std::array<char, 320> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
-
 /// Wilson and Hilferty; z in standard deviations.
 double chi_square(double freedom, double z) {
     const double k = 2 / (9 * freedom);
     return freedom * std::pow(1 - k + z * std::sqrt(k), 3);
 }
 
-Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
-
-void check(const CalibrationSettings& s) {
+void check_settings(const CalibrationSettings& s) {
     const auto require = [](bool good, const char* name, double value, const char* expected) {
         if (!good) throw ZeroError(text("%s: %g, expected %s", name, value, expected));
     };
@@ -94,7 +83,7 @@ struct Calibration::Impl {
     std::size_t count = 0;
     Eigen::Vector3d force_sum = Eigen::Vector3d::Zero(), force_squares = Eigen::Vector3d::Zero();
     double rate_before = 0, still_since_s = 0;
-    int off_rate = 0;
+    int off_rate = 0, shaken = 0;
 
     Eigen::Vector3d reference_velocity = Eigen::Vector3d::Zero();
     Eigen::Vector3d reference_position = Eigen::Vector3d::Zero();
@@ -206,7 +195,9 @@ struct Calibration::Impl {
         Eigen::Index worst = 0;
         const double level =
             std::sqrt(std::max(0.0, variance.maxCoeff(&worst))) / settings.site.gravity_mps2;
-        if (level <= settings.vibration_limit_g) return true;
+        // The start of a slew shakes once, on the border of two intervals; a shaker goes on.
+        shaken = level > settings.vibration_limit_g ? shaken + 1 : 0;
+        if (shaken < 3) return true;
         return give_up(text(
             "shaker must be off during zero calibration: vibration of %.3g g (1 "
             "sigma) on %s at %.3f s, limit %.3g g",
@@ -409,7 +400,7 @@ struct Calibration::Impl {
 };
 
 Calibration::Calibration(const CalibrationSettings& settings)
-    : impl_((check(settings), std::make_unique<Impl>(settings))) {}
+    : impl_((check_settings(settings), std::make_unique<Impl>(settings))) {}
 Calibration::~Calibration() = default;
 Calibration::Calibration(Calibration&&) noexcept = default;
 Calibration& Calibration::operator=(Calibration&&) noexcept = default;

@@ -5,11 +5,11 @@
 #include <cstdio>
 
 #include "estimator/zeros/error_model.hpp"
+#include "estimator/zeros/units.hpp"
 
 namespace vibrig::estimator::zeros {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kRankLimit = 1e-10;
 constexpr double kWeakest = 1e-5;
 constexpr double kNamed = 0.3;

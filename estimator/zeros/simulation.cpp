@@ -1,20 +1,14 @@
 #include "estimator/zeros/simulation.hpp"
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "estimator/zeros/strapdown.hpp"
+#include "estimator/zeros/units.hpp"
 
 namespace vibrig::estimator::zeros {
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDeg = kPi / 180;
-
-Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
-
-}  // namespace
-
 struct UnitSimulation::Impl {
     CalibrationSettings settings;
     UnitErrors errors;

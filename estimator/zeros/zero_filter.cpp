@@ -1,14 +1,13 @@
 #include "estimator/zeros/zero_filter.hpp"
+#include "estimator/zeros/units.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <cmath>
 
 namespace vibrig::estimator::zeros {
 namespace {
 
-constexpr double kDeg = 3.14159265358979323846 / 180;
-constexpr double kDegPerHour = kDeg / 3600;
-constexpr double kDegPerRootHour = kDeg / 60;  // rad/sqrt(s)
 /// The attitude of the error model may turn by so little (0.5 deg at 5 deg/s) before its matrix is
 /// taken anew.
 constexpr double kPart_s = 0.1;
@@ -22,8 +21,6 @@ Eigen::Matrix3d level_attitude(double azimuth, bool inverted) {
     }
     return c;
 }
-
-Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
 
 }  // namespace
 
@@ -53,7 +50,6 @@ void ZeroFilter::advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& vel
     rate_ = true_turn / dt_s;
     const Eigen::Matrix3d middle = 0.5 * (before + strapdown_.c());
     mean_c_ += middle * dt_s;
-    mean_f_ += middle * true_velocity;
     part_s_ += dt_s;
     if (part_s_ >= kPart_s) {
         propagate();
@@ -64,14 +60,15 @@ void ZeroFilter::propagate() {
     if (part_s_ <= 0) {
         return;
     }
-    const StateMatrix a =
-        part_s_ * error_dynamics(mean_c_ / part_s_, mean_f_ / part_s_, settings_.site);
+    // The specific force of the standing axis, not the measured one: what a wrong attitude makes of
+    // that would pass for information on states that cannot be observed.
+    const Eigen::Vector3d f(0, 0, settings_.site.gravity_mps2);
+    const StateMatrix a = part_s_ * error_dynamics(mean_c_ / part_s_, f, settings_.site);
     const StateMatrix step = StateMatrix::Identity() + a + 0.5 * a * a;
     phi_ = (step * phi_).eval();
     since_update_s_ += part_s_;
     part_s_ = 0;
     mean_c_.setZero();
-    mean_f_.setZero();
 }
 
 void ZeroFilter::loosen(double tilt, double velocity, double position) {

@@ -37,7 +37,6 @@ class ZeroFilter {
     Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();       ///< last, rad/s
     StateMatrix p_, phi_ = StateMatrix::Identity();
     Eigen::Matrix3d mean_c_ = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d mean_f_ = Eigen::Vector3d::Zero();
     double part_s_ = 0, since_update_s_ = 0;
     MeasurementMatrix h_;
 };

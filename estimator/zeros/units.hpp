@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdio>
+#include <string>
+
+#include "estimator/zeros/calibration.hpp"
+
+namespace vibrig::estimator::zeros {
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kDeg = kPi / 180;             ///< rad
+inline constexpr double kDegPerHour = kDeg / 3600;    ///< rad/s
+inline constexpr double kDegPerRootHour = kDeg / 60;  ///< rad/sqrt(s)
+
+[[nodiscard]] inline Eigen::Vector3d vector(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+/// printf into a string, at most 320 characters.
+template <typename... Values>
+std::string text(const char* format, Values... values) {
+    std::array<char, 320> out{};
+    std::snprintf(out.data(), out.size(), format, values...);
+    return out.data();
+}
+
+}  // namespace vibrig::estimator::zeros

@@ -1,0 +1,110 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace {
+
+using Json = nlohmann::json;
+
+/// Runs the real program in a folder of its own.
+class ZeroCommand : public ::testing::Test {
+  protected:
+    ZeroCommand() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~ZeroCommand() override { std::filesystem::remove_all(folder_); }
+
+    [[nodiscard]] std::string content(const char* name) const {
+        std::ostringstream text;
+        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
+        return text.str();
+    }
+    int vibrig(const std::string& arguments) {
+        const std::string command =
+            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        out = content("out");
+        error = content("error");
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    }
+    Json json(const std::string& arguments, int code) {
+        EXPECT_EQ(vibrig(arguments + " --json"), code) << arguments << ": " << error << out;
+        return Json::parse(out, nullptr, false);
+    }
+    void expect_refusal(const std::string& arguments, const std::string& words) {
+        EXPECT_EQ(vibrig(arguments), 2) << arguments << "\n" << out << error;
+        EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
+    }
+
+    std::filesystem::path folder_;
+    std::string out;
+    std::string error;
+};
+
+TEST_F(ZeroCommand, AFileGivesWhatTheSimulatedUnitGave) {
+    // GIVEN increments written to a file
+    ASSERT_EQ(vibrig("zero simulate --zero 3,-2,1 --seed 5 --position-noise 0.001 "
+                     "--velocity-noise 0.0005 --write run.csv"),
+              0)
+        << error;
+    EXPECT_NE(content("run.csv").find("turn_z_arcsec"), std::string::npos);
+    // WHEN they are read back; a file knows no noise of the reference, so its innovations may be
+    // smaller than expected, which is said
+    vibrig("zero run.csv --position-noise 0.001 --velocity-noise 0.0005 --plot zeros.svg --json");
+    const Json result = Json::parse(out, nullptr, false);
+    ASSERT_FALSE(result.is_discarded()) << out << error;
+    // THEN the zeros are those of the unit
+    const std::array<double, 3> truth{3, -2, 1};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Json& axis = result["zeros"][i];
+        EXPECT_NEAR(axis["zero_mg"], truth[i], 5 * axis["filter_sigma_mg"].get<double>() + 1e-3);
+        EXPECT_FALSE(axis["converged_s"].is_null());
+    }
+    EXPECT_NE(content("zeros.svg").find("<svg"), std::string::npos);
+    EXPECT_EQ(vibrig("zero run.csv --azimuth none --inverted"), 1);  // the wrong way up
+    expect_refusal("zero run.csv --azimuth heading", "heading");
+    expect_refusal("zero none.csv", "none.csv");
+}
+
+TEST_F(ZeroCommand, SimulatesAndExplains) {
+    const Json result = json("zero simulate --scale 0,0,100 --both-ways", 0);
+    EXPECT_TRUE(result["valid"].get<bool>());
+    EXPECT_EQ(result["observability"]["rank"], 15);
+    EXPECT_EQ(result["zeros"][2]["what"], "zero + 1 g x scale error");
+    EXPECT_GT(result["zeros"][2]["sigma_mg"], 0.1);
+    EXPECT_NEAR(result["zeros"][0]["level_arcmin"], 5 * 3.438, 0.2);
+    EXPECT_NEAR(result["z_apart"]["scale_ppm"], 100, 10);
+    EXPECT_NEAR(result["z_apart"]["zero_mg"], 5, 0.01);
+    EXPECT_EQ(vibrig("zero simulate"), 0) << error;
+    EXPECT_NE(out.find("rank 15 of 15"), std::string::npos) << out;
+    EXPECT_EQ(vibrig("zero simulate --vibration 1"), 1);
+    EXPECT_NE(out.find("shaker must be off"), std::string::npos);
+    EXPECT_EQ(vibrig("zero simulate --duration 30"), 1);
+    EXPECT_NE(out.find("has not converged"), std::string::npos);
+    EXPECT_EQ(vibrig("zero simulate --slews 0 --static --duration 80"), 1);
+}
+
+TEST_F(ZeroCommand, RefusesBadInput) {
+    expect_refusal("zero", "FILE or `simulate` expected");
+    expect_refusal("zero simulate --slews 0", "rank 12 of 15");
+    expect_refusal("zero simulate --slews 0,360", "phi_E with nab_y");
+    expect_refusal("zero simulate --rate 0.00139 --duration 30", "smallest singular value");
+    expect_refusal("zero simulate --rate -5", "slew rate");
+    expect_refusal("zero simulate --latitude 90", "latitude");
+    expect_refusal("zero simulate --duration 86400 --period 0.0001", "expected at most 1e7");
+    expect_refusal("zero simulate --write no/such/run.csv --duration 80", "no/such/run.csv");
+}
+
+TEST_F(ZeroCommand, ReproducesTheTable) {
+    const Json result = json("reproduce accelerometer --seeds 2", 0)["reproductions"][0];
+    EXPECT_TRUE(result["agrees"].get<bool>()) << out;
+    EXPECT_GT(result["rows"].size(), 12U);
+}
+
+}  // namespace
