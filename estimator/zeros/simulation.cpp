@@ -34,11 +34,11 @@ struct UnitSimulation::Impl {
         }
         return turned;
     }
-    /// Of the unit at its lever arm, by central difference over the motion of the axis.
+    /// Of the unit at its lever arm. At the instant in which the azimuth turns round that is the
+    /// velocity it came with, as it is for the filter, whose rate is that of the last increment.
     [[nodiscard]] Eigen::Vector3d unit_velocity(double t) const {
-        constexpr double kHalf = 1e-4;
-        const Eigen::Vector3d lever = vector(settings.lever_arm_m);
-        return (attitude(t + kHalf) - attitude(t - kHalf)) * lever / (2 * kHalf);
+        constexpr double kBack = 1e-4;
+        return (attitude(t) - attitude(t - kBack)) * vector(settings.lever_arm_m) / kBack;
     }
     Eigen::Vector3d noise(double sigma) {
         const double x = normal(generator);
