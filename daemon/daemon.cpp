@@ -73,9 +73,9 @@ Daemon::Daemon(configuration::Loaded loaded)
       shaker_(drivers::make_shaker(clock_, shaker_settings(configuration_))),
       control_waiter_(clock_.make_waiter()),
       estimator_waiter_(clock_.make_waiter()),
-      interlock_(
-          *shaker_, *control_waiter_,
-          {configuration_.campaign.max_acceleration_g, configuration_.gimbal.status_deadline}),
+      interlock_(*shaker_, *control_waiter_,
+                 {configuration_.campaign.max_acceleration_g, configuration_.gimbal.status_deadline,
+                  configuration_.interlock}),
       identification_(configuration_.estimator),
       estimator_stage_(estimator_ring_, *estimator_waiter_, *control_waiter_, identification_),
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
@@ -106,6 +106,21 @@ Daemon::Daemon(configuration::Loaded loaded)
            [this](Severity severity, const std::string& text) { log(severity, "campaign", text); },
            [this](const std::array<double, 3>& here_deg, double elapsed_s) {
                return next_dwell(here_deg, elapsed_s);
+           },
+           [this](double table_g, const std::array<double, 3>& position_deg) {
+               interlock_.command(table_g, position_deg);
+           },
+           [this](const estimator::DwellInfo& info, const estimator::DwellSummary& summary) {
+               if (journal_) journal_->dwell_done(info, summary);
+           },
+           [this] { return resume_gate(); },
+           [this](const std::string& by) {
+               identification_ = std::move(*interrupted_);
+               interrupted_.reset();
+               if (journal_) journal_->campaign_resumed(interrupted_id_, by);
+               auto result = identification_.result();
+               const std::lock_guard lock(mutex_);
+               result_ = std::move(result);
            }}) {}
 
 campaign::Next Daemon::next_dwell(const std::array<double, 3>& here_deg, double elapsed_s) {
@@ -154,12 +169,14 @@ void Daemon::start() {
                 "\", expected a folder that can be written: " + std::strerror(errno));
         }
     }
+    open_journal();
     // A daemon that died may have left it running inside the watchdog's time.
     shaker_->stop_now();
     shaker_->on_reading([this] {
         interlock_.check(shaker_->reading());
         control_waiter_->notify();
     });
+    shaker_->on_stop_written([this] { interlock_.stop_written(); });
     acquisition_.start(
         [this](drivers::PortState state, const char* text) { on_port_state(state, text); });
     shaker_->start([this] { return may_feed(); },
@@ -177,7 +194,9 @@ void Daemon::start() {
     acquisition_thread_ = std::thread([this] { io_.run(); });
     for (const auto& [thread, priority, name] :
          {std::tuple{&acquisition_thread_, configuration_.acquisition_priority, "acquisition"},
-          std::tuple{&estimator_thread_, configuration_.estimator_priority, "estimator"}}) {
+          std::tuple{&estimator_thread_, configuration_.estimator_priority, "estimator"},
+          std::tuple{&control_thread_, 0, "control"}}) {
+        ::pthread_setname_np(thread->native_handle(), name);  // for top and the like
         if (const auto why = set_fifo(*thread, priority); !why.empty()) {
             log(Severity::warning, name,
                 fmt::format("SCHED_FIFO {} could not be had ({}): ordinary scheduling", priority,
@@ -213,6 +232,7 @@ void Daemon::join() {
         acquisition_.stop();
         acquisition_thread_.join();
     }
+    if (journal_) journal_->stop();
 }
 
 void Daemon::on_port_state(drivers::PortState state, const char* text) noexcept {
@@ -233,6 +253,7 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
     record.source = source;
     record.text = text;
     event_log_.append(record);
+    if (journal_) journal_->event(record);
     const auto level = severity == Severity::info      ? spdlog::level::info
                        : severity == Severity::warning ? spdlog::level::warn
                                                        : spdlog::level::err;
@@ -257,9 +278,18 @@ void Daemon::take_commands(Time now) {
     for (auto& waiting : taken) {
         if (waiting.abandoned->exchange(true)) continue;
         const rt::Trip handled = interlock_.tripped();
+        if (const auto alarm = acknowledge_alarm(waiting.request); alarm.accepted) {
+            waiting.reply.set_value(alarm);
+            continue;
+        }
         const auto reply = campaign_.command(waiting.request, now);
         if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
             interlock_.acknowledge(handled);
+        }
+        if (journal_) {
+            journal_->command(waiting.request, reply, utc_now());
+            if (reply.accepted && waiting.request.kind == CommandRequest::Kind::start)
+                journal_->campaign_begun(configuration_.campaign.name, waiting.request.by);
         }
         waiting.reply.set_value(reply);
     }
@@ -294,9 +324,12 @@ void Daemon::control_loop() {
         port_events_.consume(words);
         shaker_events_.consume(words);
         if (const rt::Trip trip = interlock_.tripped(); trip != handled) {
-            if (trip != rt::Trip::none) campaign_.on_trip(rt::text_of(trip), now);
+            if (trip != rt::Trip::none) campaign_.on_trip(interlock_.tripped_text(), now);
             handled = trip;
         }
+        tell_alarms();
+        if (journal_) tell_journal();
+        interlock_.filter(excitation_.load() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
         take_done_dwells();
@@ -322,12 +355,17 @@ void Daemon::control_loop() {
 
 void Daemon::write_result() {
     const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
-    if (configuration_.results.empty()) return;
     std::string text;
     {
         const std::lock_guard lock(mutex_);
         text = tool::result_json(result_);
     }
+    if (journal_) {
+        StatusData ended;
+        campaign_.fill(ended, clock_.now());
+        journal_->campaign_ended(name_of(ended.state), ended.reason, text);
+    }
+    if (configuration_.results.empty()) return;
     // A partial result never takes the place of a complete one.
     const auto path = std::filesystem::path(configuration_.results) /
                       (complete ? "result.json" : "result-partial.json");
@@ -401,6 +439,8 @@ StatusData Daemon::status() const {
     }
     status.platform = acquired.platform;
     status.estimate = estimated.estimate;
+    status.interlock = interlock_status();
+    if (journal_) status.journal = journal_->status();
     return status;
 }
 

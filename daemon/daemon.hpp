@@ -13,6 +13,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/journal/journal.hpp"
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/interlock.hpp"
@@ -56,6 +57,9 @@ class Daemon final : public StatusSource {
     /// Ends the threads, orderly or not.
     void join();
 
+    /// The stages that measure or act and have ceased to; empty: all go on. Any one thread.
+    [[nodiscard]] std::string stuck_stage();
+
     [[nodiscard]] StatusData status() const override;
     [[nodiscard]] std::vector<EventRecord> events(std::uint64_t after_id,
                                                   std::size_t at_most) const override;
@@ -75,10 +79,18 @@ class Daemon final : public StatusSource {
     void take_commands(drivers::Time now);
     void on_port_state(drivers::PortState state, const char* text) noexcept;
     void log(Severity severity, const std::string& source, const std::string& text);
+    /// Accepted if it was for an alarm; a trip is the campaign's.
+    CommandReply acknowledge_alarm(const CommandRequest& request);
+    void tell_alarms();
+    void tell_journal();
+    [[nodiscard]] InterlockStatus interlock_status() const;
     void take_done_dwells();
     void write_result();
     [[nodiscard]] campaign::Next next_dwell(const std::array<double, 3>& here_deg,
                                             double elapsed_s);
+    void open_journal();
+    void offer_unfinished(journal::Unfinished& campaign);
+    [[nodiscard]] std::string resume_gate() const;
     void check_balance(drivers::Time now);
     [[nodiscard]] bool may_feed() const noexcept;
 
@@ -98,6 +110,9 @@ class Daemon final : public StatusSource {
     rt::Ring<RtEvent> port_events_{64};    ///< acquisition to control
     rt::Ring<RtEvent> shaker_events_{64};  ///< shaker to control
     estimator::Identification identification_;
+    /// As it was when the campaign was interrupted; until it is resumed.
+    std::optional<estimator::Identification> interrupted_;
+    std::int64_t interrupted_id_ = 0;
     rt::EstimatorStage estimator_stage_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
@@ -109,17 +124,27 @@ class Daemon final : public StatusSource {
     std::atomic<bool> excitation_{false};  ///< the campaign is between ramp and rest
     int dwells_with_estimator_ = 0;        ///< ordered, not yet reported done; control thread
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
-    std::string imbalance_;  ///< as last looked at
+    std::string imbalance_;                      ///< as last looked at
+    std::array<bool, rt::kMostRules> raised_{};  ///< alarms already told of
     drivers::Time balance_checked_ = 0;
     std::atomic<drivers::Time> control_beat_{0};
     drivers::Time started_ = 0;
     serve::EventLog event_log_;
+    std::unique_ptr<journal::Journal> journal_;  ///< null: none is kept
+    bool journal_was_running_ = true;            ///< control thread
     mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
     std::deque<WaitingCommand> commands_;
     StatusData campaign_status_;
     estimator::Result result_;
     bool ended_ = false;
     std::condition_variable ended_changed_;
+
+    /// How far each stage was when it last went on, for stuck_stage().
+    struct Progress {
+        std::uint64_t mark = 0;
+        std::int64_t since_ns = 0;  ///< wall
+    };
+    std::array<Progress, 4> progress_{};
 
     std::thread acquisition_thread_;
     std::thread estimator_thread_;

@@ -29,6 +29,28 @@ enum class CampaignState : std::uint8_t {
 };
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
+/// The interlock's table as it stands, and how long stops took.
+struct InterlockStatus {
+    struct Row {
+        std::string name, condition, reaction, unit;
+        double limit = 0, dwell_s = 0;
+        bool has_limit = false, latched = false, raised = false;
+        double value = 0;  ///< as last judged to be wrong
+    };
+    std::string tripped;  ///< name of the row, to be acknowledged; empty: none
+    std::vector<Row> rows;
+    std::vector<double> reaction_bounds_ms;  ///< upper ends of the classes but the last
+    std::vector<std::uint64_t> reaction_counts;
+    double reaction_largest_ms = 0;
+};
+
+struct JournalStatus {
+    std::string path;                                   ///< empty: no journal is kept
+    bool running = false;                               ///< false: the disk refuses; entries wait
+    std::string note;                                   ///< what the disk says
+    std::uint64_t taken = 0, written = 0, dropped = 0;  ///< entries; taken = written + waiting
+};
+
 struct RingCounters {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
@@ -46,6 +68,7 @@ struct StatusData {
     CampaignState state = CampaignState::idle;
     std::string reason;  ///< why it is aborted, tripped, waiting; else empty
     std::string armed_by;
+    std::string resume_offer;  ///< what can be resumed after a restart; empty: nothing
     int run = 0, runs = 0, position = 0, positions = 0;  ///< from 1; 0: none
     std::array<double, 3> position_deg{};
     double progress = 0;     ///< 0 to 1
@@ -56,6 +79,8 @@ struct StatusData {
     drivers::ShakerReading shaker;
     drivers::LinkState shaker_link = drivers::LinkState::absent;
     drivers::ShakerCounters shaker_counters;
+    InterlockStatus interlock;
+    JournalStatus journal;
     bool stop_pending = false;  ///< a stop is ordered and not read back as done
 
     drivers::PortState can = drivers::PortState::absent;

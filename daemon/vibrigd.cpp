@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <iostream>
@@ -13,6 +14,7 @@
 #include "daemon/daemon.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
+#include "daemon/watchdog.hpp"
 #include "estimator/instruction_set.hpp"
 
 namespace {
@@ -28,15 +30,69 @@ void set_up_log(const vibrig::configuration::Configuration& configuration) {
     spdlog::flush_on(spdlog::level::info);
 }
 
-int run(vibrig::configuration::Loaded loaded, const sigset_t& signals) {
+std::string words_of(const vibrig::StatusData& status) {
+    std::string words = std::string("measuring; campaign ") + vibrig::name_of(status.state);
+    if (!status.reason.empty()) words += ": " + status.reason;
+    if (status.position > 0)
+        words += fmt::format(", run {} of {}, position {} of {}", status.run, status.runs,
+                             status.position, status.positions);
+    return words;
+}
+
+/// The file as it is now; what is in force changes with a restart only, since another
+/// configuration ends an arming.
+void check_again(const std::string& path) {
+    try {
+        const auto loaded = vibrig::configuration::load(path, true);
+        vibrig::Daemon::check_bindings(loaded.configuration);
+        spdlog::info("configuration checked: valid; it takes effect with the next start");
+    } catch (const std::exception& error) {
+        spdlog::error("configuration checked, the old one stays in force: {}", error.what());
+    }
+}
+
+/// Feeds the service manager's watchdog while every stage makes progress; returns the signal that
+/// ends the daemon.
+int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, const sigset_t& signals,
+          const std::string& path) {
+    std::string told, stuck;
+    for (;;) {
+        const double period_s = manager.period_s() > 0 ? std::min(1.0, manager.period_s()) : 1.0;
+        timespec wait{};
+        wait.tv_sec = static_cast<time_t>(period_s);
+        wait.tv_nsec = static_cast<long>((period_s - static_cast<double>(wait.tv_sec)) * 1e9);
+        const int signal = ::sigtimedwait(&signals, nullptr, &wait);
+        if (signal == SIGHUP) {
+            manager.reloading();
+            check_again(path);
+            manager.ready(told);
+            continue;
+        }
+        if (signal > 0) return signal;
+        const auto now_stuck = daemon.stuck_stage();
+        if (now_stuck != stuck && !now_stuck.empty())
+            spdlog::error("no progress in: {}; the watchdog is not fed", now_stuck);
+        stuck = now_stuck;
+        if (stuck.empty()) manager.alive();
+        if (auto words = stuck.empty() ? words_of(daemon.status()) : "no progress in " + stuck;
+            words != told) {
+            told = std::move(words);
+            manager.status(told);
+        }
+    }
+}
+
+int run(vibrig::configuration::Loaded loaded, const sigset_t& signals, const std::string& path) {
+    const vibrig::ServiceManager manager;
     const auto socket = loaded.configuration.socket;
     vibrig::Daemon daemon(std::move(loaded));
     // Before anything moves: it refuses to run beside another vibrigd.
     const vibrig::serve::StatusServer server(daemon, socket);
     daemon.start();
     spdlog::info("vibrigd {} answers at {}; measuring, shaker disarmed", vibrig::kVersion, socket);
-    int signal = 0;
-    ::sigwait(&signals, &signal);
+    manager.ready(words_of(daemon.status()));
+    const int signal = watch(daemon, manager, signals, path);
+    manager.stopping();
     spdlog::info("{}: stopping", ::strsignal(signal));
     daemon.shut_down();
     // In wall time: the rig's clock may stand still, a link may be gone. A second signal cuts it
@@ -113,7 +169,7 @@ int main(int argc, char** argv) {
         set_up_log(loaded.configuration);
         spdlog::info("campaign \"{}\": {}", loaded.configuration.campaign.name,
                      vibrig::forecast_campaign(loaded.configuration));
-        return run(std::move(loaded), signals);
+        return run(std::move(loaded), signals, path);
     } catch (const std::exception& error) {
         std::cerr << "vibrigd: " << error.what() << '\n';
         return 2;

@@ -1,5 +1,7 @@
 #include "drivers/modbus_shaker.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -41,6 +43,7 @@ void ModbusShaker::start(std::function<bool()> may_feed, StateHandler on_state) 
         clock_.make_waiter();  // busy from here on: a simulated clock waits for the first round
     wakeable_ = waiter_.get();
     thread_ = std::thread([this] { run(); });
+    ::pthread_setname_np(thread_.native_handle(), "shaker");
 }
 
 bool ModbusShaker::request(const ShakerSetPoint& set_point) noexcept {
@@ -109,7 +112,10 @@ void ModbusShaker::shut_down() noexcept {
 }
 
 void ModbusShaker::run() noexcept {
-    while (!quit_.load()) work(clock_.now());
+    while (!quit_.load()) {
+        ++beats_;
+        work(clock_.now());
+    }
 }
 
 /// One round: the most urgent thing, or sleep until the next is due.
@@ -259,6 +265,7 @@ void ModbusShaker::write_stop(Time now) {
     }
     if (!reply.ok()) return;
     ++counts_.stops_written;
+    if (on_stop_written_) on_stop_written_();
     if (verify("run", run, raw) != Written::as_told) return;
     orders_.stop_done();
     drop_void_set_point();

@@ -32,6 +32,10 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] ShakerCounters counters() const noexcept override;
     [[nodiscard]] LinkState state() const noexcept override { return state_.load(); }
     void on_reading(std::function<void()> wake) override { on_reading_ = std::move(wake); }
+    void on_stop_written(std::function<void()> told) override {
+        on_stop_written_ = std::move(told);
+    }
+    [[nodiscard]] std::uint64_t beats() const noexcept override { return beats_; }
     void shut_down() noexcept override;
 
   private:
@@ -84,12 +88,13 @@ class ModbusShaker final : public Shaker {
     ShakerImage image_;
     ShakerOrders orders_;
     Counts counts_;
+    Count beats_;
     Latest<ShakerReading> latest_;
     std::atomic<LinkState> state_{LinkState::absent};
 
     std::function<bool()> may_feed_;
     StateHandler on_state_;
-    std::function<void()> on_reading_;
+    std::function<void()> on_reading_, on_stop_written_;
     std::unique_ptr<Waiter> waiter_;
     // Whoever wakes the thread counts itself in, so that the waiter is not destroyed under it.
     std::atomic<Waiter*> wakeable_{nullptr};

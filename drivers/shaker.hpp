@@ -100,6 +100,10 @@ class Shaker {
     /// Called in the shaker's thread after every completed read-back, to wake whoever waits for
     /// one. Before start().
     virtual void on_reading(std::function<void()> wake) = 0;
+    /// Rounds of the shaker's thread so far: it lives as long as they grow.
+    [[nodiscard]] virtual std::uint64_t beats() const noexcept { return 0; }
+    /// Called in the shaker's thread when the device has confirmed a stop. Before start().
+    virtual void on_stop_written(std::function<void()> /*told*/) {}
     /// Ends the thread. Does not stop the shaker: call stop_now() and wait for stop_pending() to
     /// clear first.
     virtual void shut_down() noexcept = 0;

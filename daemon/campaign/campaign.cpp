@@ -123,6 +123,10 @@ std::string Campaign::not_fit_to_excite() const {
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
+    if (state == State::ramping) excited_deg_ = here().stop.position_deg;
+    if (ports_.commanded) {
+        ports_.commanded(state == State::settling ? table_g() : 0, excited_deg_);
+    }
     ports_.guard(guard_in(state));
     entered_ = now;
     requested_ = false;
@@ -155,20 +159,16 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
+            offer_.clear();
             ports_.begin();
-            positions_done_ = 0;
-            dwells_.clear();
-            plan_stops();
-            temperatures_.clear();
-            pause_asked_ = false;
-            started_ = now;
-            enter(State::waiting, now);
+            begin(now);
             return accept("campaign started");
         case Kind::pause:
             if (!active()) return refuse("no campaign is running");
             pause_asked_ = true;
             return accept("pause before the next position");
         case Kind::resume:
+            if (!active() && !offer_.empty()) return resume_interrupted(request, now);
             if (state_ != State::paused && !pause_asked_) return refuse("not paused");
             pause_asked_ = false;
             return accept("resumed");
@@ -182,6 +182,47 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             return accept("acknowledged: " + std::exchange(reason_, {}));
     }
     return refuse("unknown command");
+}
+
+/// From the position after the ones in offer_, which is empty for a new campaign.
+void Campaign::begin(Time now) {
+    dwells_ = std::exchange(offer_, {});
+    positions_done_ = positions_before_ = dwells_.size();
+    plan_stops();
+    at_ = positions_done_;
+    temperatures_.clear();
+    pause_asked_ = false;
+    started_ = now;
+    enter(State::waiting, now);
+}
+
+CommandReply Campaign::resume_interrupted(const CommandRequest& request, Time now) {
+    if (state_ != State::armed) return {false, "not armed: a named person arms it first"};
+    if (const auto why = not_fit_to_excite(); !why.empty()) return {false, why};
+    if (!ports_.estimator_free()) return {false, "the last dwell is still being closed"};
+    if (ports_.resume_gate) {
+        if (const auto why = ports_.resume_gate(); !why.empty())
+            return {false, "not consistent with the campaign so far: " + why};
+    }
+    const std::string what = resume_offer();
+    if (ports_.resume) ports_.resume(request.by);
+    begin(now);
+    const std::string text = "campaign resumed: " + what;
+    ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+    return {true, text};
+}
+
+std::string Campaign::resume_offer() const {
+    if (offer_.empty()) return {};
+    return fmt::format("{} of {} positions done", offer_.size(), stops_.size());
+}
+
+bool Campaign::offer(std::vector<estimator::DwellSummary> done) {
+    bool fits = !settings_.adaptive && done.size() <= stops_.size();
+    for (std::size_t i = 0; fits && i < done.size(); ++i)
+        fits = done[i].run == stops_[i].run && done[i].position == stops_[i].position;
+    if (fits) offer_ = std::move(done);
+    return fits;
 }
 
 Time Campaign::step(Time now) {
@@ -277,6 +318,7 @@ void Campaign::start_position(Time now) {
         return;
     }
     if (at_ == stops_.size() && !choose_next(now)) {
+        if (positions_done_ > 0) return finish(now);
         armed_by_.clear();
         return end(State::aborted, "nothing to do", now);
     }
@@ -392,6 +434,8 @@ Time Campaign::record(Time now) {
 
 void Campaign::next_position(Time now) {
     ++positions_done_;
+    if (ports_.position_done)
+        ports_.position_done({here().run, here().position, table_g()}, dwells_.back());
     ++at_;
     enter(State::resting, now);
 }
@@ -404,12 +448,7 @@ Time Campaign::rest(Time now) {
         if (shutting_down_) {
             end(State::aborted, "the daemon is shutting down", now);
         } else if (at_ == stops_.size() && at_ > 0 && !choose_next(now)) {
-            --at_;
-            expected_ = stops_.size();
-            armed_by_.clear();
-            enter(State::finished, now);
-            ports_.end(true);
-            ports_.event(Severity::info, "campaign finished");
+            finish(now);
         } else {
             start_position(now);
         }
@@ -432,6 +471,15 @@ Time Campaign::rest(Time now) {
         }
     }
     return now + kPoll;
+}
+
+void Campaign::finish(Time now) {
+    --at_;
+    expected_ = stops_.size();
+    armed_by_.clear();
+    enter(State::finished, now);
+    ports_.end(true);
+    ports_.event(Severity::info, "campaign finished");
 }
 
 void Campaign::leave_dwell() {
@@ -494,6 +542,7 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.state = state_;
     status.reason = reason_;
     status.armed_by = armed_by_;
+    status.resume_offer = resume_offer();
     status.runs = static_cast<int>(runs());
     status.positions = static_cast<int>(positions());
     status.dwells = dwells_;
@@ -514,8 +563,10 @@ void Campaign::fill(StatusData& status, Time now) const {
     if (active()) {
         // What is left at the pace so far, at first at the nominal one.
         const double nominal = settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
-        const double pace =
-            positions_done_ > 0 ? drivers::to_seconds(now - started_) / done : nominal;
+        const auto before = static_cast<double>(positions_before_);
+        const double pace = positions_done_ > positions_before_
+                                ? drivers::to_seconds(now - started_) / (done - before)
+                                : nominal;
         status.remaining_s = (total - done) * pace;
         const bool vibrating =
             state_ == State::ramping || state_ == State::settling || state_ == State::recording;

@@ -39,6 +39,15 @@ struct Ports {
     std::function<void(Severity, const std::string&)> event;
     /// Adaptive campaigns: what to do next, at these gimbal angles, so many s after the start.
     std::function<Next(const std::array<double, 3>& here_deg, double elapsed_s)> next = {};
+    /// What the table is to do (0: nothing, or on its way) and where the gimbals are to be, deg.
+    std::function<void(double table_g, const std::array<double, 3>& position_deg)> commanded = {};
+    /// A position is done, its data with the estimator.
+    std::function<void(const estimator::DwellInfo&, const estimator::DwellSummary&)> position_done =
+        {};
+    /// Before an interrupted campaign goes on: why not, else empty.
+    std::function<std::string()> resume_gate = {};
+    /// It goes on, by this person: take the filter as it was.
+    std::function<void(const std::string& by)> resume = {};
 };
 
 /// The campaign as a state machine: for each run and position slew, ramp, settle, record, rest.
@@ -48,6 +57,10 @@ class Campaign {
   public:
     Campaign(const Settings& settings, Ports ports);
 
+    /// Before the first step(): positions that an interrupted campaign has done. Nothing moves
+    /// until a person arms and resumes it. False if they are not the first of the list; what an
+    /// adaptive campaign would have chosen cannot be taken up.
+    bool offer(std::vector<estimator::DwellSummary> done);
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
@@ -78,6 +91,10 @@ class Campaign {
     void abort(const std::string& why, drivers::Time now);
     void end(CampaignState state, const std::string& why, drivers::Time now);
     void leave_dwell();
+    void begin(drivers::Time now);
+    void finish(drivers::Time now);
+    CommandReply resume_interrupted(const CommandRequest& request, drivers::Time now);
+    [[nodiscard]] std::string resume_offer() const;
     [[nodiscard]] std::string not_fit_to_excite() const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading) const;
     void plan_stops();
@@ -117,7 +134,11 @@ class Campaign {
     bool dwell_done_ = false;
     drivers::Time dwell_from_ = 0;
     drivers::Time dwell_to_ = 0;
+    /// Where the gimbals are while the table moves; at_ is ahead when it comes to rest.
+    std::array<double, 3> excited_deg_{};
     std::size_t positions_done_ = 0;
+    std::size_t positions_before_ = 0;  ///< of them before a restart
+    std::vector<estimator::DwellSummary> offer_;
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/campaign/settings.hpp"
+#include "daemon/rt/interlock_table.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
 #include "drivers/gimbal.hpp"
@@ -42,7 +43,10 @@ struct Configuration {
     std::string socket = "/run/vibrig/vibrigd.sock";                            ///< [server] socket
     std::string log_level = "info";                                             ///< [log] level
     std::string log_file;  ///< [log] file; empty: standard error
-    std::string results;   ///< [campaign] results: folder for result.json; empty: none written
+    /// [journal] file; empty: journal.sqlite3 in results, and none without results
+    std::string journal;
+    std::string results;  ///< [campaign] results: folder for result.json; empty: none written
+    std::vector<rt::Rule> interlock = rt::default_interlock();  ///< [[interlock]]
     int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
 };

@@ -61,6 +61,8 @@ std::string format_schema() {
         std::string value = key.write(defaults);
         if (key.type == "positions") {
             value = "(table 1)";
+        } else if (key.type == "tables") {
+            value = "(see --check)";
         }
         rows.push_back({key.name, key.type, key.unit.empty() ? "-" : key.unit,
                         value.empty() ? "-" : value, key.bounds.empty() ? "-" : key.bounds,

@@ -10,6 +10,7 @@ const std::vector<Key>& schema() {
         add_shaker_keys(all);
         add_bus_keys(all);
         add_daemon_keys(all);
+        add_interlock_keys(all);
         return all;
     }();
     return keys;

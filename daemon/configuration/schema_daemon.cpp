@@ -32,6 +32,10 @@ void add_daemon_keys(std::vector<Key>& keys) {
     keys.push_back(text(
         "log.file", "a path", "empty: standard error", path_rule,
         [](C & c) -> auto& { return c.log_file; }));
+    keys.push_back(text(
+        "journal.file", "a path",
+        "SQLite: campaigns, results, events, commands; empty: journal.sqlite3 in campaign.results",
+        path_rule, [](C & c) -> auto& { return c.journal; }));
     keys.push_back(integer("threads.acquisition_priority", "", 0, 99,
                            "SCHED_FIFO; 0: ordinary scheduling",
                            [](C& c) -> int& { return c.acquisition_priority; }));

@@ -57,6 +57,7 @@ void Acquisition::stop() {
 
 void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept {
     shown_.in_hand = frames.size();
+    to_.interlock.arrived(wall_clock());
     for (const auto& frame : frames) {
         --shown_.in_hand;
         if (!rig_link_) {
@@ -129,6 +130,7 @@ void Acquisition::arm_timer() {
     timer_.expires_at(std::chrono::steady_clock::time_point(std::chrono::nanoseconds(deadline)));
     timer_.async_wait([this](const boost::system::error_code& error) {
         if (error) return;
+        to_.interlock.arrived(wall_clock());
         on_time(clock_.now());
         arm_timer();
     });

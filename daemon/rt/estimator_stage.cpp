@@ -64,11 +64,15 @@ void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
         return;
     }
     ++shown_.in_dwell;
-    if (!begun_) {
+    const bool first = !begun_;
+    if (first) {
         identification_.begin_dwell(current_.dwell);
         begun_ = true;
     }
-    identification_.add(measurement_of(sample, current_.from));
+    const auto measurement = measurement_of(sample, current_.from);
+    identification_.add(measurement);
+    if (journal_ != nullptr)
+        journal_->try_push({measurement, current_.dwell.run, current_.dwell.position, first, 0});
     shown_.dwell_fraction = static_cast<double>(sample.time - current_.from) /
                             static_cast<double>(current_.to - current_.from);
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "daemon/rt/dwell_order.hpp"
+#include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
 #include "daemon/rt/snapshot.hpp"
 #include "drivers/clock.hpp"
@@ -32,6 +33,9 @@ class EstimatorStage {
     void run() noexcept;
     void stop() noexcept;  ///< any thread
 
+    /// Before run(): what goes into the filter goes there too.
+    void feed_to(Ring<Fed>& journal) noexcept { journal_ = &journal; }
+
     /// Control thread only.
     bool order(const DwellOrder& order) noexcept;
     /// Control thread only: takes one finished dwell, if there is one.
@@ -49,6 +53,7 @@ class EstimatorStage {
     drivers::Waiter& self_;
     drivers::Waiter& control_;
     estimator::Identification& identification_;
+    Ring<Fed>* journal_ = nullptr;
     Ring<DwellOrder> orders_{8};
     Ring<DwellDone> done_{8};
     std::atomic<bool> stop_{false};

@@ -1,77 +1,253 @@
 #include "daemon/rt/interlock.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <utility>
 
 namespace vibrig::rt {
 
 using drivers::Channel;
+using drivers::Time;
 
-const char* text_of(Trip trip) noexcept {
-    switch (trip) {
-        case Trip::none:
-            return "none";
-        case Trip::stale_channel:
-            return "a resolver or accelerometer channel is stale";
-        case Trip::loop_open:
-            return "stabilisation loop open";
-        case Trip::stale_platform:
-            return "the platform's status is stale";
-        case Trip::platform_fault:
-            return "platform fault";
-        case Trip::shaker_fault:
-            return "shaker fault";
-        case Trip::uncommanded:
-            return "the shaker runs without being commanded";
-        case Trip::over_amplitude:
-            return "table acceleration above the shaker's limit";
-        case Trip::emergency_stop:
-            return "emergency-stop chain open";
-        case Trip::can_lost:
-            return "CAN bus lost";
-    }
-    return "unknown";
+Time wall_clock() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
 }
 
-void Interlock::trip(Trip cause) noexcept {
+const char* text_of(Trip trip) noexcept { return condition_of(trip).text; }
+
+void ReactionHistogram::add(Time taken) noexcept {
+    const double ms = drivers::to_seconds(taken) * 1e3;
+    const auto bound = std::ranges::lower_bound(kBounds_ms, ms);
+    ++count_[static_cast<std::size_t>(bound - kBounds_ms.begin())];
+    Time largest = largest_.load();
+    while (taken > largest && !largest_.compare_exchange_weak(largest, taken)) {
+    }
+}
+
+ReactionHistogram::Counts ReactionHistogram::counts() const noexcept {
+    Counts counts;
+    for (std::size_t i = 0; i < counts.count.size(); ++i) counts.count[i] = count_[i].load();
+    counts.largest_ms = drivers::to_seconds(largest_.load()) * 1e3;
+    return counts;
+}
+
+Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits limits)
+    : shaker_(shaker),
+      control_(control),
+      table_g_(limits.table_g),
+      platform_age_(limits.platform_age),
+      rules_(std::move(limits.rules)) {
+    std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
+    if (rules_.size() > kMostRules) rules_.resize(kMostRules);
+    mismatches_ = shaker_.counters().read_back_mismatches;
+}
+
+void Interlock::command(double table_g, const std::array<double, 3>& position_deg) noexcept {
+    for (std::size_t i = 0; i < 3; ++i)
+        position_rad_[i].store(position_deg[i] * std::numbers::pi / 180);
+    position_known_.store(true);
+    commanded_g_.store(table_g);
+}
+
+void Interlock::trip(Trip cause, std::size_t row, double value) noexcept {
     Trip expected = Trip::none;
     if (!tripped_.compare_exchange_strong(expected, cause)) return;
     shaker_.stop_now();
+    tripped_row_.store(row);
+    tripped_value_.store(value);
     control_.notify();
+}
+
+void Interlock::judge(By by, Trip trip, bool wrong, Time now) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition == trip) judge_row(by, i, wrong, wrong ? 1 : 0, now);
+    }
+}
+
+void Interlock::judge(By by, Trip trip, double value, Time now) noexcept {
+    const bool below = condition_of(trip).below;
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition != trip) continue;
+        // A NaN is wrong either way.
+        const bool good = below ? value >= rules_[i].limit : value <= rules_[i].limit;
+        judge_row(by, i, !good, value, now);
+    }
+}
+
+void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time now) noexcept {
+    State& state = states_[row];
+    Time& since = state.since[static_cast<std::size_t>(by)];
+    const Rule& rule = rules_[row];
+    if (!wrong) {
+        since = 0;
+        if (!rule.latched && state.raised.exchange(false)) control_.notify();
+        return;
+    }
+    now = std::max<Time>(now, 1);  // 0 says that the condition is met
+    if (since == 0) since = now;
+    if (now - since < drivers::from_seconds(rule.dwell_s)) return;
+    if (rule.reaction == Reaction::abort && tripped_.load() == Trip::none) {
+        if (by == By::sample && arrived_ != 0) stop_asked_.store(arrived_);
+        trip(rule.condition, row, value);
+    }
+    if (!state.raised.load()) {
+        state.value.store(value);
+        state.raised.store(true);
+        control_.notify();
+    }
+}
+
+/// What is not watched any more is not wrong for any time.
+void Interlock::forget(By by, Guard above) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        const Guard from = condition_of(rules_[i].condition).from;
+        if (from <= above) continue;
+        states_[i].since[static_cast<std::size_t>(by)] = 0;
+        if (!rules_[i].latched && states_[i].raised.exchange(false)) control_.notify();
+    }
 }
 
 void Interlock::check(const drivers::Sample& sample,
                       const drivers::PlatformStatus& platform) noexcept {
-    if (!at_least(Guard::excitation)) return;
-    if (!platform.loop_closed) trip(Trip::loop_open);
-    if (platform.fault) trip(Trip::platform_fault);
-    if (sample.of(Channel::table_accel) == drivers::Quality::good &&
-        !(std::abs(sample.table_accel) <= limits_.table_g)) {
-        trip(Trip::over_amplitude);
+    const Time now = sample.time;
+    const Guard guard = follow_guard();
+    if (guard == Guard::excitation) {
+        judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
+        judge(By::sample, Trip::platform_fault, platform.fault, now);
+        if (sample.of(Channel::table_accel) == drivers::Quality::good) {
+            judge(By::sample, Trip::over_amplitude, !(std::abs(sample.table_accel) <= table_g_),
+                  now);
+        }
+        check_motion(sample);
+        if (const double nis = nis_.load(); nis != 0)
+            judge(By::sample, Trip::filter_divergence, nis, now);
     }
+    if (platform.time > 0) judge(By::sample, Trip::temperature, platform.temperature_c, now);
+    if (const double free_mb = disk_free_mb_.load(); free_mb >= 0)
+        judge(By::sample, Trip::disk, free_mb, now);
 }
 
-void Interlock::check_ages(const drivers::SampleAssembler& assembler, drivers::Time now) noexcept {
-    if (!at_least(Guard::excitation)) return;
-    for (const auto c : {Channel::outer, Channel::inner, Channel::azimuth, Channel::accel_x,
-                         Channel::accel_y, Channel::accel_z}) {
-        if (assembler.stale(c, now)) trip(Trip::stale_channel);
+void Interlock::check_motion(const drivers::Sample& sample) noexcept {
+    if (sample.angles_good() && position_known_.load()) {
+        double farthest = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double off =
+                std::remainder(sample.angle[i] - position_rad_[i].load(), 2 * std::numbers::pi);
+            farthest = std::isnan(off) ? off : std::max(farthest, std::abs(off));
+        }
+        judge(By::sample, Trip::gimbal_off, farthest * 180 / std::numbers::pi, sample.time);
     }
-    if (now - assembler.platform().time > limits_.platform_age) trip(Trip::stale_platform);
+    if (!sample.force_good()) return;
+    motion_.add(sample);
+    // A share of a motion that is only just beginning or ending means nothing.
+    if (const double share = motion_.cross_share(); share >= 0 && commanded_g_.load() > 0)
+        judge(By::sample, Trip::cross_axis, share, sample.time);
+    if (const double tilt = motion_.tilt_deg(); !(tilt < 0))
+        judge(By::sample, Trip::tilt, tilt, sample.time);
+}
+
+Guard Interlock::follow_guard() noexcept {
+    const Guard guard = guard_.load();
+    if (guard == Guard::excitation && sampled_under_ != Guard::excitation) {
+        motion_.begin();
+        loss_ = {};
+    }
+    if (guard < sampled_under_) forget(By::sample, guard);
+    sampled_under_ = guard;
+    return guard;
+}
+
+void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) noexcept {
+    const Guard guard = follow_guard();
+    if (guard == Guard::excitation) {
+        bool stale = false;
+        for (const auto c : {Channel::outer, Channel::inner, Channel::azimuth, Channel::accel_x,
+                             Channel::accel_y, Channel::accel_z}) {
+            stale = stale || assembler.stale(c, now);
+        }
+        judge(By::sample, Trip::stale_channel, stale, now);
+        judge(By::sample, Trip::stale_platform, now - assembler.platform().time > platform_age_,
+              now);
+        const auto& counters = assembler.counters();
+        loss_.add(now, counters.samples, counters.incomplete, counters.gaps);
+        judge(By::sample, Trip::frame_loss, loss_.percent(), now);
+    }
+    if (guard >= Guard::armed) judge(By::sample, Trip::shaker_lost, !shaker_.reading().valid, now);
 }
 
 void Interlock::lost_bus() noexcept {
-    if (at_least(Guard::armed)) trip(Trip::can_lost);
+    if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, wall_clock());
 }
 
 void Interlock::check(const drivers::ShakerReading& reading) noexcept {
     if (!reading.valid) return;
-    if (reading.running && !at_least(Guard::excitation) && !shaker_.stop_pending()) {
-        trip(Trip::uncommanded);
+    const Guard guard = guard_.load();
+    if (guard < read_under_) forget(By::read_back, guard);
+    read_under_ = guard;
+    const Time now = reading.time;
+    judge(By::read_back, Trip::uncommanded,
+          reading.running && guard < Guard::excitation && !shaker_.stop_pending(), now);
+    const std::uint64_t mismatches = shaker_.counters().read_back_mismatches;
+    const bool mismatch = std::exchange(mismatches_, mismatches) != mismatches;
+    if (guard < Guard::armed) return;
+    judge(By::read_back, Trip::emergency_stop, reading.emergency_stop_open, now);
+    judge(By::read_back, Trip::shaker_fault,
+          reading.fault != 0 || reading.state == drivers::kShakerFault, now);
+    judge(By::read_back, Trip::over_amplitude, !(reading.measured_g <= table_g_), now);
+    judge(By::read_back, Trip::read_back, mismatch, now);
+    if (const double commanded = commanded_g_.load(); commanded > 0) {
+        judge(By::read_back, Trip::amplitude_off,
+              std::abs(20 * std::log10(reading.measured_g / commanded)), now);
     }
-    if (!at_least(Guard::armed)) return;
-    if (reading.emergency_stop_open) trip(Trip::emergency_stop);
-    if (reading.fault != 0 || reading.state == drivers::kShakerFault) trip(Trip::shaker_fault);
-    if (reading.measured_g > limits_.table_g) trip(Trip::over_amplitude);
+}
+
+void Interlock::stop_written() noexcept {
+    if (const Time asked = stop_asked_.exchange(0); asked != 0)
+        reactions_.add(wall_clock() - asked);
+}
+
+std::string Interlock::tripped_text() const {
+    const Trip trip = tripped_.load();
+    const Condition& condition = condition_of(trip);
+    const std::size_t row = tripped_row_.load();
+    if (!condition.has_limit() || row >= rules_.size() || rules_[row].condition != trip)
+        return condition.text;
+    std::array<char, 96> words{};
+    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s", tripped_value_.load(),
+                  rules_[row].limit, condition.unit);
+    return std::string(condition.text) + words.data();
+}
+
+std::string Interlock::tripped_name() const {
+    const Trip trip = tripped_.load();
+    if (trip == Trip::none) return {};
+    const std::size_t row = tripped_row_.load();
+    return row < rules_.size() && rules_[row].condition == trip ? rules_[row].name
+                                                                : condition_of(trip).name;
+}
+
+void Interlock::acknowledge(Trip handled) noexcept {
+    if (!tripped_.compare_exchange_strong(handled, Trip::none)) return;
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].reaction == Reaction::abort) states_[i].raised.store(false);
+    }
+}
+
+bool Interlock::acknowledge_alarm(const std::string& name) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].name == name && rules_[i].reaction == Reaction::alarm)
+            return states_[i].raised.exchange(false);
+    }
+    return false;
+}
+
+Interlock::RowState Interlock::row(std::size_t i) const noexcept {
+    return {&rules_[i], states_[i].raised.load(), states_[i].value.load()};
 }
 
 }  // namespace vibrig::rt

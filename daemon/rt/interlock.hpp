@@ -1,48 +1,70 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <string>
+#include <vector>
 
+#include "daemon/rt/interlock_motion.hpp"
+#include "daemon/rt/interlock_table.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/sample.hpp"
 #include "drivers/shaker.hpp"
 
 namespace vibrig::rt {
 
-enum class Trip : std::uint8_t {
-    none,
-    stale_channel,
-    stale_platform,
-    loop_open,
-    platform_fault,
-    over_amplitude,
-    emergency_stop,
-    shaker_fault,
-    uncommanded,
-    can_lost
-};
 [[nodiscard]] const char* text_of(Trip trip) noexcept;
+/// CLOCK_MONOTONIC, whatever clock the rig has.
+[[nodiscard]] drivers::Time wall_clock() noexcept;
 
-/// How much is watched. Each level includes the one before.
-enum class Guard : std::uint8_t {
-    idle,       ///< disarmed: only that the shaker rests
-    armed,      ///< armed or in a campaign: also emergency stop, faults, the bus
-    excitation  ///< from the ramp to rest: also amplitude, channels, platform
+/// Software's share of a reaction: frames in to stop confirmed by the controller, wall time.
+class ReactionHistogram {
+  public:
+    /// Upper bounds, ms; one more class is open.
+    static constexpr std::array<double, 11> kBounds_ms{0.1, 0.2, 0.5, 1,   2,  5,
+                                                       10,  20,  50,  100, 200};
+    void add(drivers::Time taken) noexcept;
+    struct Counts {
+        std::array<std::uint64_t, kBounds_ms.size() + 1> count{};
+        double largest_ms = 0;
+    };
+    [[nodiscard]] Counts counts() const noexcept;
+
+  private:
+    std::array<std::atomic<std::uint64_t>, kBounds_ms.size() + 1> count_{};
+    std::atomic<drivers::Time> largest_{0};
 };
 
-/// Stops the shaker from the acquisition thread, before anything else sees the sample. Latched
-/// until acknowledged.
+/// Stops the shaker before anything else sees the sample: what comes with samples or by silence is
+/// judged in the acquisition thread, what comes with a read-back in the shaker's thread right after
+/// it. Aborts latch until acknowledged. Judging neither allocates, locks nor logs.
 class Interlock {
   public:
     struct Limits {
         double table_g = 12.0;                                     ///< largest table acceleration
         drivers::Time platform_age = 500 * drivers::kMillisecond;  ///< of the platform's status
+        std::vector<Rule> rules = default_interlock();             ///< kMostRules at most
+    };
+    /// One row as it stands now.
+    struct RowState {
+        const Rule* rule = nullptr;
+        bool raised = false;
+        double value = 0;  ///< as last judged to be wrong
     };
 
-    Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits limits)
-        : shaker_(shaker), control_(control), limits_(limits) {}
+    Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits limits);
 
     void guard(Guard level) noexcept { guard_.store(level); }  ///< control thread
+    /// Control thread: what the table is to do (0: nothing yet, or ramping) and where the gimbals
+    /// are to be, deg as the encoders count.
+    void command(double table_g, const std::array<double, 3>& position_deg) noexcept;
+    /// Control thread, slowly: innovations of the filter (0: none yet), free space.
+    void filter(double nis_per_dof) noexcept { nis_.store(nis_per_dof); }
+    void disk_free(double megabytes) noexcept { disk_free_mb_.store(megabytes); }
+
+    /// Acquisition thread: a batch of frames came in at this moment (CLOCK_MONOTONIC).
+    void arrived(drivers::Time wall) noexcept { arrived_ = wall; }
     /// Acquisition thread, before the sample goes anywhere.
     void check(const drivers::Sample& sample, const drivers::PlatformStatus& platform) noexcept;
     /// Acquisition thread, on its timer: silence trips too.
@@ -52,22 +74,68 @@ class Interlock {
     /// Acquisition thread: the CAN port is no longer running.
     void lost_bus() noexcept;
     /// Any thread. The first cause stays.
-    void trip(Trip cause) noexcept;
+    void trip(Trip cause) noexcept { trip(cause, 0, 0); }
+    /// Shaker thread: a stop was written and confirmed.
+    void stop_written() noexcept;
 
     [[nodiscard]] Trip tripped() const noexcept { return tripped_.load(); }
+    /// Control thread: cause in words, with the value and its limit.
+    [[nodiscard]] std::string tripped_text() const;
+    /// Name of the row that tripped; empty: none.
+    [[nodiscard]] std::string tripped_name() const;
     /// Clears the trip if it is `handled`; one that came meanwhile stays.
-    void acknowledge(Trip handled) noexcept {
-        tripped_.compare_exchange_strong(handled, Trip::none);
+    void acknowledge(Trip handled) noexcept;
+    /// Clears a latched alarm by name; false if no row of that name is raised.
+    bool acknowledge_alarm(const std::string& name) noexcept;
+
+    [[nodiscard]] std::size_t rows() const noexcept { return rules_.size(); }
+    [[nodiscard]] RowState row(std::size_t i) const noexcept;
+    [[nodiscard]] ReactionHistogram::Counts reactions() const noexcept {
+        return reactions_.counts();
     }
 
   private:
+    /// Who judges: each keeps its own time since when a condition has not been met.
+    enum class By : std::uint8_t { sample, read_back };
+    struct State {
+        std::array<drivers::Time, 2> since{};  ///< by By; 0: met
+        std::atomic<bool> raised{false};
+        std::atomic<double> value{0};
+    };
+
     [[nodiscard]] bool at_least(Guard level) const noexcept { return guard_.load() >= level; }
+    void judge(By by, Trip trip, bool wrong, drivers::Time now) noexcept;
+    void judge(By by, Trip trip, double value, drivers::Time now) noexcept;
+    void judge_row(By by, std::size_t row, bool wrong, double value, drivers::Time now) noexcept;
+    void forget(By by, Guard above) noexcept;
+    void trip(Trip cause, std::size_t row, double value) noexcept;
+    Guard follow_guard() noexcept;
+    void check_motion(const drivers::Sample& sample) noexcept;
 
     drivers::Shaker& shaker_;
     drivers::Waiter& control_;
-    Limits limits_;
+    double table_g_;
+    drivers::Time platform_age_;
+    std::vector<Rule> rules_;
+    std::array<State, kMostRules> states_;
     std::atomic<Guard> guard_{Guard::idle};
     std::atomic<Trip> tripped_{Trip::none};
+    std::atomic<std::size_t> tripped_row_{0};
+    std::atomic<double> tripped_value_{0};
+    std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
+    std::array<std::atomic<double>, 3> position_rad_{};
+    std::atomic<bool> position_known_{false};
+    std::atomic<drivers::Time> stop_asked_{0};  ///< arrival of the frames that tripped; 0: none
+    ReactionHistogram reactions_;
+
+    // Acquisition thread.
+    drivers::Time arrived_ = 0;
+    Guard sampled_under_ = Guard::idle;
+    MotionMonitor motion_;
+    LossMonitor loss_;
+    // Shaker thread.
+    Guard read_under_ = Guard::idle;
+    std::uint64_t mismatches_ = 0;
 };
 
 }  // namespace vibrig::rt

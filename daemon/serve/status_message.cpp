@@ -72,6 +72,25 @@ void fill(v1::Shaker& out, const StatusData& status) {
     out.set_stop_pending(status.stop_pending);
 }
 
+void fill(v1::Interlock& out, const InterlockStatus& status) {
+    out.set_tripped(status.tripped);
+    for (const InterlockStatus::Row& row : status.rows) {
+        v1::Interlock::Row& to = *out.add_rows();
+        to.set_name(mend_utf8(row.name));
+        to.set_condition(row.condition);
+        to.set_reaction(row.reaction);
+        if (row.has_limit) set(to, &v1::Interlock::Row::set_limit, row.limit);
+        to.set_unit(row.unit);
+        to.set_dwell_s(row.dwell_s);
+        to.set_latched(row.latched);
+        to.set_raised(row.raised);
+        if (row.raised) set(to, &v1::Interlock::Row::set_value, row.value);
+    }
+    for (const double bound : status.reaction_bounds_ms) out.add_reaction_bounds_ms(bound);
+    for (const std::uint64_t count : status.reaction_counts) out.add_reaction_counts(count);
+    out.set_reaction_largest_ms(status.reaction_largest_ms);
+}
+
 void fill(v1::Can& out, const StatusData& status) {
     out.set_link(wire_enum<v1::Link::State>(status.can));
     const drivers::CanPortCounters& counters = status.can_counters;
@@ -193,6 +212,7 @@ void fill(v1::Campaign& out, const StatusData& status) {
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
     out.set_reason(mend_utf8(status.reason));
     out.set_armed_by(mend_utf8(status.armed_by));
+    out.set_resume_offer(mend_utf8(status.resume_offer));
     out.set_run(status.run);
     out.set_runs(status.runs);
     out.set_position(status.position);
@@ -229,6 +249,14 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_sample(), status);
     fill(*out.mutable_platform(), status.platform);
     fill(*out.mutable_estimate(), status.estimate);
+    fill(*out.mutable_interlock(), status.interlock);
+    v1::Journal& journal = *out.mutable_journal();
+    journal.set_path(mend_utf8(status.journal.path));
+    journal.set_running(status.journal.running);
+    journal.set_note(mend_utf8(status.journal.note));
+    journal.set_taken(status.journal.taken);
+    journal.set_written(status.journal.written);
+    journal.set_dropped(status.journal.dropped);
 }
 
 void fill(v1::Parameters& out, const estimator::Result& result) {

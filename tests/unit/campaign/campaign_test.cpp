@@ -1,5 +1,6 @@
 #include "daemon/campaign/campaign.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,6 +43,8 @@ struct CampaignTest : testing::Test {
     std::vector<std::string> events;
     rt::Guard guard = rt::Guard::idle;
     int ends = 0;
+    int positions_done = 0;
+    std::string gate;
     bool complete = false;
     bool slewed_while_moving = false;
     double slew_started_at = -1;
@@ -51,12 +54,16 @@ struct CampaignTest : testing::Test {
 
     void make() {
         campaign = std::make_unique<Campaign>(
-            settings, Ports{gimbal, shaker, [this] { return platform; },
+            settings, Ports{gimbal,
+                            shaker,
+                            [this] { return platform; },
                             [this](const rt::DwellOrder& o) {
                                 orders.push_back(o);
                                 return true;
                             },
-                            [this](rt::Guard g) { guard = g; }, [] { return true; }, [] {},
+                            [this](rt::Guard g) { guard = g; },
+                            [] { return true; },
+                            [] {},
                             [this](bool c) {
                                 ++ends;
                                 complete = c;
@@ -68,7 +75,13 @@ struct CampaignTest : testing::Test {
                                            ? Next{true, stops_to_choose[asked_from.size() - 1], 1,
                                                   "more"}
                                            : Next{false, {}, 0, "every target is met"};
-                            }});
+                            },
+                            {},
+                            [this](const estimator::DwellInfo&, const estimator::DwellSummary&) {
+                                ++positions_done;
+                            },
+                            [this] { return gate; },
+                            {}});
     }
 
     CampaignTest() {
@@ -345,6 +358,68 @@ TEST_F(CampaignTest, WhatCannotIdentifyIsNotArmed) {
     const auto reply = command(Kind::arm);
     EXPECT_FALSE(reply.accepted);
     EXPECT_EQ(reply.message, "rank 9 of 10");
+}
+
+/// Positions done, two of each run.
+std::vector<estimator::DwellSummary> done(std::size_t count) {
+    std::vector<estimator::DwellSummary> summaries(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        summaries[i].run = static_cast<int>(i / 2) + 1;
+        summaries[i].position = static_cast<int>(i % 2) + 1;
+    }
+    return summaries;
+}
+
+TEST_F(CampaignTest, GoesOnAfterARestartWhereItWasAndOnlyOnCommand) {
+    // GIVEN three positions of four done before a restart
+    EXPECT_FALSE(campaign->offer({done(3)[1]})) << "not the first";
+    EXPECT_TRUE(campaign->offer(done(3)));
+    EXPECT_EQ(status().resume_offer, "3 of 4 positions done");
+    // WHEN nobody does anything, or resumes without arming, THEN nothing moves
+    run_for(30);
+    EXPECT_FALSE(command(Kind::resume).accepted);
+    run_for(30);
+    EXPECT_TRUE(shaker.requests.empty());
+    EXPECT_TRUE(port.frames.empty());
+    // WHEN armed, THEN still nothing moves
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    run_for(30);
+    EXPECT_TRUE(shaker.requests.empty());
+    // WHEN the rig is not as it was, THEN it is refused
+    gate = "no platform status";
+    EXPECT_THAT(command(Kind::resume).message, testing::HasSubstr("no platform status"));
+    EXPECT_EQ(status().state, CampaignState::armed);
+    gate.clear();
+    // WHEN resumed, THEN the last position is recorded, and no other
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 200));
+    ASSERT_EQ(orders.size(), 1U);
+    EXPECT_EQ(orders[0].dwell.run, 2);
+    EXPECT_EQ(orders[0].dwell.position, 2);
+    EXPECT_EQ(status().dwells.size(), 4U);
+    EXPECT_TRUE(complete);
+    EXPECT_EQ(positions_done, 1);
+    EXPECT_EQ(status().resume_offer, "");
+}
+
+TEST_F(CampaignTest, EndsAResumedCampaignThatHadOnlyItsEndToCome) {
+    ASSERT_TRUE(campaign->offer(done(4)));
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 60));
+    EXPECT_TRUE(orders.empty());
+    EXPECT_TRUE(shaker.requests.empty());
+    EXPECT_EQ(ends, 1);
+}
+
+TEST_F(CampaignTest, ForgetsWhatItOfferedWhenStartedAnew) {
+    ASSERT_TRUE(campaign->offer(done(3)));
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    EXPECT_EQ(status().resume_offer, "");
+    EXPECT_TRUE(status().dwells.empty());
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    EXPECT_EQ(orders.size(), 4U);
 }
 
 }  // namespace

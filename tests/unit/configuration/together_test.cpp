@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "tests/unit/configuration/support.hpp"
 
 namespace vibrig::configuration {
@@ -134,6 +136,64 @@ TEST(Together, AMistakeInAValueIsToldOnce) {
     const std::string text = complaint("vibration.frequency_hz = nan", true);
     // THEN limits, aliasing and resonance at it are not discussed
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+}
+
+TEST(InterlockTable, TakesRowsByNameAndKeepsTheOthers) {
+    const auto before = accepted("").interlock;
+    const auto rows = accepted(R"(
+[[interlock]]
+name = "amplitude_abort"
+limit = 3
+dwell_s = 2
+[[interlock]]
+name = "too_hot"
+condition = "temperature"
+reaction = "alarm"
+limit = 60.5
+latched = true
+[[interlock]]
+name = "tilt"
+reaction = "off"
+)")
+                          .interlock;
+    ASSERT_EQ(rows.size(), before.size() + 1);
+    const auto row = [&rows](const std::string& name) {
+        return *std::find_if(rows.begin(), rows.end(),
+                             [&name](const rt::Rule& rule) { return rule.name == name; });
+    };
+    EXPECT_EQ(row("amplitude_abort").limit, 3);
+    EXPECT_EQ(row("amplitude_abort").dwell_s, 2);
+    EXPECT_EQ(row("amplitude_abort").reaction, rt::Reaction::abort);
+    EXPECT_EQ(row("too_hot").condition, rt::Trip::temperature);
+    EXPECT_TRUE(row("too_hot").latched);
+    EXPECT_EQ(row("tilt").reaction, rt::Reaction::off);
+    EXPECT_EQ(row("emergency_stop").reaction, rt::Reaction::abort);
+}
+
+TEST(InterlockTable, RefusesWhatWouldNotProtect) {
+    struct Case {
+        const char *row, *says;
+    };
+    const std::string head = "[[interlock]]\n";
+    for (const Case& c : {
+             Case{"name = \"emergency_stop\"\nreaction = \"alarm\"",
+                  "interlock[0].reaction: found \"alarm\" (a string), expected \"abort\""},
+             Case{"name = \"can_lost\"\ndwell_s = 0.1", "interlock[0].dwell_s: found 0.1"},
+             Case{"name = \"loop_open\"\ndwell_s = 1.1", "a number from 0 to 1 s"},
+             Case{"name = \"tilt\"\nlimit = nan", "interlock[0].limit: found nan"},
+             Case{"name = \"tilt\"\nlatched = false", "an abort latches until acknowledged"},
+             Case{"name = \"tilt\"\ncondition = \"disk\"", "which the row of this name watches"},
+             Case{"name = \"stale_channel\"\nlimit = 1", "has no limit of its own"},
+             Case{"name = \"mine\"", "interlock[0].condition: found nothing"},
+             Case{"name = \"mine\"\ncondition = \"tilt\"", "interlock[0].limit: found nothing"},
+             Case{"condition = \"tilt\"", "interlock[0].name: found nothing"},
+             Case{"name = \"tilt\"\nlimits = 1", "interlock[0].limits: found an unknown key"},
+             Case{"name = \"tilt\"\n[[interlock]]\nname = \"tilt\"", "\"tilt\" again"},
+         }) {
+        EXPECT_THAT(complaint(head + c.row), testing::HasSubstr(c.says)) << c.row;
+    }
+    EXPECT_THAT(complaint("interlock = 1"), testing::HasSubstr("[[interlock]] tables"));
+    EXPECT_THAT(complaint("[interlock]\nname = 1"), testing::HasSubstr("[[interlock]] tables"));
 }
 
 }  // namespace

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "daemon/rt/real_clock.hpp"
+#include "test_bench.hpp"
 #include "tests/unit/rt/fake_shaker.hpp"
 
 namespace vibrig::rt {
@@ -103,6 +107,228 @@ TEST_F(InterlockTest, StopsAShakerThatNobodyCommanded) {
     interlock.acknowledge(Trip::uncommanded);
     interlock.check(reading);
     EXPECT_EQ(interlock.tripped(), Trip::none);
+}
+
+/// The table's rows and nothing else; samples come at 40 Hz.
+struct TableTest : testing::Test {
+    RealClock clock;
+    std::unique_ptr<drivers::Waiter> control = clock.make_waiter();
+    FakeShaker shaker;
+    std::unique_ptr<Interlock> interlock;
+    drivers::Sample sample;
+    drivers::PlatformStatus platform;
+
+    void make(std::vector<Rule> rules) {
+        interlock = std::make_unique<Interlock>(
+            shaker, *control, Interlock::Limits{12.0, drivers::kSecond, std::move(rules)});
+        sample.quality.fill(drivers::Quality::good);
+        sample.force = {0, 1, 0};
+        sample.time = 10 * drivers::kSecond;
+        platform.loop_closed = true;
+        platform.time = sample.time;
+        interlock->guard(Guard::excitation);
+    }
+    void next() {
+        sample.time += 25 * drivers::kMillisecond;
+        interlock->check(sample, platform);
+    }
+    /// Vibration of 6 g along a vertical and of 6 g * share across it.
+    void vibrate(double seconds, const std::array<double, 3>& vertical,
+                 const std::array<double, 3>& across, double share) {
+        for (int n = 0; n < seconds * 40; ++n) {
+            const double t = drivers::to_seconds(sample.time);
+            const double a = 6 * std::sin(2 * std::numbers::pi * 15.3 * t);
+            for (std::size_t i = 0; i < 3; ++i)
+                sample.force[i] = vertical[i] * (1 + a) + across[i] * a * share;
+            next();
+        }
+    }
+    drivers::ShakerReading reading(double measured_g, double time_s) const {
+        drivers::ShakerReading r;
+        r.valid = r.running = true;
+        r.state = drivers::kShakerRunning;
+        r.measured_g = measured_g;
+        r.time = drivers::from_seconds(time_s);
+        return r;
+    }
+};
+
+TEST_F(TableTest, AlarmsInTheInnerBandAndAbortsInTheOuterOneAfterItsDwell) {
+    // GIVEN bands of 1 dB and 3 dB about 9 g, the outer one to be left for half a second
+    make({{"warn", Trip::amplitude_off, Reaction::alarm, 1, 0, false},
+          {"stop", Trip::amplitude_off, Reaction::abort, 3, 0.5, true}});
+    interlock->command(9, {0, 0, 0});
+    struct Step {
+        double decibel, time_s;
+        bool alarm;
+        Trip trip;
+    };
+    for (const Step& step :
+         {Step{0.9, 1.0, false, Trip::none}, Step{-1.1, 1.2, true, Trip::none},
+          Step{0.0, 1.4, false, Trip::none}, Step{3.1, 1.6, true, Trip::none},
+          Step{2.9, 1.8, true, Trip::none}, Step{-3.1, 2.0, true, Trip::none},
+          Step{-3.1, 2.4, true, Trip::none}, Step{-3.1, 2.5, true, Trip::amplitude_off}}) {
+        interlock->check(reading(9 * std::pow(10, step.decibel / 20), step.time_s));
+        EXPECT_EQ(interlock->row(0).raised, step.alarm) << step.time_s;
+        EXPECT_EQ(interlock->tripped(), step.trip) << step.time_s;
+    }
+    EXPECT_EQ(interlock->tripped_name(), "stop");
+    EXPECT_EQ(interlock->tripped_text(), "amplitude off command: 3.1, limit 3 dB");
+    EXPECT_EQ(shaker.stops, 1);
+}
+
+TEST_F(TableTest, TakesNoAmplitudeForOneThatIsOff) {
+    make({{"stop", Trip::amplitude_off, Reaction::abort, 3, 0, true}});
+    // on the way to the level nothing is commanded yet
+    interlock->command(0, {0, 0, 0});
+    interlock->check(reading(0.1, 1));
+    EXPECT_EQ(interlock->tripped(), Trip::none);
+    // no motion at all is infinitely far off
+    interlock->command(9, {0, 0, 0});
+    interlock->check(reading(0, 2));
+    EXPECT_EQ(interlock->tripped(), Trip::amplitude_off);
+}
+
+TEST_F(TableTest, ALatchedAlarmStaysUntilItsNameIsAcknowledged) {
+    make({{"hot", Trip::temperature, Reaction::alarm, 70, 0.1, true},
+          {"warm", Trip::temperature, Reaction::alarm, 60, 0, false}});
+    platform.temperature_c = 71;
+    next();
+    EXPECT_FALSE(interlock->row(0).raised) << "its dwell is not over";
+    for (int n = 0; n < 5; ++n) next();
+    EXPECT_TRUE(interlock->row(0).raised);
+    EXPECT_EQ(interlock->row(0).value, 71);
+    platform.temperature_c = 50;
+    next();
+    EXPECT_TRUE(interlock->row(0).raised);
+    EXPECT_FALSE(interlock->row(1).raised) << "not latched";
+    EXPECT_FALSE(interlock->acknowledge_alarm("hotter"));
+    EXPECT_TRUE(interlock->acknowledge_alarm("hot"));
+    EXPECT_FALSE(interlock->row(0).raised);
+    EXPECT_EQ(shaker.stops, 0) << "alarm is not abort";
+}
+
+TEST_F(TableTest, MeasuresCrossAxisMotionAndTiltWhateverTheGimbalAngles) {
+    // GIVEN a vertical that lies along no axis, and one across it
+    const double s = std::sqrt(0.5);
+    const std::array<double, 3> vertical{s, -s, 0}, across{s, s, 0};
+    make({{"cross", Trip::cross_axis, Reaction::alarm, 0.3, 0, false},
+          {"tilt", Trip::tilt, Reaction::abort, 5, 0, true}});
+    interlock->command(9, {0, 0, 0});
+    vibrate(10, vertical, across, 0.2);
+    EXPECT_FALSE(interlock->row(0).raised);
+    EXPECT_EQ(interlock->tripped(), Trip::none);
+    // WHEN the share grows, THEN that is cross-axis motion and no tilt
+    vibrate(10, vertical, across, 0.4);
+    EXPECT_TRUE(interlock->row(0).raised);
+    EXPECT_EQ(interlock->tripped(), Trip::none);
+    // WHEN everything turns by 6 degrees, THEN that is tilt
+    const double turn = 6 * std::numbers::pi / 180;
+    std::array<double, 3> turned{};
+    for (std::size_t i = 0; i < 3; ++i)
+        turned[i] = vertical[i] * std::cos(turn) + across[i] * std::sin(turn);
+    vibrate(10, turned, across, 0);
+    EXPECT_EQ(interlock->tripped(), Trip::tilt);
+}
+
+TEST_F(TableTest, KnowsWhereTheGimbalsAreToBe) {
+    make({{"gimbal", Trip::gimbal_off, Reaction::abort, 2, 0, true}});
+    interlock->command(9, {-45, 0, 359.5});
+    sample.angle = {315 * std::numbers::pi / 180, 0, 1.4 * std::numbers::pi / 180};
+    next();
+    EXPECT_EQ(interlock->tripped(), Trip::none) << "a turn more or less is the same place";
+    sample.angle[2] = 1.6 * std::numbers::pi / 180;
+    next();
+    EXPECT_EQ(interlock->tripped(), Trip::gimbal_off);
+}
+
+TEST_F(TableTest, JudgesFilterAndDisk) {
+    make({{"filter", Trip::filter_divergence, Reaction::alarm, 10, 0, false},
+          {"disk", Trip::disk, Reaction::alarm, 200, 0, false}});
+    next();
+    EXPECT_FALSE(interlock->row(0).raised || interlock->row(1).raised) << "not known yet";
+    interlock->filter(std::numeric_limits<double>::quiet_NaN());
+    interlock->disk_free(199);
+    next();
+    EXPECT_TRUE(interlock->row(0).raised && interlock->row(1).raised);
+    interlock->filter(1);
+    interlock->disk_free(201);
+    next();
+    EXPECT_FALSE(interlock->row(0).raised || interlock->row(1).raised);
+}
+
+TEST(Losses, AreAShareOfTheSamplesDueOverTenSeconds) {
+    LossMonitor loss;
+    std::uint64_t samples = 0, incomplete = 0, gaps = 0;
+    // GIVEN 40 samples a second, of which one never comes and one is incomplete
+    for (int second = 0; second < 30; ++second) {
+        loss.add(second * drivers::kSecond, samples, incomplete, gaps);
+        samples += 39;
+        incomplete += 1;
+        gaps += 1;
+    }
+    EXPECT_NEAR(loss.percent(), 5, 1e-12);
+    // THEN they are forgotten ten seconds after they cease
+    for (int second = 30; second < 42; ++second) {
+        loss.add(second * drivers::kSecond, samples, incomplete, gaps);
+        samples += 40;
+    }
+    EXPECT_EQ(loss.percent(), 0);
+}
+
+TEST(Reaction, TheStopIsTheNextWriteAndNoSetPointFollows) {
+    using drivers::test::Answer;
+    // GIVEN a shaker on a real Modbus connection, commanded to run, and a poll that hangs
+    drivers::test::TestServer server;
+    RealClock clock;
+    const auto control = clock.make_waiter();
+    auto settings = drivers::test::settings_for(server);
+    settings.response_timeout = 60 * drivers::kSecond;
+    const auto shaker = drivers::make_shaker(clock, settings);
+    Interlock interlock(*shaker, *control, {12.0});
+    shaker->on_reading([&] { control->notify(); });
+    shaker->on_stop_written([&] { interlock.stop_written(); });
+    shaker->start([] { return true; }, [](drivers::LinkState, const char*) {});
+    const auto eventually = [&](const auto& done) {
+        const auto deadline = clock.now() + 10 * drivers::kSecond;
+        while (!done() && clock.now() < deadline) control->wait_until(clock.now() + 2'000'000);
+        return done();
+    };
+    ASSERT_TRUE(eventually([&] { return shaker->state() == drivers::LinkState::running; }));
+    ASSERT_TRUE(shaker->request({15.0, 1.0, 1.0}));
+    ASSERT_TRUE(eventually([&] { return !shaker->busy(); }));
+    std::atomic<bool> hung = false;
+    server.script([&](const drivers::test::Request& request) {
+        return request.connection == 1 && (hung.exchange(true) || true)
+                   ? Answer{Answer::Kind::hang, 0, {}}
+                   : Answer{};
+    });
+    ASSERT_TRUE(eventually([&] { return hung.load(); }));
+    server.forget();
+    // WHEN a sample trips the interlock, and the control thread asks for more right then
+    interlock.guard(Guard::excitation);
+    drivers::Sample sample;
+    sample.quality.fill(drivers::Quality::good);
+    sample.table_accel = 13;
+    drivers::PlatformStatus platform;
+    platform.loop_closed = true;
+    interlock.arrived(clock.now());
+    interlock.check(sample, platform);
+    EXPECT_FALSE(shaker->request({15.0, 2.0, 1.0}));
+    // THEN the stop is the first write, nothing but the watchdog follows, and its time is known
+    ASSERT_TRUE(eventually([&] { return !shaker->stop_pending(); }));
+    const std::uint64_t polls = shaker->counters().requests;
+    ASSERT_TRUE(eventually([&] { return shaker->counters().requests > polls + 5; }));
+    const auto writes = server.writes();
+    ASSERT_FALSE(writes.empty());
+    EXPECT_TRUE(writes.front().writes(drivers::test::kRun, 0));
+    EXPECT_EQ(drivers::test::addresses_written(server), std::vector{drivers::test::kRun});
+    const auto reactions = interlock.reactions();
+    std::uint64_t measured = 0;
+    for (const auto count : reactions.count) measured += count;
+    EXPECT_EQ(measured, 1U);
+    EXPECT_GT(reactions.largest_ms, 0);
+    shaker->shut_down();
 }
 
 }  // namespace

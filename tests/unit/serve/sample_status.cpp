@@ -49,6 +49,14 @@ StatusData full_status() {
         s.estimate.sigma[i] = 0.01 * static_cast<double>(i + 1);
         s.estimate.observable[i] = true;
     }
+    s.resume_offer = "5 of 28 positions done";
+    s.journal = {"/var/lib/vibrig/journal.sqlite3", true, "disk full", 80, 81, 82};
+    s.interlock.tripped = "amplitude_abort";
+    s.interlock.rows = {{"amplitude_abort", "amplitude_off_command", "abort", "dB", 1, 0.5, true,
+                         true, true, 1.25}};
+    s.interlock.reaction_bounds_ms = {0.1, 1};
+    s.interlock.reaction_counts = {1, 2, 3};
+    s.interlock.reaction_largest_ms = 0.75;
     s.estimate.amplitude_g = 5.99;
     s.estimate.frequency_hz = 15.001;
     s.estimate.kappa = 18.94;

@@ -1,0 +1,180 @@
+// What the daemon does because nobody is there: journal and restart, alarms, stages that got stuck.
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include "daemon/daemon.hpp"
+
+namespace vibrig {
+
+using drivers::Time;
+
+namespace {
+// A stage that makes no progress for this long, in wall time, is stuck.
+constexpr Time kPatience = 2 * drivers::kSecond;
+}  // namespace
+
+void Daemon::open_journal() {
+    auto path = configuration_.journal;
+    if (path.empty() && !configuration_.results.empty())
+        path = (std::filesystem::path(configuration_.results) / "journal.sqlite3").string();
+    if (path.empty()) return;
+    // Everything that results depend on; not where things are kept or how one talks to the daemon.
+    std::string text;
+    for (const auto& value : loaded_.effective) {
+        const auto section = value.key.substr(0, value.key.find('.'));
+        if (section == "server" || section == "log" || section == "threads" ||
+            section == "journal" || section == "clock" || value.key == "campaign.results")
+            continue;
+        text += value.key + " = " + value.value + "\n";
+    }
+    journal_ = std::make_unique<journal::Journal>(
+        path, journal::configuration_hash(text),
+        [this](double free_mb) { interlock_.disk_free(free_mb); });
+    for (const auto& refused : journal_->recovery().refused)
+        log(Severity::warning, "journal", refused);
+    if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
+    estimator_stage_.feed_to(journal_->fed());
+    journal_->start();
+}
+
+void Daemon::offer_unfinished(journal::Unfinished& campaign) {
+    estimator::Identification fresh(configuration_.estimator);
+    std::vector<estimator::DwellSummary> done;
+    std::string why = journal::replay(campaign.dwells, fresh);
+    for (const auto& dwell : campaign.dwells) done.push_back(dwell.summary);
+    const std::size_t count = done.size();
+    if (why.empty() && !campaign_.offer(std::move(done)))
+        why = "its positions are not the first ones of this campaign, or it is adaptive";
+    if (!why.empty()) {
+        log(Severity::warning, "journal",
+            fmt::format("campaign {} ({}): {}: cold start", campaign.id, campaign.name, why));
+        return;
+    }
+    log(Severity::warning, "journal",
+        fmt::format("campaign {} ({}, started by {}) was interrupted with {} positions done: arm "
+                    "and resume it, or start anew",
+                    campaign.id, campaign.name, campaign.started_by, count));
+    interrupted_ = std::move(fresh);
+    interrupted_id_ = campaign.id;
+    campaign.dwells.clear();
+}
+
+std::string Daemon::resume_gate() const {
+    if (!interrupted_) return "the filter as it was is gone";
+    const auto view = acquisition_.view();
+    const auto& sample = view.sample;
+    const Time now = clock_.now();
+    if (now - sample.time > drivers::kSecond || !sample.angles_good() || !sample.force_good())
+        return "no good sample within the last second";
+    if (view.platform.time == 0 || now - view.platform.time > configuration_.gimbal.status_deadline)
+        return "no platform status";
+    // The shaker rests: the accelerometers see gravity, as they did before.
+    constexpr double kGravityTolerance = 0.05;
+    double square = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+        double force = 0;
+        for (std::size_t j = 0; j < 3; ++j) {
+            force += configuration_.estimator.accelerometer_matrix[i][j] *
+                     (sample.force[j] - configuration_.estimator.accelerometer_zero_g[j]);
+        }
+        square += force * force;
+    }
+    if (!(std::abs(std::sqrt(square) - 1) <= kGravityTolerance))
+        return fmt::format("specific force {:.3f} g at rest, expected 1 g within {:g} g",
+                           std::sqrt(square), kGravityTolerance);
+    return {};
+}
+
+std::string Daemon::stuck_stage() {
+    // In wall time. The simulated rig's clock may stand still, and with it all that waits on it.
+    if (rig_clock_) return {};
+    const auto wall = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                          std::chrono::steady_clock::now().time_since_epoch())
+                          .count();
+    const auto acquired = acquisition_.view();
+    const auto ring = estimator_stage_.ring();
+    struct Stage {
+        const char* name;
+        std::uint64_t mark;  ///< changes as long as the stage goes on
+        bool may_rest;       ///< nothing to do
+        Time patience;
+    };
+    const auto& shaker = configuration_.shaker;
+    const std::array<Stage, 4> stages{
+        {{"acquisition", static_cast<std::uint64_t>(acquired.beat), false, kPatience},
+         {"estimator", ring.popped, ring.popped == ring.pushed, kPatience},
+         {"control", static_cast<std::uint64_t>(control_beat_.load()), false, kPatience},
+         // Connecting takes its time when nobody is there.
+         {"shaker link", shaker_->beats(), false,
+          2 * shaker.backoff_max + 8 * shaker.response_timeout}}};
+    std::string stuck;
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+        if (stages[i].may_rest || progress_[i].since_ns == 0 ||
+            progress_[i].mark != stages[i].mark) {
+            progress_[i] = {stages[i].mark, wall};
+        } else if (wall - progress_[i].since_ns > stages[i].patience) {
+            stuck += (stuck.empty() ? "" : ", ") + std::string(stages[i].name);
+        }
+    }
+    return stuck;
+}
+
+CommandReply Daemon::acknowledge_alarm(const CommandRequest& request) {
+    if (request.kind != CommandRequest::Kind::acknowledge || request.by.empty() ||
+        !interlock_.acknowledge_alarm(request.argument)) {
+        return {};
+    }
+    log(Severity::info, "interlock",
+        fmt::format("alarm {} acknowledged by {}", request.argument, request.by));
+    return {true, "acknowledged: " + request.argument};
+}
+
+void Daemon::tell_alarms() {
+    for (std::size_t i = 0; i < interlock_.rows(); ++i) {
+        const auto row = interlock_.row(i);
+        if (row.raised == raised_[i] || row.rule->reaction != rt::Reaction::alarm) continue;
+        raised_[i] = row.raised;
+        const auto& condition = rt::condition_of(row.rule->condition);
+        if (!row.raised) {
+            log(Severity::info, "interlock", fmt::format("{}: over", row.rule->name));
+        } else if (condition.has_limit()) {
+            log(Severity::alarm, "interlock",
+                fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
+                            row.value, row.rule->limit, condition.unit));
+        } else {
+            log(Severity::alarm, "interlock",
+                fmt::format("{}: {}", row.rule->name, condition.text));
+        }
+    }
+}
+
+void Daemon::tell_journal() {
+    const auto status = journal_->status();
+    if (std::exchange(journal_was_running_, status.running) == status.running) return;
+    log(status.running ? Severity::info : Severity::alarm, "journal",
+        status.running ? "writes again" : "entries wait: " + status.note);
+}
+
+InterlockStatus Daemon::interlock_status() const {
+    InterlockStatus status;
+    status.tripped = interlock_.tripped_name();
+    for (std::size_t i = 0; i < interlock_.rows(); ++i) {
+        const auto row = interlock_.row(i);
+        const auto& condition = rt::condition_of(row.rule->condition);
+        status.rows.push_back({row.rule->name, condition.name,
+                               row.rule->reaction == rt::Reaction::abort ? "abort" : "alarm",
+                               condition.unit, row.rule->limit, row.rule->dwell_s,
+                               condition.has_limit(), row.rule->latched, row.raised, row.value});
+    }
+    const auto reactions = interlock_.reactions();
+    status.reaction_bounds_ms.assign(rt::ReactionHistogram::kBounds_ms.begin(),
+                                     rt::ReactionHistogram::kBounds_ms.end());
+    status.reaction_counts.assign(reactions.count.begin(), reactions.count.end());
+    status.reaction_largest_ms = reactions.largest_ms;
+    return status;
+}
+
+}  // namespace vibrig

@@ -1,0 +1,168 @@
+#include "daemon/journal/checkpoint.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <zlib.h>
+
+#include <bit>
+#include <cstring>
+
+namespace vibrig::journal {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the format is little endian");
+
+constexpr std::string_view kMagic = "VIBRIGCK";
+constexpr std::size_t kChecksum = 4;
+constexpr std::size_t kMeasurement = 7 * sizeof(double) + 1;
+constexpr std::uint64_t kMostMeasurements = 100'000'000;
+
+std::uint32_t checksum(std::string_view bytes) {
+    return static_cast<std::uint32_t>(::crc32_z(
+        ::crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+template <typename T>
+void put(std::string& to, const T& value) {
+    static_assert(std::is_arithmetic_v<T>);
+    to.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+class Reader {
+  public:
+    explicit Reader(std::string_view bytes) : bytes_(bytes) {}
+    template <typename T>
+    void get(T& value) {
+        if (bytes_.size() < sizeof value) {
+            good_ = false;
+            return;
+        }
+        std::memcpy(&value, bytes_.data(), sizeof value);
+        bytes_.remove_prefix(sizeof value);
+    }
+    [[nodiscard]] std::size_t left() const { return bytes_.size(); }
+    [[nodiscard]] bool good() const { return good_; }
+
+  private:
+    std::string_view bytes_;
+    bool good_ = true;
+};
+
+/// One list of the summary's numbers, for both directions.
+template <typename Summary, typename Each>
+void each_number(Summary& s, Each&& each) {
+    each(s.run);
+    each(s.position);
+    each(s.samples);
+    each(s.used);
+    each(s.rejected);
+    each(s.reinitialised);
+    each(s.kappa);
+    each(s.amplitude_g);
+    each(s.frequency_hz);
+    each(s.mean_force_g);
+    each(s.nis_per_dof);
+}
+
+std::string numbers_of(const estimator::DwellSummary& summary) {
+    std::string bytes;
+    each_number(summary, [&bytes](const auto& value) { put(bytes, value); });
+    bytes.push_back(summary.flagged ? '\1' : '\0');
+    return bytes;
+}
+
+}  // namespace
+
+// FNV-1a, 64 bits.
+std::uint64_t configuration_hash(std::string_view text) noexcept {
+    std::uint64_t hash = 0xcbf29ce484222325;
+    for (const char c : text) {
+        hash ^= static_cast<unsigned char>(c);
+        hash *= 0x100000001b3;
+    }
+    return hash;
+}
+
+std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_hash) {
+    std::string bytes(kMagic);
+    put(bytes, kCheckpointVersion);
+    put(bytes, configuration_hash);
+    put(bytes, dwell.info.run);
+    put(bytes, dwell.info.position);
+    put(bytes, dwell.info.table_g);
+    bytes += numbers_of(dwell.summary);
+    put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
+    bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
+    for (const auto& m : dwell.measurements) {
+        put(bytes, m.time_s);
+        for (const double angle : m.angle_rad) put(bytes, angle);
+        for (const double force : m.force_g) put(bytes, force);
+        bytes.push_back(static_cast<char>((m.angles_good ? 1 : 0) | (m.force_good ? 2 : 0)));
+    }
+    put(bytes, checksum(bytes));
+    return bytes;
+}
+
+std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
+                   DwellCheckpoint& dwell) {
+    if (bytes.size() < kMagic.size() + sizeof kCheckpointVersion + kChecksum)
+        return fmt::format("truncated: {} bytes", bytes.size());
+    if (bytes.substr(0, kMagic.size()) != kMagic) return "not a checkpoint of this program";
+    Reader reader(bytes.substr(kMagic.size(), bytes.size() - kMagic.size() - kChecksum));
+    std::uint32_t version = 0;
+    reader.get(version);
+    // Before the checksum, which another version may keep elsewhere.
+    if (version > kCheckpointVersion)
+        return fmt::format("version {}, newer than {}", version, kCheckpointVersion);
+    std::uint32_t expected = 0;
+    std::memcpy(&expected, bytes.data() + bytes.size() - kChecksum, kChecksum);
+    if (checksum(bytes.substr(0, bytes.size() - kChecksum)) != expected)
+        return "corrupt: the checksum does not match";
+    std::uint64_t hash = 0;
+    reader.get(hash);
+    if (hash != configuration_hash) return "of another configuration";
+    reader.get(dwell.info.run);
+    reader.get(dwell.info.position);
+    reader.get(dwell.info.table_g);
+    dwell.summary = {};
+    each_number(dwell.summary, [&reader](auto& value) { reader.get(value); });
+    char flagged = 0;
+    reader.get(flagged);
+    dwell.summary.flagged = flagged != 0;
+    std::uint64_t count = 0;
+    reader.get(count);
+    if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())
+        return fmt::format("corrupt: {} measurements in {} bytes", count, reader.left());
+    dwell.measurements.resize(count);
+    for (auto& m : dwell.measurements) {
+        reader.get(m.time_s);
+        for (double& angle : m.angle_rad) reader.get(angle);
+        for (double& force : m.force_g) reader.get(force);
+        char good = 0;
+        reader.get(good);
+        m.angles_good = (good & 1) != 0;
+        m.force_good = (good & 2) != 0;
+    }
+    return {};
+}
+
+std::string replay(std::vector<DwellCheckpoint>& dwells,
+                   estimator::Identification& identification) {
+    for (auto& dwell : dwells) {
+        if (dwell.measurements.empty()) {  // the filter never heard of it
+            dwell.summary.reason = "no samples";
+            continue;
+        }
+        identification.begin_dwell(dwell.info);
+        for (const auto& measurement : dwell.measurements) identification.add(measurement);
+        const auto summary = identification.end_dwell();
+        if (numbers_of(summary) != numbers_of(dwell.summary)) {
+            return fmt::format("run {} position {} does not come out as it did", dwell.info.run,
+                               dwell.info.position);
+        }
+        dwell.summary = summary;
+    }
+    return {};
+}
+
+}  // namespace vibrig::journal

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "daemon/journal/checkpoint.hpp"
+#include "daemon/rt/fed.hpp"
+#include "daemon/rt/ring.hpp"
+#include "daemon/status.hpp"
+
+namespace vibrig::journal {
+
+class Database;
+
+/// A campaign that was not ended in order, as far as its positions are done.
+struct Unfinished {
+    std::int64_t id = 0;
+    std::string name, started_by;
+    std::vector<DwellCheckpoint> dwells;  ///< contiguous from run 1, position 1
+};
+
+/// What opening the journal found.
+struct Recovery {
+    std::optional<Unfinished> campaign;
+    /// Why what was there is not used: a cold start, in words. Empty: nothing was refused.
+    std::vector<std::string> refused;
+};
+
+/// What happened, on disk: campaigns, positions done with what the filter was fed, results, events
+/// and who commanded what. SQLite on a thread of its own; whoever writes never waits for the disk.
+class Journal {
+  public:
+    /// Opens or makes the file and reads what an earlier life left. A damaged or newer file is put
+    /// aside. Throws DatabaseError when there can be no journal at all.
+    Journal(const std::string& path, std::uint64_t configuration_hash,
+            std::function<void(double free_mb)> on_space = {});
+    ~Journal();
+
+    [[nodiscard]] Recovery& recovery() noexcept { return recovery_; }
+    /// The estimator's thread pushes what it feeds to the filter.
+    [[nodiscard]] rt::Ring<rt::Fed>& fed() noexcept { return fed_; }
+
+    void start();
+    /// Writes what waits and ends the thread.
+    void stop() noexcept;
+
+    // Control thread. They queue; `kMostWaiting` at most, the rest is dropped and counted.
+    void campaign_begun(const std::string& name, const std::string& by);
+    void campaign_resumed(std::int64_t id, const std::string& by);
+    void dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary);
+    void campaign_ended(const std::string& state, const std::string& reason,
+                        const std::string& result_json);
+    void event(const EventRecord& event);
+    void command(const CommandRequest& request, const CommandReply& reply, std::int64_t utc_ns);
+
+    [[nodiscard]] JournalStatus status() const;
+
+    static constexpr std::size_t kMostWaiting = 10'000;
+    static constexpr std::int64_t kSchemaVersion = 1;
+
+  private:
+    struct Begun {
+        std::string name, by;
+        std::int64_t resumed_id = 0;  ///< 0: a new one
+        std::int64_t utc_ns = 0;
+    };
+    struct Done {
+        estimator::DwellInfo info;
+        estimator::DwellSummary summary;
+    };
+    struct Ended {
+        std::string state, reason, result;
+        std::int64_t utc_ns = 0;
+    };
+    struct Commanded {
+        CommandRequest request;
+        CommandReply reply;
+        std::int64_t utc_ns = 0;
+    };
+    using Entry = std::variant<Begun, Done, Ended, EventRecord, Commanded>;
+
+    void open();
+    void recover();
+    void recover_dwells(Unfinished& campaign);
+    void put(Entry entry);
+    void loop();
+    void take_fed();
+    [[nodiscard]] bool write(const std::deque<Entry>& entries);
+    void write_one(const Begun& begun);
+    void write_one(const Done& done);
+    void write_one(const Ended& ended);
+    void write_one(const EventRecord& event);
+    void write_one(const Commanded& commanded);
+
+    const std::string path_;
+    const std::uint64_t configuration_hash_;
+    std::function<void(double)> on_space_;
+    std::unique_ptr<Database> database_;
+    Recovery recovery_;
+    rt::Ring<rt::Fed> fed_{16384};
+
+    // The journal's thread.
+    std::int64_t campaign_ = 0;              ///< the one in progress; 0: none
+    std::deque<DwellCheckpoint> collected_;  ///< dwells being fed or not yet written
+
+    mutable std::mutex mutex_;
+    std::condition_variable changed_;
+    std::deque<Entry> waiting_;
+    JournalStatus status_;
+    bool stop_ = false;
+    std::thread thread_;
+};
+
+}  // namespace vibrig::journal

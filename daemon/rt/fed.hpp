@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+
+#include "estimator/identification.hpp"
+
+namespace vibrig::rt {
+
+/// One measurement as it went into the filter, on its way to the journal.
+struct Fed {
+    estimator::Measurement measurement;
+    int run = 0, position = 0;
+    bool first = false;  ///< begins its dwell
+    std::uint32_t dropped_before = 0;
+};
+
+}  // namespace vibrig::rt

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+namespace vibrig {
+
+/// What the service manager is told; nothing happens without one (sd_notify(3)).
+class ServiceManager {
+  public:
+    ServiceManager();
+    void ready(const std::string& status) const;
+    void status(const std::string& status) const;
+    void reloading() const;
+    void stopping() const;
+    /// Feeds its watchdog.
+    void alive() const;
+    /// How often alive() is to be called, s; half of what the manager waits. 0: it does not wait.
+    [[nodiscard]] double period_s() const { return period_s_; }
+
+  private:
+    double period_s_ = 0;
+};
+
+}  // namespace vibrig

@@ -1,0 +1,194 @@
+#!/usr/bin/python3
+"""Kills vibrigd with SIGKILL in the midst of a campaign, over and over, and resumes it, on the seqpacket bus and the
+rig's clock. What was done stays done, the shaker never starts by itself, and a bad checkpoint is not used.
+
+usage: restart_campaign.py PROGRAMS
+"""
+import os
+import signal
+import sqlite3
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+CAMPAIGN = {"name": "restarted", "positions_deg": [[0, 0, 0], [45, 0, 90], [0, 0, 90]], "table_g": [9.0, 7.0],
+            "dwell_s": 20.0}
+POSITIONS = 6
+
+
+def measuring(status):
+    return status["can"]["link"] == "running" and status["shaker"]["link"] == "running" and \
+        any(c["quality"] == "good" for c in status["sample"]["channels"])
+
+
+def positions_done(rig):
+    """As the file says, read by another program."""
+    with sqlite3.connect(f"file:{journal(rig)}?mode=ro", uri=True, timeout=5) as database:
+        return database.execute("SELECT count(*) FROM dwell").fetchone()[0]
+
+
+def journal(rig):
+    return os.path.join(rig.results, "journal.sqlite3")
+
+
+def kill(rig):
+    rig.daemon.process.kill()
+    rig.daemon.process.wait()
+
+
+def events(rig):
+    return rig.tool("events").stdout
+
+
+def restart(checks, rig, what):
+    begun = time.monotonic()
+    rig.start_daemon()
+    status = rig.wait_for(measuring, 60)
+    checks.check(status is not None and measuring(status), f"{what}: the daemon measures again", rig.logs())
+    checks.note(f"{what}: measures {time.monotonic() - begun:.1f} s after its start")
+    return status
+
+
+def at_rest(checks, rig, what):
+    """Nobody has armed: whatever the shaker did, it comes to rest and stays there."""
+    status = rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 60)
+    checks.check(status is not None and status["shaker"].get("state") == 0, f"{what}: the shaker comes to rest",
+                 str(status and status["shaker"]))
+    for _ in range(4):
+        time.sleep(0.25)
+        status = rig.status()
+        if not checks_rest(status):
+            checks.check(False, f"{what}: the shaker stays at rest", str(status and status["shaker"]))
+            return
+    checks.check(True, f"{what}: the shaker stays at rest")
+    checks.check(status["campaign"]["state"] in ("idle", "tripped"), f"{what}: disarmed", r.state_of(status))
+
+
+def checks_rest(status):
+    return status is not None and status["shaker"].get("state") == 0 and status["shaker"].get("running") is False
+
+
+def clear(rig):
+    """A shaker left running trips the interlock, which latches."""
+    if rig.status()["campaign"]["state"] == "tripped":
+        rig.tool("ack", "trip", "--by", "tester")
+
+
+def killed_and_resumed(checks, programs, folder):
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    try:
+        rig.start_plant("--seed", "3")
+        rig.configure(CAMPAIGN)
+        rig.start_daemon()
+        rig.wait_for(measuring, 60)
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "Ada")
+        for kills in (1, 3):
+            status = rig.wait_for(lambda s, n=kills: len(s["campaign"]["dwells"]) >= n and
+                                  s["campaign"]["state"] == "recording", 120)
+            checks.check(status is not None and status["campaign"]["state"] == "recording",
+                         f"recording after {kills} positions", r.state_of(status))
+            time.sleep(1)   # what is older than a second has to be on disk
+            kill(rig)
+            done = positions_done(rig)
+            checks.check(done >= kills, f"killed: {kills} finished positions are on disk", f"{done}")
+            status = restart(checks, rig, f"killed after {kills}")
+            checks.check(f"{done} of {POSITIONS} positions done" in status["campaign"]["resume_offer"],
+                         "it offers to resume from the last finished position", status["campaign"]["resume_offer"])
+            at_rest(checks, rig, f"killed after {kills}")
+            clear(rig)
+            refused = rig.tool("resume", "--by", "Grace")
+            checks.check(refused.returncode == 1 and "not armed" in refused.stderr, "it does not resume disarmed",
+                         refused.stderr)
+            armed = rig.tool("arm", "--by", "Grace")
+            checks.equal(armed.returncode, 0, "it can be armed")
+            time.sleep(0.5)
+            checks.check(checks_rest(rig.status()), "arming moves nothing")
+            resumed = rig.tool("resume", "--by", "Grace")
+            checks.check(resumed.returncode == 0 and f"{done} of {POSITIONS}" in resumed.stdout,
+                         "armed, it resumes on command", resumed.stdout + resumed.stderr)
+        last = rig.wait_for_state(("finished", "aborted", "tripped"), 180)
+        checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
+                     r.state_of(last) + "\n" + rig.logs())
+        places = [(d["run"], d["position"]) for d in last["campaign"]["dwells"]]
+        checks.equal(places, [(run, position) for run in (1, 2) for position in (1, 2, 3)],
+                     "every position was recorded once, in order")
+        path, _ = rig.result()
+        checks.check(path is not None, "there is a result.json")
+        checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrigd with status 0")
+        with sqlite3.connect(f"file:{journal(rig)}?mode=ro", uri=True) as database:
+            checks.equal(database.execute("PRAGMA integrity_check").fetchone()[0], "ok", "the journal is sound")
+            checks.equal([(state, by.split(" (")[0]) for state, by in
+                          database.execute("SELECT state, started_by FROM campaign")],
+                         [("finished", "Ada")], "it is one campaign, finished")
+            commands = [(kind, person.split(" (")[0]) for kind, person in database.execute(
+                "SELECT kind, person FROM command WHERE accepted AND kind <> 'acknowledge' ORDER BY id")]
+            checks.equal(commands, [("arm", "Ada"), ("start", "Ada")] + [("arm", "Grace"), ("resume", "Grace")] * 2,
+                         "it knows who did what")
+    finally:
+        rig.stop()
+
+
+def not_used(checks, programs, folder):
+    """Damage to the journal: a cold start, and said so."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    try:
+        rig.start_plant("--seed", "3")
+        rig.configure({**CAMPAIGN, "dwell_s": 10.0})
+        rig.start_daemon()
+        rig.wait_for(measuring, 60)
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "Ada")
+        rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)
+        time.sleep(1)
+        kill(rig)
+        with sqlite3.connect(journal(rig)) as database:
+            blob = bytearray(database.execute("SELECT checkpoint FROM dwell").fetchone()[0])
+            whole = bytes(blob)
+        blob[len(blob) // 2] ^= 1
+        newer = whole[:8] + b"\x63" + whole[9:]
+        for what, change, says in (("corrupt", bytes(blob), "corrupt: the checksum does not match"),
+                                   ("truncated", whole[:-1000], "corrupt: the checksum does not match"),
+                                   ("newer", newer, "version 99, newer than 1")):
+            with sqlite3.connect(journal(rig)) as database:
+                database.execute("UPDATE dwell SET checkpoint = ?", (change,))
+            database.close()
+            status = restart(checks, rig, what)
+            said = events(rig)
+            checks.check(says in said and "cold start" in said, f"{what}: it says that it starts cold", said)
+            checks.equal(status["campaign"].get("resume_offer", ""), "", f"{what}: it offers nothing to resume")
+            kill(rig)
+        with sqlite3.connect(journal(rig)) as database:
+            database.execute("UPDATE dwell SET checkpoint = ?", (whole,))
+        database.close()
+        rig.configure({**CAMPAIGN, "dwell_s": 11.0})
+        status = restart(checks, rig, "foreign")
+        checks.check("of another configuration: cold start" in events(rig), "foreign: it says so", events(rig))
+        checks.equal(status["campaign"].get("resume_offer", ""), "", "foreign: it offers nothing to resume")
+        kill(rig)
+        for beside in ("-wal", "-shm"):   # the first page may stand there too
+            if os.path.exists(journal(rig) + beside):
+                os.remove(journal(rig) + beside)
+        with open(journal(rig), "r+b") as file:
+            file.write(b"x" * 4096)
+        restart(checks, rig, "no database")
+        checks.check("put aside" in events(rig), "no database: put aside, and said so", events(rig))
+        at_rest(checks, rig, "no database")
+    finally:
+        rig.stop()
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    for part in (killed_and_resumed, not_used):
+        with tempfile.TemporaryDirectory() as folder:
+            part(checks, programs, folder)
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
