@@ -62,6 +62,7 @@ void each_number(Summary& s, Each&& each) {
     each(s.frequency_hz);
     each(s.mean_force_g);
     each(s.nis_per_dof);
+    each(s.innovation_correlation);
 }
 
 std::string numbers_of(const estimator::DwellSummary& summary) {

@@ -66,7 +66,8 @@ StatusData full_status() {
     s.estimate.nis_per_dof = 1.02;
     s.estimate.innovation_arcsec = {1.5, -2.5, 3.5};
     s.estimate.dwells = 2;
-    s.dwells.push_back({1, 2, 4000, 3990, 10, 1, 18.9, 5.98, 15.0, 1.001, 0.99, true, "rejected"});
+    s.dwells.push_back(
+        {1, 2, 4000, 3990, 10, 1, 18.9, 5.98, 15.0, 1.001, 0.99, 0.05, true, "rejected"});
     return s;
 }
 
