@@ -78,6 +78,9 @@ Daemon::Daemon(configuration::Loaded loaded)
                   configuration_.interlock}),
       identification_(configuration_.estimator),
       estimator_stage_(estimator_ring_, *estimator_waiter_, *control_waiter_, identification_),
+      noise_monitor_(
+          configuration_.estimator,
+          [this](Severity severity, const std::string& text) { log(severity, "noise", text); }),
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
                    {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_}),
       gimbal_(dbc_, configuration_.gimbal, *port_),
@@ -97,12 +100,16 @@ Daemon::Daemon(configuration::Loaded loaded)
            [this] { return dwells_with_estimator_ == 0; },
            [this] {
                identification_ = estimator::Identification(configuration_.estimator);
+               noise_monitor_.reset();
                const std::lock_guard lock(mutex_);
                result_ = {};
                for (const std::string& line : check_plan(configuration_))
                    log(Severity::warning, "campaign", line);
            },
-           [this](bool complete) { to_write_ = complete ? ToWrite::complete : ToWrite::partial; },
+           [this](bool complete) {
+               to_write_ = complete ? ToWrite::complete : ToWrite::partial;
+               noise_monitor_.report();
+           },
            [this](Severity severity, const std::string& text) { log(severity, "campaign", text); },
            [this](const std::array<double, 3>& here_deg, double elapsed_s) {
                return next_dwell(here_deg, elapsed_s);
@@ -295,10 +302,23 @@ void Daemon::take_commands(Time now) {
     }
 }
 
+/// The Identification is this thread's here: no dwell is with the estimator.
+void Daemon::take_noise(estimator::DwellSummary& dwell) {
+    rt::BlockRecord block;
+    while (estimator_stage_.take_block(block)) noise_monitor_.add(block);
+    estimator::Estimate estimate;
+    identification_.estimate(estimate);
+    if (noise_monitor_.end_dwell(dwell, estimate.value)) {
+        dwell.flagged = true;
+        dwell.reason = "noise is not that of the earlier dwells";
+    }
+    if (const auto levels = noise_monitor_.take_new_levels()) identification_.set_noise(*levels);
+}
+
 void Daemon::take_done_dwells() {
     rt::DwellDone done;
     while (estimator_stage_.take_done(done)) {
-        --dwells_with_estimator_;
+        if (--dwells_with_estimator_ == 0) take_noise(done.summary);
         campaign_.on_dwell_done(done.summary);
         auto result = identification_.result();
         const std::lock_guard lock(mutex_);
@@ -342,6 +362,7 @@ void Daemon::control_loop() {
         {
             const std::lock_guard lock(mutex_);
             campaign_.fill(campaign_status_, now);
+            campaign_status_.noise = noise_monitor_.status();
             if (campaign_.done()) break;
         }
         control_waiter_->wait_until(std::min(next, now + drivers::kSecond / 2));

@@ -14,6 +14,7 @@
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/journal/journal.hpp"
+#include "daemon/noise/noise_monitor.hpp"
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/interlock.hpp"
@@ -85,6 +86,7 @@ class Daemon final : public StatusSource {
     void tell_journal();
     [[nodiscard]] InterlockStatus interlock_status() const;
     void take_done_dwells();
+    void take_noise(estimator::DwellSummary& dwell);
     void write_result();
     [[nodiscard]] campaign::Next next_dwell(const std::array<double, 3>& here_deg,
                                             double elapsed_s);
@@ -114,6 +116,7 @@ class Daemon final : public StatusSource {
     std::optional<estimator::Identification> interrupted_;
     std::int64_t interrupted_id_ = 0;
     rt::EstimatorStage estimator_stage_;
+    noise::NoiseMonitor noise_monitor_;  ///< control thread
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
     std::optional<plan::AdaptivePlan> adaptive_;

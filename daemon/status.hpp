@@ -9,6 +9,7 @@
 #include "drivers/can_port.hpp"
 #include "drivers/sample.hpp"
 #include "drivers/shaker.hpp"
+#include "estimator/allan/fit.hpp"
 #include "estimator/identification.hpp"
 
 namespace vibrig {
@@ -55,6 +56,27 @@ struct RingCounters {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
 
+/// Noise of the gyros as seen in the dwells so far.
+struct NoiseStatus {
+    struct Gyro {
+        std::array<estimator::allan::FittedTerm, estimator::allan::kTerms> terms{};
+        double in_force = 0;         ///< N of the filter, deg/sqrt(h)
+        double smallest_change = 0;  ///< of N, times, that one dwell shows; 0: not known
+    };
+    struct Alarm {
+        int run = 0, position = 0;
+        std::size_t gyro = 0;
+        double tau_s = 0, ratio = 1, limit = 1;
+        const char* reading = "";
+    };
+    std::array<Gyro, 3> gyros;
+    double angle_in_force_arcsec = 0;
+    double block_s = 0;
+    std::uint32_t dwells = 0, dwells_left_out = 0;  ///< left out: flagged, too short or alarmed
+    std::uint64_t alarms_total = 0;
+    std::vector<Alarm> alarms;  ///< the newest
+};
+
 /// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
 /// not in real-time threads.
 struct StatusData {
@@ -94,6 +116,7 @@ struct StatusData {
     drivers::PlatformStatus platform;
 
     estimator::Estimate estimate;
+    NoiseStatus noise;
     std::vector<estimator::DwellSummary> dwells;
 };
 

@@ -1,5 +1,6 @@
 #include "estimator/drift_filter.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vibrig::estimator {
@@ -24,6 +25,23 @@ FilterNoise FilterNoise::of(const Settings& settings) noexcept {
     const double lsb = 1296000.0 / std::exp2(settings.resolver_bits);  // arcsec
     const double walk = 60.0 * settings.gyro_random_walk_deg_per_rt_h;
     return {settings.resolver_arcsec * settings.resolver_arcsec + lsb * lsb / 12.0, walk * walk};
+}
+
+NoiseLevels noise_levels(const Settings& settings) noexcept {
+    const double n = settings.gyro_random_walk_deg_per_rt_h;
+    return {std::sqrt(FilterNoise::of(settings).angle_variance), {n, n, n}};
+}
+
+FilterNoise FilterNoise::of(const NoiseLevels& levels) noexcept {
+    FilterNoise noise;
+    noise.angle_variance = levels.angle_arcsec * levels.angle_arcsec;
+    double largest = 0;
+    for (const double n : levels.gyro_random_walk_deg_per_rt_h) largest = std::max(largest, n);
+    noise.walk = 3600.0 * largest * largest;
+    for (std::size_t j = 0; j < kGyros; ++j) {
+        noise.gyro_share[j] = largest > 0 ? levels.gyro_random_walk_deg_per_rt_h[j] / largest : 1.0;
+    }
+    return noise;
 }
 
 DriftFilter::DriftFilter(const Settings& settings, const ParameterArray& sigma)
@@ -63,6 +81,9 @@ void DriftFilter::predict(double dt, double kappa) noexcept {
         for (std::size_t j = 0; j < kGyros; ++j) t.h[internal_index(group, j)] = h[group][j];
     }
     copy_scaled(pose.m, 1.0, t.noise_map);
+    for (auto& row : t.noise_map) {
+        for (std::size_t j = 0; j < kGyros; ++j) row[j] *= noise_.gyro_share[j];
+    }
     t.noise = noise_.walk * dt;
     filter_.predict(t);
 }

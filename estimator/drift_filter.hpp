@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 
 #include "estimator/drift_model.hpp"
@@ -14,8 +15,11 @@ namespace vibrig::estimator {
 struct FilterNoise {
     double angle_variance = 0;  ///< of one encoder reading, arcsec^2, quantisation included
     double walk = 0;            ///< q = (60 N)^2, arcsec^2/s
+    /// sqrt of the gyro's own q over `walk`.
+    std::array<double, 3> gyro_share{1, 1, 1};
 
     [[nodiscard]] static FilterNoise of(const Settings& settings) noexcept;
+    [[nodiscard]] static FilterNoise of(const NoiseLevels& levels) noexcept;
 };
 
 /// The filter over the dwells of one or more runs: time steps by the averaged model, innovation
@@ -24,6 +28,7 @@ class DriftFilter {
   public:
     DriftFilter(const Settings& settings, const ParameterArray& sigma);
 
+    void set_noise(const FilterNoise& noise) noexcept { noise_ = noise; }
     /// The next sample starts the angles afresh.
     void begin_dwell() noexcept;
     /// One reading at `time_s`, later than the one before.

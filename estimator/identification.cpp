@@ -334,6 +334,9 @@ StepResult Identification::add(const Measurement& measurement) noexcept {
 }
 DwellSummary Identification::end_dwell() noexcept { return impl_->end_dwell(); }
 void Identification::estimate(Estimate& out) const noexcept { impl_->estimate(out); }
+void Identification::set_noise(const NoiseLevels& levels) noexcept {
+    for (RunFilter& run : impl_->filters) run.filter.set_noise(FilterNoise::of(levels));
+}
 Result Identification::result() const { return impl_->result(); }
 
 std::vector<double> Identification::covariance() const {

@@ -72,6 +72,13 @@ struct Measurement {
     bool force_good = true;
 };
 
+/// Noise as the filter takes it.
+struct NoiseLevels {
+    double angle_arcsec = 0;  ///< of one encoder reading, quantisation included
+    std::array<double, 3> gyro_random_walk_deg_per_rt_h{};
+};
+[[nodiscard]] NoiseLevels noise_levels(const Settings& settings) noexcept;
+
 struct DwellInfo {
     int run = 1;          ///< from 1; the two-step route joins two runs
     int position = 1;     ///< from 1
@@ -183,6 +190,8 @@ class Identification {
     StepResult add(const Measurement& measurement) noexcept;
     DwellSummary end_dwell() noexcept;
     void estimate(Estimate& out) const noexcept;
+    /// In place of the settings' noise, from the next dwell on; between dwells only.
+    void set_noise(const NoiseLevels& levels) noexcept;
     /// Final result over all ended dwells. Allocates; does not change the filter.
     [[nodiscard]] Result result() const;
     /// Of the coefficients after the last ended dwell, 30 x 30 row-major in the order of

@@ -47,6 +47,10 @@ bool EstimatorStage::take_done(DwellDone& done) noexcept {
     return done_.consume([&done](const DwellDone& d) { done = d; }, 1) == 1;
 }
 
+bool EstimatorStage::take_block(BlockRecord& block) noexcept {
+    return blocks_.consume([&block](const BlockRecord& b) { block = b; }, 1) == 1;
+}
+
 void EstimatorStage::take_order(const DwellOrder& order) noexcept {
     if (ordered_) finish();
     if (order.cancel) return;
@@ -67,10 +71,13 @@ void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
     const bool first = !begun_;
     if (first) {
         identification_.begin_dwell(current_.dwell);
+        averager_.begin(current_);
         begun_ = true;
     }
     const auto measurement = measurement_of(sample, current_.from);
-    identification_.add(measurement);
+    if (identification_.add(measurement).outcome == estimator::StepOutcome::used) {
+        averager_.add(measurement.time_s, measurement.angle_rad);
+    }
     if (journal_ != nullptr)
         journal_->try_push({measurement, current_.dwell.run, current_.dwell.position, first, 0});
     shown_.dwell_fraction = static_cast<double>(sample.time - current_.from) /
@@ -82,6 +89,7 @@ void EstimatorStage::finish() noexcept {
     shown_.dwell_fraction = 0;
     if (begun_) {
         done.summary = identification_.end_dwell();
+        averager_.end();
         publish();
     } else {
         done.summary.run = current_.dwell.run;

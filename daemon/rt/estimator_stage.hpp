@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "daemon/rt/angle_blocks.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
@@ -40,6 +41,8 @@ class EstimatorStage {
     bool order(const DwellOrder& order) noexcept;
     /// Control thread only: takes one finished dwell, if there is one.
     bool take_done(DwellDone& done) noexcept;
+    /// Control thread only: takes one block of angles; those of a dwell come before its end.
+    bool take_block(BlockRecord& block) noexcept;
     [[nodiscard]] EstimatorView view() const noexcept { return view_.read(); }
     [[nodiscard]] RingCounts ring() const noexcept { return samples_.counts(); }
 
@@ -56,6 +59,8 @@ class EstimatorStage {
     Ring<Fed>* journal_ = nullptr;
     Ring<DwellOrder> orders_{8};
     Ring<DwellDone> done_{8};
+    Ring<BlockRecord> blocks_{256};
+    AngleBlocks averager_{blocks_};
     std::atomic<bool> stop_{false};
 
     DwellOrder current_;

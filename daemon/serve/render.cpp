@@ -159,6 +159,17 @@ std::string estimate_line(const v1::Estimate& estimate) {
            format(", %u dwells", estimate.dwells());
 }
 
+std::string noise_line(const v1::Noise& noise) {
+    std::string text = "N";
+    for (const v1::GyroNoise& gyro : noise.gyros()) {
+        if (!gyro.has_fit()) return "-";
+        const v1::NoiseTerm& n = gyro.fit().n();
+        text += n.has_value() ? format(" %.2e", n.value()) : format(" <%.1e", n.below());
+    }
+    return text + format(" deg/rt-h in %u dwells, %llu alarms", noise.dwells(),
+                         count(noise.alarms_total()));
+}
+
 std::string cell(const v1::Parameter& parameter) {
     if (!parameter.has_value()) return format("%-6s        -          ", parameter.name().c_str());
     const double value = parameter.value();
@@ -230,6 +241,7 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     lines.push_back(labelled("dropped", losses_line(status)));
     lines.push_back(labelled("channels", channels_line(status.sample())));
     lines.push_back(labelled("filter", estimate_line(estimate)));
+    lines.push_back(labelled("noise", noise_line(status.noise())));
     lines.push_back(labelled("daemon", "vibrigd " + status.version() + ", clock " + status.clock() +
                                            ", up " + render_duration(status.uptime_s())));
     for (std::string& line : lines) line = clipped(line, width);

@@ -189,6 +189,47 @@ void fill(v1::Estimate& out, const estimator::Estimate& estimate) {
     out.set_dwells(estimate.dwells);
 }
 
+void fill(v1::Noise& out, const NoiseStatus& noise) {
+    namespace allan = estimator::allan;
+    constexpr std::array<const char*, 3> kGyroNames{"x", "y", "z"};
+    for (std::size_t j = 0; j < kGyroNames.size(); ++j) {
+        const NoiseStatus::Gyro& gyro = noise.gyros[j];
+        v1::GyroNoise& to = *out.add_gyros();
+        to.set_gyro(kGyroNames[j]);
+        set(to, &v1::GyroNoise::set_in_force_deg_per_rt_h, gyro.in_force);
+        if (gyro.smallest_change > 0)
+            set(to, &v1::GyroNoise::set_smallest_change, gyro.smallest_change);
+        if (noise.dwells == 0) continue;
+        v1::NoiseFit& fit = *to.mutable_fit();
+        const std::array<v1::NoiseTerm*, allan::kTerms> terms{
+            fit.mutable_q(), fit.mutable_n(), fit.mutable_b(), fit.mutable_k(), fit.mutable_r()};
+        for (std::size_t t = 0; t < allan::kTerms; ++t) {
+            v1::NoiseTerm& term = *terms[t];
+            term.set_unit(allan::kTermUnits[t]);
+            if (gyro.terms[t].detected) {
+                set(term, &v1::NoiseTerm::set_value, gyro.terms[t].value);
+                set(term, &v1::NoiseTerm::set_sigma, gyro.terms[t].sigma);
+            }
+            set(term, &v1::NoiseTerm::set_below, gyro.terms[t].below);
+        }
+    }
+    set(out, &v1::Noise::set_angle_in_force_arcsec, noise.angle_in_force_arcsec);
+    if (noise.dwells > 0) set(out, &v1::Noise::set_block_s, noise.block_s);
+    out.set_dwells(noise.dwells);
+    out.set_dwells_left_out(noise.dwells_left_out);
+    out.set_alarms_total(noise.alarms_total);
+    for (const NoiseStatus::Alarm& alarm : noise.alarms) {
+        v1::NoiseAlarm& to = *out.add_alarms();
+        to.set_run(alarm.run);
+        to.set_position(alarm.position);
+        to.set_gyro(kGyroNames[std::min<std::size_t>(alarm.gyro, 2)]);
+        set(to, &v1::NoiseAlarm::set_tau_s, alarm.tau_s);
+        set(to, &v1::NoiseAlarm::set_ratio, alarm.ratio);
+        set(to, &v1::NoiseAlarm::set_limit, alarm.limit);
+        to.set_reading(alarm.reading);
+    }
+}
+
 void fill(v1::Dwell& out, const estimator::DwellSummary& dwell) {
     out.set_run(dwell.run);
     out.set_position(dwell.position);
@@ -257,6 +298,7 @@ void fill(v1::Status& out, const StatusData& status) {
     journal.set_taken(status.journal.taken);
     journal.set_written(status.journal.written);
     journal.set_dropped(status.journal.dropped);
+    fill(*out.mutable_noise(), status.noise);
 }
 
 void fill(v1::Parameters& out, const estimator::Result& result) {

@@ -3,6 +3,8 @@
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <exception>
 #include <iostream>
 #include <map>
@@ -27,6 +29,15 @@ struct Options {
     std::string plot;
     bool json = false;
 };
+
+/// CLI11's own check for positive numbers lets nan through and prints all digits of the largest one.
+std::string not_seconds(std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool good = error == std::errc{} && end == text.data() + text.size() && value > 0 &&
+                      std::isfinite(value);
+    return good ? std::string() : "found \"" + text + "\", expected seconds above zero";
+}
 
 int run(Options& options) {
     AllanAnalysis analysis;
@@ -67,7 +78,7 @@ void add_dynamic_options(CLI::App& command, Options& options) {
     AllanRequest& request = options.request;
     command.add_option("--dynamic", request.window_s, "windows of W s: surface, traces, alarms")
         ->type_name("W")
-        ->check(CLI::PositiveNumber);
+        ->check(CLI::Validator(not_seconds, ""));
     command.add_option("--overlap", request.overlap, "of neighbouring windows (0.5)");
     command
         .add_option("--mean", options.mean,
@@ -97,7 +108,8 @@ void add_allan(CLI::App& app, int& exit_code) {
                      "numbers, one a line, or CSV; plain or gzip; - is standard input")
         ->required();
     command->add_option("--tau0", request.tau0, "s between samples; or give --time")
-        ->check(CLI::PositiveNumber);
+        ->type_name("S")
+        ->check(CLI::Validator(not_seconds, ""));
     command->add_option("--column", request.column, "name or number (from 1) of the column");
     command->add_option("--time", request.time, "column with time stamps in s");
     command->add_option("--data", options->data, "rate (default) or phase")

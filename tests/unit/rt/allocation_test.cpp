@@ -65,7 +65,9 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
                             {ring, *estimator_waiter, *control, interlock});
     acquisition.start([](drivers::PortState, const char*) {});
     DwellOrder order;
-    order.to = drivers::kNever;
+    // Long enough for the test, short enough for blocks of a second.
+    order.from = clock.now();
+    order.to = order.from + 100 * kSecond;
     ASSERT_TRUE(stage.order(order));
     std::thread acquisition_thread([&] {
         test::watch_this_thread();
@@ -122,6 +124,12 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     EXPECT_GT(stage.view().in_dwell, kSamples * 9 / 10);
     EXPECT_GT(stage.view().estimate.used, kSamples / 2);
     EXPECT_EQ(after - before, 0U);
+    // and means of their angles, of one second each, have come to the control thread's side
+    BlockRecord block;
+    ASSERT_TRUE(stage.take_block(block));
+    EXPECT_EQ(block.block_s, 1.0);
+    EXPECT_GT(block.samples, 0U);
+    EXPECT_NEAR(block.angle_rad[1], 0.02 * 3.14159265358979 / 180, 6e-6);
 }
 
 }  // namespace

@@ -66,6 +66,20 @@ StatusData full_status() {
     s.estimate.nis_per_dof = 1.02;
     s.estimate.innovation_arcsec = {1.5, -2.5, 3.5};
     s.estimate.dwells = 2;
+    for (NoiseStatus::Gyro& gyro : s.noise.gyros) {
+        gyro.in_force = 0.001;
+        gyro.smallest_change = 3.5;
+        gyro.terms[0] = {true, 5.1, 0.1, 0.2};
+        gyro.terms[1] = {true, 0.0011, 0.0002, 0.0012};
+        for (std::size_t t = 2; t < gyro.terms.size(); ++t) gyro.terms[t] = {false, 0, 0, 0.03};
+    }
+    s.noise.gyros[0].terms.fill({true, 0.01, 0.002, 0.014});
+    s.noise.angle_in_force_arcsec = 5;
+    s.noise.block_s = 1;
+    s.noise.dwells = 81;
+    s.noise.dwells_left_out = 82;
+    s.noise.alarms_total = 83;
+    s.noise.alarms.push_back({1, 2, 1, 4, 2.5, 1.9, "short averaging times"});
     s.dwells.push_back(
         {1, 2, 4000, 3990, 10, 1, 18.9, 5.98, 15.0, 1.001, 0.99, 0.05, true, "rejected"});
     return s;

@@ -88,6 +88,12 @@ TEST(StatusJson, SaysTheNumbersInTheUnitsOfTheEdge) {
     EXPECT_EQ(status.estimate().parameters(29).name(), "D_OSz");
     EXPECT_EQ(status.estimate().parameters(29).unit(), "deg/h/g^2");
     EXPECT_EQ(status.campaign().dwells(0).reason(), "rejected");
+    ASSERT_EQ(status.noise().gyros_size(), 3);
+    EXPECT_DOUBLE_EQ(status.noise().gyros(2).fit().n().value(), 0.0011);
+    EXPECT_EQ(status.noise().gyros(2).fit().n().unit(), "deg/rt-h");
+    EXPECT_FALSE(status.noise().gyros(2).fit().k().has_value());
+    EXPECT_DOUBLE_EQ(status.noise().gyros(2).fit().k().below(), 0.03);
+    EXPECT_EQ(status.noise().alarms(0).gyro(), "y");
 }
 
 TEST(StatusJson, PrintsZerosAndOriginalNames) {

@@ -1,0 +1,223 @@
+#include "estimator/allan/dwell_monitor.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/allan/edf.hpp"
+
+namespace vibrig::estimator::allan {
+
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr int kMostIterations = 50;
+constexpr double kConverged = 1e-9;
+constexpr double kBound = 2;     // standard errors above the estimate
+constexpr double kDetected = 3;  // standard errors
+constexpr double kSharers = 3;   // share the level of a dwell's alarms
+constexpr double kSameLevel = 0.005;
+
+double squared(double x) { return x * x; }
+
+/// q [arcsec^2/s] of N [deg/sqrt(h)] and back.
+double walk_of(double n) { return squared(60 * n); }
+double n_of(double walk) { return std::sqrt(walk) / 60; }
+
+double scale_of(std::size_t slow_term, double block_s) {
+    return std::pow(block_s, static_cast<double>(slow_term) + 2);
+}
+
+}  // namespace
+
+std::size_t DwellMonitor::dwells_at(std::size_t level) const {
+    return static_cast<std::size_t>(std::count_if(
+        dwells_.begin(), dwells_.end(), [&](const Kept& kept) { return kept.level == level; }));
+}
+
+void DwellMonitor::learn(const DwellAngles& dwell) {
+    const auto same = [&](double level) {
+        return std::abs(level - dwell.level) <= kSameLevel * std::max(level, dwell.level);
+    };
+    const auto at = std::find_if(levels_.begin(), levels_.end(), same);
+    const auto level = static_cast<std::size_t>(at - levels_.begin());
+    if (at == levels_.end()) levels_.push_back(dwell.level);
+    dwells_.push_back({dwell, dwell.basis->contrasts(dwell.angle_arcsec), level});
+    if (dwells_.size() > settings_.keep) dwells_.pop_front();
+
+    solution_ = solve({});
+    FittedTerm& q = terms_[static_cast<std::size_t>(Term::Q)];
+    q.detected = true;
+    q.value = std::sqrt(solution_.white[level]);
+    q.sigma = solution_.white_sigma[level] / (2 * q.value);
+    FittedTerm& n = terms_[static_cast<std::size_t>(Term::N)];
+    n.detected = solve(0.0).score > kDetected && solution_.walk > 0;
+    n.value = n_of(solution_.walk);
+    n.sigma = n.value > 0 ? solution_.walk_sigma / (2 * 3600 * n.value) : 0;
+    q.below = std::sqrt(solution_.white[level] + kBound * solution_.white_sigma[level]);
+    n.below = n_of(solution_.walk + kBound * solution_.walk_sigma);
+    test_slow_terms(solution_);
+    find_smallest_change();
+}
+
+VectorXd DwellMonitor::variances(const Kept& kept, const Solution& solution) const {
+    const DwellAngles& dwell = kept.dwell;
+    return (dwell.white_share * solution.white[kept.level] +
+            solution.walk * dwell.block_s * dwell.basis->walk.array())
+        .matrix();
+}
+
+/// Fisher's scoring. The information matrix is an arrow: each level's white noise meets only q.
+DwellMonitor::Solution DwellMonitor::solve(std::optional<double> fixed_walk) const {
+    const std::size_t levels = levels_.size();
+    Solution s;
+    s.walk = fixed_walk.value_or(walk_of(settings_.walk_deg_per_rt_h));
+    s.white.assign(levels, squared(settings_.angle_arcsec));
+    s.white_sigma.assign(levels, 0);
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+        double score_q = 0, qq = 0;
+        std::vector<double> score_r(levels, 0), qr(levels, 0), rr(levels, 0);
+        for (const Kept& kept : dwells_) {
+            const VectorXd v = variances(kept, s);
+            const double a = kept.dwell.white_share;
+            for (Eigen::Index i = 0; i < v.size(); ++i) {
+                const double b = kept.dwell.block_s * kept.dwell.basis->walk[i];
+                const double weight = 1 / squared(v[i]);
+                const double excess = (squared(kept.contrasts[i]) - v[i]) * weight;
+                score_q += excess * b;
+                score_r[kept.level] += excess * a;
+                qq += b * b * weight;
+                qr[kept.level] += a * b * weight;
+                rr[kept.level] += a * a * weight;
+            }
+        }
+        for (std::size_t l = 0; l < levels; ++l) {
+            if (rr[l] > 0) {
+                qq -= squared(qr[l]) / rr[l];
+                score_q -= qr[l] / rr[l] * score_r[l];
+            }
+        }
+        // The information is half of these sums, and so is the score.
+        s.walk_sigma = std::sqrt(2 / qq);
+        s.score = score_q / std::sqrt(2 * qq);
+        const double walk = fixed_walk ? s.walk : std::max(0.0, s.walk + score_q / qq);
+        double change = std::abs(walk - s.walk) / s.walk_sigma;
+        for (std::size_t l = 0; l < levels; ++l) {
+            if (rr[l] <= 0) continue;
+            s.white_sigma[l] = std::sqrt(2 / rr[l] * (1 + squared(qr[l]) / (rr[l] * qq)));
+            const double step = (score_r[l] - qr[l] * (walk - s.walk)) / rr[l];
+            change = std::max(change, std::abs(step) / s.white_sigma[l]);
+            // Never to zero or below in one step.
+            s.white[l] = std::max(s.white[l] / 10, s.white[l] + step);
+        }
+        s.walk = walk;
+        if (change < kConverged) break;
+    }
+    return s;
+}
+
+double DwellMonitor::distance_from(double walk_deg_per_rt_h) const {
+    return dwells_.empty() ? 0 : solve(walk_of(walk_deg_per_rt_h)).score;
+}
+
+void DwellMonitor::test_slow_terms(const Solution& solution) {
+    const std::size_t levels = levels_.size();
+    for (std::size_t t = 0; t < 3; ++t) {
+        double score = 0, tt = 0, tq = 0, qq = 0;
+        std::vector<double> tr(levels, 0), qr(levels, 0), rr(levels, 0);
+        for (const Kept& kept : dwells_) {
+            const VectorXd weight = variances(kept, solution).cwiseInverse();
+            const VectorXd z = kept.contrasts.cwiseProduct(weight);
+            const double scale = scale_of(t, kept.dwell.block_s);
+            const Eigen::MatrixXd& c = kept.dwell.basis->slow[t];
+            const VectorXd diagonal = c.diagonal().cwiseProduct(weight);
+            const VectorXd walk = kept.dwell.block_s * kept.dwell.basis->walk.cwiseProduct(weight);
+            const VectorXd white = kept.dwell.white_share * weight;
+            score += scale * (z.dot(c * z) - diagonal.sum());
+            tt += squared(scale) * weight.dot(c.cwiseProduct(c) * weight);
+            tq += scale * diagonal.dot(walk);
+            qq += walk.squaredNorm();
+            tr[kept.level] += scale * diagonal.dot(white);
+            qr[kept.level] += walk.dot(white);
+            rr[kept.level] += white.squaredNorm();
+        }
+        // What resolver and random walk could explain as well is no information.
+        for (std::size_t l = 0; l < levels; ++l) {
+            if (rr[l] <= 0) continue;
+            tt -= squared(tr[l]) / rr[l];
+            tq -= tr[l] * qr[l] / rr[l];
+            qq -= squared(qr[l]) / rr[l];
+        }
+        tt -= squared(tq) / qq;
+        const double estimate = score / tt;  // of the squared coefficient
+        const double sigma = std::sqrt(2 / tt);
+        FittedTerm& term = terms_[static_cast<std::size_t>(Term::B) + t];
+        term.detected = estimate > kDetected * sigma;
+        term.value = std::sqrt(std::max(0.0, estimate));
+        term.sigma = term.value > 0 ? sigma / (2 * term.value) : 0;
+        term.below = std::sqrt(std::max(0.0, estimate) + kBound * sigma);
+    }
+}
+
+/// Bounds of the ratio of an octave to what the earlier dwells of the level let expect.
+std::array<double, 2> DwellMonitor::bounds(const DwellAngles& dwell,
+                                           const DwellBasis::Octave& octave,
+                                           std::size_t level) const {
+    const double white = dwell.white_share * solution_.white[level];
+    const double walk = solution_.walk * dwell.block_s;
+    const double trace = white * octave.white_trace + walk * octave.walk_trace;
+    const double norm = white * white * octave.white_square + 2 * white * walk * octave.product +
+                        walk * walk * octave.walk_square;
+    const auto taught = static_cast<double>(dwells_at(level));
+    // The reference is uncertain too; variances of the logarithm add.
+    const double degrees = trace * trace / norm * taught / (1 + taught);
+    const double tail =
+        settings_.alpha / (2 * kSharers * static_cast<double>(dwell.basis->octaves.size()));
+    return {chi_square_quantile(tail, degrees) / degrees,
+            chi_square_quantile(1 - tail, degrees) / degrees};
+}
+
+std::vector<Alarm> DwellMonitor::check(const DwellAngles& dwell) const {
+    std::vector<Alarm> alarms;
+    const auto at = std::find_if(levels_.begin(), levels_.end(), [&](double level) {
+        return std::abs(level - dwell.level) <= kSameLevel * std::max(level, dwell.level);
+    });
+    const auto level = static_cast<std::size_t>(at - levels_.begin());
+    if (at == levels_.end() || dwells_at(level) < settings_.reference_dwells) return alarms;
+    const Eigen::Map<const VectorXd> angle(dwell.angle_arcsec.data(),
+                                           static_cast<Eigen::Index>(dwell.angle_arcsec.size()));
+    const VectorXd centred = (angle.array() - angle[0]).matrix();
+    const std::size_t count = dwell.basis->octaves.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        const DwellBasis::Octave& octave = dwell.basis->octaves[i];
+        const double expected = dwell.white_share * solution_.white[level] * octave.white_trace +
+                                solution_.walk * dwell.block_s * octave.walk_trace;
+        const double ratio = (octave.differences * centred).squaredNorm() / expected;
+        const auto [low, high] = bounds(dwell, octave, level);
+        if (ratio >= low && ratio <= high) continue;
+        const std::size_t part = 3 * i / count;
+        alarms.push_back({part == 0   ? Reading::short_tau
+                          : part == 1 ? Reading::middle_tau
+                                      : Reading::long_tau,
+                          static_cast<double>(octave.m) * dwell.block_s, ratio,
+                          ratio < low ? low : high, 0});
+    }
+    return alarms;
+}
+
+void DwellMonitor::find_smallest_change() {
+    const Kept& newest = dwells_.back();
+    smallest_change_ = 0;
+    if (!terms_[static_cast<std::size_t>(Term::N)].detected) return;
+    for (const DwellBasis::Octave& octave : newest.dwell.basis->octaves) {
+        const double white =
+            newest.dwell.white_share * solution_.white[newest.level] * octave.white_trace;
+        const double walk = solution_.walk * newest.dwell.block_s * octave.walk_trace;
+        const double high = bounds(newest.dwell, octave, newest.level)[1];
+        const double change = std::sqrt((high * (white + walk) - white) / walk);
+        smallest_change_ = smallest_change_ > 0 ? std::min(smallest_change_, change) : change;
+    }
+}
+
+}  // namespace vibrig::estimator::allan

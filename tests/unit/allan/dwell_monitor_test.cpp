@@ -1,0 +1,191 @@
+#include "estimator/allan/dwell_monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <random>
+
+namespace {
+
+using namespace vibrig::estimator::allan;
+
+constexpr double kRate = 40;  // samples/s
+constexpr std::size_t kBlocks = 98;
+
+struct Noise {
+    double angle_arcsec = 5;
+    double walk = 1e-3;    // deg/sqrt(h)
+    double rate_walk = 0;  // deg/h^1.5
+    double ramp = 0;       // deg/h^2
+};
+
+std::shared_ptr<const DwellBasis> basis_of(std::size_t blocks) {
+    std::vector<std::size_t> present(blocks);
+    std::iota(present.begin(), present.end(), std::size_t{0});
+    return std::make_shared<const DwellBasis>(std::move(present));
+}
+
+const std::shared_ptr<const DwellBasis>& whole() {
+    static const std::shared_ptr<const DwellBasis> basis = basis_of(kBlocks);
+    return basis;
+}
+
+/// Block means as the resolver at 40 Hz would give them, with an offset and a rate.
+DwellAngles dwell_of(const Noise& noise, std::mt19937_64& generator, double level = 6,
+                     const std::shared_ptr<const DwellBasis>& basis = whole()) {
+    std::normal_distribution<double> normal;
+    DwellAngles dwell;
+    dwell.basis = basis;
+    dwell.level = level;
+    dwell.white_share = 1 / kRate;
+    const double dt = 1 / kRate;
+    double angle = 1e4 * normal(generator);
+    double rate = 3 * normal(generator);
+    const double hours = 1 / 3600.0;
+    std::size_t next = 0;
+    for (std::size_t block = 0; block <= basis->present().back(); ++block) {
+        double sum = 0;
+        for (int i = 0; i < static_cast<int>(kRate); ++i) {
+            rate +=
+                noise.ramp * dt * hours + noise.rate_walk / 60 * std::sqrt(dt) * normal(generator);
+            angle += rate * dt + 60 * noise.walk * std::sqrt(dt) * normal(generator);
+            sum += angle + noise.angle_arcsec * normal(generator);
+        }
+        if (basis->present()[next] != block) continue;
+        dwell.angle_arcsec.push_back(sum / kRate);
+        ++next;
+    }
+    return dwell;
+}
+
+const FittedTerm& term(const DwellMonitor& monitor, Term which) {
+    return monitor.terms()[static_cast<std::size_t>(which)];
+}
+
+DwellMonitor campaign(const Noise& noise, std::uint64_t seed, std::size_t dwells = 28) {
+    std::mt19937_64 generator(seed);
+    DwellMonitor monitor({});
+    for (std::size_t d = 0; d < dwells; ++d) {
+        monitor.learn(dwell_of(noise, generator, d < dwells / 2 ? 6 : 4.667));
+    }
+    return monitor;
+}
+
+TEST(DwellMonitor, MonteCarloErrorsOfNAreThoseItStates) {
+    // GIVEN campaigns of 28 dwells of 100 s at two levels, the noise of the default rig
+    constexpr int kRuns = 24;
+    constexpr std::uint64_t kSeed = 5100;
+    double mean = 0, squares = 0, claimed = 0, q_squares = 0, q_claimed = 0;
+    int slow = 0;
+    for (int run = 0; run < kRuns; ++run) {
+        const DwellMonitor monitor = campaign({}, kSeed + static_cast<unsigned>(run));
+        // WHEN all dwells are taken together
+        const FittedTerm& n = term(monitor, Term::N);
+        const FittedTerm& q = term(monitor, Term::Q);
+        EXPECT_TRUE(n.detected) << "seed " << kSeed + static_cast<unsigned>(run);
+        mean += n.value / kRuns;
+        squares += std::pow(n.value - 1e-3, 2) / kRuns;
+        claimed += n.sigma * n.sigma / kRuns;
+        q_squares += std::pow(q.value - 5, 2) / kRuns;
+        q_claimed += q.sigma * q.sigma / kRuns;
+        for (const Term which : {Term::B, Term::K, Term::R}) {
+            slow += term(monitor, which).detected ? 1 : 0;
+            EXPECT_GT(term(monitor, which).below, 0);
+        }
+        // and one dwell shows only a large change of N
+        EXPECT_GT(monitor.smallest_change(), 1.5);
+    }
+    // THEN errors are as large as stated: squares over claim within chi-square of 24 at 1e-4
+    const double low = chi_square_quantile(5e-5, kRuns) / kRuns;
+    const double high = chi_square_quantile(1 - 5e-5, kRuns) / kRuns;
+    EXPECT_GT(squares / claimed, low) << "seeds from " << kSeed;
+    EXPECT_LT(squares / claimed, high) << "seeds from " << kSeed;
+    EXPECT_GT(q_squares / q_claimed, low);
+    EXPECT_LT(q_squares / q_claimed, high);
+    EXPECT_NEAR(mean, 1e-3, 4 * std::sqrt(claimed / kRuns));
+    // and the slow terms are not detected (72 tests at three standard errors, skewed)
+    EXPECT_LE(slow, 3);
+}
+
+TEST(DwellMonitor, SlowTermsAreBoundedAndStrongOnesDetected) {
+    // GIVEN a campaign with N only: the bounds are far above a good gyro's terms
+    const DwellMonitor calm = campaign({}, 5200);
+    EXPECT_FALSE(term(calm, Term::K).detected);
+    const double bound = term(calm, Term::K).below;
+    EXPECT_GT(bound, 0.01);
+    // WHEN the rate walks five times faster than the bound, or ramps, THEN it is found
+    const DwellMonitor walking = campaign({5, 1e-3, 5 * bound, 0}, 5201);
+    EXPECT_TRUE(term(walking, Term::K).detected);
+    const double ramp = 8 * term(calm, Term::R).below;
+    const DwellMonitor ramping = campaign({5, 1e-3, 0, ramp}, 5202);
+    const FittedTerm& r = term(ramping, Term::R);
+    EXPECT_TRUE(r.detected);
+    EXPECT_NEAR(r.value, ramp, 0.5 * ramp);
+}
+
+TEST(DwellMonitor, WithoutRandomWalkNIsNotDetected) {
+    const FittedTerm n = term(campaign({5, 0, 0, 0}, 5300), Term::N);
+    EXPECT_FALSE(n.detected);
+    EXPECT_GT(n.below, 0);
+    EXPECT_LT(n.below, 1e-3);
+}
+
+TEST(DwellMonitor, ContradictsAWrongNOnly) {
+    const DwellMonitor monitor = campaign({}, 5400);
+    EXPECT_LT(std::abs(monitor.distance_from(1e-3)), 4);
+    EXPECT_GT(monitor.distance_from(4e-4), 4);
+    const DwellMonitor wild = campaign({5, 3e-3, 0, 0}, 5401);
+    EXPECT_GT(wild.distance_from(1e-3), 4);
+    EXPECT_NEAR(term(wild, Term::N).value, 3e-3, 4 * term(wild, Term::N).sigma);
+}
+
+TEST(DwellMonitor, AlarmsReadWhatHasChanged) {
+    // GIVEN dwells that have taught the noise of a level
+    std::mt19937_64 generator(5500);
+    DwellMonitor monitor({});
+    int alarms = 0;
+    constexpr int kDwells = 60;
+    for (int d = 0; d < kDwells; ++d) {
+        const DwellAngles dwell = dwell_of({}, generator);
+        alarms += monitor.check(dwell).empty() ? 0 : 1;
+        monitor.learn(dwell);
+    }
+    // THEN hardly one of 55 of the same kind alarmed (expected 55 * 1e-3 / 3)
+    EXPECT_LE(alarms, 2) << "seed 5500";
+    // WHEN the resolver's noise doubles, THEN the short averaging times say so
+    const auto resolver = monitor.check(dwell_of({10, 1e-3, 0, 0}, generator));
+    ASSERT_FALSE(resolver.empty());
+    EXPECT_EQ(resolver.front().reading, Reading::short_tau);
+    EXPECT_NEAR(resolver.front().ratio, 4, 2);
+    EXPECT_GT(resolver.front().ratio, resolver.front().limit);
+    // WHEN N grows by three times what the monitor says it sees, THEN longer ones do, these not
+    const double change = 3 * monitor.smallest_change();
+    const auto walk = monitor.check(dwell_of({5, change * 1e-3, 0, 0}, generator));
+    ASSERT_FALSE(walk.empty());
+    EXPECT_NE(walk.back().reading, Reading::short_tau);
+    // and another level has no reference yet
+    EXPECT_TRUE(monitor.check(dwell_of({10, 1e-3, 0, 0}, generator, 4.667)).empty());
+}
+
+TEST(DwellMonitor, ADwellWithAGapCounts) {
+    // GIVEN dwells with blocks missing in the middle
+    std::vector<std::size_t> present;
+    for (std::size_t i = 0; i < kBlocks; ++i) {
+        if (i < 30 || i > 39) present.push_back(i);
+    }
+    const auto basis = std::make_shared<const DwellBasis>(present);
+    std::mt19937_64 generator(5600);
+    DwellMonitor monitor({});
+    for (int d = 0; d < 28; ++d) monitor.learn(dwell_of({}, generator, 6, basis));
+    const FittedTerm& n = term(monitor, Term::N);
+    EXPECT_NEAR(n.value, 1e-3, 4 * n.sigma);
+    // THEN no difference spans the gap: a step of the angle there is none of the octaves' business
+    DwellAngles stepped = dwell_of({}, generator, 6, basis);
+    EXPECT_TRUE(monitor.check(stepped).empty());
+    for (std::size_t i = 30; i < stepped.angle_arcsec.size(); ++i) stepped.angle_arcsec[i] += 1e3;
+    EXPECT_TRUE(monitor.check(stepped).empty());
+}
+
+}  // namespace
