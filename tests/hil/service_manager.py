@@ -110,7 +110,8 @@ def blocked(checks, rig, manager, stage):
                  r.state_of(status) + rig.logs())
     manager.forget()
     checks.check("WATCHDOG=1" in manager.listen(5, "WATCHDOG=1"), f"{stage}: the watchdog is fed")
-    block(thread_named(rig.daemon.process.pid, stage))
+    thread = thread_named(rig.daemon.process.pid, stage)
+    block(thread)
     end = time.monotonic() + 20
     while shaker_state(rig) not in (0, 4) and time.monotonic() < end:
         time.sleep(0.1)
@@ -121,6 +122,7 @@ def blocked(checks, rig, manager, stage):
     manager.forget()
     checks.check("WATCHDOG=1" not in manager.listen(3), f"{stage} blocked: its watchdog is not fed")
     rig.daemon.process.kill()   # as the service manager would
+    os.waitpid(thread, WALL)    # the tracer's; only then the process can be
     rig.daemon.process.wait()
     start_daemon(rig, manager)
     status = rig.wait_for(measuring, 20)
