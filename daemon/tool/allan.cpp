@@ -30,7 +30,8 @@ struct Options {
     bool json = false;
 };
 
-/// CLI11's own check for positive numbers lets nan through and prints all digits of the largest one.
+/// CLI11's own check for positive numbers lets nan through and prints all digits of the largest
+/// one.
 std::string not_seconds(std::string& text) {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -120,9 +120,8 @@ class Parser {
     /// Separator, header and columns from the first line; true if it was a header.
     bool first(std::string_view content) {
         known_ = true;
-        if (std::any_of(content.begin(), content.end(), [](char c) {
-                return static_cast<unsigned char>(c) < 0x20 && c != '\t';
-            })) {
+        if (std::any_of(content.begin(), content.end(),
+                        [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; })) {
             fail("binary data found, expected lines of numbers");
         }
         for (const char candidate : {',', ';', '\t'}) {

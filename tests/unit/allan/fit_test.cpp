@@ -76,8 +76,7 @@ TEST(Fit, MonteCarloErrorsStayWithinTheirLimits) {
     // WHEN, THEN rms errors are at most 2, 3, 10, 60, 60 %
     const Terms limit{0.02, 0.03, 0.10, 0.60, 0.60};
     for (std::size_t j = 0; j < kTerms; ++j) {
-        EXPECT_LT(std::sqrt(squares[j]), limit[j])
-            << kTermNames[j] << ", seeds from " << kSeed;
+        EXPECT_LT(std::sqrt(squares[j]), limit[j]) << kTermNames[j] << ", seeds from " << kSeed;
         EXPECT_GT(std::sqrt(squares[j]), reported[j] / 4) << kTermNames[j];
     }
 }
