@@ -11,7 +11,8 @@ import tempfile
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
-SHORT = {"name": "sanitized", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 20.0}
+SHORT = {"name": "sanitized", "identify": "what-it-can",
+         "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 20.0}
 
 
 def campaign(checks, programs, folder):

@@ -17,7 +17,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
 PTRACE_SEIZE, PTRACE_INTERRUPT, WALL = 0x4206, 0x4207, 0x40000000
-CAMPAIGN = {"name": "blocked", "positions_deg": [[0, 0, 0]], "table_g": [5.0], "dwell_s": 600.0, "settle_s": 2.0,
+CAMPAIGN = {"name": "blocked", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0], "dwell_s": 600.0, "settle_s": 2.0,
             "ramp_s": 0.5, "temperature_window_s": 0.0}
 LINK = {"backoff_max_ms": 500, "response_timeout_ms": 200}
 STAGES = ("acquisition", "estimator", "control", "shaker")

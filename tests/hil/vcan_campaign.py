@@ -16,7 +16,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
 BUS = "vcan0"
-SHORT = {"name": "short", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 20]], "table_g": [9.0, 7.0], "dwell_s": 4.0,
+SHORT = {"name": "short", "identify": "what-it-can",
+         "positions_deg": [[0, 0, 0], [0, 0, 20]], "table_g": [9.0, 7.0], "dwell_s": 4.0,
          "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 1.0}
 SAMPLE_IDS = {0x080, 0x101, 0x102, 0x110, 0x111, 0x112}
 STATUS_IDS = {0x210, 0x220, 0x221}

@@ -26,7 +26,8 @@ POLL_S = 10
 CAMPAIGNS = {
     # 14 positions, 9 g and 7 g at the table, 100 s each: the defaults
     "full": {"name": "full"},
-    "short": {"name": "short", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [45, 0, 90], [270, 0, 0]], "table_g": [9.0, 7.0],
+    "short": {"name": "short", "identify": "what-it-can",
+              "positions_deg": [[0, 0, 0], [45, 0, 90], [270, 0, 0]], "table_g": [9.0, 7.0],
               "dwell_s": 20.0, "temperature_window_s": 5.0},
 }
 # A stamp is a whole microsecond of a clock whose every reading takes 256 ns of virtual time, and how often the kernel

@@ -46,7 +46,7 @@ struct JournalTest : testing::Test {
             estimator::Measurement m;
             m.time_s = n * 0.025;
             const double a = 6 * std::sin(2 * std::numbers::pi * 15 * m.time_s);
-            m.angle_rad = {1e-6 * n, 2e-6 * std::sin(n), 0.5 * position};
+            m.angle_rad = {1e-6 * n, 2e-6 * std::sin(n), 0.5 * position + 2e-6 * std::cos(2 * n)};
             m.force_g = {0, 1 + a, 1e-4 * std::cos(n)};
             m.angles_good = n % 97 != 0;
             filter.add(m);
