@@ -39,7 +39,7 @@ def end_without_rig(checks, programs, folder):
     """The rig dies, its clock with it, at the moment the daemon is told to end while the table shakes."""
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        start(rig)
+        start(rig, dwell_s=7200.0)   # still shaking when the rig dies, however fast its clock
         last = rig.wait_for_state(("recording",), 60)
         checks.check(last is not None and last["campaign"]["state"] == "recording", "another campaign records",
                      r.state_of(last))
@@ -53,9 +53,9 @@ def end_without_rig(checks, programs, folder):
         rig.stop()
 
 
-def start(rig):
+def start(rig, **other):
     rig.start_plant("--seed", "3")
-    rig.configure(SHORT)
+    rig.configure({**SHORT, **other})
     rig.start_daemon()
     rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
     return [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
