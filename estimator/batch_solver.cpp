@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "estimator/linear_algebra.hpp"
+
 namespace vibrig::estimator {
 
 BatchSolver::BatchSolver(const Settings& settings, const ParameterArray& prior)
@@ -78,10 +80,10 @@ bool BatchSolver::solve(ParameterArray& value, Covariance& covariance) const noe
     const Covariance information =
         Covariance::Identity() +
         Covariance(scale.asDiagonal() * kept_.topLeftCorner<n, n>() * scale.asDiagonal());
-    const Eigen::LDLT<Covariance> solver(information);
+    const Covariance normalised = linear_algebra::covariance_inverse(information);
     const Vector right = scale.cwiseProduct(kept_.col(n).head<n>());
-    Eigen::Map<Vector>(value.data()) = scale.cwiseProduct(Vector(solver.solve(right)));
-    covariance = scale.asDiagonal() * solver.solve(Covariance::Identity()) * scale.asDiagonal();
+    Eigen::Map<Vector>(value.data()) = scale.cwiseProduct(Vector(normalised * right));
+    covariance = scale.asDiagonal() * normalised * scale.asDiagonal();
     return covariance.allFinite();
 }
 

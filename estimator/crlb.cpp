@@ -1,10 +1,10 @@
 #include "estimator/crlb.hpp"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 
 #include "estimator/drift_filter.hpp"
+#include "estimator/linear_algebra.hpp"
 #include "estimator/observability.hpp"
 #include "estimator/settings_check.hpp"
 
@@ -48,7 +48,8 @@ Covariance information_in_prior_units(const Settings& settings,
     Covariance information = Covariance::Zero();
     for (const PlannedDwell& dwell : plan) {
         const Matrix3x30 g = sensitivity(kinematics, model, dwell, nominal) * scale.asDiagonal();
-        information += g.transpose() * g / rate_variance(settings, dwell.duration_s, period_s);
+        information +=
+            linear_algebra::gram(g) / rate_variance(settings, dwell.duration_s, period_s);
     }
     return information;
 }
@@ -99,15 +100,15 @@ std::array<double, kParameters> predicted_sigma(const Settings& settings,
     const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> scale(prior.data());
     const Covariance information =
         information_in_prior_units(settings, plan, in_order, prior, period_s);
-    const Eigen::SelfAdjointEigenSolver<Covariance> eigen(information);
-    const double least = kNoInformation * eigen.eigenvalues().maxCoeff();
+    const auto eigen = linear_algebra::covariance_eigen(information);
+    const double least = kNoInformation * eigen.values.maxCoeff();
     std::array<double, kParameters> sigma{};
     for (std::size_t i = 0; i < kParameters; ++i) {
         const auto row = static_cast<Eigen::Index>(internal_of(i));
         double variance = 0;
-        for (Eigen::Index k = 0; k < eigen.eigenvalues().size(); ++k) {
-            const double share = eigen.eigenvectors()(row, k);
-            const double value = eigen.eigenvalues()[k];
+        for (Eigen::Index k = 0; k < eigen.values.size(); ++k) {
+            const double share = eigen.vectors(row, k);
+            const double value = eigen.values[k];
             if (value > least) {
                 variance += share * share / value;
             } else if (std::abs(share) > kShare) {
@@ -127,7 +128,7 @@ Covariance planned_covariance(const Settings& settings, const std::vector<Planne
     const Covariance information =
         information_in_prior_units(settings, plan, ParameterArray{}, prior, period_s) +
         Covariance::Identity();
-    return scale.asDiagonal() * Covariance(information.llt().solve(Covariance::Identity())) *
+    return scale.asDiagonal() * linear_algebra::covariance_inverse(information) *
            scale.asDiagonal();
 }
 

@@ -1,6 +1,5 @@
 #include "estimator/observability.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -61,10 +60,10 @@ Observability observability(const Covariance& posterior, const ParameterArray& p
         found.directions.setIdentity();
         return found;
     }
-    const Eigen::SelfAdjointEigenSolver<Covariance> eigen(normalised);
+    const auto eigen = linear_algebra::covariance_eigen(normalised);
     for (std::size_t k = kParameters; k-- > 0;) {
-        if (!(eigen.eigenvalues()[index(k)] > kUndeterminedVariance)) break;
-        append(found, eigen.eigenvectors().col(index(k)), 0.5);
+        if (!(eigen.values[index(k)] > kUndeterminedVariance)) break;
+        append(found, eigen.vectors.col(index(k)), 0.5);
     }
     const auto basis = found.directions.leftCols(index(found.undetermined));
     for (std::size_t i = 0; i < kParameters; ++i) {
@@ -123,13 +122,14 @@ std::vector<Combination> determined_combinations(const Observability& found,
     Eigen::MatrixXd at_pivots(count, physical.cols());
     for (Eigen::Index k = 0; k < count; ++k)
         at_pivots.row(k) = physical.row(index(pivot[static_cast<std::size_t>(k)]));
-    const Eigen::FullPivLU<Eigen::MatrixXd> solver(at_pivots.transpose());
+    const Eigen::MatrixXd shares =
+        linear_algebra::least_squares(at_pivots.transpose(), physical.transpose());
 
     for (std::size_t name = 0; name < kParameters; ++name) {
         const std::size_t i = internal_of(name);
         if (found.observable[i] || std::find(pivot.begin(), pivot.end(), i) != pivot.end())
             continue;
-        const Eigen::VectorXd share = solver.solve(physical.row(index(i)).transpose());
+        const auto share = shares.col(index(i));
         Vector30 w = Vector30::Zero();
         w[index(i)] = 1.0;
         for (Eigen::Index k = 0; k < count; ++k) {

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "estimator/identification.hpp"
+#include "estimator/linear_algebra.hpp"
 #include "estimator/parameters.hpp"
 
 namespace vibrig::estimator {
 
-using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 
 /// How far the vibration levels of the dwells are apart.
 struct KappaSpread {

@@ -1,6 +1,5 @@
 #include "daemon/tool/reproduce_tang2009_study.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "daemon/tool/progress.hpp"
 #include "estimator/crlb.hpp"
+#include "estimator/linear_algebra.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::tool::tang2009 {
@@ -41,9 +41,9 @@ double nees(const estimator::Result& result) {
         sigma[k] = result.sigma[i];
         error[k] = (result.value[i] - truth()[i]) / result.sigma[i];
     }
-    const Eigen::Matrix<double, kParameters, kParameters> correlation =
+    const estimator::Covariance correlation =
         sigma.cwiseInverse().asDiagonal() * result.covariance * sigma.cwiseInverse().asDiagonal();
-    return error.dot(correlation.ldlt().solve(error));
+    return error.dot(estimator::linear_algebra::covariance_inverse(correlation) * error);
 }
 
 /// One route while the rig runs.

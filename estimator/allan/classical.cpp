@@ -1,11 +1,12 @@
 #include "estimator/allan/classical.hpp"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <complex>
 #include <initializer_list>
 #include <limits>
 #include <sstream>
+
+#include "estimator/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -99,8 +100,7 @@ ClassicalFit fit_classical(std::span<const ClassicalPoint> curve, MeanMode mode)
     }
     const Eigen::VectorXd scale = basis.colwise().norm().cwiseMax(1e-300);
     basis = basis * scale.cwiseInverse().asDiagonal();
-    const Eigen::VectorXd x =
-        basis.colPivHouseholderQr().solve(b).cwiseProduct(scale.cwiseInverse());
+    const Eigen::VectorXd x = linear_algebra::least_squares(basis, b).cwiseQuotient(scale);
     Polynomial a{};
     for (std::size_t k = 0; k < unknowns; ++k) {
         a[k + (corrected ? 1 : 0)] = x[static_cast<Eigen::Index>(k)];

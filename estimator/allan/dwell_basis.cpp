@@ -1,16 +1,18 @@
 #include "estimator/allan/dwell_basis.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
+
+#include "estimator/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 
 namespace {
 
 using Eigen::Index;
+using linear_algebra::product;
 
 /// Entry (i, k) from the numbers of two blocks.
 template <typename F>
@@ -30,6 +32,11 @@ Eigen::MatrixXd matrix_of(const std::vector<std::size_t>& blocks, F&& entry) {
 /// the same block a third of the block instead of a half.
 double walk_covariance(double a, double b) { return a == b ? a + 1.0 / 3.0 : std::min(a, b) + 0.5; }
 
+/// B' C B.
+Eigen::MatrixXd sandwich(const Eigen::MatrixXd& b, const Eigen::MatrixXd& c) {
+    return product(b.transpose(), product(c, b));
+}
+
 }  // namespace
 
 DwellBasis::DwellBasis(std::vector<std::size_t> present) : present_(std::move(present)) {
@@ -41,18 +48,15 @@ DwellBasis::DwellBasis(std::vector<std::size_t> present) : present_(std::move(pr
         line(i, 0) = 1;
         line(i, 1) = static_cast<double>(present_[static_cast<std::size_t>(i)]) - centre;
     }
-    const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(line).householderQ();
-    const Eigen::MatrixXd free = q.rightCols(n - 2);
+    const Eigen::MatrixXd free = linear_algebra::orthogonal_factor(line).rightCols(n - 2);
     const Eigen::MatrixXd walking = matrix_of(present_, walk_covariance);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(free.transpose() * walking * free);
-    basis_ = free * solver.eigenvectors();
-    walk = solver.eigenvalues().cwiseMax(0.0);
+    const auto eigen = linear_algebra::symmetric_eigen(sandwich(free, walking));
+    basis_ = product(free, eigen.vectors);
+    walk = eigen.values.cwiseMax(0.0);
 
     // Generalised covariances of the angle: they hold for contrasts that no line changes. Their
     // second differences have the Allan variances 2 ln2/pi B^2, (K/60)^2 tau/3, (R/3600)^2 tau^2/2.
-    const auto in_contrasts = [&](const Eigen::MatrixXd& c) {
-        return Eigen::MatrixXd(basis_.transpose() * c * basis_);
-    };
+    const auto in_contrasts = [&](const Eigen::MatrixXd& c) { return sandwich(basis_, c); };
     slow[0] = in_contrasts(matrix_of(present_, [](double a, double b) {
         const double t = std::abs(a - b);
         return t > 0 ? t * t * std::log(t) / (2 * std::numbers::pi) : 0.0;
@@ -93,9 +97,8 @@ void DwellBasis::add_octaves(const Eigen::MatrixXd& walk_covariance) {
                     (j / step == 1 ? -2.0 : 1.0) / static_cast<double>(m);
             }
         }
-        const Eigen::MatrixXd white = octave.differences * octave.differences.transpose();
-        const Eigen::MatrixXd walking =
-            octave.differences * walk_covariance * octave.differences.transpose();
+        const Eigen::MatrixXd white = linear_algebra::gram(octave.differences.transpose());
+        const Eigen::MatrixXd walking = sandwich(octave.differences.transpose(), walk_covariance);
         octave.white_trace = white.trace();
         octave.walk_trace = walking.trace();
         octave.white_square = white.squaredNorm();

@@ -1,11 +1,12 @@
 #include "estimator/allan/fit.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <sstream>
+
+#include "estimator/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 
@@ -48,15 +49,16 @@ Solution non_negative(const Matrix& a, const Vector& b, const std::array<bool, k
             continue;
         }
         part = part * scale.cwiseInverse().asDiagonal();
-        const Eigen::HouseholderQR<Eigen::MatrixXd> qr(part);
-        const Vector x = qr.solve(b);
+        const Vector x = linear_algebra::least_squares(part, b);
         const double rest = (part * x - b).squaredNorm();
         if (!x.allFinite() || x.minCoeff() <= 0 || rest >= least) {
             continue;
         }
         least = rest;
         best = {};
-        const Eigen::MatrixXd covariance = (part.transpose() * part).inverse();
+        const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(count, count);
+        const Eigen::MatrixXd covariance =
+            linear_algebra::least_squares(linear_algebra::gram(part), unit);
         for (Eigen::Index k = 0; k < count; ++k) {
             best.squares[columns[static_cast<std::size_t>(k)]] = x[k] / scale[k];
             best.sigma[columns[static_cast<std::size_t>(k)]] =

@@ -1,10 +1,10 @@
 #include "estimator/plan/augmentation.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "estimator/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 
 namespace vibrig::estimator::plan {
@@ -37,13 +37,10 @@ class RunSearch {
         // Inverted in units of the present standard errors, where it is best conditioned.
         const Matrix normal =
             present.cwiseInverse().asDiagonal() * p0 * present.cwiseInverse().asDiagonal();
-        const Eigen::LLT<Matrix> factor(normal);
-        if (factor.info() != Eigen::Success) {
-            throw PlanError("covariance: found one that is not positive definite");
-        }
+        const auto factor = linear_algebra::Cholesky::of(normal);
+        if (!factor) throw PlanError("covariance: found one that is not positive definite");
         const Vector change = scale_.cwiseQuotient(present);
-        information_ =
-            change.asDiagonal() * factor.solve(Matrix::Identity(p_, p_)) * change.asDiagonal();
+        information_ = change.asDiagonal() * factor->inverse() * change.asDiagonal();
         for (const Experiment& experiment : experiments) {
             const auto r = at(experiment.rows.size()) / p_;
             Matrix rows(r, p_);
@@ -64,12 +61,12 @@ class RunSearch {
     [[nodiscard]] double missing() const { return missing(cov_.diagonal()); }
 
     void add(std::size_t j) {
-        information_ += rows_[j].transpose() * rows_[j];
+        information_ += linear_algebra::gram(rows_[j]);
         runs_.push_back(j);
         invert();
     }
     void remove(std::size_t k) {
-        information_ -= rows_[runs_[k]].transpose() * rows_[runs_[k]];
+        information_ -= linear_algebra::gram(rows_[runs_[k]]);
         runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(k));
         invert();
     }
@@ -119,9 +116,7 @@ class RunSearch {
         std::size_t pick = 0;
         double least = -1;
         for (std::size_t k = 0; k < runs_.size(); ++k) {
-            const Matrix& r = rows_[runs_[k]];
-            const Eigen::LLT<Matrix> factor(information_ - r.transpose() * r);
-            const Matrix cov = factor.solve(Matrix::Identity(p_, p_));
+            const Matrix cov = inverse(information_ - linear_algebra::gram(rows_[runs_[k]]));
             const double m = missing(cov.diagonal());
             if (least < 0 || m < least) {
                 least = m;
@@ -138,16 +133,21 @@ class RunSearch {
     }
 
   private:
-    void invert() {
-        const Eigen::LLT<Matrix> factor(information_);
-        cov_ = factor.solve(Matrix::Identity(p_, p_));
+    void invert() { cov_ = inverse(information_); }
+    static Matrix inverse(const Matrix& information) {
+        const auto factor = linear_algebra::Cholesky::of(information);
+        if (!factor) throw PlanError("augmentation: the information is not positive definite");
+        return factor->inverse();
     }
     /// Variances with one more run.
     [[nodiscard]] Vector with(std::size_t j) const {
         const Matrix& r = rows_[j];
-        const Matrix k = cov_ * r.transpose();
-        const Matrix s = Matrix::Identity(r.rows(), r.rows()) + r * k;
-        return cov_.diagonal() - (k * s.llt().solve(k.transpose())).diagonal();
+        const Matrix k = linear_algebra::product(r, cov_);
+        const Matrix s =
+            Matrix::Identity(r.rows(), r.rows()) + linear_algebra::product(r, k.transpose());
+        // The identity keeps it positive definite.
+        const Matrix gain = linear_algebra::Cholesky::of(s).value().solve(k);
+        return cov_.diagonal() - k.cwiseProduct(gain).colwise().sum().transpose();
     }
     [[nodiscard]] double missing(const Vector& variance) const {
         return (variance.array().max(0.0).pow(kMissingPower) * wanted_.array()).sum();
@@ -230,8 +230,9 @@ std::vector<double> covariance_after(const std::vector<double>& prior,
             information += done[j] * row * row.transpose();
         }
     }
-    const Matrix covariance =
-        sigma.asDiagonal() * information.llt().solve(Matrix::Identity(p, p)) * sigma.asDiagonal();
+    const auto factor = linear_algebra::Cholesky::of(information);
+    if (!factor) throw PlanError("the runs done: their information is not finite");
+    const Matrix covariance = sigma.asDiagonal() * factor->inverse() * sigma.asDiagonal();
     return {covariance.data(), covariance.data() + covariance.size()};
 }
 

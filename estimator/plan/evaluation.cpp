@@ -1,10 +1,10 @@
 #include "estimator/plan/evaluation.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "estimator/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 
 namespace vibrig::estimator::plan {
@@ -34,11 +34,9 @@ Decomposition decompose(const Problem& problem, const Effort& effort) {
     for (Eigen::Index i = 0; i < all.rows(); ++i) {
         used.row(i) = std::sqrt(effort[static_cast<std::size_t>(i)]) * all.row(i);
     }
-    const Matrix triangle =
-        used.householderQr().matrixQR().topRows(p).triangularView<Eigen::Upper>();
-    const Eigen::JacobiSVD<Matrix> svd(triangle, Eigen::ComputeFullV);
-    d.values = svd.singularValues();
-    d.v = svd.matrixV();
+    auto svd = linear_algebra::right_singular(used);
+    d.values = std::move(svd.values);
+    d.v = std::move(svd.v);
     const double least = kRankTolerance * d.values[0];
     d.rank = static_cast<std::size_t>((d.values.array() > least).count());
     return d;
@@ -85,17 +83,17 @@ Matrix covariance(const Decomposition& d) {
     Matrix half = d.v.leftCols(at(d.rank));
     for (std::size_t k = 0; k < d.rank; ++k) half.col(at(k)) /= d.values[at(k)];
     half = d.scale.cwiseInverse().asDiagonal() * half;
-    return half * half.transpose();
+    return linear_algebra::product(half, half.transpose());
 }
 
 double condition_of(const Decomposition& d) {
-    Matrix information = d.v * d.values.cwiseAbs2().asDiagonal() * d.v.transpose();
+    Matrix information = linear_algebra::gram(d.values.asDiagonal() * d.v.transpose());
     const Vector size = information.diagonal().cwiseSqrt();
     if (!(size.minCoeff() > 0)) return kInfinity;
     information = size.cwiseInverse().asDiagonal() * information * size.cwiseInverse().asDiagonal();
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(information, Eigen::EigenvaluesOnly);
-    const double least = eigen.eigenvalues().minCoeff();
-    return least > 0 ? eigen.eigenvalues().maxCoeff() / least : kInfinity;
+    const Vector values = linear_algebra::symmetric_eigenvalues(information);
+    const double least = values.minCoeff();
+    return least > 0 ? values.maxCoeff() / least : kInfinity;
 }
 
 void find_strongest_correlation(const Matrix& cov, const std::vector<std::size_t>& terms,
@@ -182,8 +180,7 @@ Evaluation evaluate(const Problem& problem, const Effort& effort) {
     result.log_det = 2 * (d.values.array().log().sum() + d.scale.array().log().sum()) -
                      static_cast<double>(terms.size()) * std::log(result.effort);
     result.trace = cov.trace() * result.effort;
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(cov, Eigen::EigenvaluesOnly);
-    result.largest = eigen.eigenvalues().maxCoeff() * result.effort;
+    result.largest = linear_algebra::symmetric_eigenvalues(cov).maxCoeff() * result.effort;
     find_strongest_correlation(cov, terms, result);
     return result;
 }

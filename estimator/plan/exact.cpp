@@ -1,11 +1,11 @@
 #include "estimator/plan/exact.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
 
+#include "estimator/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 #include "estimator/plan/evaluation.hpp"
 
@@ -33,7 +33,8 @@ class Fedorov {
         for (std::size_t k = 0; k < runs; ++k) {
             Eigen::Index i = any(random);
             if (k >= runs / 2) {
-                inverse_ = information_.llt().solve(Matrix::Identity(p, p));
+                // The ridge keeps it positive definite.
+                inverse_ = linear_algebra::Cholesky::of(information_).value().inverse();
                 (g_ * inverse_).cwiseProduct(g_).rowwise().sum().maxCoeff(&i);
             }
             in_plan_.push_back(i);
@@ -62,17 +63,15 @@ class Fedorov {
     bool refactor() {
         information_ = kept_;
         for (const Eigen::Index i : in_plan_) information_ += g_.row(i).transpose() * g_.row(i);
-        const Eigen::LLT<Matrix> factor(information_);
-        if (factor.info() != Eigen::Success) return false;
-        const Matrix lower = factor.matrixL();
-        if (!(lower.diagonal().minCoeff() > 1e-9)) return false;
-        log_det_ = 2 * lower.diagonal().array().log().sum();
-        inverse_ = factor.solve(Matrix::Identity(g_.cols(), g_.cols()));
+        const auto factor = linear_algebra::Cholesky::of(information_);
+        if (!factor || !(factor->least_pivot() > 1e-9)) return false;
+        log_det_ = factor->log_det();
+        inverse_ = factor->inverse();
         return true;
     }
 
     bool swap_best() {
-        const Matrix gw = g_ * inverse_;
+        const Matrix gw = linear_algebra::product(g_, inverse_);
         const Vector d = gw.cwiseProduct(g_).rowwise().sum();
         double best = 1 + kLeastFactor;
         std::size_t out = in_plan_.size();

@@ -1,10 +1,10 @@
 #include "estimator/plan/optimum.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "estimator/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 #include "estimator/plan/evaluation.hpp"
 
@@ -38,11 +38,11 @@ class DSearch {
 
     /// Brings the inverse and all variances up to date; returns max d - p.
     double refresh() {
-        const Matrix information = g_.transpose() * share_.asDiagonal() * g_;
-        const Eigen::LLT<Matrix> factor(information);
-        inverse_ = factor.solve(Matrix::Identity(g_.cols(), g_.cols()));
-        const Matrix lower = factor.matrixL();
-        log_det_ = 2 * lower.diagonal().array().log().sum();
+        const Matrix information = linear_algebra::gram(share_.cwiseSqrt().asDiagonal() * g_);
+        const auto factor = linear_algebra::Cholesky::of(information);
+        if (!factor) throw PlanError("the search left the plans that determine the coefficients");
+        inverse_ = factor->inverse();
+        log_det_ = factor->log_det();
         d_.resize(g_.rows());
         for (const Eigen::Index i : candidates_) d_[i] = variance(i, i);
         best_ = *std::max_element(candidates_.begin(), candidates_.end(),
@@ -148,12 +148,12 @@ void kiefer(const Problem& problem, int q, const Visit& visit) {
     const double work = static_cast<double>(g.size() * g.cols());
     const auto most = static_cast<std::size_t>(std::clamp(kKieferWork / work, 200.0, 5000.0));
     for (std::size_t n = 0; n < most; ++n) {
-        const Matrix information = g.transpose() * share.asDiagonal() * g;
-        const Eigen::SelfAdjointEigenSolver<Matrix> eigen(information);
-        const Vector& lambda = eigen.eigenvalues();
+        const Matrix information = linear_algebra::gram(share.cwiseSqrt().asDiagonal() * g);
+        const auto eigen = linear_algebra::symmetric_eigen(information);
+        const Vector& lambda = eigen.values;
         // Relative to the smallest eigenvalue, so that high powers stay finite.
         const Vector power = (lambda[0] / lambda.array()).pow(q + 1);
-        const Matrix y = g * eigen.eigenvectors();
+        const Matrix y = linear_algebra::product(g, eigen.vectors);
         const Vector phi = y.cwiseAbs2() * power;
         if (visit(lambda, power, phi.maxCoeff())) return;
         share = share.array() * phi.array().pow(1.0 / (q + 1));

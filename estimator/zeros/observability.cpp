@@ -1,9 +1,9 @@
 #include "estimator/zeros/observability.hpp"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/linear_algebra.hpp"
 #include "estimator/zeros/error_model.hpp"
 #include "estimator/zeros/units.hpp"
 
@@ -92,9 +92,7 @@ Observability observability(const std::vector<double>& azimuths_deg, const Site&
             power = (power * a).eval();
         }
     }
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(som, Eigen::ComputeThinV);
-    const Eigen::VectorXd& s = svd.singularValues();
-    const Eigen::MatrixXd& v = svd.matrixV();
+    const auto [s, v] = linear_algebra::right_singular(som);
     Observability result;
     for (Eigen::Index i = 0; i < kStates; ++i) {
         result.singular[static_cast<std::size_t>(i)] = s[i];

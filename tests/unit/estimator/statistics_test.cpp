@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 #include <string>
@@ -8,6 +7,7 @@
 
 #include "estimator/crlb.hpp"
 #include "estimator/identification.hpp"
+#include "estimator/linear_algebra.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 // Many simulated campaigns (9 and 7 g at the table, Table 1 of Tang et al. 2009): are the errors as
@@ -64,10 +64,9 @@ Statistics run(std::uint64_t seeds, double duration_s, std::size_t gyro_average 
             s.largest_sigma_error =
                 std::max(s.largest_sigma_error, std::abs(result.sigma[i] / bound[i] - 1));
         }
-        const Eigen::Matrix<double, kParameters, kParameters> correlation =
-            sigma.cwiseInverse().asDiagonal() * result.covariance *
-            sigma.cwiseInverse().asDiagonal();
-        s.nees += error.dot(correlation.ldlt().solve(error)) / n;
+        const Covariance correlation = sigma.cwiseInverse().asDiagonal() * result.covariance *
+                                       sigma.cwiseInverse().asDiagonal();
+        s.nees += error.dot(linear_algebra::covariance_inverse(correlation) * error) / n;
         s.nis += result.nis_per_dof / n;
         s.samples += static_cast<double>(result.samples - result.rejected);
     }
