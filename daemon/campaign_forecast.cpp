@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+
 #include "daemon/plan/forecast.hpp"
 
 namespace vibrig {
@@ -39,6 +41,46 @@ std::optional<plan::AdaptivePlan> adaptive_plan(const configuration::Configurati
     settings.time_limit_s = c.campaign.time_limit_s;
     settings.period_s = period_s(c);
     return plan::AdaptivePlan(c.estimator, settings);
+}
+
+PlanData plan_data(const configuration::Configuration& c) {
+    const campaign::Settings& campaign = c.campaign;
+    PlanData plan;
+    plan.name = campaign.name;
+    plan.adaptive = campaign.adaptive;
+    plan.dwell_s = campaign.dwell_s;
+    plan.frequency_hz = campaign.frequency_hz;
+    if (campaign.adaptive) {
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+            const std::string unit = estimator::parameter_unit(i);
+            plan.target[i] = unit == "deg/h"     ? campaign.target_bias
+                             : unit == "deg/h/g" ? campaign.target_linear
+                                                 : campaign.target_quadratic;
+        }
+        return plan;
+    }
+    int run = 1;
+    std::vector<double> levels;
+    for (const auto& stop : campaign.stops) {
+        // Each level is a run, as in the campaign.
+        auto level = std::ranges::find(levels, stop.table_g);
+        if (level == levels.end()) level = levels.insert(level, stop.table_g);
+        plan.stops.push_back({static_cast<int>(level - levels.begin()) + 1,
+                              static_cast<int>(plan.stops.size()) + 1, stop.position_deg,
+                              stop.table_g});
+    }
+    if (campaign.stops.empty()) {
+        for (const double table_g : campaign.table_g) {
+            int position = 0;
+            for (const auto& at : campaign.positions_deg)
+                plan.stops.push_back({run, ++position, at, table_g});
+            ++run;
+        }
+    }
+    plan.sigma = plan::forecast(c.estimator, runs_of(campaign, c.estimator.transmission),
+                                campaign.dwell_s, period_s(c))
+                     .sigma;
+    return plan;
 }
 
 std::string forecast_campaign(configuration::Configuration& c) {

@@ -5,6 +5,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/plan/adaptive.hpp"
+#include "daemon/status.hpp"
 
 namespace vibrig {
 
@@ -16,5 +17,8 @@ namespace vibrig {
 /// What the configured campaign will know at its end, in words. Sets the campaign's refusal if it
 /// cannot determine what is asked.
 [[nodiscard]] std::string forecast_campaign(configuration::Configuration& configuration);
+
+/// The configured campaign, stop by stop, with the standard errors to be expected.
+[[nodiscard]] PlanData plan_data(const configuration::Configuration& configuration);
 
 }  // namespace vibrig

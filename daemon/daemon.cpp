@@ -85,6 +85,7 @@ Daemon::Daemon(configuration::Loaded loaded)
                    {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_}),
       gimbal_(dbc_, configuration_.gimbal, *port_),
       adaptive_(adaptive_plan(configuration_)),
+      plan_(plan_data(configuration_)),
       campaign_(
           configuration_.campaign,
           {gimbal_, *shaker_, [this] { return acquisition_.view().platform; },
@@ -286,6 +287,7 @@ void Daemon::take_commands(Time now) {
         if (waiting.abandoned->exchange(true)) continue;
         const rt::Trip handled = interlock_.tripped();
         if (const auto alarm = acknowledge_alarm(waiting.request); alarm.accepted) {
+            if (journal_) journal_->command(waiting.request, alarm, utc_now());
             waiting.reply.set_value(alarm);
             continue;
         }

@@ -67,6 +67,8 @@ class Daemon final : public StatusSource {
     [[nodiscard]] estimator::Result result() const override;
     [[nodiscard]] std::string effective_configuration() const override;
     CommandReply command(const CommandRequest& request) override;
+    [[nodiscard]] PlanData plan() const override { return plan_; }
+    void refused(const std::string& who, const std::string& what, const std::string& why) override;
 
   private:
     struct WaitingCommand {
@@ -120,6 +122,7 @@ class Daemon final : public StatusSource {
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
     std::optional<plan::AdaptivePlan> adaptive_;
+    const PlanData plan_;
     campaign::Campaign campaign_;
 
     std::atomic<bool> shut_down_{false};

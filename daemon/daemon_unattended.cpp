@@ -132,6 +132,10 @@ CommandReply Daemon::acknowledge_alarm(const CommandRequest& request) {
     return {true, "acknowledged: " + request.argument};
 }
 
+void Daemon::refused(const std::string& who, const std::string& what, const std::string& why) {
+    log(Severity::warning, "server", fmt::format("refused {} ({}): {}", what, who, why));
+}
+
 void Daemon::tell_alarms() {
     for (std::size_t i = 0; i < interlock_.rows(); ++i) {
         const auto row = interlock_.row(i);
@@ -174,6 +178,7 @@ InterlockStatus Daemon::interlock_status() const {
                                      rt::ReactionHistogram::kBounds_ms.end());
     status.reaction_counts.assign(reactions.count.begin(), reactions.count.end());
     status.reaction_largest_ms = reactions.largest_ms;
+    status.reaction_sum_ms = reactions.sum_ms;
     return status;
 }
 

@@ -42,7 +42,7 @@ struct InterlockStatus {
     std::vector<Row> rows;
     std::vector<double> reaction_bounds_ms;  ///< upper ends of the classes but the last
     std::vector<std::uint64_t> reaction_counts;
-    double reaction_largest_ms = 0;
+    double reaction_largest_ms = 0, reaction_sum_ms = 0;
 };
 
 struct JournalStatus {
@@ -149,6 +149,21 @@ struct CommandReply {
     std::string message;
 };
 
+/// What the campaign does and will know at its end.
+struct PlanData {
+    struct Stop {
+        int run = 1, position = 1;
+        std::array<double, 3> position_deg{};
+        double table_g = 0;
+    };
+    std::string name;
+    bool adaptive = false;
+    double dwell_s = 0, frequency_hz = 0;
+    std::vector<Stop> stops;
+    /// Order of parameter_names(); not finite: not determined. Targets 0: none.
+    std::array<double, estimator::kParameters> sigma{}, target{};
+};
+
 /// What the status server asks the daemon for. Any thread; never touches the real-time threads.
 class StatusSource {
   public:
@@ -160,6 +175,10 @@ class StatusSource {
     [[nodiscard]] virtual estimator::Result result() const = 0;
     [[nodiscard]] virtual std::string effective_configuration() const = 0;
     virtual CommandReply command(const CommandRequest& request) = 0;
+    [[nodiscard]] virtual PlanData plan() const { return {}; }
+    /// A command that was not let through: who wanted what, and why not.
+    virtual void refused(const std::string& /*who*/, const std::string& /*what*/,
+                         const std::string& /*why*/) {}
 };
 
 }  // namespace vibrig

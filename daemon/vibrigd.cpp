@@ -30,6 +30,14 @@ void set_up_log(const vibrig::configuration::Configuration& configuration) {
     spdlog::flush_on(spdlog::level::info);
 }
 
+vibrig::serve::ServerSettings settings_of(const vibrig::configuration::Configuration& c) {
+    vibrig::serve::ServerSettings settings{
+        c.socket,        c.server.operator_group, c.server.status_socket, c.server.page,
+        c.server.remote, c.server.certificate,    c.server.key,           c.server.clients_ca};
+    settings.limits.connections = 256;
+    return settings;
+}
+
 std::string words_of(const vibrig::StatusData& status) {
     std::string words = std::string("measuring; campaign ") + vibrig::name_of(status.state);
     if (!status.reason.empty()) words += ": " + status.reason;
@@ -85,11 +93,15 @@ int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, const s
 int run(vibrig::configuration::Loaded loaded, const sigset_t& signals, const std::string& path) {
     const vibrig::ServiceManager manager;
     const auto socket = loaded.configuration.socket;
+    const auto server_settings = settings_of(loaded.configuration);
     vibrig::Daemon daemon(std::move(loaded));
     // Before anything moves: it refuses to run beside another vibrigd.
-    const vibrig::serve::StatusServer server(daemon, socket);
+    const vibrig::serve::StatusServer server(daemon, server_settings);
     daemon.start();
     spdlog::info("vibrigd {} answers at {}; measuring, shaker disarmed", vibrig::kVersion, socket);
+    if (const auto page = server.page_address(); !page.empty()) spdlog::info("live page: {}", page);
+    if (const auto remote = server.remote_address(); !remote.empty())
+        spdlog::info("remote, with certificates: {}", remote);
     manager.ready(words_of(daemon.status()));
     const int signal = watch(daemon, manager, signals, path);
     manager.stopping();

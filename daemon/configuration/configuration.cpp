@@ -198,6 +198,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     const std::filesystem::path folder = std::filesystem::path(name).parent_path();
     resolve(c.dbc, folder);
     resolve(c.results, folder);
+    resolve(c.server.certificate, folder);
+    resolve(c.server.key, folder);
+    resolve(c.server.clients_ca, folder);
     resolve(c.journal, folder);
     resolve(c.log_file, folder);
     return loaded;

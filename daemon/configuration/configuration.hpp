@@ -41,6 +41,11 @@ struct Configuration {
     } amplitude_unit = AmplitudeUnit::g_peak;
     enum class ClockKind : std::uint8_t { real, rig } clock = ClockKind::real;  ///< [clock] source
     std::string socket = "/run/vibrig/vibrigd.sock";                            ///< [server] socket
+    /// [server]: who may command at the socket, and where else is listened; empty: all, nowhere
+    struct Server {
+        std::string operator_group, status_socket, page, remote;
+        std::string certificate, key, clients_ca;
+    } server;
     std::string log_level = "info";                                             ///< [log] level
     std::string log_file;  ///< [log] file; empty: standard error
     /// [journal] file; empty: journal.sqlite3 in results, and none without results

@@ -53,6 +53,23 @@ std::string socket_or_empty_rule(const std::string& text) {
     return text.empty() ? "" : socket_rule(text);
 }
 
+std::string endpoint_rule(const std::string& text) {
+    if (text.empty()) return "";
+    const std::size_t colon = text.rfind(':');
+    const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
+    const bool number = !port.empty() && port.size() <= 5 &&
+                        std::all_of(port.begin(), port.end(), is_digit) && std::stoi(port) <= 65535;
+    const bool good = number && colon > 0 && text.size() <= kHostName + 6 &&
+                      only(text.substr(0, colon), ".:-_%[]");
+    return good ? "" : "\"ADDRESS:PORT\" or \"\"";
+}
+
+std::string group_rule(const std::string& text) {
+    constexpr std::size_t kGroupName = 32;
+    const bool good = text.size() <= kGroupName && only(text, "._-$");
+    return good ? "" : "the name of a group, 32 characters at most, or \"\"";
+}
+
 std::string path_rule(const std::string& text) {
     const bool good = text.size() < PATH_MAX && text.find('\0') == std::string::npos;
     return good ? "" : "a path";

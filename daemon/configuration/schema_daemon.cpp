@@ -16,6 +16,31 @@ void add_daemon_keys(std::vector<Key>& keys) {
     keys.push_back(text(
         "server.socket", "absolute or \"@name\"", "Unix socket of the status server", socket_rule,
         [](C & c) -> auto& { return c.socket; }));
+    keys.push_back(text(
+        "server.operator_group", "a group's name",
+        "who may command at the socket, besides root; empty: whoever may open it", group_rule,
+        [](C & c) -> auto& { return c.server.operator_group; }));
+    keys.push_back(text(
+        "server.status_socket", "absolute or \"@name\"",
+        "Unix socket for reading only; empty: none", socket_or_empty_rule,
+        [](C & c) -> auto& { return c.server.status_socket; }));
+    keys.push_back(text(
+        "server.page", "\"127.0.0.1:PORT\" or \"[::1]:PORT\", port 0: any free one",
+        "live page for a browser on this machine, read-only; empty: none", endpoint_rule,
+        [](C & c) -> auto& { return c.server.page; }));
+    keys.push_back(text(
+        "server.remote", "\"ADDRESS:PORT\"",
+        "the page and the API over TLS with certificates on both sides; empty: none", endpoint_rule,
+        [](C & c) -> auto& { return c.server.remote; }));
+    keys.push_back(text(
+        "server.certificate", "a path", "of server.remote, PEM; `vibrig pki init` makes one",
+        path_rule, [](C & c) -> auto& { return c.server.certificate; }));
+    keys.push_back(text(
+        "server.key", "a path", "of the certificate, PEM", path_rule,
+        [](C & c) -> auto& { return c.server.key; }));
+    keys.push_back(text(
+        "server.clients_ca", "a path", "authority the clients' certificates come from, PEM",
+        path_rule, [](C & c) -> auto& { return c.server.clients_ca; }));
     // The words are spdlog's own.
     const std::vector<std::string> levels{"trace", "debug",    "info", "warning",
                                           "error", "critical", "off"};

@@ -24,6 +24,7 @@ void ReactionHistogram::add(Time taken) noexcept {
     const double ms = drivers::to_seconds(taken) * 1e3;
     const auto bound = std::ranges::lower_bound(kBounds_ms, ms);
     ++count_[static_cast<std::size_t>(bound - kBounds_ms.begin())];
+    sum_ += taken;
     Time largest = largest_.load();
     while (taken > largest && !largest_.compare_exchange_weak(largest, taken)) {
     }
@@ -32,6 +33,7 @@ void ReactionHistogram::add(Time taken) noexcept {
 ReactionHistogram::Counts ReactionHistogram::counts() const noexcept {
     Counts counts;
     for (std::size_t i = 0; i < counts.count.size(); ++i) counts.count[i] = count_[i].load();
+    counts.sum_ms = drivers::to_seconds(sum_.load()) * 1e3;
     counts.largest_ms = drivers::to_seconds(largest_.load()) * 1e3;
     return counts;
 }

@@ -27,13 +27,13 @@ class ReactionHistogram {
     void add(drivers::Time taken) noexcept;
     struct Counts {
         std::array<std::uint64_t, kBounds_ms.size() + 1> count{};
-        double largest_ms = 0;
+        double largest_ms = 0, sum_ms = 0;
     };
     [[nodiscard]] Counts counts() const noexcept;
 
   private:
     std::array<std::atomic<std::uint64_t>, kBounds_ms.size() + 1> count_{};
-    std::atomic<drivers::Time> largest_{0};
+    std::atomic<drivers::Time> largest_{0}, sum_{0};
 };
 
 /// Stops the shaker before anything else sees the sample: what comes with samples or by silence is

@@ -8,15 +8,29 @@
 #include <stdexcept>
 #include <utility>
 
+#include "daemon/serve/metrics.hpp"
+#include "daemon/serve/openapi.hpp"
+#include "daemon/serve/page.hpp"
+#include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_json.hpp"
 
 namespace vibrig::serve {
 namespace {
 
 constexpr std::string_view kCommands = "/api/v1/commands";
-constexpr std::array<std::string_view, 6> kReadable{"/api/v1/status",   "/api/v1/parameters",
-                                                    "/api/v1/campaign", "/api/v1/events",
-                                                    "/api/v1/config",   "/healthz"};
+constexpr std::array<std::string_view, 12> kReadable{"/api/v1/status",
+                                                     "/api/v1/parameters",
+                                                     "/api/v1/campaign",
+                                                     "/api/v1/events",
+                                                     "/api/v1/config",
+                                                     "/api/v1/plan",
+                                                     "/api/v1/openapi.json",
+                                                     "/api/v1/selftest",
+                                                     "/api/v1/stream",
+                                                     "/metrics",
+                                                     "/healthz",
+                                                     "/readyz"};
+constexpr int kDeepestBody = 8;                 // levels of JSON; a command has one
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
 
@@ -24,6 +38,8 @@ const char* title_of(int status) {
     switch (status) {
         case 400:
             return "Bad Request";
+        case 403:
+            return "Forbidden";
         case 404:
             return "Not Found";
         case 405:
@@ -34,6 +50,12 @@ const char* title_of(int status) {
             return "Payload Too Large";
         case 415:
             return "Unsupported Media Type";
+        case 421:
+            return "Misdirected Request";
+        case 426:
+            return "Upgrade Required";
+        case 429:
+            return "Too Many Requests";
         case 431:
             return "Request Header Fields Too Large";
         case 503:
@@ -99,22 +121,114 @@ bool is_json(std::string_view content_type) {
     });
 }
 
+/// Levels of brackets outside of strings: before a parser recurses into them.
+int depth_of(std::string_view json) {
+    int depth = 0, deepest = 0;
+    bool in_text = false;
+    for (std::size_t i = 0; i < json.size(); ++i) {
+        const char c = json[i];
+        if (in_text) {
+            if (c == '\\') ++i;
+            in_text = c != '"';
+        } else if (c == '"') {
+            in_text = true;
+        } else if (c == '{' || c == '[') {
+            deepest = std::max(deepest, ++depth);
+        } else if (c == '}' || c == ']') {
+            --depth;
+        }
+    }
+    return deepest;
+}
+
+const char* word_of(CommandRequest::Kind kind) {
+    constexpr std::array<const char*, 6> kNames{"arm",    "start", "pause",
+                                                "resume", "abort", "acknowledge"};
+    return kNames[static_cast<std::size_t>(kind)];
+}
+
 }  // namespace
+
+const char* name_of(Role role) noexcept {
+    constexpr std::array<const char*, 4> kNames{"none", "viewer", "operator", "admin"};
+    return kNames[static_cast<std::size_t>(role)];
+}
+
+Role role_named(const std::string& name) noexcept {
+    for (const Role role : {Role::viewer, Role::operate, Role::administer}) {
+        if (name == name_of(role)) return role;
+    }
+    return Role::none;
+}
+
+bool TokenBucket::take(std::chrono::steady_clock::time_point now) {
+    left_ = std::min(burst_, left_ + per_s_ * std::chrono::duration<double>(now - last_).count());
+    last_ = now;
+    if (left_ < 1) return false;
+    left_ -= 1;
+    return true;
+}
+
+std::string_view query_value(std::string_view query, std::string_view name) {
+    while (!query.empty()) {
+        const std::string_view pair = query.substr(0, query.find('&'));
+        query.remove_prefix(std::min(pair.size() + 1, query.size()));
+        if (pair.substr(0, pair.find('=')) == name && pair.size() > name.size())
+            return pair.substr(name.size() + 1);
+    }
+    return {};
+}
 
 Api::Api(StatusSource& source, std::string instance)
     : source_(source), instance_(std::move(instance)) {}
 
 ApiAnswer Api::problem(int status, const std::string& detail) {
-    return {status, "application/problem+json", problem_json(status, title_of(status), detail), {}};
+    ApiAnswer answer;
+    answer.status = status;
+    answer.content_type = "application/problem+json";
+    answer.body = problem_json(status, title_of(status), detail);
+    answer.try_later = status == 429 || status == 503;
+    return answer;
 }
 
-ApiAnswer Api::answer(const ApiRequest& request) {
+ApiAnswer Api::check_browser(const ApiRequest& request, const Caller& caller) {
+    if (!caller.browser) return {};
+    // Another name that resolves to this machine would make a stranger's page ours.
+    if (!caller.host.empty()) {
+        const std::string port = caller.host.substr(caller.host.rfind(':'));
+        if (request.host != caller.host && request.host != "localhost" + port &&
+            request.host != "127.0.0.1" + port && request.host != "[::1]" + port) {
+            return problem(
+                421, "Host: found " + quoted(request.host) + ", expected " + quoted(caller.host));
+        }
+    }
+    const std::string own = (caller.encrypted ? "https://" : "http://") + std::string(request.host);
+    if (!request.origin.empty() && request.origin != own) {
+        return problem(403, "Origin: found " + quoted(request.origin) + ", expected " +
+                                quoted(own) + ": other pages are not answered");
+    }
+    return {};
+}
+
+ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
+    ++traffic.requests;
     try {
+        if (ApiAnswer refusal = check_browser(request, caller); refusal.status != 200)
+            return refusal;
         const std::size_t mark = std::min(request.target.find('?'), request.target.size());
         const std::string_view path = request.target.substr(0, mark);
         const std::string_view query =
             request.target.substr(std::min(mark + 1, request.target.size()));
         const bool takes_commands = path == kCommands;
+        if (caller.browser && request.method == "GET") {
+            if (const auto* file = page_file(path)) {
+                ApiAnswer page;
+                page.content_type = file->content_type;
+                page.body = file->text;
+                page.is_page = true;
+                return page;
+            }
+        }
         if (!takes_commands &&
             std::find(kReadable.begin(), kReadable.end(), path) == kReadable.end()) {
             return problem(404, "no such path: " + quoted(path));
@@ -126,7 +240,7 @@ ApiAnswer Api::answer(const ApiRequest& request) {
             refusal.allow = method;
             return refusal;
         }
-        return takes_commands ? command(request) : get(path, query);
+        return takes_commands ? command(request, caller) : get(path, query);
     } catch (const std::invalid_argument& error) {
         return problem(400, error.what());
     } catch (const std::exception& error) {
@@ -146,7 +260,20 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
         answer.body = events_json(instance_, source_.events(wanted.after, wanted.limit));
         return answer;
     }
-    if (path == "/api/v1/parameters") {
+    if (path == "/readyz" || path == "/api/v1/selftest") {
+        const Readiness found = readiness(source_.status());
+        if (!found.ready() && path == "/readyz") return problem(503, found.failures());
+        answer.body = readiness_json(found);
+    } else if (path == "/metrics") {
+        answer.content_type = "text/plain; version=0.0.4; charset=utf-8";
+        answer.body = metrics_text(source_.status(), traffic);
+    } else if (path == "/api/v1/plan") {
+        answer.body = plan_json(source_.plan());
+    } else if (path == "/api/v1/openapi.json") {
+        answer.body = openapi_json();
+    } else if (path == "/api/v1/stream") {
+        return problem(426, "this path takes a WebSocket");
+    } else if (path == "/api/v1/parameters") {
         answer.body = parameters_json(source_.result());
     } else if (path == "/api/v1/campaign") {
         answer.body = campaign_json(source_.status());
@@ -158,14 +285,46 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
     return answer;
 }
 
-ApiAnswer Api::command(const ApiRequest& request) {
-    if (!request.content_type.empty() && !is_json(request.content_type)) {
-        return problem(415, "Content-Type: found " + quoted(request.content_type) +
-                                ", expected application/json");
+ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
+    const auto refuse = [&](int status, const std::string& what, const std::string& why) {
+        ++traffic.refused;
+        source_.refused(caller.identity, what, why);
+        return problem(status, why);
+    };
+    // A page of another origin can send anything but this type without asking first.
+    if ((!request.content_type.empty() || caller.browser) && !is_json(request.content_type)) {
+        return refuse(
+            415, "a command",
+            "Content-Type: found " + quoted(request.content_type) + ", expected application/json");
     }
-    CommandRequest parsed = parse_command(request.body);
-    // The name is what the person says; the uid is what the kernel says. The audit line has both.
-    parsed.by += " (uid " + std::to_string(request.uid) + ")";
+    if (depth_of(request.body) > kDeepestBody) {
+        return refuse(400, "a command",
+                      "body: JSON nested deeper than " + std::to_string(kDeepestBody) + " levels");
+    }
+    CommandRequest parsed;
+    try {
+        parsed = parse_command(request.body);
+    } catch (const std::invalid_argument& error) {
+        if (!commands_.take(std::chrono::steady_clock::now()))
+            return problem(429, "more than 10 commands a second");
+        return refuse(400, "a command", error.what());
+    }
+    const std::string what = std::string(word_of(parsed.kind)) + " by " + parsed.by;
+    // A stop is never one too many.
+    if (!commands_.take(std::chrono::steady_clock::now()) &&
+        parsed.kind != CommandRequest::Kind::abort) {
+        ++traffic.refused;
+        return problem(429, "more than 10 commands a second");
+    }
+    if (caller.role < Role::operate) {
+        return refuse(403, what,
+                      std::string("commands take an operator; this connection is a ") +
+                          (caller.role == Role::none ? "stranger" : name_of(caller.role)) +
+                          "'s: " + caller.identity);
+    }
+    // The name is what the person says; the rest is what the kernel or a certificate says. The
+    // audit line has both.
+    parsed.by += " (" + caller.identity + ")";
     const CommandReply reply = source_.command(parsed);
     if (!reply.accepted) return problem(409, reply.message);
     ApiAnswer answer;

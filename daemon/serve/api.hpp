@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+#include <chrono>
 #include <string>
 #include <string_view>
 
+#include "daemon/serve/caller.hpp"
 #include "daemon/status.hpp"
 
 namespace vibrig::serve {
@@ -12,15 +15,29 @@ struct ApiRequest {
     std::string_view method;        ///< "GET", "POST", ...
     std::string_view target;        ///< path and query
     std::string_view content_type;  ///< may be empty
+    std::string_view host;
+    std::string_view origin;  ///< empty: not from a page
     std::string body;
-    unsigned uid = 0;  ///< of the process at the other end
 };
 
 struct ApiAnswer {
     int status = 200;
     std::string content_type = "application/json";
     std::string body;
-    std::string allow;  ///< for 405: the methods that would do
+    std::string allow;       ///< for 405: the methods that would do
+    bool is_page = false;    ///< part of the live page: a browser may show it
+    bool try_later = false;  ///< for 429 and 503
+};
+
+/// So many a second on average, a burst at once.
+class TokenBucket {
+  public:
+    TokenBucket(double per_s, double burst) : per_s_(per_s), burst_(burst), left_(burst) {}
+    [[nodiscard]] bool take(std::chrono::steady_clock::time_point now);
+
+  private:
+    double per_s_, burst_, left_;
+    std::chrono::steady_clock::time_point last_{};
 };
 
 /// What each path answers, whatever carries it. Server thread only.
@@ -29,16 +46,31 @@ class Api {
     /// `instance` names this start of the daemon: event ids are unique within it.
     Api(StatusSource& source, std::string instance);
     /// Never throws for what a client sends; a failing source is a 500.
-    [[nodiscard]] ApiAnswer answer(const ApiRequest& request);
+    [[nodiscard]] ApiAnswer answer(const ApiRequest& request, const Caller& caller);
+    /// Why a browser's request is refused before it is looked at; status 200: it is not.
+    [[nodiscard]] static ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
 
     [[nodiscard]] static ApiAnswer problem(int status, const std::string& detail);
+    [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
+    [[nodiscard]] StatusSource& source() noexcept { return source_; }
+
+    /// What the server itself counts, for /metrics.
+    struct Traffic {
+        std::uint64_t requests = 0, refused = 0, turned_away = 0, streams_dropped = 0;
+        std::size_t connections = 0, streams = 0;
+    };
+    Traffic traffic;
 
   private:
     ApiAnswer get(std::string_view path, std::string_view query);
-    ApiAnswer command(const ApiRequest& request);
+    ApiAnswer command(const ApiRequest& request, const Caller& caller);
 
     StatusSource& source_;
     std::string instance_;
+    TokenBucket commands_{10, 50};
 };
+
+/// The value of `name` in "a=1&b=2"; empty: it is not there.
+[[nodiscard]] std::string_view query_value(std::string_view query, std::string_view name);
 
 }  // namespace vibrig::serve

@@ -1,21 +1,26 @@
 #include "daemon/serve/client.hpp"
 
+#include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
-#include <boost/beast/core/basic_stream.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
+#include <filesystem>
 #include <optional>
 #include <utility>
+
+#include "daemon/serve/any_stream.hpp"
+#include "daemon/serve/socket_file.hpp"
+#include "daemon/serve/tls.hpp"
 
 namespace vibrig::serve {
 namespace {
 
 namespace asio = boost::asio;
-namespace beast = boost::beast;
 namespace http = boost::beast::http;
 using Protocol = asio::local::stream_protocol;
 using Request = http::request<http::string_body>;
@@ -24,51 +29,108 @@ using boost::system::system_error;
 
 constexpr unsigned kHttp11 = 11;
 constexpr std::uint64_t kLongestAnswer = 64 * 1024 * 1024;
+constexpr const char* kDefaultPort = "8443";
 
 }  // namespace
 
 struct Client::Impl {
-    Impl(std::string socket_path, std::chrono::milliseconds limit)
-        : path(std::move(socket_path)), timeout(limit) {}
+    Impl(Address given, std::chrono::milliseconds limit)
+        : address(std::move(given)), timeout(limit) {
+        if (address.host.empty()) {
+            where = address.socket;
+            return;
+        }
+        // "rig.lab", "rig.lab:8443", "[fe80::1]:8443"
+        const std::size_t colon = address.host.rfind(':');
+        const bool has_port = colon != std::string::npos && address.host.back() != ']' &&
+                              (address.host.find(':') == colon || address.host[colon - 1] == ']');
+        port = has_port ? address.host.substr(colon + 1) : kDefaultPort;
+        host = has_port ? address.host.substr(0, colon) : address.host;
+        if (host.size() > 2 && host.front() == '[' && host.back() == ']')
+            host = host.substr(1, host.size() - 2);
+        where = host + " port " + port;
+        if (address.identity.empty())
+            throw ClientError("--host needs --identity FOLDER/NAME, as made by `vibrig pki init`");
+        const auto folder = std::filesystem::path(address.identity).parent_path();
+        try {
+            tls.emplace(mutual_tls(address.identity + ".crt", address.identity + ".key",
+                                   (folder / "authority.crt").string(), false));
+        } catch (const ServeError& error) {
+            throw ClientError(error.what());
+        }
+    }
 
     /// Asynchronous underneath: only so does a deadline hold.
     template <typename Start>
     error_code run(Start&& start) {
-        error_code result = asio::error::would_block;
-        stream->expires_after(timeout);
-        start([&result](error_code error, std::size_t = 0) { result = error; });
+        bool done = false;
+        error_code result;
+        start([&](error_code error, std::size_t = 0) {
+            done = true;
+            result = error;
+        });
+        io.restart();
+        io.run_for(timeout);
+        if (done) return result;
+        stream->close();
         io.restart();
         io.run();
-        return result;
+        return asio::error::timed_out;
     }
 
     void connect() {
-        stream.emplace(io);
+        stream.reset();
         buffer.clear();
+        if (tls) return connect_remote();
         Protocol::endpoint endpoint;
         try {
-            endpoint = Protocol::endpoint(path);
+            endpoint = Protocol::endpoint(address.socket);
         } catch (const system_error&) {
-            stream.reset();
-            throw ClientError("socket: found '" + path + "', expected at most 107 bytes");
+            throw ClientError("socket: found '" + address.socket + "', expected at most 107 bytes");
         }
+        stream.emplace(AnyStream::Socket(io));
         const error_code error = run([&](auto done) {
-            stream->async_connect(endpoint, [done](error_code code) mutable { done(code); });
+            stream->socket().async_connect(endpoint, [done](error_code code) { done(code); });
         });
         if (!error) return;
         stream.reset();
         if (error == boost::system::errc::no_such_file_or_directory ||
             error == asio::error::connection_refused) {
-            throw NotRunning("no vibrigd answers at " + path +
+            throw NotRunning("no vibrigd answers at " + where +
                              " (is it running? --socket PATH or VIBRIG_SOCKET names another one)");
         }
-        throw ClientError("cannot connect to " + path + ": " + error.message());
+        throw ClientError("cannot connect to " + where + ": " + error.message());
+    }
+
+    void connect_remote() {
+        error_code error;
+        asio::ip::tcp::resolver resolver(io);
+        const auto found = resolver.resolve(host, port, error);
+        if (error) throw ClientError("cannot find " + host + ": " + error.message());
+        for (const auto& entry : found) {
+            stream.emplace(AnyStream::Socket(io), *tls);
+            const asio::generic::stream_protocol::endpoint endpoint(entry.endpoint());
+            error = run([&](auto done) {
+                stream->socket().async_connect(endpoint, [done](error_code code) { done(code); });
+            });
+            if (!error) break;
+        }
+        if (!error) {
+            error = run([&](auto done) {
+                stream->connect_handshake(host, [done](error_code code) { done(code); });
+            });
+        }
+        if (!error) return;
+        stream.reset();
+        if (error == asio::error::connection_refused)
+            throw NotRunning("no vibrigd answers at " + where);
+        throw ClientError("cannot connect to " + where + ": " + error.message());
     }
 
     error_code exchange(const Request& request, Reply& reply) {
         const error_code written =
             run([&](auto done) { http::async_write(*stream, request, std::move(done)); });
-        if (written == beast::error::timeout) return written;
+        if (written == asio::error::timed_out) return written;
         // A daemon that refuses may close before it has read all; its answer is there all the same.
         http::response_parser<http::string_body> parser;
         parser.body_limit(kLongestAnswer);
@@ -81,52 +143,54 @@ struct Client::Impl {
         return {};
     }
 
-    Reply ask(const Request& request, bool may_repeat) {
+    Reply ask(Request request, bool may_repeat) {
+        request.set(http::field::host, tls ? address.host : "localhost");
+        request.prepare_payload();
         const bool kept = stream.has_value();
         if (!kept) connect();
         Reply reply;
         error_code error = exchange(request, reply);
-        if (error && error != beast::error::timeout && kept && may_repeat) {
+        if (error && error != asio::error::timed_out && kept && may_repeat) {
             connect();
             error = exchange(request, reply);
         }
         if (!error) return reply;
         stream.reset();
-        const bool late = error == beast::error::timeout;
+        const bool late = error == asio::error::timed_out;
+        // In TLS 1.3 a client learns only here that its certificate was refused.
         throw ClientError(
-            "vibrigd at " + path +
+            "vibrigd at " + where +
             (late ? ": no answer within the time" : ": connection lost: " + error.message()));
     }
 
-    std::string path;
-    std::chrono::milliseconds timeout;
+    const Address address;
+    const std::chrono::milliseconds timeout;
+    std::string where, host, port;
+    std::optional<asio::ssl::context> tls;
     asio::io_context io{1};
-    std::optional<beast::basic_stream<Protocol>> stream;
-    beast::flat_buffer buffer;
+    std::optional<AnyStream> stream;
+    boost::beast::flat_buffer buffer;
 };
 
 Client::Client(std::string path, std::chrono::milliseconds timeout)
-    : impl_(std::make_unique<Impl>(std::move(path), timeout)) {}
+    : Client(Address{std::move(path), {}, {}}, timeout) {}
+
+Client::Client(const Address& address, std::chrono::milliseconds timeout)
+    : impl_(std::make_unique<Impl>(address, timeout)) {}
 
 Client::~Client() = default;
 
 Reply Client::get(const std::string& target) {
     Request request(http::verb::get, target, kHttp11);
-    request.set(http::field::host, "localhost");
-    request.prepare_payload();
-    return impl_->ask(request, true);
+    return impl_->ask(std::move(request), true);
 }
 
 Reply Client::post(const std::string& target, const std::string& json) {
     Request request(http::verb::post, target, kHttp11);
-    request.set(http::field::host, "localhost");
     request.set(http::field::content_type, "application/json");
     request.body() = json;
-    request.prepare_payload();
     impl_->stream.reset();
-    return impl_->ask(request, false);
+    return impl_->ask(std::move(request), false);
 }
-
-const std::string& Client::path() const noexcept { return impl_->path; }
 
 }  // namespace vibrig::serve

@@ -23,10 +23,20 @@ struct Reply {
     std::string body;
 };
 
-/// Asks a running vibrigd over its Unix socket. Blocks up to the timeout; one thread.
+/// Where a daemon is asked: at its Unix socket, or with TLS when there is a host.
+struct Address {
+    std::string socket;
+    std::string host;      ///< "rig.lab", "rig.lab:8443"; empty: the socket
+    std::string identity;  ///< "FOLDER/NAME": NAME.crt, NAME.key and authority.crt are there
+};
+
+/// Asks a running vibrigd. Blocks up to the timeout; one thread.
 class Client {
   public:
     explicit Client(std::string path, std::chrono::milliseconds timeout = std::chrono::seconds(5));
+    /// Throws ClientError when the identity cannot be read.
+    explicit Client(const Address& address,
+                    std::chrono::milliseconds timeout = std::chrono::seconds(5));
     ~Client();
     Client(const Client&) = delete;
     Client& operator=(const Client&) = delete;
@@ -36,7 +46,6 @@ class Client {
     [[nodiscard]] Reply get(const std::string& target);
     /// On a connection of its own and never sent twice. Throws ClientError.
     [[nodiscard]] Reply post(const std::string& target, const std::string& json);
-    [[nodiscard]] const std::string& path() const noexcept;
 
   private:
     struct Impl;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_message.hpp"
 #include "proto/vibrig.pb.h"
 
@@ -81,6 +82,30 @@ std::string events_json(const std::string& instance, const std::vector<EventReco
     v1::Events message;
     message.set_instance(instance);
     for (const EventRecord& event : events) fill(*message.add_events(), event);
+    return to_json(message);
+}
+
+std::string plan_json(const PlanData& plan) {
+    v1::Plan message;
+    fill(message, plan);
+    return to_json(message);
+}
+
+std::string readiness_json(const Readiness& readiness) {
+    v1::Readiness message;
+    message.set_ready(readiness.ready());
+    for (const Readiness::Check& check : readiness.checks) {
+        v1::Readiness::Check& to = *message.add_checks();
+        to.set_name(check.name);
+        to.set_passed(check.passed);
+        to.set_text(mend_utf8(check.text));
+    }
+    return to_json(message);
+}
+
+std::string event_json(const EventRecord& event) {
+    v1::Event message;
+    fill(message, event);
     return to_json(message);
 }
 

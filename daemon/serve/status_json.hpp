@@ -15,6 +15,10 @@ namespace vibrig::serve {
 [[nodiscard]] std::string parameters_json(const estimator::Result& result);
 [[nodiscard]] std::string events_json(const std::string& instance,
                                       const std::vector<EventRecord>& events);
+struct Readiness;
+[[nodiscard]] std::string plan_json(const PlanData& plan);
+[[nodiscard]] std::string readiness_json(const Readiness& readiness);
+[[nodiscard]] std::string event_json(const EventRecord& event);
 [[nodiscard]] std::string reply_json(const CommandReply& reply);
 [[nodiscard]] std::string configuration_json(const std::string& text);
 [[nodiscard]] std::string problem_json(int status, const std::string& title,

@@ -89,6 +89,7 @@ void fill(v1::Interlock& out, const InterlockStatus& status) {
     for (const double bound : status.reaction_bounds_ms) out.add_reaction_bounds_ms(bound);
     for (const std::uint64_t count : status.reaction_counts) out.add_reaction_counts(count);
     out.set_reaction_largest_ms(status.reaction_largest_ms);
+    out.set_reaction_sum_ms(status.reaction_sum_ms);
 }
 
 void fill(v1::Can& out, const StatusData& status) {
@@ -337,6 +338,30 @@ void fill(v1::Parameters& out, const estimator::Result& result) {
     out.set_samples(result.samples);
     out.set_rejected(result.rejected);
     for (const std::string& warning : result.warnings) out.add_warnings(mend_utf8(warning));
+}
+
+void fill(v1::Plan& out, const PlanData& plan) {
+    out.set_name(mend_utf8(plan.name));
+    out.set_adaptive(plan.adaptive);
+    out.set_dwell_s(plan.dwell_s);
+    out.set_frequency_hz(plan.frequency_hz);
+    for (const PlanData::Stop& stop : plan.stops) {
+        v1::Plan::Stop& to = *out.add_stops();
+        to.set_run(stop.run);
+        to.set_position(stop.position);
+        v1::Angles& angles = *to.mutable_angles();
+        set(angles, &v1::Angles::set_outer_deg, stop.position_deg[0]);
+        set(angles, &v1::Angles::set_inner_deg, stop.position_deg[1]);
+        set(angles, &v1::Angles::set_azimuth_deg, stop.position_deg[2]);
+        to.set_table_g(stop.table_g);
+    }
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        v1::Plan::Expected& to = *out.add_expected();
+        to.set_name(estimator::parameter_names()[i]);
+        to.set_unit(estimator::parameter_unit(i));
+        if (plan.sigma[i] > 0) set(to, &v1::Plan::Expected::set_sigma, plan.sigma[i]);
+        if (plan.target[i] > 0) set(to, &v1::Plan::Expected::set_target, plan.target[i]);
+    }
 }
 
 void fill(v1::Event& out, const EventRecord& event) {

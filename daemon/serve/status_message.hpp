@@ -10,6 +10,7 @@ namespace vibrig::v1 {
 class Campaign;
 class Event;
 class Parameters;
+class Plan;
 class Status;
 }  // namespace vibrig::v1
 
@@ -20,6 +21,7 @@ namespace vibrig::serve {
 void fill(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);
+void fill(v1::Plan& out, const PlanData& plan);
 void fill(v1::Event& out, const EventRecord& event);
 
 /// Bytes that are not UTF-8 become '?': a text from a device or a file must not spoil a whole

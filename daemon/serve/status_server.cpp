@@ -1,47 +1,38 @@
 #include "daemon/serve/status_server.hpp"
 
+#include <grp.h>
 #include <pthread.h>
+#include <pwd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <boost/asio/basic_socket_acceptor.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core/basic_stream.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http/parser.hpp>
-#include <boost/beast/http/read.hpp>
-#include <boost/beast/http/string_body.hpp>
-#include <boost/beast/http/write.hpp>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <deque>
 #include <optional>
 #include <random>
 #include <thread>
 #include <utility>
 
-#include "daemon/serve/api.hpp"
+#include "daemon/serve/session.hpp"
+#include "daemon/serve/tcp_listener.hpp"
+#include "daemon/serve/tls.hpp"
 
 namespace vibrig::serve {
 namespace {
 
 namespace asio = boost::asio;
-namespace beast = boost::beast;
-namespace http = boost::beast::http;
-using Protocol = asio::local::stream_protocol;
-using Socket = Protocol::socket;
+using Protocol = asio::generic::stream_protocol;
 using boost::system::error_code;
 
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
-
-/// The peer as the kernel recorded it at connect().
-unsigned uid_of(Socket& socket) {
-    ucred peer{};
-    socklen_t size = sizeof peer;
-    if (::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-        return static_cast<unsigned>(-1);
-    }
-    return peer.uid;
-}
 
 std::string random_instance() {
     std::random_device random;
@@ -50,131 +41,54 @@ std::string random_instance() {
     return text.data();
 }
 
-using Response = http::response<http::string_body>;
-
-Response response_of(ApiAnswer answer, unsigned version, bool keep_alive) {
-    Response response(static_cast<http::status>(answer.status), version);
-    response.set(http::field::server, "vibrigd");
-    response.set(http::field::content_type, answer.content_type);
-    response.set(http::field::cache_control, "no-store");
-    if (!answer.allow.empty()) response.set(http::field::allow, answer.allow);
-    response.keep_alive(keep_alive);
-    response.body() = std::move(answer.body);
-    response.prepare_payload();
-    return response;
+gid_t group_named(const std::string& name) {
+    const group* const found = ::getgrnam(name.c_str());
+    if (found == nullptr)
+        throw ServeError("server.operator_group: found '" + name + "', expected a group's name");
+    return found->gr_gid;
 }
 
-/// One connection: read a request, answer, again. Server thread only; lives while a handler of it
-/// waits.
-class Session : public std::enable_shared_from_this<Session> {
-  public:
-    Session(Socket socket, Api& api, const ServerLimits& limits, std::size_t& open)
-        : uid_(uid_of(socket)),
-          stream_(std::move(socket)),
-          api_(api),
-          limits_(limits),
-          open_(open),
-          buffer_(limits.header_bytes + limits.body_bytes + 4096) {
-        ++open_;
+bool is_member(uid_t uid, gid_t wanted) {
+    const passwd* const user = ::getpwuid(uid);
+    if (user == nullptr) return false;
+    constexpr int kMostGroups = 1024;
+    std::vector<gid_t> groups(kMostGroups);
+    int count = kMostGroups;
+    if (::getgrouplist(user->pw_name, user->pw_gid, groups.data(), &count) < 0) return false;
+    return std::find(groups.begin(), groups.begin() + count, wanted) != groups.begin() + count;
+}
+
+enum class Door : std::uint8_t { control, status, page, remote };
+
+struct Listener {
+    Listener(asio::io_context& io, Door which, const Protocol& protocol, int descriptor)
+        : door(which), acceptor(io), pause(io) {
+        acceptor.assign(protocol, descriptor);
     }
-    ~Session() { --open_; }
-    Session(const Session&) = delete;
-    Session& operator=(const Session&) = delete;
-
-    void read() {
-        parser_.emplace();
-        parser_->header_limit(limits_.header_bytes);
-        parser_->body_limit(limits_.body_bytes);
-        // One deadline for the whole request: who sends a byte now and then does not hold a place.
-        stream_.expires_after(limits_.idle_timeout);
-        http::async_read(
-            stream_, buffer_, *parser_,
-            [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
-    }
-
-    void write(Response response) {
-        response_ = std::move(response);
-        stream_.expires_after(limits_.idle_timeout);
-        http::async_write(stream_, response_,
-                          [self = shared_from_this()](error_code error, std::size_t) {
-                              if (error) return;
-                              if (self->response_.need_eof()) return self->close();
-                              self->read();
-                          });
-    }
-
-  private:
-    void on_read(error_code error) {
-        if (error == http::error::header_limit || error == http::error::buffer_overflow) {
-            return refuse(431,
-                          "header: more than " + std::to_string(limits_.header_bytes) + " bytes");
-        }
-        if (error == http::error::body_limit) {
-            return refuse(413, "body: more than " + std::to_string(limits_.body_bytes) + " bytes");
-        }
-        if (error == http::error::end_of_stream || error == http::error::partial_message) {
-            return close();
-        }
-        if (error &&
-            error.category() == http::make_error_code(http::error::bad_method).category()) {
-            return refuse(400, "not a request in HTTP/1.1: " + error.message());
-        }
-        if (error) return;  // gone, or out of time
-
-        const auto& request = parser_->get();
-        const bool head = request.method() == http::verb::head;
-        const auto method = request.method_string();
-        const auto target = request.target();
-        const auto type = request[http::field::content_type];
-        ApiAnswer answer = api_.answer({{method.data(), method.size()},
-                                        {target.data(), target.size()},
-                                        {type.data(), type.size()},
-                                        request.body(),
-                                        uid_});
-        // HEAD is refused like any other method, but its answer may not carry a body.
-        if (head) answer.body.clear();
-        write(response_of(std::move(answer), request.version(), request.keep_alive()));
-    }
-
-    /// After a request that could not be read the place of the next one is not known: answer and
-    /// close.
-    void refuse(int status, const std::string& detail) {
-        constexpr unsigned kHttp11 = 11;
-        write(response_of(Api::problem(status, detail), kHttp11, false));
-    }
-
-    void close() {
-        error_code ignored;
-        stream_.socket().shutdown(Socket::shutdown_send, ignored);
-    }
-
-    const unsigned uid_;
-    beast::basic_stream<Protocol> stream_;
-    Api& api_;
-    const ServerLimits& limits_;
-    std::size_t& open_;
-    beast::flat_buffer buffer_;
-    std::optional<http::request_parser<http::string_body>> parser_;
-    Response response_;
+    Door door;
+    asio::basic_socket_acceptor<Protocol> acceptor;
+    asio::steady_timer pause;
 };
-
-/// Answers without reading, as far as the socket takes it at once, and closes.
-void turn_away(Socket socket, std::size_t limit) {
-    constexpr unsigned kHttp11 = 11;
-    const std::string detail = "all " + std::to_string(limit) + " connections are taken";
-    error_code ignored;
-    socket.non_blocking(true, ignored);
-    const Response response = response_of(Api::problem(503, detail), kHttp11, false);
-    http::write(socket, response, ignored);
-}
 
 }  // namespace
 
 struct StatusServer::Impl {
-    Impl(StatusSource& source, const std::string& path, const ServerLimits& given)
-        : limits(given), file(path), api(source, random_instance()), acceptor(io), pause(io) {
-        acceptor.assign(Protocol(), file.release());
-        accept();
+    Impl(StatusSource& source, const ServerSettings& given)
+        : settings(given), api(source, random_instance()), feed(source) {
+        if (!settings.operator_group.empty()) operators = group_named(settings.operator_group);
+        open_unix(Door::control, settings.socket);
+        if (operators && ::chown(settings.socket.c_str(), static_cast<uid_t>(-1), *operators) != 0)
+            throw ServeError("server.operator_group: cannot give " + settings.socket +
+                             " to group '" + settings.operator_group +
+                             "': " + std::strerror(errno));
+        if (!settings.status_socket.empty()) open_unix(Door::status, settings.status_socket);
+        if (!settings.page.empty())
+            page = open_tcp(Door::page, listen_tcp("server.page", settings.page, true));
+        if (!settings.remote.empty()) {
+            tls.emplace(mutual_tls(settings.certificate, settings.key, settings.clients_ca, true));
+            remote = open_tcp(Door::remote, listen_tcp("server.remote", settings.remote, false));
+        }
+        for (Listener& listener : listeners) accept(listener);
         // Signals are for the main thread.
         sigset_t all, before;
         sigfillset(&all);
@@ -191,40 +105,112 @@ struct StatusServer::Impl {
         thread.join();
     }
 
-    void accept() {
-        acceptor.async_accept([this](error_code error, Socket socket) {
-            if (error == asio::error::operation_aborted) return;
-            if (error) {
-                // Out of descriptors, mostly: a waiting connection would be reported again at once.
-                pause.expires_after(kAcceptPause);
-                pause.async_wait([this](error_code stopped) {
-                    if (!stopped) accept();
-                });
-                return;
-            }
-            if (open >= limits.connections) {
-                turn_away(std::move(socket), limits.connections);
-            } else {
-                std::make_shared<Session>(std::move(socket), api, limits, open)->read();
-            }
-            accept();
-        });
+    void open_unix(Door door, const std::string& path) {
+        files.emplace_back(path);
+        listeners.emplace_back(io, door, Protocol(AF_UNIX, 0), files.back().release());
+    }
+    std::string open_tcp(Door door, const TcpListener& opened) {
+        const bool v6 = opened.address.front() == '[';
+        listeners.emplace_back(io, door, Protocol(v6 ? AF_INET6 : AF_INET, IPPROTO_TCP),
+                               opened.descriptor);
+        return opened.address;
     }
 
-    const ServerLimits limits;
-    SocketFile file;
+    void accept(Listener& listener) {
+        listener.acceptor.async_accept(
+            [this, &listener](error_code error, AnyStream::Socket socket) {
+                if (error == asio::error::operation_aborted) return;
+                if (error) {
+                    // Out of descriptors, mostly: a waiting connection would be reported again at
+                    // once.
+                    listener.pause.expires_after(kAcceptPause);
+                    listener.pause.async_wait([this, &listener](error_code stopped) {
+                        if (!stopped) accept(listener);
+                    });
+                    return;
+                }
+                if (api.traffic.connections >= places(listener.door)) {
+                    ++api.traffic.turned_away;
+                    // In TLS nothing can be said before the handshake.
+                    if (listener.door != Door::remote)
+                        turn_away(std::move(socket), settings.limits.connections);
+                } else {
+                    welcome(listener.door, std::move(socket));
+                }
+                accept(listener);
+            });
+    }
+
+    /// Over the network some places stay free, so that nobody there can lock out who has to stop
+    /// the rig at its own socket.
+    [[nodiscard]] std::size_t places(Door door) const {
+        const std::size_t all = settings.limits.connections;
+        return door == Door::control ? all : all - all / 8;
+    }
+
+    void welcome(Door door, AnyStream::Socket socket) {
+        Caller caller;
+        if (door == Door::control || door == Door::status) {
+            ucred peer{};
+            socklen_t size = sizeof peer;
+            peer.uid = static_cast<uid_t>(-1);
+            ::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size);
+            caller.identity = "uid " + std::to_string(peer.uid);
+            caller.role = role_of(door, peer.uid);
+        } else {
+            error_code error;
+            const asio::generic::stream_protocol::endpoint end = socket.remote_endpoint(error);
+            if (error) return;
+            asio::ip::tcp::endpoint address;
+            std::memcpy(address.data(), end.data(), std::min(end.size(), address.capacity()));
+            const std::string from = ", from " + address.address().to_string();
+            caller.browser = true;
+            caller.role = Role::viewer;
+            caller.identity = door == Door::page ? "page" + from : from;
+            if (door == Door::page) caller.host = page;
+            caller.encrypted = door == Door::remote;
+            const int on = 1;
+            ::setsockopt(socket.native_handle(), IPPROTO_TCP, 1 /* TCP_NODELAY */, &on, sizeof on);
+        }
+        AnyStream stream =
+            caller.encrypted ? AnyStream(std::move(socket), *tls) : AnyStream(std::move(socket));
+        serve_connection(std::move(stream), std::move(caller), shared);
+    }
+
+    [[nodiscard]] Role role_of(Door door, uid_t uid) const {
+        if (door == Door::status) return Role::viewer;
+        if (uid == 0 || uid == ::geteuid()) return Role::administer;
+        return !operators || is_member(uid, *operators) ? Role::operate : Role::viewer;
+    }
+
+    const ServerSettings settings;
+    std::optional<gid_t> operators;
+    // Outlive the io_context, whose end destroys the waiting sessions.
+    std::deque<SocketFile> files;
     Api api;
-    std::size_t open = 0;  // outlives the io_context, whose end destroys the waiting sessions
+    StreamFeed feed;
+    Shared shared{api, feed, settings.limits};
+    std::optional<asio::ssl::context> tls;
+    std::string page, remote;
     asio::io_context io{1};
-    Protocol::acceptor acceptor;
-    asio::steady_timer pause;
+    std::deque<Listener> listeners;
     std::thread thread;
 };
 
+StatusServer::StatusServer(StatusSource& source, const ServerSettings& settings)
+    : impl_(std::make_unique<Impl>(source, settings)) {}
+
 StatusServer::StatusServer(StatusSource& source, const std::string& path,
                            const ServerLimits& limits)
-    : impl_(std::make_unique<Impl>(source, path, limits)) {}
+    : StatusServer(source, ServerSettings{path, {}, {}, {}, {}, {}, {}, {}, limits}) {}
 
 StatusServer::~StatusServer() = default;
+
+std::string StatusServer::page_address() const {
+    return impl_->page.empty() ? "" : "http://" + impl_->page + "/";
+}
+std::string StatusServer::remote_address() const {
+    return impl_->remote.empty() ? "" : "https://" + impl_->remote + "/";
+}
 
 }  // namespace vibrig::serve

@@ -17,19 +17,37 @@ struct ServerLimits {
         30'000};  ///< for a whole request to come, and for an answer to be taken
     std::uint32_t header_bytes = 8 * 1024;
     std::uint64_t body_bytes = 16 * 1024;
+    double requests_per_s = 2000;  ///< of one connection; more are answered 429
 };
 
-/// HTTP/1.1 over a Unix domain socket, on a thread of its own: it asks the StatusSource, and
-/// nothing waits for it. Whoever may open the socket may read and command.
+/// Where it listens; an empty text: not there.
+struct ServerSettings {
+    std::string socket;          ///< control: who may open it may read, operators may command
+    std::string operator_group;  ///< of the control socket's peers; empty: all are operators
+    std::string status_socket;   ///< read-only
+    std::string page;            ///< "127.0.0.1:8090": plain HTTP on loopback, read-only
+    std::string remote;          ///< "0.0.0.0:8443": TLS with certificates on both sides
+    std::string certificate, key, clients_ca;  ///< of `remote`, PEM files
+    ServerLimits limits = {};
+};
+
+/// HTTP/1.1 and WebSocket on a thread of its own: it asks the StatusSource, and nothing waits for
+/// it.
 class StatusServer {
   public:
     /// Listens when it returns. Throws ServeError ("another vibrigd answers at PATH", no such
-    /// folder, ...).
+    /// folder, a certificate that cannot be read, ...).
+    StatusServer(StatusSource& source, const ServerSettings& settings);
+    /// The control socket alone.
     StatusServer(StatusSource& source, const std::string& path, const ServerLimits& limits = {});
-    /// Closes all connections and removes the socket's file.
+    /// Closes all connections and removes the sockets' files.
     ~StatusServer();
     StatusServer(const StatusServer&) = delete;
     StatusServer& operator=(const StatusServer&) = delete;
+
+    /// With the port that was found for port 0; empty: not listening there.
+    [[nodiscard]] std::string page_address() const;
+    [[nodiscard]] std::string remote_address() const;
 
   private:
     struct Impl;

@@ -22,12 +22,12 @@ namespace {
 using Steady = std::chrono::steady_clock;
 
 struct StatusOptions {
-    std::string socket;
+    serve::Address at;
     bool json = false;
 };
 
 struct CommandOptions {
-    std::string socket;
+    serve::Address at;
     v1::Command::Kind kind = v1::Command::unspecified;
     std::string by;
     std::string argument;
@@ -58,7 +58,7 @@ int width_of_output() {
 }
 
 int show_status(const StatusOptions& options) {
-    serve::Client client(options.socket);
+    serve::Client client(options.at);
     if (options.json) {
         const serve::Reply reply = client.get("/api/v1/status");
         if (reply.status != 200) throw serve::ClientError(problem_of(reply));
@@ -79,6 +79,23 @@ int show_status(const StatusOptions& options) {
     return 0;
 }
 
+int self_test(const StatusOptions& options) {
+    serve::Client client(options.at);
+    const serve::Reply reply = client.get("/api/v1/selftest");
+    v1::Readiness found;
+    parse_answer(reply, found);
+    if (options.json) {
+        std::cout << reply.body << '\n';
+    } else {
+        for (const v1::Readiness::Check& check : found.checks()) {
+            std::cout << (check.passed() ? "  ok    " : "  NOT   ")
+                      << serve::clipped(check.name() + ": " + check.text(), 200) << '\n';
+        }
+        std::cout << (found.ready() ? "ready for a campaign" : "not ready for a campaign") << '\n';
+    }
+    return found.ready() ? 0 : kNo;
+}
+
 int send_command(const CommandOptions& options) {
     v1::Command command;
     command.set_kind(options.kind);
@@ -88,7 +105,7 @@ int send_command(const CommandOptions& options) {
     if (!google::protobuf::util::MessageToJsonString(command, &json).ok()) {
         throw serve::ClientError("--by: not UTF-8");
     }
-    serve::Client client(options.socket);
+    serve::Client client(options.at);
     const serve::Reply reply = client.post("/api/v1/commands", json);
     if (options.json) std::cout << reply.body << '\n';
     if (reply.status == 200) {
@@ -115,12 +132,18 @@ void guarded(int& exit_code, Body&& body) {
     }
 }
 
-void add_socket(CLI::App& command, std::string& socket) {
-    socket = default_socket();
+void add_socket(CLI::App& command, serve::Address& at) {
+    at.socket = default_socket();
     command
-        .add_option("--socket", socket,
+        .add_option("--socket", at.socket,
                     "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
         ->capture_default_str();
+    command.add_option("--host", at.host, "Another machine, HOST[:8443], over TLS")
+        ->envname("VIBRIG_HOST");
+    command
+        .add_option("--identity", at.identity,
+                    "Who you are there: FOLDER/NAME of `vibrig pki init`")
+        ->envname("VIBRIG_IDENTITY");
 }
 
 void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char* name,
@@ -129,7 +152,7 @@ void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const ch
     auto options = std::make_shared<CommandOptions>();
     options->kind = kind;
     options->by = login_name();
-    add_socket(command, options->socket);
+    add_socket(command, options->at);
     command.add_option("--by", options->by, "Who commands; goes into the event log")
         ->capture_default_str();
     command.add_flag("--json", options->json, "Print the daemon's answer as JSON");
@@ -150,7 +173,12 @@ void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const ch
 
 std::string default_socket() {
     const char* const other = std::getenv("VIBRIG_SOCKET");
-    return other != nullptr && *other != '\0' ? other : "/run/vibrig/vibrigd.sock";
+    if (other != nullptr && *other != '\0') return other;
+    constexpr const char* kControl = "/run/vibrig/vibrigd.sock";
+    constexpr const char* kStatus = "/run/vibrig/status.sock";
+    // Who may not command may look.
+    const bool only_looks = access(kControl, W_OK) != 0 && access(kStatus, W_OK) == 0;
+    return only_looks ? kStatus : kControl;
 }
 
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message) {
@@ -173,16 +201,28 @@ v1::Status ask_status(serve::Client& client) {
 void add_remote(CLI::App& app, int& exit_code) {
     CLI::App& status = *app.add_subcommand("status", "What a running vibrigd does");
     auto status_options = std::make_shared<StatusOptions>();
-    add_socket(status, status_options->socket);
+    add_socket(status, status_options->at);
     status.add_flag("--json", status_options->json, "As JSON (vibrig.v1.Status)");
-    status.footer("Example: vibrig status --json");
+    status.footer(
+        "Example: vibrig status --json\n"
+        "Remotely: vibrig status --host rig.lab --identity vibrig-pki/ada");
     status.callback([status_options, &exit_code] {
         guarded(exit_code, [&] { return show_status(*status_options); });
     });
 
+    CLI::App& testing = *app.add_subcommand(
+        "selftest", "What is looked at before a campaign; exit code 1 unless all is well");
+    auto test_options = std::make_shared<StatusOptions>();
+    add_socket(testing, test_options->at);
+    testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
+    testing.footer("Example: vibrig selftest && vibrig arm --by 'Ada Lovelace'");
+    testing.callback([test_options, &exit_code] {
+        guarded(exit_code, [&] { return self_test(*test_options); });
+    });
+
     CLI::App& watching = *app.add_subcommand("watch", "The status as a live table");
     auto watch_options = std::make_shared<WatchOptions>();
-    add_socket(watching, watch_options->socket);
+    add_socket(watching, watch_options->at);
     watching.add_flag(
         "--until-finished", watch_options->until_finished,
         "End with the campaign: exit code 0 when it finished, 1 when aborted or tripped");
@@ -195,7 +235,7 @@ void add_remote(CLI::App& app, int& exit_code) {
 
     CLI::App& events = *app.add_subcommand("events", "What happened, oldest first");
     auto event_options = std::make_shared<EventOptions>();
-    add_socket(events, event_options->socket);
+    add_socket(events, event_options->at);
     events.add_flag("--follow", event_options->follow, "Go on with what comes");
     events.add_flag("--json", event_options->json, "One JSON object per line (vibrig.v1.Event)");
     events.footer("Example: vibrig events --follow");

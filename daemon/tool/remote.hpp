@@ -16,7 +16,7 @@ void parse_answer(const serve::Reply& reply, google::protobuf::Message& message)
 [[nodiscard]] v1::Status ask_status(serve::Client& client);
 
 struct WatchOptions {
-    std::string socket;
+    serve::Address at;
     bool until_finished = false;
     double interval_s = 1.0;
 };
@@ -24,7 +24,7 @@ struct WatchOptions {
 int watch(const WatchOptions& options);
 
 struct EventOptions {
-    std::string socket;
+    serve::Address at;
     bool follow = false;
     bool json = false;
 };

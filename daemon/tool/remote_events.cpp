@@ -53,7 +53,7 @@ bool print_new(serve::Client& client, Cursor& cursor, bool json) {
 }  // namespace
 
 int show_events(const EventOptions& options) {
-    serve::Client client(options.socket);
+    serve::Client client(options.at);
     Cursor cursor;
     while (print_new(client, cursor, options.json)) {
     }

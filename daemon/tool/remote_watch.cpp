@@ -97,7 +97,7 @@ bool is_under_way(v1::Campaign::State state) {
 
 class Watch {
   public:
-    explicit Watch(const WatchOptions& options) : options_(options), client_(options.socket) {
+    explicit Watch(const WatchOptions& options) : options_(options), client_(options.at) {
         if (isatty(STDOUT_FILENO) != 0) screen_.emplace();
     }
 

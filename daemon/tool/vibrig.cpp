@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
     vibrig::tool::add_zero(app, exit_code);
     vibrig::tool::add_reproduce(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
+    vibrig::tool::add_pki(app, exit_code);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

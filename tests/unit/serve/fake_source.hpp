@@ -42,6 +42,15 @@ class FakeSource : public StatusSource {
         return reply_;
     }
 
+    void refused(const std::string& who, const std::string& what, const std::string& why) override {
+        const std::lock_guard lock(mutex_);
+        refusals_.push_back(what + " | " + who + " | " + why);
+    }
+    [[nodiscard]] std::vector<std::string> refusals() const {
+        const std::lock_guard lock(mutex_);
+        return refusals_;
+    }
+
     void set(const StatusData& status) {
         const std::lock_guard lock(mutex_);
         status_ = status;
@@ -63,6 +72,7 @@ class FakeSource : public StatusSource {
     StatusData status_;
     CommandReply reply_{true, "done"};
     std::vector<CommandRequest> requests_;
+    std::vector<std::string> refusals_;
 };
 
 }  // namespace vibrig::serve

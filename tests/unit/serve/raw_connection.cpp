@@ -1,5 +1,7 @@
 #include "tests/unit/serve/raw_connection.hpp"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <sys/un.h>
@@ -25,11 +27,22 @@ TemporaryFolder::~TemporaryFolder() {
 }
 
 RawConnection::RawConnection(const std::string& path)
-    : descriptor_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    : descriptor_(
+          ::socket(path.front() == '/' ? AF_UNIX : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path.copy(address.sun_path, sizeof address.sun_path - 1);
-    if (::connect(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    sockaddr_in local{};
+    local.sin_family = AF_INET;
+    local.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    local.sin_port =
+        htons(static_cast<std::uint16_t>(std::atoi(path.c_str() + path.rfind(':') + 1)));
+    const bool is_unix = path.front() == '/';
+    const int failed =
+        is_unix
+            ? ::connect(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address)
+            : ::connect(descriptor_, reinterpret_cast<const sockaddr*>(&local), sizeof local);
+    if (failed != 0) {
         const std::string cause = std::strerror(errno);
         ::close(descriptor_);
         throw std::runtime_error("cannot connect to " + path + ": " + cause);
@@ -49,6 +62,13 @@ void RawConnection::send(std::string_view bytes) const {
 }
 
 void RawConnection::finish_sending() const { ::shutdown(descriptor_, SHUT_WR); }
+
+std::string RawConnection::bytes(std::size_t count) const {
+    std::string text(count, '\0');
+    const ssize_t got = ::recv(descriptor_, text.data(), count, MSG_WAITALL);
+    text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+    return text;
+}
 
 std::string RawConnection::answer() const {
     std::string text;

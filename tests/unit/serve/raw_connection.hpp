@@ -22,6 +22,7 @@ class TemporaryFolder {
 /// A Unix stream socket that sends whatever bytes a test wants. Reads give up after 20 s.
 class RawConnection {
   public:
+    /// A Unix socket's path, or "127.0.0.1:PORT".
     explicit RawConnection(const std::string& path);
     ~RawConnection();
     RawConnection(const RawConnection&) = delete;
@@ -29,6 +30,8 @@ class RawConnection {
 
     void send(std::string_view bytes) const;
     void finish_sending() const;
+    /// So many bytes; fewer when the server closes before.
+    [[nodiscard]] std::string bytes(std::size_t count) const;
     /// One whole answer by its Content-Length; what came, when the server closes before.
     [[nodiscard]] std::string answer() const;
     /// All until the server closes; "(open)" appended when it does not within the time.

@@ -57,6 +57,7 @@ StatusData full_status() {
     s.interlock.reaction_bounds_ms = {0.1, 1};
     s.interlock.reaction_counts = {1, 2, 3};
     s.interlock.reaction_largest_ms = 0.75;
+    s.interlock.reaction_sum_ms = 4.5;
     s.estimate.amplitude_g = 5.99;
     s.estimate.frequency_hz = 15.001;
     s.estimate.kappa = 18.94;

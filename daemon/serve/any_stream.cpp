@@ -1,0 +1,100 @@
+#include "daemon/serve/any_stream.hpp"
+
+#include <openssl/x509v3.h>
+
+#include <boost/asio/ssl/host_name_verification.hpp>
+#include <boost/asio/ssl/stream.hpp>
+#include <optional>
+#include <vector>
+
+namespace vibrig::serve {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+struct AnyStream::Impl {
+    std::optional<Socket> plain;
+    std::optional<asio::ssl::stream<Socket>> tls;
+};
+
+AnyStream::AnyStream(Socket socket) : impl_(std::make_unique<Impl>()) {
+    impl_->plain.emplace(std::move(socket));
+}
+AnyStream::AnyStream(Socket socket, asio::ssl::context& tls) : impl_(std::make_unique<Impl>()) {
+    impl_->tls.emplace(std::move(socket), tls);
+}
+AnyStream::AnyStream(AnyStream&&) noexcept = default;
+AnyStream& AnyStream::operator=(AnyStream&&) noexcept = default;
+AnyStream::~AnyStream() = default;
+
+AnyStream::Socket& AnyStream::socket() noexcept {
+    return impl_->tls ? impl_->tls->next_layer() : *impl_->plain;
+}
+AnyStream::executor_type AnyStream::get_executor() noexcept { return socket().get_executor(); }
+bool AnyStream::encrypted() const noexcept { return impl_->tls.has_value(); }
+
+void AnyStream::read(asio::mutable_buffer into, Done done) {
+    if (impl_->tls)
+        impl_->tls->async_read_some(asio::mutable_buffers_1(into), std::move(done));
+    else
+        impl_->plain->async_read_some(asio::mutable_buffers_1(into), std::move(done));
+}
+
+void AnyStream::write(const Buffers& from, Done done) {
+    if (impl_->tls)
+        impl_->tls->async_write_some(from, std::move(done));
+    else
+        impl_->plain->async_write_some(from, std::move(done));
+}
+
+void AnyStream::accept_handshake(std::function<void(error_code)> done) {
+    impl_->tls->async_handshake(asio::ssl::stream_base::server, std::move(done));
+}
+
+void AnyStream::connect_handshake(const std::string& host, std::function<void(error_code)> done) {
+    SSL* const ssl = impl_->tls->native_handle();
+    error_code numeric;
+    asio::ip::make_address(host, numeric);
+    // As the macro SSL_set_tlsext_host_name does, without its cast.
+    if (numeric) {
+        std::string name = host;
+        SSL_ctrl(ssl, SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name, name.data());
+    }
+    impl_->tls->set_verify_callback(asio::ssl::host_name_verification(host));
+    impl_->tls->async_handshake(asio::ssl::stream_base::client, std::move(done));
+}
+
+std::pair<std::string, std::string> AnyStream::peer_subject() const {
+    if (!impl_->tls) return {};
+    const std::unique_ptr<X509, void (*)(X509*)> certificate(
+        SSL_get1_peer_certificate(impl_->tls->native_handle()), X509_free);
+    if (!certificate) return {};
+    X509_NAME* const subject = X509_get_subject_name(certificate.get());
+    const auto entry = [subject](int nid) -> std::string {
+        // More than one would leave open which of them counts.
+        const int at = X509_NAME_get_index_by_NID(subject, nid, -1);
+        if (at < 0 || X509_NAME_get_index_by_NID(subject, nid, at) >= 0) return {};
+        unsigned char* text = nullptr;
+        const int size =
+            ASN1_STRING_to_UTF8(&text, X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
+        if (size < 0) return {};
+        std::string found(text, text + size);
+        OPENSSL_free(text);
+        // It goes into one readable line of the audit.
+        for (char& c : found) c = static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? '?' : c;
+        return found;
+    };
+    return {entry(NID_commonName), entry(NID_organizationalUnitName)};
+}
+
+void AnyStream::finish() noexcept {
+    error_code ignored;
+    socket().shutdown(Socket::shutdown_send, ignored);
+}
+
+void AnyStream::close() noexcept {
+    error_code ignored;
+    socket().close(ignored);
+}
+
+}  // namespace vibrig::serve

@@ -1,0 +1,270 @@
+#include "daemon/serve/metrics.hpp"
+
+#include <prometheus/text_serializer.h>
+
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+namespace vibrig::serve {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+using Labels = std::vector<ClientMetric::Label>;
+
+constexpr std::array<const char*, drivers::kChannels> kChannelLabels{
+    "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
+constexpr std::array<const char*, 3> kAxisLabels{"x", "y", "z"};
+constexpr std::array<const char*, 6> kQualityLabels{"good",    "missing",      "stale",
+                                                    "flagged", "out_of_range", "unbound"};
+
+class Families {
+  public:
+    MetricFamily& family(std::string name, std::string help, MetricType type) {
+        families_.push_back({std::move(name), std::move(help), type, {}});
+        return families_.back();
+    }
+    void counter(std::string name, std::string help,
+                 const std::vector<std::pair<Labels, std::uint64_t>>& values) {
+        MetricFamily& to = family(std::move(name), std::move(help), MetricType::Counter);
+        for (const auto& [labels, value] : values) {
+            ClientMetric metric;
+            metric.label = labels;
+            metric.counter.value = static_cast<double>(value);
+            to.metric.push_back(std::move(metric));
+        }
+    }
+    void counter(std::string name, std::string help, std::uint64_t value) {
+        counter(std::move(name), std::move(help), {{{}, value}});
+    }
+    void gauge(std::string name, std::string help,
+               const std::vector<std::pair<Labels, double>>& values) {
+        MetricFamily to{std::move(name), std::move(help), MetricType::Gauge, {}};
+        for (const auto& [labels, value] : values) {
+            if (!std::isfinite(value)) continue;
+            ClientMetric metric;
+            metric.label = labels;
+            metric.gauge.value = value;
+            to.metric.push_back(std::move(metric));
+        }
+        if (!to.metric.empty()) families_.push_back(std::move(to));
+    }
+    void gauge(std::string name, std::string help, double value) {
+        gauge(std::move(name), std::move(help), {{Labels{}, value}});
+    }
+    [[nodiscard]] std::string text() const {
+        std::ostringstream out;
+        prometheus::TextSerializer().Serialize(out, families_);
+        return out.str();
+    }
+
+  private:
+    std::vector<MetricFamily> families_;
+};
+
+double yes(bool value) { return value ? 1 : 0; }
+
+void add_campaign(Families& to, const StatusData& s) {
+    std::vector<std::pair<Labels, double>> states;
+    for (int i = 0; i <= static_cast<int>(CampaignState::tripped); ++i) {
+        const auto state = static_cast<CampaignState>(i);
+        states.push_back({{{"state", name_of(state)}}, yes(state == s.state)});
+    }
+    to.gauge("vibrig_build_info", "Version of the daemon, and which clock it follows.",
+             {{{{"clock", s.clock}, {"version", s.version}}, 1}});
+    to.gauge("vibrig_uptime_seconds", "Since the start, by the daemon's clock.",
+             drivers::to_seconds(s.uptime));
+    to.gauge("vibrig_campaign_state", "1 for the state the campaign is in.", states);
+    to.gauge("vibrig_campaign_progress_ratio", "Part of the campaign that is done.", s.progress);
+    to.gauge("vibrig_campaign_remaining_seconds", "Estimate.", s.remaining_s);
+    to.gauge("vibrig_campaign_run", "Present run, from 1; 0: none.", s.run);
+    to.gauge("vibrig_campaign_position", "Present position, from 1; 0: none.", s.position);
+    std::uint64_t flagged = 0;
+    for (const auto& dwell : s.dwells) flagged += dwell.flagged ? 1 : 0;
+    to.gauge("vibrig_campaign_dwells", "Ended dwells of this campaign.",
+             {{{{"flagged", "false"}}, static_cast<double>(s.dwells.size() - flagged)},
+              {{{"flagged", "true"}}, static_cast<double>(flagged)}});
+}
+
+void add_shaker(Families& to, const StatusData& s) {
+    constexpr double kGravity = 9.80665;  // m/s^2
+    const auto& n = s.shaker_counters;
+    to.gauge("vibrig_shaker_link_up", "1 while the shaker's controller answers.",
+             yes(s.shaker_link == drivers::LinkState::running));
+    to.gauge("vibrig_shaker_command_meters_per_second_squared",
+             "Commanded peak acceleration of the table.", s.command_table_g * kGravity);
+    if (s.shaker.valid) {
+        to.gauge("vibrig_shaker_measured_meters_per_second_squared",
+                 "Measured peak acceleration of the table.", s.shaker.measured_g * kGravity);
+        to.gauge("vibrig_shaker_frequency_hertz", "Set-point as read back.", s.shaker.frequency_hz);
+        to.gauge("vibrig_shaker_running", "1 while the run register is set.",
+                 yes(s.shaker.running));
+        to.gauge("vibrig_shaker_fault", "1 while the controller reports a fault.",
+                 yes(s.shaker.fault != 0));
+        to.gauge("vibrig_emergency_stop_open", "1 while the emergency-stop chain is open.",
+                 yes(s.shaker.emergency_stop_open));
+    }
+    to.gauge("vibrig_shaker_stop_pending", "1: a stop is ordered and not read back as done.",
+             yes(s.stop_pending));
+    to.counter("vibrig_shaker_requests_total", "Modbus requests by how they ended.",
+               {{{{"result", "reply"}}, n.replies},
+                {{{"result", "timeout"}}, n.timeouts},
+                {{{"result", "exception"}}, n.exceptions},
+                {{{"result", "wrong_reply"}}, n.wrong_replies},
+                {{{"result", "lost"}}, n.lost}});
+    to.counter("vibrig_shaker_reconnects_total", "Connections made anew.", n.reconnects);
+    to.counter("vibrig_shaker_watchdog_feeds_total", "Feeds of the shaker's watchdog.", n.feeds);
+    to.counter("vibrig_shaker_stops_total", "Stops written.", n.stops_written);
+    to.counter("vibrig_shaker_read_back_mismatches_total", "Set-points that read back otherwise.",
+               n.read_back_mismatches);
+}
+
+void add_acquisition(Families& to, const StatusData& s) {
+    const auto& can = s.can_counters;
+    const auto& a = s.assembler;
+    to.gauge("vibrig_can_link_up", "1 while the CAN port runs.",
+             yes(s.can == drivers::PortState::running));
+    to.counter("vibrig_can_received_frames_total", "Frames read from the CAN port.", can.received);
+    to.counter("vibrig_can_sent_frames_total", "Frames sent.", can.sent);
+    to.counter("vibrig_can_frames_dropped_total", "Frames that went no further, by reason.",
+               {{{{"reason", "kernel"}}, can.kernel_dropped},
+                {{{"reason", "error_frame"}}, can.error_frames},
+                {{{"reason", "malformed"}}, can.malformed},
+                {{{"reason", "unknown"}}, a.unknown},
+                {{{"reason", "duplicate"}}, a.duplicate},
+                {{{"reason", "late"}}, a.late},
+                {{{"reason", "wrong_length"}}, a.wrong_length}});
+    to.counter("vibrig_can_send_failures_total", "Frames that could not be sent.", can.send_failed);
+    to.counter("vibrig_samples_total", "Samples put together.", a.samples);
+    to.counter("vibrig_samples_incomplete_total", "Samples with a missing channel.", a.incomplete);
+    to.counter("vibrig_sample_gaps_total", "Sync counts that never showed.", a.gaps);
+    to.counter("vibrig_ring_pushed_samples_total", "Samples offered and taken by the ring.",
+               {{{{"ring", "estimator"}}, s.estimator_ring.pushed}});
+    to.counter("vibrig_ring_popped_samples_total", "Samples the consumer took.",
+               {{{{"ring", "estimator"}}, s.estimator_ring.popped}});
+    to.counter("vibrig_ring_dropped_samples_total", "Samples dropped because the ring was full.",
+               {{{{"ring", "estimator"}}, s.estimator_ring.dropped}});
+    std::vector<std::pair<Labels, double>> ages, good;
+    for (std::size_t c = 0; c < drivers::kChannels; ++c) {
+        if (s.sample.quality[c] == drivers::Quality::unbound) continue;
+        const Labels channel{{"channel", kChannelLabels[c]}};
+        if (s.channel_age_s[c] >= 0) ages.emplace_back(channel, s.channel_age_s[c]);
+        for (std::size_t q = 0; q < kQualityLabels.size() - 1; ++q) {
+            Labels labels = channel;
+            labels.push_back({"quality", kQualityLabels[q]});
+            good.emplace_back(labels, yes(static_cast<std::size_t>(s.sample.quality[c]) == q));
+        }
+    }
+    to.gauge("vibrig_channel_age_seconds", "Since the newest good value.", ages);
+    to.gauge("vibrig_channel_quality", "1 for the quality of the newest sample.", good);
+    if (s.platform.time != 0) {
+        to.gauge("vibrig_platform_ready", "1 while the platform says so.", yes(s.platform.ready));
+        to.gauge("vibrig_platform_loop_closed", "1 while its loop is closed.",
+                 yes(s.platform.loop_closed));
+        to.gauge("vibrig_platform_fault", "1 while it reports a fault.", yes(s.platform.fault));
+        to.gauge("vibrig_platform_temperature_celsius", "As the platform says.",
+                 s.platform.temperature_c);
+    }
+}
+
+void add_estimate(Families& to, const StatusData& s) {
+    const auto& e = s.estimate;
+    std::vector<std::pair<Labels, double>> values, sigmas;
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        if (!e.observable[i]) continue;
+        const Labels labels{{"name", estimator::parameter_names()[i]},
+                            {"unit", estimator::parameter_unit(i)}};
+        values.emplace_back(labels, e.value[i]);
+        sigmas.emplace_back(labels, e.sigma[i]);
+    }
+    to.gauge("vibrig_coefficient", "Gyro error coefficients (IEEE Std 517), in the unit named.",
+             values);
+    to.gauge("vibrig_coefficient_sigma", "Their standard deviations, in the unit named.", sigmas);
+    to.gauge("vibrig_filter_nis_ratio", "Normalised innovation squared per degree of freedom.",
+             e.nis_per_dof);
+    to.gauge("vibrig_filter_samples", "Samples of this campaign in the filter, by outcome.",
+             {{{{"outcome", "used"}}, static_cast<double>(e.used)},
+              {{{"outcome", "rejected"}}, static_cast<double>(e.rejected)}});
+    std::vector<std::pair<Labels, double>> innovations, walks, sigma_walks, in_force;
+    for (std::size_t j = 0; j < kAxisLabels.size(); ++j) {
+        constexpr double kArcsecond = 4.84813681109536e-6;  // rad
+        const Labels axis{{"axis", kAxisLabels[j]}};
+        innovations.emplace_back(axis, e.innovation_arcsec[j] * kArcsecond);
+        const auto& gyro = s.noise.gyros[j];
+        const auto& n = gyro.terms[static_cast<std::size_t>(estimator::allan::Term::N)];
+        in_force.emplace_back(axis, gyro.in_force);
+        if (s.noise.dwells == 0 || !n.detected) continue;
+        walks.emplace_back(axis, n.value);
+        sigma_walks.emplace_back(axis, n.sigma);
+    }
+    to.gauge("vibrig_innovation_radians", "Newest innovation of the filter.", innovations);
+    to.gauge("vibrig_gyro_random_walk_degrees_per_root_hour",
+             "Angle random walk N identified from the dwells.", walks);
+    to.gauge("vibrig_gyro_random_walk_sigma_degrees_per_root_hour", "Its standard deviation.",
+             sigma_walks);
+    to.gauge("vibrig_gyro_random_walk_in_force_degrees_per_root_hour", "N of the filter.",
+             in_force);
+    to.gauge("vibrig_noise_dwells", "Dwells the noise is known from.", s.noise.dwells);
+    to.counter("vibrig_noise_alarms_total", "Dwells whose noise was not that of the earlier ones.",
+               s.noise.alarms_total);
+}
+
+void add_interlock(Families& to, const StatusData& s) {
+    std::vector<std::pair<Labels, double>> raised;
+    for (const auto& row : s.interlock.rows) {
+        raised.push_back({{{"name", row.name}, {"reaction", row.reaction}}, yes(row.raised)});
+    }
+    to.gauge("vibrig_interlock_raised", "1 while the condition of this row is met.", raised);
+    to.gauge("vibrig_interlock_tripped", "1: the shaker was stopped; latched until acknowledged.",
+             yes(!s.interlock.tripped.empty()));
+    MetricFamily& reaction =
+        to.family("vibrig_interlock_reaction_seconds",
+                  "From the frames that tripped to the stop confirmed by the controller.",
+                  MetricType::Histogram);
+    ClientMetric metric;
+    std::uint64_t sum = 0;
+    const auto& counts = s.interlock.reaction_counts;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+        sum += counts[i];
+        const bool open = i >= s.interlock.reaction_bounds_ms.size();
+        const double bound = open ? std::numeric_limits<double>::infinity()
+                                  : s.interlock.reaction_bounds_ms[i] / 1e3;
+        metric.histogram.bucket.push_back({sum, bound});
+    }
+    metric.histogram.sample_count = sum;
+    metric.histogram.sample_sum = s.interlock.reaction_sum_ms / 1e3;
+    reaction.metric.push_back(std::move(metric));
+}
+
+}  // namespace
+
+std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) {
+    Families families;
+    add_campaign(families, status);
+    add_shaker(families, status);
+    add_acquisition(families, status);
+    add_estimate(families, status);
+    add_interlock(families, status);
+    families.gauge("vibrig_journal_up", "1 while the journal writes, or none is kept.",
+                   yes(status.journal.path.empty() || status.journal.running));
+    families.counter("vibrig_journal_entries_total", "Entries of the journal.",
+                     {{{{"outcome", "written"}}, status.journal.written},
+                      {{{"outcome", "dropped"}}, status.journal.dropped}});
+    families.counter("vibrig_server_requests_total", "Requests to the status server.",
+                     traffic.requests);
+    families.counter("vibrig_server_commands_refused_total", "Commands that were not let through.",
+                     traffic.refused);
+    families.counter("vibrig_server_connections_refused_total", "Connections turned away.",
+                     traffic.turned_away);
+    families.counter("vibrig_server_streams_dropped_total", "Streams closed for being too slow.",
+                     traffic.streams_dropped);
+    families.gauge("vibrig_server_connections", "Open connections, this one included.",
+                   static_cast<double>(traffic.connections));
+    families.gauge("vibrig_server_streams", "Open WebSocket streams.",
+                   static_cast<double>(traffic.streams));
+    return families.text();
+}
+
+}  // namespace vibrig::serve

@@ -1,0 +1,132 @@
+'use strict';
+// Charts, the gimbals' picture and the table of coefficients. No state but what is drawn.
+const Draw = (() => {
+  const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const byId = id => document.getElementById(id);
+  const charts = new Map();
+
+  function options(element, name) {
+    const axis = {stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
+    const line = (k, extra) => ({stroke: css('--c' + k), width: 2, points: {show: false}, ...extra});
+    const sized = {width: element.clientWidth || 300, height: element.clientHeight || 200, cursor: {show: false}, legend: {show: false}};
+    const minutes = {...axis, label: 'min', labelSize: 16, size: 34, labelFont: '12px system-ui'};
+    const none = {stroke: 'transparent', points: {show: false}};
+    const decades = v => v.map(x => (x === null ? '' : Math.abs(Math.log10(x) % 1) < 1e-9 ? String(+x.toPrecision(2)) : ''));
+    const log = {...axis, size: 54, values: (u, v) => decades(v)};
+    switch (name) {
+      case 'amplitude': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [0, Math.max(1, hi * 1.05)]}},
+        axes: [minutes, {...axis, size: 40}],
+        series: [{}, none, none, none, none, line(1, {dash: [6, 4]}), line(0)],
+        bands: [{series: [2, 1], fill: css('--alarm')}, {series: [4, 3], fill: css('--abort')}]};
+      case 'innovations': return {...sized, scales: {x: {time: false}}, axes: [minutes, {...axis, size: 44}],
+        series: [{}, line(0, {width: 1}), line(1, {width: 1}), line(2, {width: 1})]};
+      case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},
+        axes: [minutes, log], series: [{}, line(0), line(1), line(2), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
+      default: return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3}},
+        axes: [{...axis, values: (u, v) => decades(v), label: 's', labelSize: 16, size: 34, labelFont: '12px system-ui'}, log],
+        series: [{}, line(0), line(1), line(2)]};
+    }
+  }
+
+  function chart(name, data) {
+    const element = byId('c-' + name);
+    let plot = charts.get(name);
+    if (!plot) {
+      element.textContent = '';
+      plot = new uPlot(options(element, name), data, element);
+      charts.set(name, plot);
+    } else {
+      plot.setData(data);
+    }
+  }
+
+  function again() {
+    for (const plot of charts.values()) plot.destroy();
+    charts.clear();
+  }
+  function resize() {
+    for (const [name, plot] of charts) {
+      const element = byId('c-' + name);
+      plot.setSize({width: element.clientWidth, height: element.clientHeight});
+    }
+  }
+
+  // Reference axes: x north, y up, z east; reference to platform is Rz(azimuth) Ry(inner) Rx(outer), so
+  // the way back turns by the negative angles.
+  const turn = (i, j) => (v, deg) => {
+    const r = deg * Math.PI / 180, c = Math.cos(r), s = Math.sin(r), w = v.slice();
+    w[i] = c * v[i] - s * v[j];
+    w[j] = s * v[i] + c * v[j];
+    return w;
+  };
+  const back = f => (v, deg) => f(v, -deg);
+  const ry0 = turn(2, 0), rx = back(turn(1, 2)), ry = back(ry0), rz = back(turn(0, 1));
+
+  const up = ([a, b, g], v) => rx(ry(rz(v, g), b), a)[1];
+
+  function gimbals(deg, force, words) {
+    const [a, b, g] = deg;
+    const toReference = v => rx(ry(rz(v, g), b), a);
+    // Seen from the south-east, a little from above.
+    const screen = v => {
+      const w = ry0(v, -28), down = 18 * Math.PI / 180;
+      return [w[0] * 100, -(w[1] * Math.cos(down) + w[2] * -Math.sin(down)) * 100];
+    };
+    const path = points => 'M' + points.map(p => screen(p).map(n => n.toFixed(1)).join(' ')).join('L');
+    const ring = (radius, u, v) => path(Array.from({length: 49}, (_, k) => {
+      const t = k * Math.PI / 24;
+      return [0, 1, 2].map(i => radius * (Math.cos(t) * u[i] + Math.sin(t) * v[i]));
+    }));
+    const outer = v => rx(v, a), inner = v => rx(ry(v, b), a);
+    const line = (v, from = 0) => path([v.map(n => n * from), v]);
+    const parts = [
+      `<path d="${line([0, 1, 0], -1)}" stroke="var(--soft)" stroke-dasharray="3 3"/>`,
+      `<path d="${ring(.95, outer([1, 0, 0]), outer([0, 1, 0]))}" stroke="var(--c0)" stroke-width="3"/>`,
+      `<path d="${ring(.78, inner([0, 1, 0]), inner([0, 0, 1]))}" stroke="var(--c1)" stroke-width="3"/>`,
+      `<path d="${ring(.6, toReference([1, 0, 0]), toReference([0, 1, 0]))}Z" stroke="var(--c2)" stroke-width="3" fill="var(--c2)" fill-opacity=".15"/>`];
+    ['x', 'y', 'z'].forEach((name, i) => {
+      const axis = toReference([0, 1, 2].map(k => (k === i ? .6 : 0)));
+      const [x, y] = screen(axis.map(n => n * 1.15));
+      parts.push(`<path d="${line(axis)}" stroke="var(--c2)" stroke-width="1.5"/><text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="var(--ink)" font-size="9" text-anchor="middle">${name}</text>`);
+    });
+    if (force) {
+      const tip = toReference(force), [x, y] = screen(tip);
+      parts.push(`<path d="${line(tip)}" stroke="var(--bad)" stroke-width="3"/><circle cx="${x.toFixed(1)}" cy="${y.toFixed(1)}" r="4" fill="var(--bad)"/>`);
+    }
+    const picture = byId('gimbals');
+    picture.innerHTML = `<g fill="none" stroke-linejoin="round">${parts.join('')}</g>`;
+    picture.setAttribute('aria-label', words);
+    return force ? toReference(force) : null;
+  }
+
+  const digits = (value, sigma) => {
+    const decimals = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma || 1e-3))));
+    return value.toFixed(decimals);
+  };
+
+  let cells = null;
+  function coefficients(parameters, targets) {
+    const table = byId('coefficients');
+    if (!cells || cells.length !== parameters.length) {
+      const rows = parameters.length / 3;
+      let html = '<thead><tr><td></td><th scope="col">gyro x</th><th scope="col">gyro y</th><th scope="col">gyro z</th><th scope="col" class="unit">unit</th></tr></thead><tbody>';
+      for (let r = 0; r < rows; ++r) {
+        html += `<tr><th scope="row">${parameters[r].name.replace(/[xyz]$/, '')}</th>` + '<td></td>'.repeat(3) + `<th class="unit">${parameters[r].unit}</th></tr>`;
+      }
+      table.innerHTML = html + '</tbody>';
+      const found = [...table.querySelectorAll('tbody td')];
+      cells = parameters.map((p, i) => found[(i % rows) * 3 + Math.floor(i / rows)]);
+    }
+    parameters.forEach((p, i) => {
+      if (p.value === undefined || p.sigma === undefined) { cells[i].textContent = '–'; return; }
+      const target = targets[p.name], factor = target ? p.sigma / target : NaN;
+      const decades = Math.log10(factor);
+      const width = Number.isFinite(decades) ? Math.min(100, Math.max(2, decades * 25)) : 0;
+      const met = factor <= 1.02;
+      cells[i].innerHTML = `${digits(p.value, p.sigma)} <small>± ${p.sigma.toPrecision(2)}</small>` +
+        `<svg preserveAspectRatio="none" viewBox="0 0 100 4" role="img" aria-label="${Number.isFinite(factor) ? `sigma ${factor.toFixed(1)} times its target` : 'no target'}"><rect class="${met ? 'met' : 'over'}" width="${width}" height="4"/></svg>`;
+    });
+  }
+
+  return {chart, again, resize, up, gimbals, coefficients, digits, byId};
+})();

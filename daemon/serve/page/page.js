@@ -1,0 +1,327 @@
+'use strict';
+// Follows /api/v1/stream and shows what it says; loud when it says nothing.
+(() => {
+  const {byId} = Draw;
+  const kKept = 1200, kStale_ms = 4000, kRate_hz = 2, kHidden_hz = 0.2, kEvents = 300;
+  let direction = null, status = null, plan = null, targets = {}, role = 'viewer', instance = '', lastEvent = 0;
+  let heard = performance.now(), socket = null, pause = 500, failing = false;
+  const history = {t: [], rows: []};
+
+  const number = x => (x === undefined ? NaN : Number(x));
+  const fixed = (x, n, unit) => (Number.isFinite(number(x)) ? number(x).toFixed(n) + ' ' + unit : '– ' + unit);
+  function duration(s) {
+    s = Math.round(s);
+    if (!(s >= 0)) return '–';
+    return s >= 3600 ? `${Math.floor(s / 3600)} h ${String(Math.floor(s / 60) % 60).padStart(2, '0')} min`
+      : s >= 60 ? `${Math.floor(s / 60)} min ${String(s % 60).padStart(2, '0')} s` : `${s} s`;
+  }
+  function set(id, text) { const e = byId(id); if (e.textContent !== text) e.textContent = text; }
+
+  function merge(target, patch) {   // RFC 7396
+    for (const [key, value] of Object.entries(patch)) {
+      if (value === null) delete target[key];
+      else if (typeof value === 'object' && !Array.isArray(value)) {
+        const inside = target[key] && typeof target[key] === 'object' && !Array.isArray(target[key]) ? target[key] : {};
+        target[key] = merge(inside, value);
+      } else target[key] = value;
+    }
+    return target;
+  }
+
+  // ---- what is drawn of a status
+  function list(id, items) {
+    const e = byId(id);
+    while (e.children.length > items.length) e.lastChild.remove();
+    items.forEach(([kind, left, right], i) => {
+      let li = e.children[i];
+      if (!li) {
+        li = document.createElement('li');
+        li.append(document.createElement('span'), document.createElement('span'));
+        e.append(li);
+      }
+      if (li.className !== kind) li.className = kind;
+      if (li.firstChild.textContent !== left) li.firstChild.textContent = left;
+      if (li.lastChild.textContent !== right) li.lastChild.textContent = right;
+    });
+  }
+  function table(id, items) {
+    const e = byId(id);
+    if (e.children.length !== 2 * items.length) {
+      e.textContent = '';
+      for (const [name] of items) {
+        const dt = document.createElement('dt');
+        dt.textContent = name;
+        e.append(dt, document.createElement('dd'));
+      }
+    }
+    items.forEach(([, text, bad], i) => {
+      const dd = e.children[2 * i + 1];
+      if (dd.textContent !== text) dd.textContent = text;
+      dd.className = bad ? 'bad-value' : '';
+    });
+  }
+
+  const kBad = ['tripped', 'aborted'], kCalm = ['idle', 'finished', 'unspecified'];
+  function head(s) {
+    const c = s.campaign;
+    set('state', c.state);
+    set('reason', c.reason || (c.resume_offer ? 'to be resumed: ' + c.resume_offer : ''));
+    set('campaign', c.name + (c.armed_by ? ', armed by ' + c.armed_by : ', not armed'));
+    document.querySelector('header').className = kBad.includes(c.state) ? 'bad' : kCalm.includes(c.state) ? 'good' : 'active';
+    const done = 100 * (c.progress || 0);
+    document.title = `${c.state.toUpperCase()} ${done.toFixed(0)} % – ${c.name}`;
+    set('position', c.run > 0 ? `run ${c.run}/${c.runs}, position ${c.position}/${c.positions}` : 'no position');
+    set('left', `${done.toFixed(1)} %` + (c.remaining_s > 0 ? `, ${duration(c.remaining_s)} left` : ''));
+    byId('progress').value = done;
+    stops(c);
+  }
+  function stops(c) {
+    const e = byId('stops'), all = plan ? plan.stops : [];
+    const dwells = new Map((c.dwells || []).map(d => [d.run + '/' + d.position, d]));
+    const key = JSON.stringify([all.length, [...dwells].map(([k, d]) => k + d.flagged), c.run, c.position]);
+    if (e.dataset.key === key) return;
+    e.dataset.key = key;
+    e.textContent = '';
+    let run = 0;
+    for (const stop of all) {
+      if (stop.run !== run) {
+        const li = document.createElement('li');
+        li.className = 'run';
+        li.textContent = `run ${run = stop.run}, ${stop.table_g} g`;
+        e.append(li);
+      }
+      const li = document.createElement('li'), dwell = dwells.get(stop.run + '/' + stop.position);
+      const now = stop.run === c.run && stop.position === c.position;
+      li.className = (dwell ? (dwell.flagged ? 'flagged' : 'done') : '') + (now ? ' now' : '');
+      li.textContent = stop.position;
+      const a = stop.angles;
+      li.title = `${a.outer_deg}, ${a.inner_deg}, ${a.azimuth_deg} deg` + (dwell && dwell.flagged ? ': ' + dwell.reason : '');
+      li.setAttribute('aria-label', `position ${stop.position}${dwell ? (dwell.flagged ? ', flagged' : ', done') : ''}${now ? ', now' : ''}`);
+      e.append(li);
+    }
+  }
+
+  function channel(s, name) { return (s.sample.channels || []).find(c => c.name === name) || {}; }
+  function gimbals(s) {
+    const names = ['outer', 'inner', 'azimuth'];
+    const deg = names.map(n => channel(s, n).value), force = ['accel_x', 'accel_y', 'accel_z'].map(n => channel(s, n).value);
+    const shown = deg.map(d => d || 0), good = force.every(f => f !== undefined);
+    const size = good ? Math.hypot(...force) : NaN;
+    const words = `Gimbals: ${names.map((n, i) => `${n} ${fixed(deg[i], 1, 'degrees')}`).join(', ')}; the red line is the measured specific force, the dashed one the vertical`;
+    // Under vibration gravity and acceleration lie on one line, whichever is greater at the moment.
+    if (good && size > 0.3) direction = force.map(f => f / size);
+    if (direction && Draw.up(shown, direction) < 0) direction = direction.map(f => -f);
+    const up = Draw.gimbals(shown, good ? direction : null, words);
+    const off = up ? Math.acos(Math.max(-1, Math.min(1, up[1]))) * 180 / Math.PI : NaN;
+    table('angles', [...names.map((n, i) => [n, deg[i] === undefined ? 'not good' : fixed(deg[i], 3, '°'), deg[i] === undefined]),
+      ['specific force', fixed(size, 3, 'g'), !good], ['off the vertical', fixed(off, 1, '°'), false],
+      ['platform', !s.platform || s.platform.ready === undefined ? 'no status' : (s.platform.ready ? 'ready' : 'not ready') + (s.platform.temperature_c === undefined ? '' : `, ${s.platform.temperature_c.toFixed(2)} °C`),
+        !(s.platform && s.platform.ready)]]);
+  }
+
+  function remember(s) {
+    const t = s.time_s, last = history.t[history.t.length - 1];
+    if (last !== undefined && t < last) { history.t = []; history.rows = []; }   // another daemon
+    if (t === last) return;
+    const rows = (s.interlock.rows || []).filter(r => r.condition === 'amplitude_off_command' && r.limit !== undefined);
+    const command = s.campaign.state === 'idle' ? 0 : s.campaign.command_table_g || 0;
+    const band = reaction => {
+      const row = rows.find(r => r.reaction === reaction);
+      return row && command > 0 ? [command * 10 ** (-row.limit / 20), command * 10 ** (row.limit / 20)] : [null, null];
+    };
+    const worst = [0, 0, 0], kinds = ['deg/h', 'deg/h/g', 'deg/h/g^2'];
+    for (const p of s.estimate.parameters || []) {
+      if (p.sigma === undefined || !targets[p.name]) continue;
+      const k = kinds.indexOf(p.unit);
+      worst[k] = Math.max(worst[k], p.sigma / targets[p.name]);
+    }
+    const v = s.estimate.innovation || {}, n = x => (x === undefined ? null : x);
+    history.t.push(t);
+    history.rows.push([...band('alarm'), ...band('abort'), command, n(s.shaker.measured_g),
+      n(v.x_arcsec), n(v.y_arcsec), n(v.z_arcsec), ...worst.map(w => w || null)]);
+    if (history.t.length > kKept) { history.t.splice(0, kKept / 4); history.rows.splice(0, kKept / 4); }
+  }
+  const column = k => history.rows.map(r => r[k]);
+  function charts(s) {
+    if (history.t.length === 0) return;
+    const start = history.t[0], t = history.t.map(s => s / 60);
+    Draw.chart('amplitude', [t, ...[0, 1, 2, 3, 4, 5].map(column)]);
+    Draw.chart('innovations', [t, ...[6, 7, 8].map(column)]);
+    Draw.chart('sigma', [t, ...[9, 10, 11].map(column), t.map(() => 1)]);
+    const e = s.estimate, c = s.campaign;
+    set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
+    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`);
+    byId('c-amplitude').setAttribute('aria-label', `Table amplitude ${fixed(s.shaker.measured_g, 3, 'g')}, commanded ${fixed(c.command_table_g, 2, 'g')}, since ${duration(s.time_s - start)}`);
+    set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)} (1 when consistent)`);
+    byId('c-innovations').setAttribute('aria-label', `Innovations ${['x', 'y', 'z'].map(a => fixed((e.innovation || {})[a + '_arcsec'], 1, 'arc seconds')).join(', ')}`);
+    const worst = history.rows[history.rows.length - 1].slice(9, 12);
+    byId('c-sigma').setAttribute('aria-label', `Largest sigma over target: bias ${worst[0] || 'unknown'}, linear ${worst[1] || 'unknown'}, quadratic ${worst[2] || 'unknown'}`);
+    allan(s);
+  }
+  // The identified terms as a deviation (IEEE Std 952, annex C): Q of an angle reading, N, B, K, R.
+  function allan(s) {
+    const noise = s.noise || {}, gyros = noise.gyros || [];
+    const taus = Array.from({length: 31}, (_, i) => 10 ** (-1 + i / 10 * 1.2));
+    const curve = g => taus.map(tau => {
+      const v = k => (g.fit && g.fit[k] && g.fit[k].value) || 0, h = tau / 3600;
+      const q = v('Q') / tau, n = (g.fit ? v('N') : g.in_force_deg_per_rt_h || 0) / Math.sqrt(h), b = v('B') * 0.664, k = v('K') * Math.sqrt(h / 3), r = v('R') * h / Math.SQRT2;
+      const sum = Math.sqrt(3 * q * q + n * n + b * b + k * k + r * r);
+      return sum > 0 ? sum : null;
+    });
+    if (gyros.length < 3) return;
+    Draw.chart('allan', [taus, ...gyros.map(curve)]);
+    const words = gyros.map(g => {
+      const n = g.fit && g.fit.N;
+      return `${g.gyro} ${n && n.value !== undefined ? n.value.toExponential(1) : 'N as configured'}`;
+    }).join(', ');
+    set('noise', noise.dwells ? `   N, deg/√h, from ${noise.dwells} dwells: ${words}` : '   as configured; no dwell yet');
+    byId('c-allan').setAttribute('aria-label', `Allan deviation as identified. ${words}`);
+  }
+
+  function health(s) {
+    list('channels', (s.sample.channels || []).map(c => {
+      const kind = c.quality === 'unbound' ? 'off' : c.quality !== 'good' || c.age_s > 1 ? 'bad' : c.age_s > 0.2 ? 'warn' : '';
+      return [kind, c.name, `${c.quality}${c.value === undefined ? '' : ', ' + c.value.toFixed(4) + ' ' + c.unit}${c.age_s === undefined ? '' : ', ' + c.age_s.toFixed(2) + ' s'}`];
+    }));
+    const i = s.interlock;
+    list('interlock', (i.rows || []).map(r => [r.raised ? (r.reaction === 'abort' ? 'bad' : 'warn') : '', r.name,
+      (r.raised ? 'RAISED' + (r.value === undefined ? '' : ` ${r.value.toPrecision(3)} ${r.unit}`).trimEnd() + ', ' : '') + r.reaction + (r.limit === undefined ? '' : ` at ${r.limit} ${r.unit}`)]));
+    const a = s.assembler, stopped = (i.reaction_counts || []).reduce((n, c) => n + Number(c), 0);
+    const dropped = number(s.can.kernel_dropped) + number(s.estimator_ring.dropped);
+    table('links', [
+      ['CAN', s.can.link, s.can.link !== 'running'], ['shaker', s.shaker.link, s.shaker.link !== 'running'],
+      ['emergency stop', s.shaker.emergency_stop_open === undefined ? 'not read' : s.shaker.emergency_stop_open ? 'OPEN' : 'closed', s.shaker.emergency_stop_open !== false],
+      ['journal', s.journal.path ? (s.journal.running ? 'writes' : 'WAITS: ' + s.journal.note) : 'none', s.journal.path && !s.journal.running],
+      ['samples', a.samples], ['dropped', String(dropped), dropped > 0], ['gaps, incomplete', `${a.gaps}, ${a.incomplete}`, number(a.gaps) > 0],
+      ['late, duplicate, unknown', `${a.late}, ${a.duplicate}, ${a.unknown}`],
+      ['Modbus timeouts', s.shaker.timeouts], ['stops', `${stopped}, slowest ${number(i.reaction_largest_ms || 0).toFixed(2)} ms`]]);
+    set('footer', `vibrigd ${s.version}, clock ${s.clock}, up ${duration(s.uptime_s)}; you are a ${role}`);
+  }
+
+  function show() {
+    if (!status) return;
+    head(status);
+    gimbals(status);
+    remember(status);
+    charts(status);
+    Draw.coefficients(status.estimate.parameters || [], targets);
+    health(status);
+  }
+
+  function events(more) {
+    const e = byId('events');
+    for (const event of more) {
+      lastEvent = Math.max(lastEvent, number(event.id));
+      const li = document.createElement('li'), time = document.createElement('time');
+      li.className = event.severity;
+      time.dateTime = event.utc;
+      time.textContent = new Date(event.utc).toLocaleTimeString();
+      li.append(time, `${event.source}: ${event.text}`);
+      e.prepend(li);
+    }
+    while (e.children.length > kEvents) e.lastChild.remove();
+  }
+
+  async function getPlan() {
+    try {
+      plan = await (await fetch('/api/v1/plan')).json();
+      targets = {};
+      for (const p of plan.expected || []) if (p.target || p.sigma) targets[p.name] = p.target || p.sigma;
+      set('target-note', plan.adaptive ? 'The bar is the standard deviation, in factors of ten above its target.'
+        : 'The bar is the standard deviation, in factors of ten above what the plan lets expect at the end.');
+      show();
+    } catch { /* the stream tells when the link is lost */ }
+  }
+
+  // ---- the link
+  function take(message) {
+    heard = performance.now();
+    switch (message.type) {
+      case 'hello':
+        if (instance && instance !== message.instance) {
+          byId('events').textContent = '';
+          lastEvent = 0;
+          history.t = []; history.rows = [];
+        }
+        if (instance !== message.instance) getPlan();
+        instance = message.instance;
+        role = message.role;
+        stopButton();
+        break;
+      case 'status': status = message.status; show(); break;
+      case 'delta': merge(status, message.patch); show(); break;
+      case 'events': events(message.events); break;
+    }
+    state();
+  }
+  function connect() {
+    const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
+    // Events of another life of the daemon count anew: all of them are asked for, known ones are skipped by instance.
+    socket = new WebSocket(`${scheme}//${location.host}/api/v1/stream?rate_hz=${document.hidden ? kHidden_hz : kRate_hz}&after=${lastEvent}`);
+    let greeted = false;
+    const mine = socket;
+    socket.onmessage = e => {
+      if (mine !== socket) return;
+      const message = JSON.parse(e.data);
+      if (message.type === 'hello') {
+        greeted = true;
+        pause = 500;
+        if (instance && instance !== message.instance && lastEvent > 0) {   // asked with an id of the old life
+          lastEvent = 0;
+          take(message);
+          socket.close();
+          return;
+        }
+      }
+      take(message);
+    };
+    socket.onclose = () => {
+      if (mine !== socket) return;
+      socket = null;
+      setTimeout(connect, greeted ? 200 : pause);
+      pause = Math.min(pause * 1.6, 3000);
+      state();
+    };
+  }
+  function state() {
+    const silent = performance.now() - heard, connected = socket && socket.readyState === WebSocket.OPEN;
+    const lost = !connected && (silent > 1500 || !status), stale = connected && !document.hidden && silent > kStale_ms;
+    document.body.classList.toggle('lost', lost && !!status);
+    document.body.classList.toggle('stale', stale);
+    document.body.classList.toggle('waiting', !status);
+    const alert = byId('alert');
+    const what = lost ? 'LINK LOST' : stale ? 'STALE' : '';
+    alert.hidden = !what;
+    if (what) {   // said once to a screen reader, counted for the eyes
+      set('alert-text', `${what}: ${status ? 'what is shown is old' : 'no answer from vibrigd yet'}, trying again`);
+      set('alert-age', status ? ` (${duration(silent / 1000)})` : '');
+    }
+    if (stale && silent > 3 * kStale_ms && socket) { socket.close(); heard += kStale_ms; }
+    stopButton();
+  }
+  function stopButton() {
+    const button = byId('stop'), may = role === 'operator' || role === 'admin';
+    button.disabled = !may;
+    const note = failing ? 'THE STOP WAS NOT ACCEPTED. Use the emergency stop.'
+      : may ? 'Ramps the shaker down and ends the campaign. Not the emergency stop.'
+        : 'Read-only here: operators stop with “vibrig abort”. Not the emergency stop.';
+    if (byId('stop-note').textContent !== note) byId('stop-note').textContent = note;
+  }
+  byId('stop').addEventListener('click', async () => {   // without a question: a stop must not wait for one
+    try {
+      const reply = await fetch('/api/v1/commands', {method: 'POST', headers: {'Content-Type': 'application/json'},
+        body: JSON.stringify({kind: 'abort', by: 'live page'}), signal: AbortSignal.timeout(5000)});
+      failing = !reply.ok && reply.status !== 409;
+    } catch { failing = true; }
+    stopButton();
+  });
+  document.addEventListener('visibilitychange', () => {
+    if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({rate_hz: document.hidden ? kHidden_hz : kRate_hz}));
+    heard = performance.now();
+  });
+  const theme = matchMedia('(prefers-color-scheme: dark)');
+  theme.addEventListener('change', () => { Draw.again(); show(); });
+  addEventListener('resize', Draw.resize);
+  setInterval(state, 500);
+  connect();
+})();

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace vibrig::serve {
+
+class PkiError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// What stands in a certificate. Times are relative to now.
+struct CertificateSettings {
+    enum class Use { authority, server, client } use = Use::client;
+    std::string common_name;
+    std::string role;                ///< organisational unit; of clients
+    std::vector<std::string> hosts;  ///< of servers: names and addresses
+    std::chrono::hours valid_from{-1};
+    std::chrono::hours valid_for{24 * 825};
+};
+
+/// A key (elliptic, P-256) with its certificate, both PEM.
+struct Identity {
+    std::string certificate, key;
+};
+
+/// Signed by the issuer; by itself without one. Throws PkiError.
+[[nodiscard]] Identity make_identity(const CertificateSettings& settings,
+                                     const Identity* issuer = nullptr);
+/// Key, certificate and authority in one file that browsers import. Throws PkiError.
+[[nodiscard]] std::string pkcs12_of(const Identity& identity, const std::string& authority,
+                                    const std::string& name, const std::string& password);
+
+}  // namespace vibrig::serve

@@ -1,0 +1,82 @@
+#include "daemon/serve/readiness.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace vibrig::serve {
+namespace {
+
+constexpr std::array<const char*, 5> kLinkWords{"absent", "connecting", "running", "degraded",
+                                                "fault"};
+constexpr std::array<const char*, drivers::kChannels> kChannelWords{
+    "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
+constexpr double kOldest_s = 1;  // of a good value
+
+std::string seconds(double value) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.1f s", value);
+    return text.data();
+}
+
+}  // namespace
+
+bool Readiness::ready() const {
+    return std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.passed; });
+}
+
+std::string Readiness::failures() const {
+    std::string text;
+    for (const Check& check : checks) {
+        if (!check.passed) text += (text.empty() ? "" : "; ") + check.name + ": " + check.text;
+    }
+    return text;
+}
+
+Readiness readiness(const StatusData& status) {
+    Readiness found;
+    const auto add = [&found](const char* name, bool passed, std::string text) {
+        found.checks.push_back({name, passed, std::move(text)});
+    };
+    add("can", status.can == drivers::PortState::running,
+        std::string("link ") + kLinkWords[static_cast<std::size_t>(status.can)]);
+    add("shaker", status.shaker_link == drivers::LinkState::running && status.shaker.valid,
+        std::string("link ") + kLinkWords[static_cast<std::size_t>(status.shaker_link)] +
+            (status.shaker.valid ? "" : ", no reading"));
+    add("shaker fault", status.shaker.valid && status.shaker.fault == 0,
+        status.shaker.valid ? "fault bits " + std::to_string(status.shaker.fault) : "no reading");
+    add("emergency stop", status.shaker.valid && !status.shaker.emergency_stop_open,
+        !status.shaker.valid                ? "no reading"
+        : status.shaker.emergency_stop_open ? "open"
+                                            : "closed");
+    std::string bad;
+    for (std::size_t c = 0; c < drivers::kChannels; ++c) {
+        const auto quality = status.sample.quality[c];
+        const double age_s = status.channel_age_s[c];
+        if (quality == drivers::Quality::unbound) continue;
+        if (quality == drivers::Quality::good && age_s >= 0 && age_s <= kOldest_s) continue;
+        bad += (bad.empty() ? "" : ", ") + std::string(kChannelWords[c]) +
+               (age_s < 0 ? " never good" : " last good " + seconds(age_s) + " ago");
+    }
+    add("channels", bad.empty(), bad.empty() ? "all good" : bad);
+    const auto& platform = status.platform;
+    add("platform", platform.time != 0 && platform.ready && !platform.fault,
+        platform.time == 0 ? "no status yet"
+        : platform.fault   ? "fault"
+        : platform.ready   ? "ready"
+                           : "not ready");
+    add("interlock", status.interlock.tripped.empty(),
+        status.interlock.tripped.empty() ? "not tripped" : "tripped: " + status.interlock.tripped);
+    const auto& journal = status.journal;
+    add("journal", journal.path.empty() || journal.running,
+        journal.path.empty() ? "none is kept"
+        : journal.running    ? "writes"
+                             : journal.note);
+    add("losses", status.estimator_ring.dropped == 0,
+        std::to_string(status.estimator_ring.dropped) + " samples dropped before the filter");
+    return found;
+}
+
+}  // namespace vibrig::serve

@@ -1,0 +1,320 @@
+#include "daemon/serve/session.hpp"
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket.hpp>
+#include <charconv>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+namespace vibrig::serve {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+namespace websocket = boost::beast::websocket;
+using boost::system::error_code;
+using Clock = std::chrono::steady_clock;
+using Request = http::request<http::string_body>;
+using Response = http::response<http::string_body>;
+
+constexpr unsigned kHttp11 = 11;
+constexpr auto kHandshakeTime = std::chrono::seconds(10);
+constexpr std::size_t kLongestStreamMessage = 1024;
+
+Response response_of(ApiAnswer answer, unsigned version, bool keep_alive) {
+    Response response(static_cast<http::status>(answer.status), version);
+    response.set(http::field::server, "vibrigd");
+    response.set(http::field::content_type, answer.content_type);
+    response.set(http::field::cache_control, "no-store");
+    response.set("X-Content-Type-Options", "nosniff");
+    if (answer.is_page) {
+        response.set("Content-Security-Policy",
+                     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
+                     "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+                     "frame-ancestors 'none'");
+        response.set("Referrer-Policy", "no-referrer");
+    }
+    if (!answer.allow.empty()) response.set(http::field::allow, answer.allow);
+    if (answer.try_later) response.set(http::field::retry_after, "1");
+    response.keep_alive(keep_alive);
+    response.body() = std::move(answer.body);
+    response.prepare_payload();
+    return response;
+}
+
+std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
+
+/// One WebSocket client of the stream. Server thread only; lives while a handler of it waits.
+class Stream : public std::enable_shared_from_this<Stream> {
+  public:
+    Stream(AnyStream stream, StreamClient client, Shared& shared)
+        : socket_(std::move(stream)),
+          client_(std::move(client)),
+          shared_(shared),
+          timer_(socket_.get_executor()) {
+        ++shared_.api.traffic.streams;
+        ++shared_.api.traffic.connections;
+        auto timeout = websocket::stream_base::timeout::suggested(beast::role_type::server);
+        timeout.idle_timeout = shared_.limits.idle_timeout;
+        timeout.keep_alive_pings = true;
+        socket_.set_option(timeout);
+        socket_.read_message_max(kLongestStreamMessage);
+        socket_.text(true);
+    }
+    ~Stream() {
+        --shared_.api.traffic.streams;
+        --shared_.api.traffic.connections;
+    }
+    Stream(const Stream&) = delete;
+    Stream& operator=(const Stream&) = delete;
+
+    void start(const Request& request) {
+        socket_.async_accept(request, [self = shared_from_this()](error_code error) {
+            if (error) return;
+            self->read();
+            self->go_on();
+        });
+    }
+
+  private:
+    void read() {
+        socket_.async_read(buffer_, [self = shared_from_this()](error_code error, std::size_t) {
+            if (error) return self->end();
+            try {
+                self->client_.take(beast::buffers_to_string(self->buffer_.data()));
+            } catch (const std::exception& wrong) {
+                return self->close(websocket::close_code::policy_error, wrong.what());
+            }
+            self->buffer_.consume(self->buffer_.size());
+            self->read();
+        });
+    }
+
+    /// Writes what is next, or waits until there is something. One of both is always under way.
+    void go_on() {
+        if (ended_) return;
+        try {
+            text_ = client_.next(Clock::now());
+        } catch (const std::exception& slow) {
+            ++shared_.api.traffic.streams_dropped;
+            return close(websocket::close_code::try_again_later, slow.what());
+        }
+        if (!text_) {
+            timer_.expires_at(client_.due());
+            timer_.async_wait([self = shared_from_this()](error_code error) {
+                if (!error) self->go_on();
+            });
+            return;
+        }
+        socket_.async_write(asio::buffer(*text_),
+                            [self = shared_from_this()](error_code error, std::size_t) {
+                                if (error) return self->end();
+                                self->go_on();
+                            });
+    }
+
+    void close(websocket::close_code code, const std::string& why) {
+        if (std::exchange(ended_, true)) return;
+        timer_.cancel();
+        constexpr std::size_t kLongestReason = 120;
+        websocket::close_reason reason(code);
+        reason.reason = why.substr(0, kLongestReason);
+        socket_.async_close(reason, [self = shared_from_this()](error_code) {
+            self->socket_.next_layer().close();
+        });
+    }
+    void end() {
+        ended_ = true;
+        timer_.cancel();
+        socket_.next_layer().close();
+    }
+
+    websocket::stream<AnyStream> socket_;
+    StreamClient client_;
+    Shared& shared_;
+    asio::steady_timer timer_;
+    beast::flat_buffer buffer_;
+    std::shared_ptr<const std::string> text_;
+    bool ended_ = false;
+};
+
+/// One connection: read a request, answer, again. Server thread only; lives while a handler of it
+/// waits.
+class Session : public std::enable_shared_from_this<Session> {
+  public:
+    Session(AnyStream stream, Caller caller, Shared& shared)
+        : stream_(std::move(stream)),
+          caller_(std::move(caller)),
+          shared_(shared),
+          deadline_(stream_.get_executor()),
+          buffer_(shared.limits.header_bytes + shared.limits.body_bytes + 4096),
+          requests_(shared.limits.requests_per_s, shared.limits.requests_per_s) {
+        ++shared_.api.traffic.connections;
+    }
+    ~Session() { --shared_.api.traffic.connections; }
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
+
+    void start() {
+        if (!caller_.encrypted) return read();
+        arm(kHandshakeTime);
+        stream_.accept_handshake([self = shared_from_this()](error_code error) {
+            if (error) return self->end();
+            const auto [name, unit] = self->stream_.peer_subject();
+            Caller& who = self->caller_;
+            who.role = role_named(unit);
+            who.identity = "certificate " + name + ", " + name_of(who.role) + who.identity;
+            self->read();
+        });
+    }
+
+  private:
+    void arm(std::chrono::milliseconds time) {
+        deadline_.expires_after(time);
+        deadline_.async_wait([weak = weak_from_this()](error_code error) {
+            const auto self = weak.lock();
+            if (!error && self) self->stream_.close();
+        });
+    }
+    void end() {
+        deadline_.cancel();
+        stream_.close();
+    }
+
+    void read() {
+        parser_.emplace();
+        parser_->header_limit(shared_.limits.header_bytes);
+        parser_->body_limit(shared_.limits.body_bytes);
+        // One deadline for the whole request: who sends a byte now and then does not hold a place.
+        arm(shared_.limits.idle_timeout);
+        http::async_read(
+            stream_, buffer_, *parser_,
+            [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
+    }
+
+    void write(Response response) {
+        response_ = std::move(response);
+        arm(shared_.limits.idle_timeout);
+        http::async_write(stream_, response_,
+                          [self = shared_from_this()](error_code error, std::size_t) {
+                              if (error) return self->end();
+                              if (self->response_.need_eof()) return self->finish();
+                              self->read();
+                          });
+    }
+
+    void on_read(error_code error) {
+        const ServerLimits& limits = shared_.limits;
+        if (error == http::error::header_limit || error == http::error::buffer_overflow) {
+            return refuse(431,
+                          "header: more than " + std::to_string(limits.header_bytes) + " bytes");
+        }
+        if (error == http::error::body_limit) {
+            return refuse(413, "body: more than " + std::to_string(limits.body_bytes) + " bytes");
+        }
+        if (error == http::error::end_of_stream || error == http::error::partial_message) {
+            return finish();
+        }
+        if (error &&
+            error.category() == http::make_error_code(http::error::bad_method).category()) {
+            return refuse(400, "not a request in HTTP/1.1: " + error.message());
+        }
+        if (error) return end();  // gone, or out of time
+
+        const Request& request = parser_->get();
+        const bool head = request.method() == http::verb::head;
+        const bool wants_stream = websocket::is_upgrade(request) &&
+                                  view(request.target()).substr(0, 14) == "/api/v1/stream";
+        const ApiRequest asked{view(request.method_string()),
+                               view(request.target()),
+                               view(request[http::field::content_type]),
+                               view(request[http::field::host]),
+                               view(request[http::field::origin]),
+                               request.body()};
+        ApiAnswer answer;
+        if (!requests_.take(Clock::now())) {
+            answer = Api::problem(429, "too many requests on this connection");
+        } else if (caller_.role == Role::none) {
+            answer = Api::problem(403,
+                                  "the certificate names no role: its organisational unit is "
+                                  "none of viewer, operator, admin");
+        } else if (wants_stream) {
+            answer = upgrade(asked);
+            if (answer.status == 200) return;
+        } else {
+            answer = shared_.api.answer(asked, caller_);
+        }
+        // HEAD is refused like any other method, but its answer may not carry a body.
+        if (head) answer.body.clear();
+        write(response_of(std::move(answer), request.version(), request.keep_alive()));
+    }
+
+    /// Hands the connection to a Stream; status 200: done.
+    ApiAnswer upgrade(const ApiRequest& asked) {
+        if (ApiAnswer refusal = Api::check_browser(asked, caller_); refusal.status != 200)
+            return refusal;
+        const std::size_t mark = std::min(asked.target.find('?'), asked.target.size());
+        const std::string_view query = asked.target.substr(std::min(mark + 1, asked.target.size()));
+        double rate = 0;
+        std::uint64_t after = 0;
+        try {
+            rate = parse_rate(query_value(query, "rate_hz"));
+        } catch (const std::invalid_argument& error) {
+            return Api::problem(400, error.what());
+        }
+        const std::string_view id = query_value(query, "after");
+        std::from_chars(id.data(), id.data() + id.size(), after);
+        deadline_.cancel();
+        StreamClient client(shared_.feed, shared_.api.instance(), caller_.role, rate, after);
+        std::make_shared<Stream>(std::move(stream_), std::move(client), shared_)
+            ->start(parser_->get());
+        return {};
+    }
+
+    /// After a request that could not be read the place of the next one is not known: answer and
+    /// close.
+    void refuse(int status, const std::string& detail) {
+        write(response_of(Api::problem(status, detail), kHttp11, false));
+    }
+
+    void finish() {
+        deadline_.cancel();
+        stream_.finish();
+    }
+
+    AnyStream stream_;
+    Caller caller_;
+    Shared& shared_;
+    asio::steady_timer deadline_;
+    beast::flat_buffer buffer_;
+    TokenBucket requests_;
+    std::optional<http::request_parser<http::string_body>> parser_;
+    Response response_;
+};
+
+}  // namespace
+
+void serve_connection(AnyStream stream, Caller caller, Shared& shared) {
+    std::make_shared<Session>(std::move(stream), std::move(caller), shared)->start();
+}
+
+void turn_away(AnyStream::Socket socket, std::size_t limit) {
+    const std::string detail = "all " + std::to_string(limit) + " connections are taken";
+    error_code ignored;
+    socket.non_blocking(true, ignored);
+    std::ostringstream text;
+    text << response_of(Api::problem(503, detail), kHttp11, false);
+    asio::write(socket, asio::buffer(text.str()), ignored);
+}
+
+}  // namespace vibrig::serve

@@ -1,0 +1,49 @@
+// Drives Chromium over the live page for a test: one JSON command a line on standard input, one JSON answer a line.
+import {createInterface} from 'node:readline';
+import {createRequire} from 'node:module';
+
+const {chromium} = createRequire(process.env.VIBRIG_BROWSER_NPM + '/')('playwright-core');
+const browser = await chromium.launch({executablePath: process.env.VIBRIG_CHROMIUM || '/usr/bin/chromium', headless: true,
+  args: ['--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage']});
+const context = await browser.newContext({viewport: {width: 1400, height: 1000}, ignoreHTTPSErrors: true});
+const page = await context.newPage();
+const errors = [];
+let bytes = 0;
+page.on('pageerror', error => errors.push(String(error)));
+page.on('console', message => { if (message.type() === 'error') errors.push(message.text()); });
+page.on('response', async response => { try { bytes += (await response.body()).length; } catch { /* a WebSocket */ } });
+
+const commands = {
+  async open({url}) { await page.goto(url, {waitUntil: 'load'}); return bytes; },
+  async text({selector}) { return (await page.textContent(selector)) ?? null; },
+  async evaluate({script}) { return page.evaluate(script); },
+  async until({script, timeout}) {   // waitForFunction() evaluates inside the page, which its policy forbids
+    for (const end = Date.now() + timeout; Date.now() < end; await new Promise(done => setTimeout(done, 50))) {
+      if (await page.evaluate(script)) return true;
+    }
+    return false;
+  },
+  async press({key}) { await page.keyboard.press(key); return page.evaluate(() => document.activeElement.id || document.activeElement.className); },
+  async shot({file, width, height, scheme}) {
+    await page.setViewportSize({width, height});
+    await page.emulateMedia({colorScheme: scheme});
+    await page.waitForTimeout(300);
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+    await page.screenshot({path: file, fullPage: true});
+    return wide;
+  },
+  async names() {   // what has no name for a screen reader
+    return page.evaluate(() => [...document.querySelectorAll('button, [role=img], section, progress, [tabindex="0"]')]
+      .filter(e => !(e.getAttribute('aria-label') || e.getAttribute('aria-labelledby') || e.textContent.trim()))
+      .map(e => e.outerHTML.slice(0, 80)));
+  },
+  async errors() { return errors; },
+};
+
+for await (const line of createInterface({input: process.stdin})) {
+  const command = JSON.parse(line);
+  let answer;
+  try { answer = {value: await commands[command.command](command)}; } catch (error) { answer = {error: String(error)}; }
+  process.stdout.write(JSON.stringify(answer) + '\n');
+}
+await browser.close();

@@ -1,0 +1,289 @@
+#!/usr/bin/python3
+"""The status server of a whole vibrigd during a simulated campaign, by programs that are not ours: Chromium shows the
+live page, Prometheus scrapes, jsonschema compares every answer with the OpenAPI description, promtool checks metrics,
+alert rules and dashboard. Screenshots stay in build/tests/live-page for a person to look at.
+
+usage: live_page.py PROGRAMS     environment: VIBRIG_BROWSER_NPM, the folder with playwright-core's node_modules
+"""
+import http.client
+import json
+import os
+import socket
+import ssl
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.parse
+
+import jsonschema
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+ROOT = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
+SHOTS = os.path.join(ROOT, "build", "tests", "live-page")
+# Table 1 of Tang et al. 2009.
+POSITIONS = [[0, 0, 0], [0, 0, 45], [0, 0, 90], [0, 0, 180], [180, 0, 45], [45, 0, 0], [45, 0, 90], [90, 0, 90],
+             [90, 0, 180], [180, 0, 270], [270, 0, 0], [270, 0, 90], [-45, 0, 0], [-45, 0, 90]]
+CAMPAIGN = {"name": "live", "identify": "what-it-can", "positions_deg": POSITIONS,
+            "table_g": [9.0, 7.0], "dwell_s": 10.0}
+LARGEST_PAGE = 200_000  # bytes, all files together
+
+
+class Page:
+    """Chromium, driven line by line."""
+
+    def __init__(self):
+        driver = os.path.join(ROOT, "tests", "browser", "page_driver.mjs")
+        self.process = subprocess.Popen(["node", driver], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                                        preexec_fn=r.die_with_parent)
+
+    def ask(self, command, **arguments):
+        self.process.stdin.write(json.dumps({"command": command, **arguments}) + "\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        return json.loads(line) if line else {"error": "the browser is gone"}
+
+    def until(self, script, timeout_s=20):
+        return self.ask("until", script=script, timeout=1000 * timeout_s)
+
+    def end(self):
+        self.process.stdin.close()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+
+
+def get(address, path, headers=None, method="GET", body=None):
+    where = urllib.parse.urlparse(address)
+    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=10)
+    connection.request(method, path, body=body, headers=headers or {})
+    answer = connection.getresponse()
+    return answer.status, answer.getheader("Content-Type"), answer.read().decode()
+
+
+def page_address(rig, timeout_s=30):
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        for line in reversed(rig.daemon.text().splitlines()):
+            if "live page: " in line:
+                return line.split("live page: ")[1].strip()
+        time.sleep(0.1)
+    raise RuntimeError("vibrigd names no page:\n" + rig.logs())
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def check_description(checks, address):
+    """Every path of the OpenAPI description answers as it says."""
+    status, _, text = get(address, "/api/v1/openapi.json")
+    checks.check(status == 200, "the OpenAPI description is served")
+    api = json.loads(text)
+    checks.check(api["openapi"].startswith("3.1"), "it is OpenAPI 3.1")
+
+    def wrong(schema, value):
+        validator = jsonschema.Draft202012Validator({**schema, "components": api["components"]})
+        return "; ".join(f"{list(e.absolute_path)}: {e.message[:200]}" for e in validator.iter_errors(value))
+
+    for path, methods in api["paths"].items():
+        if "get" not in methods or "101" in methods["get"]["responses"]:
+            continue
+        status, kind, text = get(address, path)
+        kinds = methods["get"]["responses"]["200" if status == 200 else "default"]["content"]
+        found = next((s for k, s in kinds.items() if kind.startswith(k)), None)
+        value = json.loads(text) if "json" in kind else text
+        said = f"{status} {kind}" if found is None else wrong(found["schema"], value)
+        checks.check(found is not None and not said, f"{path} answers as described ({status})", said)
+    problem = api["components"]["schemas"]["Problem"]
+    for path, method, headers, body, expected in [
+            ("/nothing", "GET", {}, None, 404), ("/api/v1/status", "DELETE", {}, None, 405),
+            ("/api/v1/events?after=x", "GET", {}, None, 400), ("/api/v1/stream", "GET", {}, None, 426),
+            ("/api/v1/status", "GET", {"Host": "evil.example:80"}, None, 421),
+            ("/api/v1/status", "GET", {"Origin": "http://evil.example"}, None, 403),
+            ("/api/v1/commands", "POST", {"Content-Type": "text/plain"}, "{}", 415),
+            ("/api/v1/commands", "POST", {"Content-Type": "application/json"}, "[" * 5000, 400),
+            ("/api/v1/commands", "POST", {"Content-Type": "application/json"}, '{"kind":"abort","by":"x"}', 403)]:
+        status, kind, text = get(address, path, headers, method, body)
+        good = status == expected and kind == "application/problem+json" and not wrong(problem, json.loads(text))
+        checks.check(good, f"{method} {path} {json.dumps(headers)} is refused as a problem ({expected})", f"{status} {text[:300]}")
+
+
+def check_prometheus(checks, address, folder, seen):
+    """`seen`: the metrics while a campaign was recording."""
+    _, _, text = get(address, "/metrics")
+    run = subprocess.run(["promtool", "check", "metrics"], input=text, capture_output=True, text=True)
+    checks.check(run.returncode == 0 and not run.stderr.strip(), "promtool check metrics has nothing to say", run.stderr + run.stdout)
+    rules = os.path.join(ROOT, "systemd", "prometheus", "vibrig-alerts.yml")
+    run = subprocess.run(["promtool", "check", "rules", rules], capture_output=True, text=True)
+    checks.check(run.returncode == 0, "promtool check rules", run.stdout + run.stderr)
+    tests = os.path.join(ROOT, "systemd", "prometheus", "vibrig-alerts-test.yml")
+    run = subprocess.run(["promtool", "test", "rules", tests], capture_output=True, text=True)
+    checks.check(run.returncode == 0, "promtool test rules", run.stdout + run.stderr)
+    port = free_port()
+    configuration = os.path.join(folder, "prometheus.yml")
+    with open(configuration, "w", encoding="utf-8") as file:
+        file.write(f"global: {{scrape_interval: 1s, evaluation_interval: 1s}}\nrule_files: ['{rules}']\nscrape_configs:\n"
+                   f"  - job_name: vibrig\n    static_configs: [{{targets: ['{urllib.parse.urlparse(address).netloc}']}}]\n")
+    server = r.Child("prometheus", ["prometheus", "--config.file=" + configuration, "--storage.tsdb.path=" + os.path.join(folder, "tsdb"),
+                                    f"--web.listen-address=127.0.0.1:{port}"], folder)
+
+    def query(expression):
+        try:
+            _, _, said = get(f"http://127.0.0.1:{port}", "/api/v1/query?" + urllib.parse.urlencode({"query": expression}))
+            return json.loads(said)["data"]["result"]
+        except (OSError, ValueError, KeyError):
+            return []
+    end = time.monotonic() + 30
+    while time.monotonic() < end and len(query("rate(vibrig_samples_total[10s]) > 0")) == 0:
+        time.sleep(0.5)
+    checks.check(query("up{job='vibrig'} == 1"), "a real Prometheus scrapes it", server.text()[-2000:])
+    checks.check(query("rate(vibrig_samples_total[10s]) > 0"), "and sees samples come in")
+    with open(os.path.join(ROOT, "systemd", "prometheus", "vibrig-dashboard.json"), encoding="utf-8") as file:
+        dashboard = json.load(file)
+    known = {line.split()[2] for line in seen.splitlines() if line.startswith("# TYPE")}
+    known |= {name + "_bucket" for name in known}
+    missing = []
+    for panel in dashboard["panels"]:
+        for target in panel.get("targets", []):
+            used = [word for word in target["expr"].replace("(", " ").replace("[", " ").replace("{", " ").replace(")", " ").split()
+                    if word.startswith("vibrig_")]
+            missing += [name for name in used if name not in known]
+    checks.check(not missing, "every metric of the Grafana dashboard is there", str(sorted(set(missing))))
+    server.end()
+
+
+def check_remote(checks, rig, address, folder):
+    """Every command with every certificate, by the tool that people use."""
+    pki = os.path.join(folder, "pki")
+    expected = {"ada": 1, "wall": 2}  # pause without a campaign: refused by the campaign (1), by the role (2)
+    for name, code in expected.items():
+        tool = rig.program("vibrig")
+        host = urllib.parse.urlparse(address).netloc
+        run = subprocess.run([tool, "status", "--json", "--host", host, "--identity", os.path.join(pki, name)],
+                             capture_output=True, text=True, timeout=30)
+        checks.check(run.returncode == 0 and '"version"' in run.stdout, f"{name} reads the status over TLS", run.stderr)
+        run = subprocess.run([tool, "resume", "--by", name, "--host", host, "--identity", os.path.join(pki, name)],
+                             capture_output=True, text=True, timeout=30)
+        checks.check(run.returncode == code, f"{name} commands over TLS: exit code {code}", f"{run.returncode} {run.stderr}")
+    # Python's own TLS: no certificate, and a version that is too old.
+    port = int(address.rsplit(":", 1)[1])
+    for what, version, certificate in (("without a certificate", None, None), ("in TLS 1.1", ssl.TLSVersion.TLSv1_1, "ada"),
+                                       ("in TLS 1.2 with one", ssl.TLSVersion.TLSv1_2, "ada")):
+        context = ssl.create_default_context(cafile=os.path.join(pki, "authority.crt"))
+        if version is not None:
+            context.set_ciphers("ALL:@SECLEVEL=0")
+            context.minimum_version = context.maximum_version = version
+        if certificate:
+            context.load_cert_chain(os.path.join(pki, certificate + ".crt"), os.path.join(pki, certificate + ".key"))
+        try:
+            connection = http.client.HTTPSConnection("127.0.0.1", port, context=context, timeout=10)
+            connection.request("GET", "/api/v1/status")
+            said = connection.getresponse().status
+        except (OSError, http.client.HTTPException) as error:
+            said = type(error).__name__
+        checks.check((said == 200) == (what == "in TLS 1.2 with one"), f"{what}: {'answered' if said == 200 else 'refused'}", str(said))
+    checks.check("certificate wall, viewer" in rig.tool("events").stdout, "a refused command is in the events with its certificate")
+
+
+def check_page(checks, rig, page, address, control):
+    def until(what, script, timeout_s=20):
+        answer = page.until(script, timeout_s)
+        checks.check(answer.get("value") is True, what, str(answer) + "\n" + rig.logs(8))
+    state = "document.getElementById('state').textContent"
+    page.ask("open", url=address)
+    until("the page loads and shows a state", state + " === 'idle'")
+    size = page.ask("evaluate", script="performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation'))"
+                    ".filter(e => !e.name.includes('/api/')).reduce((n, e) => n + e.decodedBodySize, 0)").get("value", 0)
+    checks.check(0 < size < LARGEST_PAGE, f"it is smaller than {LARGEST_PAGE} bytes", f"{size} bytes")
+    checks.check(page.ask("evaluate", script="document.getElementById('stop').disabled").get("value") is True,
+                 "on plain HTTP nobody can stop the rig")
+    checks.check("Not the emergency stop" in page.ask("text", selector="#stop-note").get("value", ""),
+                 "the stop says that it is not the emergency stop")
+    checks.check(rig.tool("arm", "--by", "page test").returncode == 0 and rig.tool("start", "--by", "page test").returncode == 0,
+                 "the campaign starts", rig.logs())
+    until("the page follows the campaign live", state + " === 'recording'", 60)
+    until("its progress grows", "document.getElementById('progress').value > 20", 60)
+    until("coefficients with sigma are shown", "document.querySelectorAll('#coefficients td small').length >= 10")
+    until("positions done are marked", "document.querySelectorAll('#stops li.done').length >= 1")
+    until("charts are drawn", "document.querySelectorAll('.chart canvas').length === 4")
+    until("events are listed", "document.querySelectorAll('#events li').length > 3")
+    checks.check(page.ask("names").get("value") == [], "everything has a name for a screen reader", str(page.ask("names")))
+    page.ask("press", key="Tab")
+    checks.check(page.ask("evaluate", script="document.activeElement.className").get("value") == "skip",
+                 "the keyboard reaches the page's first link")
+    for name, width, height in (("desktop", 1400, 1000), ("phone", 390, 844)):
+        for scheme in ("light", "dark"):
+            file = os.path.join(SHOTS, f"recording-{name}-{scheme}.png")
+            wide = page.ask("shot", file=file, width=width, height=height, scheme=scheme).get("value", 10**6)
+            checks.check(wide <= width, f"{name}, {scheme}: no wider than the screen", f"{wide} of {width} pixels")
+    seen = get(address, "/metrics")[2]
+    rig.daemon.end()
+    until("a lost link is said loudly", "!document.getElementById('alert').hidden && document.getElementById('alert').textContent.startsWith('LINK LOST')")
+    page.ask("shot", file=os.path.join(SHOTS, "link-lost.png"), width=1400, height=1000, scheme="light")
+    rig.start_daemon()
+    until("the page finds the restarted daemon by itself", "document.getElementById('alert').hidden && " + state + " !== 'recording'", 40)
+    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running" and s["shaker"].get("state") == 0 and
+                 s["platform"].get("ready"), 60)
+    for _ in range(100):   # the daemon waits for its first readings
+        if rig.tool("arm", "--by", "page test").returncode == 0:
+            break
+        time.sleep(0.2)
+    checks.check(rig.tool("start", "--by", "page test").returncode == 0, "another campaign starts", rig.logs())
+    until("the page follows it", "['ramping', 'settling', 'recording'].includes(" + state + ")", 60)
+    control.write("estop open\n")
+    control.flush()
+    until("a trip is shown", state + " === 'tripped' && document.querySelector('header').className === 'bad'", 30)
+    until("with its reason", "/emergency/i.test(document.getElementById('reason').textContent)")
+    page.ask("shot", file=os.path.join(SHOTS, "tripped-desktop.png"), width=1400, height=1000, scheme="light")
+    page.ask("shot", file=os.path.join(SHOTS, "tripped-phone.png"), width=390, height=844, scheme="dark")
+    # What the browser says of a connection that was cut is no error of the page's.
+    errors = [e for e in page.ask("errors").get("value", ["?"]) if "WebSocket" not in e and "ERR_CONNECTION" not in e]
+    checks.check(errors == [], "no error in the browser's console", str(errors))
+    return seen
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    os.makedirs(SHOTS, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="vibrig-page-") as folder:
+        rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1)
+        pki = os.path.join(folder, "pki")
+        run = subprocess.run([rig.program("vibrig"), "pki", "init", "--folder", pki, "--host", "127.0.0.1", "--operator", "ada",
+                              "--viewer", "wall"], capture_output=True, text=True)
+        checks.check(run.returncode == 0, "vibrig pki init makes certificates", run.stderr)
+        fifo = os.path.join(folder, "control")
+        os.mkfifo(fifo)
+        control = os.fdopen(os.open(fifo, os.O_RDWR), "w", encoding="utf-8")
+        page = None
+        try:
+            rig.start_plant("--control", fifo, "--speed", "100", "--warm-up", "1")
+            remote = f"127.0.0.1:{free_port()}"
+            rig.configure(CAMPAIGN, server={"page": f"127.0.0.1:{free_port()}", "remote": remote,
+                                            "status_socket": os.path.join(folder, "status.sock"),
+                                            "certificate": os.path.join(pki, "server.crt"), "key": os.path.join(pki, "server.key"),
+                                            "clients_ca": os.path.join(pki, "authority.crt")})
+            rig.start_daemon()
+            address = page_address(rig)
+            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            check_description(checks, address)
+            check_remote(checks, rig, "https://" + remote, folder)
+            page = Page()
+            seen = check_page(checks, rig, page, address, control)
+            check_prometheus(checks, address, folder, seen)
+        finally:
+            if page is not None:
+                page.end()
+            rig.stop()
+            control.close()
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

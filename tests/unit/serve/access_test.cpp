@@ -1,0 +1,229 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <optional>
+
+#include "daemon/serve/client.hpp"
+#include "daemon/serve/pki.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "tests/unit/serve/fake_source.hpp"
+#include "tests/unit/serve/raw_connection.hpp"
+
+// Who may do what, through which door, and who is not let in at all.
+namespace vibrig::serve {
+namespace {
+
+using std::chrono::hours;
+using Use = CertificateSettings::Use;
+
+const std::vector<std::string> kKinds{"arm", "start", "pause", "resume", "abort", "acknowledge"};
+
+std::string body_for(const std::string& kind) {
+    return R"({"kind":")" + kind + R"(","by":"Ada","argument":"trip"})";
+}
+
+std::string without_scheme(std::string address) {
+    address.erase(0, address.find("//") + 2);
+    address.pop_back();
+    return address;
+}
+
+class Access : public testing::Test {
+  protected:
+    Access() {
+        save("authority", authority);
+        save("server",
+             make_identity({Use::server, "rig", "", {"127.0.0.1", "localhost"}}, &authority));
+        settings.socket = folder.file("control");
+        settings.status_socket = folder.file("status");
+        settings.page = "127.0.0.1:0";
+        settings.remote = "127.0.0.1:0";
+        settings.certificate = folder.file("server.crt");
+        settings.key = folder.file("server.key");
+        settings.clients_ca = folder.file("authority.crt");
+    }
+    void save(const std::string& name, const Identity& identity) const {
+        std::ofstream(folder.file(name + ".crt")) << identity.certificate;
+        std::ofstream(folder.file(name + ".key")) << identity.key;
+    }
+    /// A client with this certificate; the folder's authority is the one it trusts.
+    [[nodiscard]] Address remote(const std::string& name, const Identity& identity) const {
+        save(name, identity);
+        return {"", without_scheme(server->remote_address()), folder.file(name)};
+    }
+    [[nodiscard]] Identity person(const std::string& role) const {
+        return make_identity({Use::client, "p " + role, role, {}}, &authority);
+    }
+
+    FakeSource source;
+    TemporaryFolder folder;
+    Identity authority = make_identity({Use::authority, "authority", "", {}});
+    ServerSettings settings;
+    std::optional<StatusServer> server;
+};
+
+TEST_F(Access, EveryCommandByEveryRole) {
+    server.emplace(source, settings);
+    struct Row {
+        const char* role;
+        int reads, commands;
+    };
+    for (const Row& row : {Row{"viewer", 200, 403}, Row{"operator", 200, 200},
+                           Row{"admin", 200, 200}, Row{"chief", 403, 403}, Row{"", 403, 403}}) {
+        const std::string name = std::string("p") + row.role;
+        Client client(remote(name, person(row.role)));
+        for (const char* path : {"/api/v1/status", "/api/v1/config", "/metrics"})
+            EXPECT_EQ(client.get(path).status, row.reads) << row.role << ' ' << path;
+        for (const std::string& kind : kKinds) {
+            const std::size_t before = source.requests().size();
+            const std::size_t refused = source.refusals().size();
+            const Reply reply = client.post("/api/v1/commands", body_for(kind));
+            EXPECT_EQ(reply.status, row.commands) << row.role << ' ' << kind << ' ' << reply.body;
+            const auto requests = source.requests();
+            EXPECT_EQ(requests.size() - before, row.commands == 200 ? 1u : 0u);
+            if (row.commands == 200) {
+                EXPECT_EQ(requests.back().by, "Ada (certificate p " + std::string(row.role) + ", " +
+                                                  row.role + ", from 127.0.0.1)");
+            } else if (row.reads == 200) {
+                ASSERT_EQ(source.refusals().size() - refused, 1u) << "refusals are audited";
+                EXPECT_EQ(
+                    source.refusals().back().rfind(kind + " by Ada | certificate p viewer", 0), 0u)
+                    << source.refusals().back();
+            }
+        }
+    }
+}
+
+TEST_F(Access, EveryCommandThroughEveryLocalDoor) {
+    server.emplace(source, settings);
+    const std::string page = without_scheme(server->page_address());
+    for (const std::string& kind : kKinds) {
+        EXPECT_EQ(status_of(post(settings.socket, "/api/v1/commands", body_for(kind))), 200)
+            << kind;
+        EXPECT_EQ(status_of(post(settings.status_socket, "/api/v1/commands", body_for(kind))), 403);
+        const std::string body = body_for(kind);
+        const RawConnection browser(page);
+        browser.send("POST /api/v1/commands HTTP/1.1\r\nHost: " + page + "\r\nOrigin: http://" +
+                     page + "\r\nContent-Type: application/json\r\nContent-Length: " +
+                     std::to_string(body.size()) + "\r\n\r\n" + body);
+        EXPECT_EQ(status_of(browser.answer()), 403) << "the page is read-only";
+    }
+    EXPECT_EQ(source.requests().size(), kKinds.size());
+    EXPECT_EQ(source.refusals().size(), 2 * kKinds.size());
+    EXPECT_EQ(status_of(get(settings.status_socket, "/api/v1/status")), 200);
+}
+
+TEST_F(Access, BadCertificatesAreRefused) {
+    server.emplace(source, settings);
+    const Identity stranger = make_identity({Use::authority, "authority", "", {}});
+    const std::vector<std::pair<const char*, Identity>> bad{
+        {"expired",
+         make_identity({Use::client, "a", "admin", {}, hours(-48), hours(24)}, &authority)},
+        {"not yet valid", make_identity({Use::client, "a", "admin", {}, hours(24)}, &authority)},
+        {"of another authority with the same name",
+         make_identity({Use::client, "a", "admin", {}}, &stranger)},
+        {"signed by itself", make_identity({Use::client, "a", "admin", {}})},
+        {"a server's", make_identity({Use::server, "a", "admin", {"127.0.0.1"}}, &authority)},
+        {"with another's key", {person("admin").certificate, person("admin").key}}};
+    for (const auto& [what, identity] : bad) {
+        const int before = source.asked;
+        EXPECT_THROW((void)Client(remote("bad", identity)).get("/api/v1/status"), ClientError)
+            << what;
+        EXPECT_EQ(source.asked, before) << what;
+    }
+    // none at all, and no TLS at all
+    EXPECT_THROW((void)Client({"", without_scheme(server->remote_address()), ""}), ClientError);
+    const RawConnection plain(without_scheme(server->remote_address()));
+    plain.send("GET /api/v1/status HTTP/1.1\r\nHost: x\r\n\r\n");
+    EXPECT_EQ(plain.until_closed().find("200 OK"), std::string::npos);
+    // and a good one still is
+    EXPECT_EQ(Client(remote("good", person("viewer"))).get("/healthz").status, 200);
+}
+
+TEST_F(Access, BadServersAreNotBelieved) {
+    struct Row {
+        const char* what;
+        CertificateSettings settings;
+    };
+    for (const Row& row :
+         {Row{"of another host", {Use::server, "rig", "", {"rig.elsewhere"}}},
+          Row{"expired", {Use::server, "rig", "", {"127.0.0.1"}, hours(-48), hours(24)}},
+          Row{"a person's", {Use::client, "rig", "", {"127.0.0.1"}}}}) {
+        save("server", make_identity(row.settings, &authority));
+        server.emplace(source, settings);
+        EXPECT_THROW((void)Client(remote("ada", person("admin"))).get("/healthz"), ClientError)
+            << row.what;
+        server.reset();
+    }
+}
+
+TEST_F(Access, StrangersPagesAreNotAnswered) {
+    server.emplace(source, settings);
+    const std::string page = without_scheme(server->page_address());
+    const std::string port = page.substr(page.find(':'));
+    const auto ask = [&](const std::string& path, const std::string& host,
+                         const std::string& more = "") {
+        const RawConnection browser(page);
+        browser.send("GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\n" + more + "\r\n");
+        return browser.answer();
+    };
+    const std::string front = ask("/", page);
+    EXPECT_EQ(status_of(front), 200);
+    EXPECT_NE(front.find("Content-Security-Policy: default-src 'none'"), std::string::npos);
+    EXPECT_EQ(status_of(ask("/", "localhost" + port)), 200);
+    EXPECT_EQ(status_of(ask("/", "evil.example" + port)), 421) << "a name bound anew";
+    EXPECT_EQ(status_of(ask("/api/v1/status", "127.0.0.1")), 421);
+    EXPECT_EQ(status_of(ask("/api/v1/status", "")), 421);
+    EXPECT_EQ(status_of(ask("/api/v1/status", page, "Origin: http://" + page + "\r\n")), 200);
+    EXPECT_EQ(status_of(ask("/api/v1/status", page, "Origin: http://evil.example\r\n")), 403);
+    EXPECT_EQ(status_of(ask("/api/v1/status", page, "Origin: null\r\n")), 403);
+    const std::string upgrade =
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + "Origin: http://" + page + "\r\n")),
+              101);
+    EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + "Origin: http://evil.example\r\n")),
+              403);
+}
+
+TEST_F(Access, ManyCommandsAreTooManyButAStopNeverIs) {
+    server.emplace(source, settings);
+    Client client(settings.socket);
+    int taken = 0, refused = 0;
+    for (int i = 0; i < 200; ++i) {
+        const int status = client.post("/api/v1/commands", body_for("pause")).status;
+        taken += status == 200 ? 1 : 0;
+        refused += status == 429 ? 1 : 0;
+        ASSERT_EQ(client.post("/api/v1/commands", body_for("abort")).status, 200) << i;
+    }
+    EXPECT_EQ(taken + refused, 200);
+    EXPECT_GT(refused, 0);
+    EXPECT_GE(taken, 25) << "a burst is fine";
+}
+
+TEST_F(Access, SettingsThatCannotBeAreRefusedByName) {
+    struct Row {
+        std::string ServerSettings::*field;
+        const char *value, *words;
+    };
+    for (const Row& row :
+         {Row{&ServerSettings::page, "0.0.0.0:0", "loopback"},
+          Row{&ServerSettings::page, "127.0.0.1", "expected HOST:PORT"},
+          Row{&ServerSettings::remote, "no.such.host.invalid:1", "server.remote"},
+          Row{&ServerSettings::certificate, "/nowhere.crt", "/nowhere.crt"},
+          Row{&ServerSettings::clients_ca, "/nowhere.crt", "authority"},
+          Row{&ServerSettings::operator_group, "no-such-group", "server.operator_group"}}) {
+        ServerSettings bad = settings;
+        bad.*row.field = row.value;
+        try {
+            const StatusServer refused(source, bad);
+            ADD_FAILURE() << row.value;
+        } catch (const ServeError& error) {
+            EXPECT_NE(std::string(error.what()).find(row.words), std::string::npos) << error.what();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace vibrig::serve

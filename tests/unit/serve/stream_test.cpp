@@ -1,0 +1,213 @@
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "daemon/serve/metrics.hpp"
+#include "daemon/serve/openapi.hpp"
+#include "daemon/serve/readiness.hpp"
+#include "daemon/serve/status_json.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "daemon/serve/stream_feed.hpp"
+#include "tests/unit/serve/fake_source.hpp"
+#include "tests/unit/serve/raw_connection.hpp"
+
+namespace vibrig::serve {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+bool has(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+TEST(StreamClientTest, GetsTheStatusOnceAndThenWhatChanged) {
+    FakeSource source;
+    StreamFeed feed(source);
+    StreamClient client(feed, "1234", Role::viewer, 20, 0);
+    auto now = Clock::now();
+    EXPECT_EQ(*client.next(now), R"({"type":"hello","instance":"1234","role":"viewer"})");
+    EXPECT_EQ(*client.next(now),
+              R"({"type":"status","status":)" + status_json(source.status()) + '}');
+    EXPECT_EQ(client.next(now), nullptr) << "not due";
+    EXPECT_GT(client.due(), now);
+    // WHEN one number changes THEN the patch holds it and nothing else
+    StatusData status = source.status();
+    status.time += drivers::kSecond;
+    source.set(status);
+    std::this_thread::sleep_for(25ms);  // older than what clients share
+    const auto patch = client.next(client.due());
+    ASSERT_NE(patch, nullptr);
+    EXPECT_TRUE(has(*patch, R"({"type":"delta","patch":{"time_s":)")) << *patch;
+    EXPECT_LT(patch->size(), 200u) << *patch;
+    // WHEN a value is no longer there THEN the patch says null
+    status.shaker.valid = false;
+    source.set(status);
+    std::this_thread::sleep_for(25ms);
+    EXPECT_TRUE(has(*client.next(client.due()), R"("measured_g":null)"));
+}
+
+TEST(StreamClientTest, GetsEveryEventInOrderOrIsTooSlow) {
+    FakeSource source;
+    StreamFeed feed(source);
+    const auto add = [&](int count) {
+        for (int i = 0; i < count; ++i)
+            source.log.append({0, 0, 0, Severity::info, "x", "happened"});
+    };
+    add(5000);
+    StreamClient client(feed, "1", Role::viewer, 20, 0);
+    (void)client.next(Clock::now());
+    const std::string first = *client.next(Clock::now());
+    EXPECT_TRUE(has(first, R"("id":"5000")") && has(first, R"("id":"4501")")) << "the newest 500";
+    EXPECT_FALSE(has(first, R"("id":"4500")"));
+    (void)client.next(Clock::now());
+    add(2);
+    const std::string next = *client.next(client.due());
+    EXPECT_TRUE(has(next, R"("id":"5001")") && has(next, R"("id":"5002")") && !has(next, "5000"));
+    add(501);
+    (void)client.next(client.due());  // the status that was due
+    EXPECT_THROW((void)client.next(client.due()), std::runtime_error);
+}
+
+TEST(StreamClientTest, TakesARateAndNothingElse) {
+    FakeSource source;
+    StreamFeed feed(source);
+    StreamClient client(feed, "1", Role::viewer, 1, 0);
+    EXPECT_NO_THROW(client.take(R"({"rate_hz": 5})"));
+    for (const char* bad : {"", "{", "5", R"({"rate_hz":"5"})", R"({"rate_hz":0})",
+                            R"({"rate_hz":1e9})", R"({"rate_hz":null})", R"({"rate":1})", "[]"})
+        EXPECT_THROW(client.take(bad), std::invalid_argument) << bad;
+}
+
+/// A WebSocket by hand: what the server sends is not masked.
+class Socket {
+  public:
+    Socket(const std::string& path, const std::string& query) : raw_(path) {
+        raw_.send(
+            "GET /api/v1/stream" + query +
+            " HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n");
+        answer = raw_.answer();
+    }
+    /// The next message's text; "(closed CODE)".
+    std::string next() {
+        std::string text;
+        while (true) {
+            const std::string head = raw_.bytes(2);
+            if (head.size() < 2) return "(gone)";
+            const auto byte = [](char c) {
+                return static_cast<std::size_t>(static_cast<unsigned char>(c));
+            };
+            std::size_t size = byte(head[1]) & 0x7F;
+            if (size >= 126) {
+                const std::string longer = raw_.bytes(size == 126 ? 2 : 8);
+                size = 0;
+                for (const char c : longer) size = size << 8 | byte(c);
+            }
+            const std::string payload = raw_.bytes(size);
+            if ((byte(head[0]) & 0x0F) == 8)
+                return "(closed " + std::to_string(byte(payload[0]) << 8 | byte(payload[1])) + ")";
+            if ((byte(head[0]) & 0x0F) > 2) continue;  // a ping
+            text += payload;
+            if ((byte(head[0]) & 0x80) != 0) return text;
+        }
+    }
+    std::string answer;
+
+  private:
+    RawConnection raw_;
+};
+
+TEST(Stream, OverASocketIsAWebSocketAtTheRateAskedFor) {
+    FakeSource source;
+    const TemporaryFolder folder;
+    StatusServer server(source, folder.file("s"));
+    Socket stream(folder.file("s"), "?rate_hz=20");
+    EXPECT_EQ(status_of(stream.answer), 101);
+    // The accept key of RFC 6455, section 1.3.
+    EXPECT_TRUE(has(stream.answer, "s3pPLMBiTxaQ9kYGzzhZRbK+xOo="));
+    EXPECT_TRUE(has(stream.next(), R"("type":"hello")"));
+    EXPECT_TRUE(has(stream.next(), R"("type":"status")"));
+    source.log.append({0, 0, 0, Severity::trip, "interlock", "emergency stop"});
+    EXPECT_TRUE(has(stream.next(), R"("type":"events")"));
+    EXPECT_EQ(status_of(Socket(folder.file("s"), "?rate_hz=1000").answer), 400);
+    EXPECT_EQ(status_of(get(folder.file("s"), "/api/v1/stream")), 426);
+}
+
+TEST(Stream, OfOneWhoNeverReadsHoldsNobodyUpAndEnds) {
+    FakeSource source;
+    const TemporaryFolder folder;
+    StatusServer server(source, folder.file("s"));
+    // GIVEN one who never reads, while events pour in
+    const Socket deaf(folder.file("s"), "?rate_hz=20");
+    Socket reads(folder.file("s"), "?rate_hz=20");
+    bool ended = false;
+    for (int i = 0; i < 200 && !ended; ++i) {
+        for (int k = 0; k < 400; ++k)
+            source.log.append({0, 0, 0, Severity::info, "x", std::string(500, 'x')});
+        // THEN who reads is served, until everything he gets has come
+        for (std::string text; !has(text, R"("type":"events")");) {
+            text = reads.next();
+            ASSERT_NE(text.front(), '(') << text;
+        }
+        ended = has(get(folder.file("s"), "/metrics"), "vibrig_server_streams_dropped_total 1");
+    }
+    EXPECT_TRUE(ended || has(get(folder.file("s"), "/metrics"), "vibrig_server_streams 2"))
+        << "its place is bounded either way";
+}
+
+TEST(Readiness, NamesWhatIsNotWell) {
+    StatusData well;
+    well.can = drivers::PortState::running;
+    well.shaker_link = drivers::LinkState::running;
+    well.shaker.valid = true;
+    well.sample.quality.fill(drivers::Quality::good);
+    well.platform.time = 1;
+    well.platform.ready = true;
+    EXPECT_TRUE(readiness(well).ready()) << readiness(well).failures();
+    struct Row {
+        const char* words;
+        void (*spoil)(StatusData&);
+    };
+    for (const Row& row : {
+             Row{"can: link fault", [](StatusData& s) { s.can = drivers::PortState::fault; }},
+             Row{"shaker: link connecting",
+                 [](StatusData& s) { s.shaker_link = drivers::LinkState::connecting; }},
+             Row{"emergency stop: open",
+                 [](StatusData& s) { s.shaker.emergency_stop_open = true; }},
+             Row{"channels: inner last good 5.0 s ago",
+                 [](StatusData& s) { s.channel_age_s[1] = 5; }},
+             Row{"platform: not ready", [](StatusData& s) { s.platform.ready = false; }},
+             Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
+             Row{"journal: disk full",
+                 [](StatusData& s) { s.journal = {"j", false, "disk full", 0, 0, 0}; }},
+         }) {
+        StatusData spoilt = well;
+        row.spoil(spoilt);
+        EXPECT_TRUE(has(readiness(spoilt).failures(), row.words)) << readiness(spoilt).failures();
+    }
+}
+
+TEST(Metrics, CarryWhatIsValidAndAddUp) {
+    StatusData status = full_status();
+    const std::string text = metrics_text(status, {});
+    EXPECT_TRUE(has(text, "# TYPE vibrig_interlock_reaction_seconds histogram"));
+    EXPECT_TRUE(has(text, "vibrig_interlock_reaction_seconds_count 6\n")) << text;
+    EXPECT_TRUE(has(text, "vibrig_interlock_reaction_seconds_sum 0.0045\n"));
+    EXPECT_TRUE(has(text, "vibrig_interlock_reaction_seconds_bucket{le=\"+Inf\"} 6\n"));
+    EXPECT_TRUE(has(text, "vibrig_campaign_state{state=\"recording\"} 1\n"));
+    EXPECT_FALSE(has(text, "nan") || has(text, "Nan")) << text;
+    status.shaker.valid = false;
+    EXPECT_FALSE(has(metrics_text(status, {}), "vibrig_shaker_measured"));
+}
+
+TEST(OpenApi, IsOneJsonObject) {
+    google::protobuf::Struct tree;
+    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(openapi_json(), &tree).ok());
+    EXPECT_EQ(tree.fields().count("paths"), 1u);
+}
+
+}  // namespace
+}  // namespace vibrig::serve
