@@ -493,7 +493,9 @@ CommandReply Daemon::command(const CommandRequest& request) {
     }
     if (reply.wait_for(std::chrono::seconds(5)) != std::future_status::ready &&
         !abandoned->exchange(true)) {
-        return {false, "no answer from the control thread within 5 s"};
+        const CommandReply none{false, "no answer from the control thread within 5 s"};
+        if (journal_) journal_->command(request, none, utc_now());
+        return none;
     }
     return reply.get();
 }

@@ -46,8 +46,8 @@ struct Configuration {
         std::string operator_group, status_socket, page, remote;
         std::string certificate, key, clients_ca;
     } server;
-    std::string log_level = "info";                                             ///< [log] level
-    std::string log_file;  ///< [log] file; empty: standard error
+    std::string log_level = "info";  ///< [log] level
+    std::string log_file;            ///< [log] file; empty: standard error
     /// [journal] file; empty: journal.sqlite3 in results, and none without results
     std::string journal;
     std::string results;  ///< [campaign] results: folder for result.json; empty: none written

@@ -180,7 +180,7 @@ std::string_view query_value(std::string_view query, std::string_view name) {
 }
 
 Api::Api(StatusSource& source, std::string instance)
-    : source_(source), instance_(std::move(instance)) {}
+    : source_(source), instance_(std::move(instance)), feed_(source) {}
 
 ApiAnswer Api::problem(int status, const std::string& detail) {
     ApiAnswer answer;
@@ -280,7 +280,7 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
     } else if (path == "/api/v1/config") {
         answer.body = configuration_json(source_.effective_configuration());
     } else {
-        answer.body = status_json(source_.status());
+        answer.body = feed_.newest_text();
     }
     return answer;
 }
@@ -326,6 +326,7 @@ ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
     // audit line has both.
     parsed.by += " (" + caller.identity + ")";
     const CommandReply reply = source_.command(parsed);
+    feed_.forget();
     if (!reply.accepted) return problem(409, reply.message);
     ApiAnswer answer;
     answer.body = reply_json(reply);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "daemon/serve/caller.hpp"
+#include "daemon/serve/stream_feed.hpp"
 #include "daemon/status.hpp"
 
 namespace vibrig::serve {
@@ -52,7 +53,7 @@ class Api {
 
     [[nodiscard]] static ApiAnswer problem(int status, const std::string& detail);
     [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
-    [[nodiscard]] StatusSource& source() noexcept { return source_; }
+    [[nodiscard]] StreamFeed& feed() noexcept { return feed_; }
 
     /// What the server itself counts, for /metrics.
     struct Traffic {
@@ -67,6 +68,7 @@ class Api {
 
     StatusSource& source_;
     std::string instance_;
+    StreamFeed feed_;
     TokenBucket commands_{10, 50};
 };
 

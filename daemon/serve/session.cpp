@@ -275,7 +275,7 @@ class Session : public std::enable_shared_from_this<Session> {
         const std::string_view id = query_value(query, "after");
         std::from_chars(id.data(), id.data() + id.size(), after);
         deadline_.cancel();
-        StreamClient client(shared_.feed, shared_.api.instance(), caller_.role, rate, after);
+        StreamClient client(shared_.api.feed(), shared_.api.instance(), caller_.role, rate, after);
         std::make_shared<Stream>(std::move(stream_), std::move(client), shared_)
             ->start(parser_->get());
         return {};

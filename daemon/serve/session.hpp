@@ -13,7 +13,6 @@ namespace vibrig::serve {
 /// What all connections of the server share; outlives them.
 struct Shared {
     Api& api;
-    StreamFeed& feed;
     const ServerLimits& limits;
 };
 

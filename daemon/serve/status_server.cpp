@@ -58,23 +58,23 @@ bool is_member(uid_t uid, gid_t wanted) {
     return std::find(groups.begin(), groups.begin() + count, wanted) != groups.begin() + count;
 }
 
-enum class Door : std::uint8_t { control, status, page, remote };
-
-struct Listener {
-    Listener(asio::io_context& io, Door which, const Protocol& protocol, int descriptor)
-        : door(which), acceptor(io), pause(io) {
-        acceptor.assign(protocol, descriptor);
-    }
-    Door door;
-    asio::basic_socket_acceptor<Protocol> acceptor;
-    asio::steady_timer pause;
-};
-
 }  // namespace
 
 struct StatusServer::Impl {
+    enum class Door : std::uint8_t { control, status, page, remote };
+
+    struct Listener {
+        Listener(asio::io_context& io, Door which, const Protocol& protocol, int descriptor)
+            : door(which), acceptor(io), pause(io) {
+            acceptor.assign(protocol, descriptor);
+        }
+        Door door;
+        asio::basic_socket_acceptor<Protocol> acceptor;
+        asio::steady_timer pause;
+    };
+
     Impl(StatusSource& source, const ServerSettings& given)
-        : settings(given), api(source, random_instance()), feed(source) {
+        : settings(given), api(source, random_instance()) {
         if (!settings.operator_group.empty()) operators = group_named(settings.operator_group);
         open_unix(Door::control, settings.socket);
         if (operators && ::chown(settings.socket.c_str(), static_cast<uid_t>(-1), *operators) != 0)
@@ -188,8 +188,7 @@ struct StatusServer::Impl {
     // Outlive the io_context, whose end destroys the waiting sessions.
     std::deque<SocketFile> files;
     Api api;
-    StreamFeed feed;
-    Shared shared{api, feed, settings.limits};
+    Shared shared{api, settings.limits};
     std::optional<asio::ssl::context> tls;
     std::string page, remote;
     asio::io_context io{1};

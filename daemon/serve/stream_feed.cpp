@@ -17,7 +17,7 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr auto kYoung = std::chrono::milliseconds(20);  // clients due together share a status
-constexpr std::size_t kMadeKept = 16;
+constexpr std::size_t kMadeKept = 64;
 constexpr double kDefaultRate_hz = 1;
 
 /// The merge patch that makes `after` of `before`; both objects.
@@ -45,8 +45,14 @@ struct Frame {
     std::uint64_t number = 0;
     Clock::time_point made;
     std::string text;
-    Json tree;
+    mutable Json parsed = nullptr;
+    [[nodiscard]] const Json& tree() const {
+        if (parsed.is_null()) parsed = Json::parse(text);
+        return parsed;
+    }
 };
+
+const std::string& StreamFeed::newest_text() { return newest()->text; }
 
 std::shared_ptr<const Frame> StreamFeed::newest() {
     const auto now = Clock::now();
@@ -55,7 +61,6 @@ std::shared_ptr<const Frame> StreamFeed::newest() {
     frame->number = ++number_;
     frame->made = now;
     frame->text = status_json(source_.status());
-    frame->tree = Json::parse(frame->text);
     newest_ = std::move(frame);
     return newest_;
 }
@@ -69,7 +74,7 @@ std::shared_ptr<const std::string> StreamFeed::change(const std::shared_ptr<cons
     std::shared_ptr<const std::string> text;
     if (!before) {
         text = shared(R"({"type":"status","status":)" + after->text + '}');
-    } else if (Json patch = difference(before->tree, after->tree); !patch.empty()) {
+    } else if (Json patch = difference(before->tree(), after->tree()); !patch.empty()) {
         text = shared(R"({"type":"delta","patch":)" + patch.dump() + '}');
     }
     made_.push_back({from, after->number, text});
@@ -118,8 +123,9 @@ std::shared_ptr<const std::string> StreamClient::next(Clock::time_point now) {
     if (now < due_) {
         return {};
     }
-    // Never faster than asked for, and no burst afterwards to make up for what was slow.
-    due_ = now + period_;
+    // On a grid: clients of one rate are due together and share what is made for them. No burst
+    // afterwards to make up for what was slow.
+    due_ = Clock::time_point((now.time_since_epoch() / period_ + 1) * period_);
     events_looked_at_ = false;
     const auto frame = feed_.newest();
     auto text = feed_.change(sent_, frame);

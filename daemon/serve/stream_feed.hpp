@@ -5,9 +5,11 @@
 #include <deque>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "daemon/serve/api.hpp"
+#include "daemon/serve/caller.hpp"
+#include "daemon/status.hpp"
 
 namespace vibrig::serve {
 
@@ -21,6 +23,9 @@ class StreamFeed {
     explicit StreamFeed(StatusSource& source) : source_(source) {}
     /// The status now, or of a moment ago.
     [[nodiscard]] std::shared_ptr<const Frame> newest();
+    /// Its text; one who commands sees what came of it after forget().
+    [[nodiscard]] const std::string& newest_text();
+    void forget() noexcept { newest_.reset(); }
     [[nodiscard]] StatusSource& source() noexcept { return source_; }
     /// {"type":"status","status":...} without a frame before, else {"type":"delta","patch":...}, a
     /// JSON merge patch (RFC 7396); empty: nothing changed.

@@ -15,7 +15,8 @@ void add_level(CLI::App& app, int& exit_code);
 void add_zero(CLI::App& app, int& exit_code);
 void add_reproduce(CLI::App& app, int& exit_code);
 void add_pki(CLI::App& app, int& exit_code);
-void add_remote(CLI::App& app,
-                int& exit_code);  ///< status, selftest, watch, events, arm, start, pause, resume, abort, ack
+void add_remote(
+    CLI::App& app,
+    int& exit_code);  ///< status, selftest, watch, events, arm, start, pause, resume, abort, ack
 
 }  // namespace vibrig::tool
