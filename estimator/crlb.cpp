@@ -14,7 +14,7 @@ namespace {
 /// A direction with less than this share of the largest information, prior units, is not determined
 /// at all.
 constexpr double kNoInformation = 1e-10;
-constexpr double kShare = 1e-3;
+constexpr double kUndeterminedShare = 1e-3;
 
 using Matrix3x30 = Eigen::Matrix<double, 3, kParameters>;
 
@@ -111,7 +111,7 @@ std::array<double, kParameters> predicted_sigma(const Settings& settings,
             const double value = eigen.values[k];
             if (value > least) {
                 variance += share * share / value;
-            } else if (std::abs(share) > kShare) {
+            } else if (std::abs(share) > kUndeterminedShare) {
                 variance = std::numeric_limits<double>::infinity();
             }
         }
