@@ -19,7 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-bool has(const std::string& text, const std::string& part) {
+bool holds(const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
 }
 
@@ -40,13 +40,13 @@ TEST(StreamClientTest, GetsTheStatusOnceAndThenWhatChanged) {
     std::this_thread::sleep_for(25ms);  // older than what clients share
     const auto patch = client.next(client.due());
     ASSERT_NE(patch, nullptr);
-    EXPECT_TRUE(has(*patch, R"({"type":"delta","patch":{"time_s":)")) << *patch;
+    EXPECT_TRUE(holds(*patch, R"({"type":"delta","patch":{"time_s":)")) << *patch;
     EXPECT_LT(patch->size(), 200u) << *patch;
     // WHEN a value is no longer there THEN the patch says null
     status.shaker.valid = false;
     source.set(status);
     std::this_thread::sleep_for(25ms);
-    EXPECT_TRUE(has(*client.next(client.due()), R"("measured_g":null)"));
+    EXPECT_TRUE(holds(*client.next(client.due()), R"("measured_g":null)"));
 }
 
 TEST(StreamClientTest, GetsEveryEventInOrderOrIsTooSlow) {
@@ -60,12 +60,14 @@ TEST(StreamClientTest, GetsEveryEventInOrderOrIsTooSlow) {
     StreamClient client(feed, "1", Role::viewer, 20, 0);
     (void)client.next(Clock::now());
     const std::string first = *client.next(Clock::now());
-    EXPECT_TRUE(has(first, R"("id":"5000")") && has(first, R"("id":"4501")")) << "the newest 500";
-    EXPECT_FALSE(has(first, R"("id":"4500")"));
+    EXPECT_TRUE(holds(first, R"("id":"5000")") && holds(first, R"("id":"4501")"))
+        << "the newest 500";
+    EXPECT_FALSE(holds(first, R"("id":"4500")"));
     (void)client.next(Clock::now());
     add(2);
     const std::string next = *client.next(client.due());
-    EXPECT_TRUE(has(next, R"("id":"5001")") && has(next, R"("id":"5002")") && !has(next, "5000"));
+    EXPECT_TRUE(holds(next, R"("id":"5001")") && holds(next, R"("id":"5002")") &&
+                !holds(next, "5000"));
     add(501);
     (void)client.next(client.due());  // the status that was due
     EXPECT_THROW((void)client.next(client.due()), std::runtime_error);
@@ -127,11 +129,11 @@ TEST(Stream, OverASocketIsAWebSocketAtTheRateAskedFor) {
     Socket stream(folder.file("s"), "?rate_hz=20");
     EXPECT_EQ(status_of(stream.answer), 101);
     // The accept key of RFC 6455, section 1.3.
-    EXPECT_TRUE(has(stream.answer, "s3pPLMBiTxaQ9kYGzzhZRbK+xOo="));
-    EXPECT_TRUE(has(stream.next(), R"("type":"hello")"));
-    EXPECT_TRUE(has(stream.next(), R"("type":"status")"));
+    EXPECT_TRUE(holds(stream.answer, "s3pPLMBiTxaQ9kYGzzhZRbK+xOo="));
+    EXPECT_TRUE(holds(stream.next(), R"("type":"hello")"));
+    EXPECT_TRUE(holds(stream.next(), R"("type":"status")"));
     source.log.append({0, 0, 0, Severity::trip, "interlock", "emergency stop"});
-    EXPECT_TRUE(has(stream.next(), R"("type":"events")"));
+    EXPECT_TRUE(holds(stream.next(), R"("type":"events")"));
     EXPECT_EQ(status_of(Socket(folder.file("s"), "?rate_hz=1000").answer), 400);
     EXPECT_EQ(status_of(get(folder.file("s"), "/api/v1/stream")), 426);
 }
@@ -148,13 +150,13 @@ TEST(Stream, OfOneWhoNeverReadsHoldsNobodyUpAndEnds) {
         for (int k = 0; k < 400; ++k)
             source.log.append({0, 0, 0, Severity::info, "x", std::string(500, 'x')});
         // THEN who reads is served, until everything he gets has come
-        for (std::string text; !has(text, R"("type":"events")");) {
+        for (std::string text; !holds(text, R"("type":"events")");) {
             text = reads.next();
             ASSERT_NE(text.front(), '(') << text;
         }
-        ended = has(get(folder.file("s"), "/metrics"), "vibrig_server_streams_dropped_total 1");
+        ended = holds(get(folder.file("s"), "/metrics"), "vibrig_server_streams_dropped_total 1");
     }
-    EXPECT_TRUE(ended || has(get(folder.file("s"), "/metrics"), "vibrig_server_streams 2"))
+    EXPECT_TRUE(ended || holds(get(folder.file("s"), "/metrics"), "vibrig_server_streams 2"))
         << "its place is bounded either way";
 }
 
@@ -186,21 +188,21 @@ TEST(Readiness, NamesWhatIsNotWell) {
          }) {
         StatusData spoilt = well;
         row.spoil(spoilt);
-        EXPECT_TRUE(has(readiness(spoilt).failures(), row.words)) << readiness(spoilt).failures();
+        EXPECT_TRUE(holds(readiness(spoilt).failures(), row.words)) << readiness(spoilt).failures();
     }
 }
 
 TEST(Metrics, CarryWhatIsValidAndAddUp) {
     StatusData status = full_status();
     const std::string text = metrics_text(status, {});
-    EXPECT_TRUE(has(text, "# TYPE vibrig_interlock_reaction_seconds histogram"));
-    EXPECT_TRUE(has(text, "vibrig_interlock_reaction_seconds_count 6\n")) << text;
-    EXPECT_TRUE(has(text, "vibrig_interlock_reaction_seconds_sum 0.0045\n"));
-    EXPECT_TRUE(has(text, "vibrig_interlock_reaction_seconds_bucket{le=\"+Inf\"} 6\n"));
-    EXPECT_TRUE(has(text, "vibrig_campaign_state{state=\"recording\"} 1\n"));
-    EXPECT_FALSE(has(text, "nan") || has(text, "Nan")) << text;
+    EXPECT_TRUE(holds(text, "# TYPE vibrig_interlock_reaction_seconds histogram"));
+    EXPECT_TRUE(holds(text, "vibrig_interlock_reaction_seconds_count 6\n")) << text;
+    EXPECT_TRUE(holds(text, "vibrig_interlock_reaction_seconds_sum 0.0045\n"));
+    EXPECT_TRUE(holds(text, "vibrig_interlock_reaction_seconds_bucket{le=\"+Inf\"} 6\n"));
+    EXPECT_TRUE(holds(text, "vibrig_campaign_state{state=\"recording\"} 1\n"));
+    EXPECT_FALSE(holds(text, "nan") || holds(text, "Nan")) << text;
     status.shaker.valid = false;
-    EXPECT_FALSE(has(metrics_text(status, {}), "vibrig_shaker_measured"));
+    EXPECT_FALSE(holds(metrics_text(status, {}), "vibrig_shaker_measured"));
 }
 
 TEST(OpenApi, IsOneJsonObject) {
