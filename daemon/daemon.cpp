@@ -81,9 +81,15 @@ Daemon::Daemon(configuration::Loaded loaded)
       noise_monitor_(
           configuration_.estimator,
           [this](Severity severity, const std::string& text) { log(severity, "noise", text); }),
+      recorder_(make_recorder()),
+      sent_tap_(recorder_ ? std::make_unique<record::SentTap>(*port_, clock_, recorder_->sent())
+                          : nullptr),
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
-                   {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_}),
-      gimbal_(dbc_, configuration_.gimbal, *port_),
+                   {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_,
+                    recorder_ ? &recorder_->received() : nullptr,
+                    recorder_ ? &recorder_->samples() : nullptr}),
+      gimbal_(dbc_, configuration_.gimbal,
+              sent_tap_ ? static_cast<drivers::CanPort&>(*sent_tap_) : *port_),
       adaptive_(adaptive_plan(configuration_)),
       plan_(plan_data(configuration_)),
       campaign_(
@@ -92,6 +98,7 @@ Daemon::Daemon(configuration::Loaded loaded)
            [this](const rt::DwellOrder& order) {
                const bool taken = estimator_stage_.order(order);
                if (taken && !order.cancel) ++dwells_with_estimator_;
+               if (taken && recorder_) recorder_->ordered(order, clock_.now());
                return taken;
            },
            [this](rt::Guard level) {
@@ -126,6 +133,7 @@ Daemon::Daemon(configuration::Loaded loaded)
                identification_ = std::move(*interrupted_);
                interrupted_.reset();
                if (journal_) journal_->campaign_resumed(interrupted_id_, by);
+               record_begin(by, identification_.result().dwells.size());
                auto result = identification_.result();
                const std::lock_guard lock(mutex_);
                result_ = std::move(result);
@@ -178,6 +186,7 @@ void Daemon::start() {
         }
     }
     open_journal();
+    if (recorder_) recorder_->start();
     // A daemon that died may have left it running inside the watchdog's time.
     shaker_->stop_now();
     shaker_->on_reading([this] {
@@ -240,6 +249,7 @@ void Daemon::join() {
         acquisition_.stop();
         acquisition_thread_.join();
     }
+    if (recorder_) recorder_->stop();
     if (journal_) journal_->stop();
 }
 
@@ -262,6 +272,7 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
     record.text = text;
     event_log_.append(record);
     if (journal_) journal_->event(record);
+    if (recorder_) recorder_->event(record);
     const auto level = severity == Severity::info      ? spdlog::level::info
                        : severity == Severity::warning ? spdlog::level::warn
                                                        : spdlog::level::err;
@@ -300,6 +311,8 @@ void Daemon::take_commands(Time now) {
             if (reply.accepted && waiting.request.kind == CommandRequest::Kind::start)
                 journal_->campaign_begun(configuration_.campaign.name, waiting.request.by);
         }
+        if (reply.accepted && waiting.request.kind == CommandRequest::Kind::start)
+            record_begin(waiting.request.by, 0);
         waiting.reply.set_value(reply);
     }
 }
@@ -321,6 +334,7 @@ void Daemon::take_done_dwells() {
     rt::DwellDone done;
     while (estimator_stage_.take_done(done)) {
         if (--dwells_with_estimator_ == 0) take_noise(done.summary);
+        record_dwell(done.summary);
         campaign_.on_dwell_done(done.summary);
         auto result = identification_.result();
         const std::lock_guard lock(mutex_);
@@ -383,11 +397,16 @@ void Daemon::write_result() {
         const std::lock_guard lock(mutex_);
         text = tool::result_json(result_);
     }
+    StatusData ended;
+    campaign_.fill(ended, clock_.now());
+    write_result_file(text, complete);
+    if (recorder_) recorder_->campaign_ended(name_of(ended.state), ended.reason, text, utc_now());
     if (journal_) {
-        StatusData ended;
-        campaign_.fill(ended, clock_.now());
         journal_->campaign_ended(name_of(ended.state), ended.reason, text);
     }
+}
+
+void Daemon::write_result_file(const std::string& text, bool complete) {
     if (configuration_.results.empty()) return;
     // A partial result never takes the place of a complete one.
     const auto path = std::filesystem::path(configuration_.results) /
@@ -464,6 +483,7 @@ StatusData Daemon::status() const {
     status.estimate = estimated.estimate;
     status.interlock = interlock_status();
     if (journal_) status.journal = journal_->status();
+    if (recorder_) status.recorder = recorder_->status();
     return status;
 }
 

@@ -15,6 +15,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/journal/journal.hpp"
 #include "daemon/noise/noise_monitor.hpp"
+#include "daemon/record/recorder.hpp"
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/interlock.hpp"
@@ -90,9 +91,15 @@ class Daemon final : public StatusSource {
     void take_done_dwells();
     void take_noise(estimator::DwellSummary& dwell);
     void write_result();
+    void write_result_file(const std::string& text, bool complete);
     [[nodiscard]] campaign::Next next_dwell(const std::array<double, 3>& here_deg,
                                             double elapsed_s);
     void open_journal();
+    /// Everything that results depend on; not where things are kept or how one talks to the daemon.
+    [[nodiscard]] std::string result_configuration() const;
+    [[nodiscard]] std::unique_ptr<record::Recorder> make_recorder();
+    void record_begin(const std::string& by, std::size_t dwells_before);
+    void record_dwell(const estimator::DwellSummary& summary);
     void offer_unfinished(journal::Unfinished& campaign);
     [[nodiscard]] std::string resume_gate() const;
     void check_balance(drivers::Time now);
@@ -119,6 +126,9 @@ class Daemon final : public StatusSource {
     std::int64_t interrupted_id_ = 0;
     rt::EstimatorStage estimator_stage_;
     noise::NoiseMonitor noise_monitor_;  ///< control thread
+    std::unique_ptr<drivers::Waiter> recorder_waiter_;
+    std::unique_ptr<record::Recorder> recorder_;  ///< null: nothing is recorded
+    std::unique_ptr<record::SentTap> sent_tap_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
     std::optional<plan::AdaptivePlan> adaptive_;

@@ -21,23 +21,27 @@ void Daemon::open_journal() {
     if (path.empty() && !configuration_.results.empty())
         path = (std::filesystem::path(configuration_.results) / "journal.sqlite3").string();
     if (path.empty()) return;
-    // Everything that results depend on; not where things are kept or how one talks to the daemon.
-    std::string text;
-    for (const auto& value : loaded_.effective) {
-        const auto section = value.key.substr(0, value.key.find('.'));
-        if (section == "server" || section == "log" || section == "threads" ||
-            section == "journal" || section == "clock" || value.key == "campaign.results")
-            continue;
-        text += value.key + " = " + value.value + "\n";
-    }
     journal_ = std::make_unique<journal::Journal>(
-        path, journal::configuration_hash(text),
+        path, journal::configuration_hash(result_configuration()),
         [this](double free_mb) { interlock_.disk_free(free_mb); });
     for (const auto& refused : journal_->recovery().refused)
         log(Severity::warning, "journal", refused);
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
+}
+
+std::string Daemon::result_configuration() const {
+    std::string text;
+    for (const auto& value : loaded_.effective) {
+        const auto section = value.key.substr(0, value.key.find('.'));
+        if (section == "server" || section == "log" || section == "threads" ||
+            section == "journal" || section == "clock" || section == "record" ||
+            value.key == "campaign.results")
+            continue;
+        text += value.key + " = " + value.value + "\n";
+    }
+    return text;
 }
 
 void Daemon::offer_unfinished(journal::Unfinished& campaign) {

@@ -52,6 +52,20 @@ struct JournalStatus {
     std::uint64_t taken = 0, written = 0, dropped = 0;  ///< entries; taken = written + waiting
 };
 
+/// Recording of the present campaign, or of the last one.
+struct RecorderStatus {
+    std::string folder;      ///< empty: nothing is recorded
+    std::string file;        ///< the campaign's HDF5 file
+    bool recording = false;  ///< a campaign is being recorded
+    bool good = false;       ///< false: the disk refuses; what comes is lost and counted
+    std::string note;        ///< what the disk says
+    std::uint64_t samples = 0, samples_lost = 0;  ///< written; not written
+    std::uint64_t frames = 0, frames_lost = 0;    ///< of the raw log
+    std::uint64_t raw_bytes = 0, segments = 0, gaps = 0;
+    std::uint64_t samples_dropped = 0, frames_dropped = 0;  ///< by full rings, since the start
+    std::uint64_t entries_dropped = 0;
+};
+
 struct RingCounters {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
@@ -103,6 +117,7 @@ struct StatusData {
     drivers::ShakerCounters shaker_counters;
     InterlockStatus interlock;
     JournalStatus journal;
+    RecorderStatus recorder;
     bool stop_pending = false;  ///< a stop is ordered and not read back as done
 
     drivers::PortState can = drivers::PortState::absent;

@@ -184,7 +184,8 @@ CandumpReader::CandumpReader(std::string path) : path_(std::move(path)) {
 std::optional<LoggedFrame> CandumpReader::next() {
     try {
         while (const auto line = lines_->next()) {
-            if (line->find_first_not_of(" \t") != std::string_view::npos) {
+            const std::size_t begin = line->find_first_not_of(" \t");
+            if (begin != std::string_view::npos && (*line)[begin] != '#') {
                 return parse_candump_line(*line);
             }
         }

@@ -39,7 +39,8 @@ class CandumpError : public std::runtime_error {
 /// without file and line.
 [[nodiscard]] LoggedFrame parse_candump_line(std::string_view text);
 
-/// Reads a log frame by frame in bounded memory. Empty lines are passed over.
+/// Reads a log frame by frame in bounded memory. Empty lines and comments (#), which
+/// canplayer skips as well, are passed over.
 class CandumpReader {
   public:
     explicit CandumpReader(std::string path);

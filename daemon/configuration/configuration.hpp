@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/campaign/settings.hpp"
+#include "daemon/record/settings.hpp"
 #include "daemon/rt/interlock_table.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
@@ -52,6 +53,7 @@ struct Configuration {
     std::string journal;
     std::string results;  ///< [campaign] results: folder for result.json; empty: none written
     std::vector<rt::Rule> interlock = rt::default_interlock();  ///< [[interlock]]
+    record::Settings record;                                    ///< [record]
     int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
 };

@@ -7,6 +7,30 @@ namespace {
 
 using C = Configuration;
 
+void add_record_keys(std::vector<Key>& keys) {
+    keys.push_back(boolean("record.enabled", "campaigns are recorded",
+                           [](C& c) -> bool& { return c.record.enabled; }));
+    keys.push_back(text(
+        "record.folder", "a folder",
+        "a folder for each campaign goes there; empty: campaign.results, and without it nothing is "
+        "recorded",
+        path_rule, [](C & c) -> auto& { return c.record.folder; }));
+    keys.push_back(boolean("record.raw", "all frames too, as candump logs",
+                           [](C& c) -> bool& { return c.record.raw; }));
+    keys.push_back(number("record.segment_s", "s", {1, 86'400},
+                          "a log is closed and another begun after so long",
+                          [](C& c) -> double& { return c.record.segment_s; }));
+    keys.push_back(integer("record.segment_mb", "MB", 1, 4096, "or when it is so long",
+                           [](C& c) -> int& { return c.record.segment_mb; }));
+    keys.push_back(boolean("record.zstd", "closed logs are compressed",
+                           [](C& c) -> bool& { return c.record.zstd; }));
+    keys.push_back(number("record.flush_s", "s", {0.1, 60}, "readers see what is older",
+                          [](C& c) -> double& { return c.record.flush_s; }));
+    keys.push_back(integer("record.keep_free_mb", "MB", 0, 1'000'000,
+                           "with less on the disk nothing is recorded, until there is more",
+                           [](C& c) -> int& { return c.record.keep_free_mb; }));
+}
+
 }  // namespace
 
 void add_daemon_keys(std::vector<Key>& keys) {
@@ -61,6 +85,7 @@ void add_daemon_keys(std::vector<Key>& keys) {
         "journal.file", "a path",
         "SQLite: campaigns, results, events, commands; empty: journal.sqlite3 in campaign.results",
         path_rule, [](C & c) -> auto& { return c.journal; }));
+    add_record_keys(keys);
     keys.push_back(integer("threads.acquisition_priority", "", 0, 99,
                            "SCHED_FIFO; 0: ordinary scheduling",
                            [](C& c) -> int& { return c.acquisition_priority; }));

@@ -61,17 +61,26 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
     for (const auto& frame : frames) {
         --shown_.in_hand;
         if (!rig_link_) {
+            record(frame, frame.time);
             assembler_.feed(frame);
         } else if (rig_link_->is_time(frame.frame)) {
             ++shown_.rig_ticks;
-            if (const auto tick = rig_link_->decode(frame.frame)) on_tick(*tick);
+            const auto tick = rig_link_->decode(frame.frame);
+            record(frame, tick ? tick->time : rig_->now());
+            if (tick) on_tick(*tick);
         } else {
             drivers::ReceivedFrame stamped = frame;
             stamped.time = rig_->now();
+            record(frame, stamped.time);
             assembler_.feed(stamped);
         }
     }
     if (!rig_link_) hand_on();
+}
+
+void Acquisition::record(const drivers::ReceivedFrame& frame, Time time) noexcept {
+    if (to_.recorder_frames != nullptr)
+        to_.recorder_frames->try_push({frame.frame, time, frame.fd, false, 0});
 }
 
 void Acquisition::on_tick(const RigTimeLink::Tick& tick) noexcept {
@@ -99,6 +108,7 @@ void Acquisition::push_batch() noexcept {
     if (batched_ == 0) return;
     to_.estimator_ring.push_n({batch_.data(), batched_});
     to_.estimator.notify();
+    if (to_.recorder_samples != nullptr) to_.recorder_samples->push_n({batch_.data(), batched_});
     shown_.samples_offered += batched_;
     shown_.sample = batch_[batched_ - 1];
     batched_ = 0;

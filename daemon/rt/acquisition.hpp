@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "daemon/rt/frame_record.hpp"
 #include "daemon/rt/interlock.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/rt/rig_time_link.hpp"
@@ -40,6 +41,9 @@ class Acquisition {
         drivers::Waiter& estimator;
         drivers::Waiter& control;
         Interlock& interlock;
+        // To the recorder, which looks into them by itself; null: none.
+        Ring<FrameRecord>* recorder_frames = nullptr;
+        Ring<drivers::Sample>* recorder_samples = nullptr;
     };
     using Event = std::function<void(drivers::PortState, const char* text)>;
 
@@ -57,6 +61,7 @@ class Acquisition {
   private:
     void on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept;
     void on_sample(const drivers::Sample& sample) noexcept;
+    void record(const drivers::ReceivedFrame& frame, drivers::Time time) noexcept;
     void on_tick(const RigTimeLink::Tick& tick) noexcept;
     void push_batch() noexcept;
     void hand_on() noexcept;

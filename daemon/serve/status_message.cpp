@@ -44,6 +44,24 @@ void set_time(google::protobuf::Timestamp& out, std::int64_t utc_ns) {
     out.set_nanos(static_cast<std::int32_t>(rest));
 }
 
+void fill(v1::Recorder& out, const RecorderStatus& recorder) {
+    out.set_folder(mend_utf8(recorder.folder));
+    out.set_file(mend_utf8(recorder.file));
+    out.set_recording(recorder.recording);
+    out.set_good(recorder.good);
+    out.set_note(mend_utf8(recorder.note));
+    out.set_samples(recorder.samples);
+    out.set_samples_lost(recorder.samples_lost);
+    out.set_frames(recorder.frames);
+    out.set_frames_lost(recorder.frames_lost);
+    out.set_raw_bytes(recorder.raw_bytes);
+    out.set_segments(recorder.segments);
+    out.set_gaps(recorder.gaps);
+    out.set_samples_dropped(recorder.samples_dropped);
+    out.set_frames_dropped(recorder.frames_dropped);
+    out.set_entries_dropped(recorder.entries_dropped);
+}
+
 void fill(v1::Shaker& out, const StatusData& status) {
     out.set_link(wire_enum<v1::Link::State>(status.shaker_link));
     const drivers::ShakerReading& reading = status.shaker;
@@ -299,6 +317,7 @@ void fill(v1::Status& out, const StatusData& status) {
     journal.set_taken(status.journal.taken);
     journal.set_written(status.journal.written);
     journal.set_dropped(status.journal.dropped);
+    fill(*out.mutable_recorder(), status.recorder);
     fill(*out.mutable_noise(), status.noise);
 }
 

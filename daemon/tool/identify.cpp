@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/record/campaign_file.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
@@ -78,6 +79,39 @@ estimator::Result identify(const std::vector<RecordingRow>& rows,
     return identification.result();
 }
 
+/// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
+estimator::Result identify(const record::Campaign& campaign, const estimator::Settings& settings) {
+    const auto dwells = record::recorded_dwells(campaign);
+    estimator::Identification identification(settings, dwells.size());
+    Progress progress("identifying");
+    std::size_t done = 0;
+    for (const auto& dwell : dwells) {
+        identification.begin_dwell({dwell.order->run, dwell.order->position, dwell.order->table_g});
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
+            const auto& sample = campaign.samples[i];
+            static_cast<void>(
+                identification.add({.time_s = drivers::to_seconds(sample.time - dwell.order->from),
+                                    .angle_rad = sample.angle,
+                                    .force_g = sample.force,
+                                    .angles_good = sample.angles_good(),
+                                    .force_good = sample.force_good()}));
+            if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
+        }
+        static_cast<void>(identification.end_dwell());
+    }
+    return identification.result();
+}
+
+estimator::Result identify_campaign(const std::string& path, const std::string& config) {
+    const record::Campaign campaign = record::read_campaign(path);
+    const auto loaded =
+        config.empty()
+            ? configuration::parse(record::identification_sections(campaign.head.configuration),
+                                   "configuration in " + campaign.path, false)
+            : configuration::load(config, false);
+    return identify(campaign, loaded.configuration.estimator);
+}
+
 std::vector<RecordingRow> read(const std::string& path) {
     Progress progress("reading " + path);
     progress.show(0, 1);
@@ -89,9 +123,13 @@ int run(const std::string& recording, const std::string& config, const std::stri
     estimator::Result result;
     try {
         estimator::use_instruction_set(instruction_set);
-        const estimator::Settings settings =
-            configuration::load(config, false).configuration.estimator;
-        result = identify(read(recording), settings);
+        if (record::is_hdf5(recording)) {
+            result = identify_campaign(recording, config);
+        } else {
+            const estimator::Settings settings =
+                configuration::load(config, false).configuration.estimator;
+            result = identify(read(recording), settings);
+        }
     } catch (const std::exception& error) {
         // The room that found the fault named file, line, key and value already.
         std::cerr << error.what() << '\n';
@@ -115,15 +153,18 @@ void add_identify(CLI::App& app, int& exit_code) {
         bool json = false;
     };
     auto options = std::make_shared<Options>();
-    CLI::App* command =
-        app.add_subcommand("identify", "Gyro error coefficients from a recording (CSV)");
+    CLI::App* command = app.add_subcommand(
+        "identify", "Gyro error coefficients from a recording (CSV, or HDF5 of vibrigd)");
     command
         ->add_option("FILE", options->recording,
                      "CSV with a header row and the columns time_s, run, position, alpha_deg, "
-                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order")
+                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order; or a campaign's HDF5 "
+                     "file")
         ->required();
-    command->add_option("--config", options->config,
-                        "configuration file (TOML); without it all defaults apply");
+    command->add_option(
+        "--config", options->config,
+        "configuration file (TOML); without it all defaults apply, of an HDF5 file its "
+        "own");
     command
         ->add_option("--instruction-set", options->instruction_set,
                      "of the filter: auto (the best), or one of this processor's")

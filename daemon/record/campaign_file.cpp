@@ -1,0 +1,403 @@
+#include "daemon/record/campaign_file.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/hdf5.hpp"
+#include "daemon/record/replay.hpp"
+
+namespace vibrig::record {
+
+namespace fs = std::filesystem;
+using hdf5::Array;
+using hdf5::File;
+
+namespace {
+
+constexpr std::size_t kCoefficients = estimator::kParameters;
+
+/// Columns of one table; as long as the shortest, since a reader may come between two columns.
+class Columns {
+  public:
+    Columns(const File& file, std::string group) : file_(file), group_(std::move(group)) {}
+
+    std::vector<double> doubles(const char* name, std::size_t width = 1) {
+        auto found = file_.doubles(group_ + "/" + name);
+        check(name, found.dimensions, width);
+        return std::move(found.values);
+    }
+    std::vector<std::int64_t> integers(const char* name, std::size_t width = 1) {
+        auto found = file_.integers(group_ + "/" + name);
+        check(name, found.dimensions, width);
+        return std::move(found.values);
+    }
+    std::vector<std::string> texts(const char* name) {
+        auto found = file_.texts(group_ + "/" + name);
+        rows_ = std::min(rows_, found.size());
+        return found;
+    }
+    [[nodiscard]] std::size_t rows() const { return rows_; }
+
+  private:
+    void check(const char* name, const std::vector<std::size_t>& dimensions, std::size_t width) {
+        std::size_t found = 1;
+        for (std::size_t i = 1; i < dimensions.size(); ++i) found *= dimensions[i];
+        if (dimensions.empty() || found != width)
+            throw hdf5::Error(fmt::format("{}: {}/{}: found {} numbers in a row, expected {}",
+                                          file_.path(), group_, name, found, width));
+        rows_ = std::min(rows_, dimensions[0]);
+    }
+
+    const File& file_;
+    std::string group_;
+    std::size_t rows_ = static_cast<std::size_t>(-1);
+};
+
+template <std::size_t N>
+std::array<double, N> row(const std::vector<double>& values, std::size_t index) {
+    std::array<double, N> out;
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(index * N), N, out.begin());
+    return out;
+}
+
+void read_samples(const File& file, Campaign& to) {
+    Columns c(file, "/samples");
+    const auto time = c.integers("time_ns"), sequence = c.integers("sequence"),
+               lost = c.integers("lost_before"),
+               quality = c.integers("quality", drivers::kChannels);
+    const auto angle = c.doubles("angle_rad", 3), force = c.doubles("force_g", 3),
+               table = c.doubles("table_accel_g");
+    to.samples.resize(c.rows());
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        drivers::Sample& s = to.samples[i];
+        s.time = time[i];
+        s.sequence = static_cast<std::uint32_t>(sequence[i]);
+        s.dropped_before = static_cast<std::uint32_t>(lost[i]);
+        s.angle = row<3>(angle, i);
+        s.force = row<3>(force, i);
+        s.table_accel = table[i];
+        for (std::size_t k = 0; k < drivers::kChannels; ++k) {
+            const auto q = quality[i * drivers::kChannels + k];
+            // Anything unknown is not good.
+            s.quality[k] =
+                q >= 0 && q <= 5 ? static_cast<drivers::Quality>(q) : drivers::Quality::flagged;
+        }
+    }
+}
+
+void read_orders(const File& file, Campaign& to) {
+    Columns c(file, "/orders");
+    const auto announced = c.integers("announced_ns"), from = c.integers("from_ns"),
+               until = c.integers("to_ns"), run = c.integers("run"),
+               position = c.integers("position"), cancel = c.integers("cancel");
+    const auto table = c.doubles("table_g");
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        to.orders.push_back({announced[i], from[i], until[i], static_cast<int>(run[i]),
+                             static_cast<int>(position[i]), table[i], cancel[i] != 0});
+    }
+}
+
+void read_dwells(const File& file, Campaign& to) {
+    Columns c(file, "/dwells");
+    const auto time = c.integers("time_ns"), run = c.integers("run"),
+               position = c.integers("position"), samples = c.integers("samples"),
+               used = c.integers("used"), rejected = c.integers("rejected"),
+               reinitialised = c.integers("reinitialised"), flagged = c.integers("flagged"),
+               observable = c.integers("observable", kCoefficients);
+    const auto kappa = c.doubles("kappa"), amplitude = c.doubles("amplitude_g"),
+               frequency = c.doubles("frequency_hz"), force = c.doubles("mean_force_g"),
+               nis = c.doubles("nis_per_dof"), correlation = c.doubles("innovation_correlation"),
+               value = c.doubles("value", kCoefficients), sigma = c.doubles("sigma", kCoefficients),
+               covariance = c.doubles("covariance", kCoefficients * kCoefficients);
+    const auto reason = c.texts("reason");
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        Dwell d;
+        d.time = time[i];
+        auto& s = d.summary;
+        s.run = static_cast<int>(run[i]);
+        s.position = static_cast<int>(position[i]);
+        s.samples = static_cast<std::uint32_t>(samples[i]);
+        s.used = static_cast<std::uint32_t>(used[i]);
+        s.rejected = static_cast<std::uint32_t>(rejected[i]);
+        s.reinitialised = static_cast<std::uint32_t>(reinitialised[i]);
+        s.kappa = kappa[i];
+        s.amplitude_g = amplitude[i];
+        s.frequency_hz = frequency[i];
+        s.mean_force_g = force[i];
+        s.nis_per_dof = nis[i];
+        s.innovation_correlation = correlation[i];
+        s.flagged = flagged[i] != 0;
+        d.reason = reason[i];
+        d.value = row<kCoefficients>(value, i);
+        d.sigma = row<kCoefficients>(sigma, i);
+        for (std::size_t k = 0; k < kCoefficients; ++k)
+            d.observable[k] = observable[i * kCoefficients + k] != 0;
+        d.covariance.assign(
+            covariance.begin() + static_cast<std::ptrdiff_t>(i * kCoefficients * kCoefficients),
+            covariance.begin() +
+                static_cast<std::ptrdiff_t>((i + 1) * kCoefficients * kCoefficients));
+        to.dwells.push_back(std::move(d));
+    }
+}
+
+void read_estimates(const File& file, Campaign& to) {
+    Columns c(file, "/estimates");
+    const auto time = c.integers("time_ns");
+    const auto amplitude = c.doubles("amplitude_g"), frequency = c.doubles("frequency_hz"),
+               kappa = c.doubles("kappa"), nis = c.doubles("nis_per_dof"),
+               innovation = c.doubles("innovation_arcsec", 3),
+               value = c.doubles("value", kCoefficients), sigma = c.doubles("sigma", kCoefficients);
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        to.estimates.push_back({time[i], amplitude[i], frequency[i], kappa[i], nis[i],
+                                row<3>(innovation, i), row<kCoefficients>(value, i),
+                                row<kCoefficients>(sigma, i)});
+    }
+}
+
+Severity severity_of(const std::string& word) {
+    for (const Severity s : {Severity::warning, Severity::alarm, Severity::trip}) {
+        if (word == name_of(s)) return s;
+    }
+    return Severity::info;
+}
+
+void read_events(const File& file, Campaign& to) {
+    Columns c(file, "/events");
+    const auto time = c.integers("time_ns"), utc = c.integers("utc_ns");
+    const auto severity = c.texts("severity"), source = c.texts("source"), text = c.texts("text");
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        EventRecord event;
+        event.id = i + 1;
+        event.time = time[i];
+        event.utc_ns = utc[i];
+        event.severity = severity_of(severity[i]);
+        event.source = source[i];
+        event.text = text[i];
+        to.events.push_back(std::move(event));
+    }
+}
+
+void read_gaps(const File& file, Campaign& to) {
+    Columns c(file, "/gaps");
+    const auto from = c.integers("from_ns"), until = c.integers("to_ns"), lost = c.integers("lost");
+    const auto stream = c.texts("stream"), reason = c.texts("reason");
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        to.gaps.push_back(
+            {from[i], until[i], stream[i], static_cast<std::uint64_t>(lost[i]), reason[i]});
+    }
+}
+
+void read_head(const File& file, Campaign& to) {
+    std::string format;
+    try {
+        format = file.text("/", "format");
+    } catch (const hdf5::Error&) {
+    }
+    if (format != "vibrig-campaign")
+        throw hdf5::Error(to.path + ": attribute format: found " +
+                          (format.empty() ? "nothing" : "\"" + format + "\"") +
+                          ", expected \"vibrig-campaign\"");
+    if (const auto version = file.number("/", "format_version"); version > kFormatVersion)
+        throw hdf5::Error(fmt::format("{}: format_version: found {}, expected at most {}", to.path,
+                                      version, kFormatVersion));
+    Head& head = to.head;
+    head.name = file.text("/", "name");
+    head.started_by = file.text("/", "started_by");
+    head.utc_ns = file.number("/", "started_utc_ns");
+    head.utc_offset_ns = file.number("/", "utc_offset_ns");
+    head.clock = file.text("/", "clock");
+    head.version = file.text("/", "version");
+    head.compiler = file.text("/", "compiler");
+    head.instruction_set = file.text("/", "instruction_set");
+    head.configuration_hash = file.text("/", "configuration_hash");
+    head.dwells_before = static_cast<std::size_t>(file.number("/", "dwells_before"));
+    head.configuration = file.read_text("/configuration");
+    head.dbc = file.read_text("/dbc");
+    head.plan = file.read_text("/plan");
+    to.state = file.text("/", "state");
+    if (to.state != "running") {
+        to.reason = file.text("/", "reason");
+        to.ended_utc_ns = file.number("/", "ended_utc_ns");
+    }
+    if (file.has("/result")) to.result_json = file.read_text("/result");
+}
+
+}  // namespace
+
+bool is_hdf5(const std::string& path) {
+    std::array<char, 8> head{};
+    std::ifstream file(path, std::ios::binary);
+    file.read(head.data(), head.size());
+    constexpr std::array<char, 8> kSignature{'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
+    return file.good() && head == kSignature;
+}
+
+std::string campaign_path(const std::string& argument) {
+    std::error_code error;
+    if (fs::is_regular_file(argument, error)) {
+        if (!is_hdf5(argument))
+            throw std::runtime_error(argument + ": found no HDF5 file, expected a campaign's");
+        return argument;
+    }
+    if (!fs::is_directory(argument, error))
+        throw std::runtime_error(argument +
+                                 ": found nothing, expected a campaign's HDF5 file or its folder");
+    const fs::path folder(argument);
+    if (fs::exists(folder / "campaign.h5", error)) return (folder / "campaign.h5").string();
+    std::vector<std::string> found;
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+        if (fs::exists(entry.path() / "campaign.h5", error))
+            found.push_back((entry.path() / "campaign.h5").string());
+    }
+    if (found.size() == 1) return found.front();
+    std::ranges::sort(found);
+    std::string names;
+    for (const auto& name : found) names += " " + name;
+    throw std::runtime_error(found.empty()
+                                 ? argument + ": found no campaign.h5 in it, expected one"
+                                 : argument + ": found several campaigns, expected one of" + names);
+}
+
+Campaign read_campaign(const std::string& argument) {
+    Campaign campaign;
+    campaign.path = campaign_path(argument);
+    campaign.folder = fs::path(campaign.path).parent_path().string();
+    if (campaign.folder.empty()) campaign.folder = ".";
+    const File file = File::open(campaign.path, File::Mode::read);
+    read_head(file, campaign);
+    read_samples(file, campaign);
+    read_orders(file, campaign);
+    read_dwells(file, campaign);
+    read_estimates(file, campaign);
+    read_events(file, campaign);
+    read_gaps(file, campaign);
+    return campaign;
+}
+
+std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign) {
+    std::vector<RecordedDwell> dwells;
+    const auto& samples = campaign.samples;
+    const auto at = [&](drivers::Time time) {
+        return static_cast<std::size_t>(
+            std::ranges::lower_bound(samples, time, {}, &drivers::Sample::time) - samples.begin());
+    };
+    std::size_t done = 0;
+    for (std::size_t i = 0; i < campaign.orders.size(); ++i) {
+        const Order& order = campaign.orders[i];
+        if (order.cancel) continue;
+        RecordedDwell dwell{&order, at(order.from), 0, false};
+        dwell.count = at(order.to) - dwell.first;
+        const bool cancelled = i + 1 < campaign.orders.size() && campaign.orders[i + 1].cancel;
+        // As many as the filter saw, wherever in time the end was ordered.
+        if (done < campaign.dwells.size()) {
+            const auto& summary = campaign.dwells[done].summary;
+            if (summary.run == order.run && summary.position == order.position) {
+                ++done;
+                if (cancelled) {
+                    dwell.cut_short = summary.samples < dwell.count;
+                    dwell.count = std::min<std::size_t>(dwell.count, summary.samples);
+                }
+            }
+        }
+        dwells.push_back(dwell);
+    }
+    return dwells;
+}
+
+std::string identification_sections(const std::string& configuration) {
+    static const std::set<std::string> kSections{"site",          "vibration", "platform",
+                                                 "accelerometer", "noise",     "estimator"};
+    std::istringstream lines(configuration);
+    std::string kept;
+    for (std::string line; std::getline(lines, line);) {
+        if (kSections.contains(line.substr(0, line.find('.')))) kept += line + "\n";
+    }
+    return kept;
+}
+
+std::vector<std::string> raw_files(const std::string& folder) {
+    std::vector<std::string> files;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+        const std::string name = entry.path().filename().string();
+        if (name.starts_with("raw-") && (name.ends_with(".log") || name.ends_with(".log.zst")))
+            files.push_back(entry.path().string());
+    }
+    std::ranges::sort(files);
+    // Between the compressed one and the end of the other both are there for a moment.
+    std::erase_if(files, [&](const std::string& name) {
+        return name.ends_with(".log") && std::ranges::find(files, name + ".zst") != files.end();
+    });
+    return files;
+}
+
+Recovery recover(const std::string& argument) {
+    Recovery recovery;
+    const std::string path = campaign_path(argument);
+    {
+        const File file = File::open(path, File::Mode::read);
+        if (file.text("/", "format") == "vibrig-campaign" && file.text("/", "state") != "running") {
+            recovery.was_closed = true;
+        }
+    }
+    if (!recovery.was_closed) File::open(path, File::Mode::mend).close();
+    Campaign campaign = read_campaign(path);
+    recovery.samples = campaign.samples.size();
+    recovery.dwells = campaign.dwells.size();
+    if (!campaign.samples.empty())
+        recovery.recorded_s =
+            drivers::to_seconds(campaign.samples.back().time - campaign.samples.front().time);
+    for (const Gap& gap : campaign.gaps)
+        recovery.words.push_back(
+            fmt::format("{} {} lost while recording: {}", gap.lost, gap.stream, gap.reason));
+    if (recovery.was_closed) return recovery;
+
+    // What the raw log has beyond the last sample comes from the frames themselves.
+    std::vector<drivers::Sample> more;
+    drivers::Time raw_until = 0;
+    std::string raw_trouble;
+    try {
+        more = samples_from_raw(campaign, raw_until);
+    } catch (const std::exception& error) {
+        raw_trouble = error.what();
+    }
+    const drivers::Time last = campaign.samples.empty() ? 0 : campaign.samples.back().time;
+    std::erase_if(more, [last](const drivers::Sample& s) { return s.time <= last; });
+    File file = File::open(path, File::Mode::write);
+    {
+        hdf5::Table samples(file, "/samples", sample_columns());
+        for (const auto& sample : more) put_sample(samples, sample);
+        samples.commit();
+        recovery.samples_from_raw = more.size();
+        hdf5::Table gaps(file, "/gaps", gap_columns());
+        const drivers::Time end = more.empty() ? last : more.back().time;
+        put_gap(gaps, {end, end, "end", 0, "the recorder died; nothing is recorded after this"});
+        gaps.commit();
+    }
+    for (const auto& order : campaign.orders) {
+        const bool done = std::ranges::any_of(campaign.dwells, [&](const Dwell& d) {
+            return d.summary.run == order.run && d.summary.position == order.position;
+        });
+        if (!done && !order.cancel)
+            recovery.cut_dwell = fmt::format("run {} position {}", order.run, order.position);
+    }
+    if (raw_until > last) recovery.raw_until_s = drivers::to_seconds(raw_until - last);
+    if (!raw_trouble.empty()) recovery.words.push_back("raw log: " + raw_trouble);
+    file.set("/", "state", "recovered");
+    file.set("/", "reason", "the recorder died before the campaign was over");
+    file.set("/", "ended_utc_ns",
+             (more.empty() ? last : more.back().time) + campaign.head.utc_offset_ns);
+    file.close();
+    return recovery;
+}
+
+}  // namespace vibrig::record

@@ -1,0 +1,214 @@
+#include "daemon/record/campaign_writer.hpp"
+
+#include <algorithm>
+
+namespace vibrig::record {
+
+using hdf5::ColumnSpec;
+using hdf5::File;
+using hdf5::Table;
+using hdf5::Type;
+
+namespace {
+
+constexpr std::size_t kN = estimator::kParameters;
+const char* const kTimeText = "daemon's clock; UTC is this plus the file's utc_offset_ns";
+
+std::vector<ColumnSpec> order_columns() {
+    return {{"announced_ns", Type::i64, {}, "ns", "when it was ordered"},
+            {"from_ns", Type::i64, {}, "ns", "samples from this time on belong to the dwell"},
+            {"to_ns", Type::i64, {}, "ns", "samples before this time belong to the dwell"},
+            {"run", Type::i32, {}, "", "from 1"},
+            {"position", Type::i32, {}, "", "from 1"},
+            {"table_g", Type::f64, {}, "g", "commanded peak at the table"},
+            {"cancel", Type::u8, {}, "", "1: the dwell in progress ends with what it has"}};
+}
+
+std::vector<ColumnSpec> dwell_columns() {
+    return {{"time_ns", Type::i64, {}, "ns", kTimeText},
+            {"run", Type::i32, {}, "", "from 1"},
+            {"position", Type::i32, {}, "", "from 1"},
+            {"samples", Type::u32, {}, "", "offered to the filter"},
+            {"used", Type::u32, {}, "", "of them in the filter"},
+            {"rejected", Type::u32, {}, "", "of them not in the filter"},
+            {"reinitialised", Type::u32, {}, "", "times the angles started afresh"},
+            {"kappa", Type::f64, {}, "", "1 + a^2 / 2 over the whole dwell"},
+            {"amplitude_g", Type::f64, {}, "g", "peak at the platform"},
+            {"frequency_hz", Type::f64, {}, "Hz", "of the vibration; 0 at rest"},
+            {"mean_force_g", Type::f64, {}, "g", "vertical specific force, mean"},
+            {"nis_per_dof", Type::f64, {}, "", "normalised innovations squared, 1 expected"},
+            {"innovation_correlation", Type::f64, {}, "", "from one sample to the next"},
+            {"flagged", Type::u8, {}, "", "1: see reason"},
+            {"reason", Type::text, {96}, "", "why it is flagged"},
+            {"value", Type::f64, {kN}, "deg/h, deg/h/g, deg/h/g^2", "coefficients after the dwell"},
+            {"sigma", Type::f64, {kN}, "deg/h, deg/h/g, deg/h/g^2", "their standard deviations"},
+            {"observable", Type::u8, {kN}, "", "1: determined by the data"},
+            {"covariance", Type::f64, {kN, kN}, "products of the units", "of the coefficients"}};
+}
+
+std::vector<ColumnSpec> estimate_columns() {
+    return {{"time_ns", Type::i64, {}, "ns", kTimeText},
+            {"amplitude_g", Type::f64, {}, "g", "peak at the platform, present dwell"},
+            {"frequency_hz", Type::f64, {}, "Hz", "of the vibration"},
+            {"kappa", Type::f64, {}, "", "1 + a^2 / 2"},
+            {"nis_per_dof", Type::f64, {}, "", "normalised innovations squared so far"},
+            {"innovation_arcsec", Type::f64, {3}, "arcsec", "outer, inner, azimuth"},
+            {"value", Type::f64, {kN}, "deg/h, deg/h/g, deg/h/g^2", "coefficients"},
+            {"sigma", Type::f64, {kN}, "deg/h, deg/h/g, deg/h/g^2", "standard deviations"}};
+}
+
+std::vector<ColumnSpec> event_columns() {
+    return {{"time_ns", Type::i64, {}, "ns", kTimeText},
+            {"utc_ns", Type::i64, {}, "ns", "UTC since 1970"},
+            {"severity", Type::text, {8}, "", "info, warning, alarm or trip"},
+            {"source", Type::text, {16}, "", "who says so"},
+            {"text", Type::text, {320}, "", "what happened"}};
+}
+
+template <typename T, std::size_t N>
+void put(Table& table, const std::array<T, N>& values) {
+    table.put_bytes(values.data(), sizeof values);
+}
+
+std::uint8_t byte(bool value) { return value ? 1 : 0; }
+
+}  // namespace
+
+std::vector<ColumnSpec> sample_columns() {
+    return {{"time_ns", Type::i64, {}, "ns", kTimeText},
+            {"sequence", Type::u32, {}, "", "sync count"},
+            {"lost_before", Type::u32, {}, "", "samples lost on the way to the recorder"},
+            {"angle_rad", Type::f64, {3}, "rad", "encoders: outer, inner, azimuth; raw"},
+            {"force_g", Type::f64, {3}, "g", "specific force, accelerometer axes x, y, z; raw"},
+            {"table_accel_g", Type::f64, {}, "g", "accelerometer on the table"},
+            {"quality",
+             Type::u8,
+             {drivers::kChannels},
+             "",
+             "of outer, inner, azimuth, accelerometers x, y, z, table: 0 good, 1 missing, 2 stale, "
+             "3 flagged, 4 out of range, 5 unbound"}};
+}
+
+std::vector<ColumnSpec> gap_columns() {
+    return {{"from_ns", Type::i64, {}, "ns", kTimeText},
+            {"to_ns", Type::i64, {}, "ns", kTimeText},
+            {"stream", Type::text, {16}, "", "what is missing"},
+            {"lost", Type::u64, {}, "", "how many"},
+            {"reason", Type::text, {160}, "", "why"}};
+}
+
+void put_sample(Table& table, const drivers::Sample& sample) {
+    table.put(sample.time).put(sample.sequence).put(sample.dropped_before);
+    put(table, sample.angle);
+    put(table, sample.force);
+    table.put(sample.table_accel);
+    table.put_bytes(sample.quality.data(), drivers::kChannels);
+}
+
+void put_gap(Table& table, const Gap& gap) {
+    table.put(gap.from).put(gap.to).put(std::string_view(gap.stream)).put(gap.lost);
+    table.put(std::string_view(gap.reason));
+}
+
+CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
+    : file_(std::make_unique<File>(File::create(path))) {
+    write_head(head);
+    const auto table = [this](const char* name, std::vector<ColumnSpec> columns, std::size_t chunk,
+                              const char* description) {
+        return std::make_unique<Table>(*file_, name, std::move(columns), chunk, description);
+    };
+    samples_ = table("/samples", sample_columns(), 1024, "one row for each instant of the rig");
+    orders_ = table("/orders", order_columns(), 16, "dwells as they were ordered");
+    dwells_ = table("/dwells", dwell_columns(), 4, "dwells done");
+    estimates_ = table("/estimates", estimate_columns(), 64, "the filter while it works");
+    events_ = table("/events", event_columns(), 16, "what happened");
+    gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
+    file_->start_swmr();
+}
+
+void CampaignWriter::write_head(const Head& head) {
+    file_->set("/", "format", "vibrig-campaign");
+    file_->set("/", "format_version", kFormatVersion);
+    file_->set("/", "description",
+               "Identification of the gyro error coefficients of an inertial platform on a "
+               "vibration rig");
+    file_->set("/", "name", head.name);
+    file_->set("/", "started_by", head.started_by);
+    file_->set("/", "started_utc_ns", head.utc_ns);
+    file_->set("/", "utc_offset_ns", head.utc_offset_ns);
+    file_->set("/", "clock", head.clock);
+    file_->set("/", "version", head.version);
+    file_->set("/", "compiler", head.compiler);
+    file_->set("/", "instruction_set", head.instruction_set);
+    file_->set("/", "configuration_hash", head.configuration_hash);
+    file_->set("/", "dwells_before", static_cast<std::int64_t>(head.dwells_before));
+    file_->set("/", "state", "running");
+    std::string names;
+    for (const char* name : estimator::parameter_names())
+        names += (names.empty() ? "" : " ") + std::string(name);
+    file_->set("/", "coefficients", names);
+    file_->write_text("/configuration", head.configuration, "effective configuration, TOML");
+    file_->write_text("/dbc", head.dbc, "signals on the bus");
+    file_->write_text("/plan", head.plan, "positions (deg) and levels at the table (g), JSON");
+}
+
+void CampaignWriter::order(const Order& order) {
+    orders_->put(order.announced).put(order.from).put(order.to);
+    orders_->put(std::int32_t{order.run}).put(std::int32_t{order.position}).put(order.table_g);
+    orders_->put(byte(order.cancel));
+}
+
+void CampaignWriter::dwell(const Dwell& dwell) {
+    const auto& s = dwell.summary;
+    dwells_->put(dwell.time).put(std::int32_t{s.run}).put(std::int32_t{s.position});
+    dwells_->put(s.samples).put(s.used).put(s.rejected).put(s.reinitialised);
+    dwells_->put(s.kappa).put(s.amplitude_g).put(s.frequency_hz).put(s.mean_force_g);
+    dwells_->put(s.nis_per_dof).put(s.innovation_correlation).put(byte(s.flagged));
+    dwells_->put(std::string_view(dwell.reason));
+    put(*dwells_, dwell.value);
+    put(*dwells_, dwell.sigma);
+    std::array<std::uint8_t, kN> observable{};
+    std::ranges::transform(dwell.observable, observable.begin(), byte);
+    put(*dwells_, observable);
+    std::vector<double> covariance = dwell.covariance;
+    covariance.resize(kN * kN);
+    dwells_->put_bytes(covariance.data(), covariance.size() * sizeof(double));
+}
+
+void CampaignWriter::estimate(const EstimateRow& row) {
+    estimates_->put(row.time).put(row.amplitude_g).put(row.frequency_hz).put(row.kappa);
+    estimates_->put(row.nis_per_dof);
+    put(*estimates_, row.innovation_arcsec);
+    put(*estimates_, row.value);
+    put(*estimates_, row.sigma);
+}
+
+void CampaignWriter::event(const EventRecord& event) {
+    events_->put(event.time).put(event.utc_ns).put(std::string_view(name_of(event.severity)));
+    events_->put(std::string_view(event.source)).put(std::string_view(event.text));
+}
+
+void CampaignWriter::commit() {
+    // Samples last: whoever sees a sample also sees the order that it belongs to.
+    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &samples_})
+        (*table)->commit();
+    file_->flush();
+}
+
+void CampaignWriter::end(const std::string& state, const std::string& reason,
+                         const std::string& result_json, std::int64_t utc_ns) {
+    commit();
+    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &samples_})
+        table->reset();
+    const std::string path = file_->path();
+    file_->close();
+    // While a file is written with readers, no attribute can be added.
+    File file = File::open(path, File::Mode::write);
+    file.set("/", "state", state);
+    file.set("/", "reason", reason);
+    file.set("/", "ended_utc_ns", utc_ns);
+    file.write_text("/result", result_json, "final result, JSON as vibrig identify --json");
+    file.close();
+}
+
+}  // namespace vibrig::record

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "daemon/record/hdf5.hpp"
+#include "daemon/record/records.hpp"
+
+namespace vibrig::record {
+
+inline constexpr std::int64_t kFormatVersion = 1;
+
+/// Columns of the tables of a campaign's file, for writing and for mending.
+[[nodiscard]] std::vector<hdf5::ColumnSpec> sample_columns();
+[[nodiscard]] std::vector<hdf5::ColumnSpec> gap_columns();
+void put_sample(hdf5::Table& table, const drivers::Sample& sample);
+void put_gap(hdf5::Table& table, const Gap& gap);
+
+/// A campaign's HDF5 file while the campaign goes on: rows are kept until commit(), from then on a
+/// reader sees them. One thread; everything throws hdf5::Error.
+class CampaignWriter {
+  public:
+    CampaignWriter(const std::string& path, const Head& head);
+
+    void sample(const drivers::Sample& sample) { put_sample(*samples_, sample); }
+    void order(const Order& order);
+    void dwell(const Dwell& dwell);
+    void estimate(const EstimateRow& row);
+    void event(const EventRecord& event);
+    void gap(const Gap& gap) { put_gap(*gaps_, gap); }
+
+    void commit();
+    /// Writes how it ended and closes the file.
+    void end(const std::string& state, const std::string& reason, const std::string& result_json,
+             std::int64_t utc_ns);
+
+    [[nodiscard]] std::size_t samples_waiting() const { return samples_->waiting(); }
+    [[nodiscard]] std::size_t samples_written() const { return samples_->written(); }
+    [[nodiscard]] const std::string& path() const { return file_->path(); }
+
+  private:
+    void write_head(const Head& head);
+
+    std::unique_ptr<hdf5::File> file_;
+    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, estimates_, events_, gaps_;
+};
+
+}  // namespace vibrig::record

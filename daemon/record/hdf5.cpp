@@ -1,0 +1,419 @@
+#include "daemon/record/hdf5.hpp"
+
+#include <hdf5.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace vibrig::record::hdf5 {
+
+namespace {
+
+static_assert(sizeof(hid_t) == sizeof(std::int64_t));
+
+int close_file(std::int64_t id) { return H5Fclose(id); }
+int close_set(std::int64_t id) { return H5Dclose(id); }
+int close_space(std::int64_t id) { return H5Sclose(id); }
+int close_type(std::int64_t id) { return H5Tclose(id); }
+int close_list(std::int64_t id) { return H5Pclose(id); }
+int close_group(std::int64_t id) { return H5Gclose(id); }
+int close_attribute(std::int64_t id) { return H5Aclose(id); }
+
+/// The library prints to standard error unless told not to, each thread for itself.
+void quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+std::string what_it_says() {
+    std::string text;
+    const auto take = [](unsigned, const H5E_error2_t* error, void* to) -> herr_t {
+        auto& out = *static_cast<std::string*>(to);
+        if (error->desc != nullptr && out.size() < 300)
+            out += (out.empty() ? "" : "; ") + std::string(error->desc);
+        return 0;
+    };
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take, &text);
+    return text.empty() ? "HDF5 gives no reason" : text;
+}
+
+std::int64_t native(Type type) {
+    switch (type) {
+        case Type::f64:
+            return H5T_NATIVE_DOUBLE;
+        case Type::i64:
+            return H5T_NATIVE_INT64;
+        case Type::u64:
+            return H5T_NATIVE_UINT64;
+        case Type::i32:
+            return H5T_NATIVE_INT32;
+        case Type::u32:
+            return H5T_NATIVE_UINT32;
+        case Type::u8:
+        case Type::text:
+            return H5T_NATIVE_UINT8;
+    }
+    return H5T_NATIVE_UINT8;
+}
+
+std::size_t bytes_of(Type type) {
+    switch (type) {
+        case Type::f64:
+        case Type::i64:
+        case Type::u64:
+            return 8;
+        case Type::i32:
+        case Type::u32:
+            return 4;
+        default:
+            return 1;
+    }
+}
+
+/// Ends with a zero only where there is room, as h5py, Octave and MATLAB take it.
+Handle text_type(std::size_t size) {
+    Handle type(H5Tcopy(H5T_C_S1), close_type);
+    H5Tset_size(type.get(), std::max<std::size_t>(size, 1));
+    H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+    H5Tset_cset(type.get(), H5T_CSET_UTF8);
+    return type;
+}
+
+Handle access_list() {
+    Handle list(H5Pcreate(H5P_FILE_ACCESS), close_list);
+    H5Pset_libver_bounds(list.get(), H5F_LIBVER_LATEST, H5F_LIBVER_LATEST);
+    return list;
+}
+
+std::vector<std::size_t> dimensions_of(std::int64_t set) {
+    const Handle space(H5Dget_space(set), close_space);
+    const int rank = H5Sget_simple_extent_ndims(space.get());
+    std::vector<hsize_t> found(static_cast<std::size_t>(std::max(rank, 0)));
+    H5Sget_simple_extent_dims(space.get(), found.data(), nullptr);
+    return {found.begin(), found.end()};
+}
+
+}  // namespace
+
+Handle& Handle::operator=(Handle&& other) noexcept {
+    if (this != &other) {
+        reset();
+        id_ = std::exchange(other.id_, -1);
+        close_ = other.close_;
+    }
+    return *this;
+}
+
+bool Handle::reset() noexcept {
+    if (id_ < 0 || close_ == nullptr) return true;
+    return close_(std::exchange(id_, -1)) >= 0;
+}
+
+void File::fail(const std::string& object) const {
+    throw Error(path_ + ": " + (object.empty() ? "" : object + ": ") + what_it_says());
+}
+
+File File::create(const std::string& path) {
+    quiet();
+    File file;
+    file.path_ = path;
+    file.file_ =
+        Handle(H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, access_list().get()), close_file);
+    if (file.file_.get() < 0) file.fail("");
+    return file;
+}
+
+File File::open(const std::string& path, Mode mode) {
+    quiet();
+    File file;
+    file.path_ = path;
+    const Handle list = access_list();
+    const auto attempt = [&](unsigned flags) {
+        file.file_ = Handle(H5Fopen(path.c_str(), flags, list.get()), close_file);
+        return file.file_.get() >= 0;
+    };
+    if (mode == Mode::mend) {
+        // What h5clear does: the flags of a writer that is gone are cleared at opening.
+        const hbool_t clear = 1;
+        H5Pset(list.get(), "clear_status_flags", &clear);
+        if (!attempt(H5F_ACC_RDWR)) file.fail("");
+    } else if (mode == Mode::write) {
+        if (!attempt(H5F_ACC_RDWR)) file.fail("");
+    } else if (!attempt(H5F_ACC_RDONLY) && !attempt(H5F_ACC_RDONLY | H5F_ACC_SWMR_READ)) {
+        file.fail("");
+    }
+    return file;
+}
+
+void File::start_swmr() {
+    if (H5Fstart_swmr_write(file_.get()) < 0) fail("SWMR");
+}
+
+void File::flush() {
+    if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0) fail("flush");
+}
+
+void File::close() {
+    if (!file_.reset()) fail("close");
+}
+
+void File::make_group(const std::string& name) {
+    const Handle group(H5Gcreate2(file_.get(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                       close_group);
+    if (group.get() < 0) fail(name);
+}
+
+bool File::has(const std::string& name) const {
+    // Every step of the path must be there to be asked for the next.
+    for (std::size_t at = name.find('/', 1); at != std::string::npos; at = name.find('/', at + 1)) {
+        if (H5Lexists(file_.get(), name.substr(0, at).c_str(), H5P_DEFAULT) <= 0) return false;
+    }
+    return H5Lexists(file_.get(), name.c_str(), H5P_DEFAULT) > 0;
+}
+
+void File::attribute(const std::string& object, const char* name, std::int64_t type,
+                     const void* value) {
+    if (H5Aexists_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT) > 0)
+        H5Adelete_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT);
+    const Handle space(H5Screate(H5S_SCALAR), close_space);
+    const Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name, type, space.get(),
+                                        H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                      close_attribute);
+    if (made.get() < 0 || H5Awrite(made.get(), type, value) < 0)
+        fail(object + ": attribute " + name);
+}
+
+void File::set(const std::string& object, const char* name, std::string_view text) {
+    std::string padded(text);
+    padded.resize(std::max<std::size_t>(text.size(), 1));
+    attribute(object, name, text_type(padded.size()).get(), padded.data());
+}
+
+void File::set(const std::string& object, const char* name, std::int64_t number) {
+    attribute(object, name, H5T_NATIVE_INT64, &number);
+}
+
+std::string File::text(const std::string& object, const char* name) const {
+    const Handle found(H5Aopen_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT),
+                       close_attribute);
+    if (found.get() < 0) fail(object + ": attribute " + name);
+    const Handle type(H5Aget_type(found.get()), close_type);
+    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
+        throw Error(path_ + ": " + object + ": attribute " + name +
+                    ": found no text, expected one");
+    std::string text(H5Tget_size(type.get()), '\0');
+    if (H5Aread(found.get(), text_type(text.size()).get(), text.data()) < 0)
+        fail(object + ": attribute " + name);
+    return text.c_str();
+}
+
+std::int64_t File::number(const std::string& object, const char* name) const {
+    const Handle found(H5Aopen_by_name(file_.get(), object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT),
+                       close_attribute);
+    std::int64_t number = 0;
+    if (found.get() < 0 || H5Aread(found.get(), H5T_NATIVE_INT64, &number) < 0)
+        fail(object + ": attribute " + name);
+    return number;
+}
+
+void File::write_text(const std::string& name, std::string_view text,
+                      std::string_view description) {
+    if (has(name)) H5Ldelete(file_.get(), name.c_str(), H5P_DEFAULT);
+    std::string padded(text);
+    padded.resize(std::max<std::size_t>(text.size(), 1));
+    const Handle type = text_type(padded.size());
+    {
+        const Handle space(H5Screate(H5S_SCALAR), close_space);
+        const Handle made(H5Dcreate2(file_.get(), name.c_str(), type.get(), space.get(),
+                                     H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                          close_set);
+        if (made.get() < 0 ||
+            H5Dwrite(made.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()) < 0)
+            fail(name);
+    }
+    set(name, "description", description);
+}
+
+std::string File::read_text(const std::string& name) const {
+    const auto all = texts(name);
+    return all.empty() ? std::string() : all.front();
+}
+
+void File::write_numbers(const std::string& name, std::span<const double> values,
+                         const std::vector<std::size_t>& dimensions, std::string_view unit,
+                         std::string_view description) {
+    if (has(name)) H5Ldelete(file_.get(), name.c_str(), H5P_DEFAULT);
+    {
+        const std::vector<hsize_t> size(dimensions.begin(), dimensions.end());
+        const Handle space(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
+                           close_space);
+        const Handle made(H5Dcreate2(file_.get(), name.c_str(), H5T_IEEE_F64LE, space.get(),
+                                     H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                          close_set);
+        if (made.get() < 0 || H5Dwrite(made.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                                       values.data()) < 0)
+            fail(name);
+    }
+    set(name, "unit", unit);
+    set(name, "description", description);
+}
+
+template <typename T>
+Array<T> File::read(const std::string& name, std::int64_t type) const {
+    const Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
+    if (set.get() < 0) fail(name);
+    Array<T> array;
+    array.dimensions = dimensions_of(set.get());
+    std::size_t count = 1;
+    for (const std::size_t d : array.dimensions) count *= d;
+    array.values.resize(count);
+    if (count > 0 &&
+        H5Dread(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()) < 0)
+        fail(name);
+    return array;
+}
+
+Array<double> File::doubles(const std::string& name) const {
+    return read<double>(name, H5T_NATIVE_DOUBLE);
+}
+Array<std::int64_t> File::integers(const std::string& name) const {
+    return read<std::int64_t>(name, H5T_NATIVE_INT64);
+}
+
+std::vector<std::string> File::texts(const std::string& name) const {
+    const Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
+    if (set.get() < 0) fail(name);
+    const Handle type(H5Dget_type(set.get()), close_type);
+    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) > 0)
+        throw Error(path_ + ": " + name + ": found no texts of fixed size, expected them");
+    const std::size_t size = H5Tget_size(type.get());
+    std::size_t count = 1;
+    for (const std::size_t d : dimensions_of(set.get())) count *= d;
+    std::string all(size * count, '\0');
+    if (count > 0 &&
+        H5Dread(set.get(), text_type(size).get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0)
+        fail(name);
+    std::vector<std::string> texts;
+    for (std::size_t i = 0; i < count; ++i) {
+        std::string text = all.substr(i * size, size);
+        text.resize(std::min(text.find('\0'), text.size()));
+        texts.push_back(std::move(text));
+    }
+    return texts;
+}
+
+std::size_t File::rows(const std::string& name) const {
+    const Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), close_set);
+    if (set.get() < 0) fail(name);
+    const auto dimensions = dimensions_of(set.get());
+    return dimensions.empty() ? 0 : dimensions[0];
+}
+
+namespace {
+
+std::size_t row_size(const ColumnSpec& spec) {
+    std::size_t bytes = bytes_of(spec.type);
+    for (const std::size_t d : spec.shape) bytes *= d;
+    return bytes;
+}
+
+}  // namespace
+
+Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std::size_t chunk_rows,
+             const char* description)
+    : file_(&file), group_(std::move(group)) {
+    file.make_group(group_);
+    file.set(group_, "description", description);
+    for (auto& spec : columns) {
+        Column column;
+        column.bytes = row_size(spec);
+        const bool text = spec.type == Type::text;
+        column.type =
+            text ? text_type(column.bytes) : Handle(H5Tcopy(native(spec.type)), close_type);
+        std::vector<hsize_t> size{0}, most{H5S_UNLIMITED}, chunk{chunk_rows};
+        for (const std::size_t d : text ? std::vector<std::size_t>{} : spec.shape) {
+            size.push_back(d);
+            most.push_back(d);
+            chunk.push_back(d);
+        }
+        const Handle space(
+            H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), close_space);
+        const Handle list(H5Pcreate(H5P_DATASET_CREATE), close_list);
+        H5Pset_chunk(list.get(), static_cast<int>(chunk.size()), chunk.data());
+        const std::string name = group_ + "/" + spec.name;
+        column.dataset = Handle(H5Dcreate2(file.id(), name.c_str(), column.type.get(), space.get(),
+                                           H5P_DEFAULT, list.get(), H5P_DEFAULT),
+                                close_set);
+        if (column.dataset.get() < 0) file.fail(name);
+        if (*spec.unit != '\0') file.set(name, "unit", spec.unit);
+        file.set(name, "description", spec.description);
+        column.spec = std::move(spec);
+        columns_.push_back(std::move(column));
+    }
+}
+
+Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns)
+    : file_(&file), group_(std::move(group)) {
+    for (auto& spec : columns) {
+        Column column;
+        column.bytes = row_size(spec);
+        const std::string name = group_ + "/" + spec.name;
+        column.dataset = Handle(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT), close_set);
+        if (column.dataset.get() < 0) file.fail(name);
+        column.type = spec.type == Type::text ? text_type(column.bytes)
+                                              : Handle(H5Tcopy(native(spec.type)), close_type);
+        rows_ = dimensions_of(column.dataset.get()).at(0);
+        column.spec = std::move(spec);
+        columns_.push_back(std::move(column));
+    }
+}
+
+void Table::cell(const void* value, std::size_t size) {
+    Column& column = columns_[next_];
+    if (size != column.bytes)
+        throw std::logic_error(group_ + "/" + column.spec.name + ": a cell of another size");
+    const auto* bytes = static_cast<const unsigned char*>(value);
+    column.buffer.insert(column.buffer.end(), bytes, bytes + size);
+    next_ = (next_ + 1) % columns_.size();
+    if (next_ == 0) ++waiting_;
+}
+
+Table& Table::put(std::string_view text) {
+    std::string padded(text.substr(0, columns_[next_].bytes));
+    padded.resize(columns_[next_].bytes);
+    cell(padded.data(), padded.size());
+    return *this;
+}
+
+std::size_t Table::row_bytes() const noexcept {
+    std::size_t bytes = 0;
+    for (const Column& column : columns_) bytes += column.bytes;
+    return bytes;
+}
+
+void Table::commit() {
+    if (waiting_ == 0) return;
+    for (Column& column : columns_) {
+        std::vector<hsize_t> start{rows_}, count{waiting_}, size{rows_ + waiting_};
+        if (column.spec.type != Type::text) {
+            for (const std::size_t d : column.spec.shape) {
+                start.push_back(0);
+                count.push_back(d);
+                size.push_back(d);
+            }
+        }
+        const std::string name = group_ + "/" + column.spec.name;
+        if (H5Dset_extent(column.dataset.get(), size.data()) < 0) file_->fail(name);
+        const Handle in_file(H5Dget_space(column.dataset.get()), close_space);
+        H5Sselect_hyperslab(in_file.get(), H5S_SELECT_SET, start.data(), nullptr, count.data(),
+                            nullptr);
+        const Handle in_memory(
+            H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), close_space);
+        if (H5Dwrite(column.dataset.get(), column.type.get(), in_memory.get(), in_file.get(),
+                     H5P_DEFAULT, column.buffer.data()) < 0)
+            file_->fail(name);
+        column.buffer.clear();
+    }
+    rows_ += waiting_;
+    waiting_ = 0;
+}
+
+}  // namespace vibrig::record::hdf5

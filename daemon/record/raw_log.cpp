@@ -1,0 +1,245 @@
+#include "daemon/record/raw_log.hpp"
+
+#include <fcntl.h>
+#include <spdlog/fmt/fmt.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "daemon/record/wall_clock.hpp"
+
+namespace vibrig::record {
+
+using drivers::Time;
+
+namespace {
+
+constexpr std::size_t kBuffer = 64 * 1024;
+constexpr int kLevel = 3;  // of zstd: fast, and logs shrink to a fifth
+
+struct CloseFile {
+    void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
+};
+using StdFile = std::unique_ptr<std::FILE, CloseFile>;
+
+}  // namespace
+
+RawLog::RawLog(std::string folder, std::string interface, const Settings& settings,
+               std::int64_t utc_offset_ns, Closed on_closed)
+    : folder_(std::move(folder)),
+      settings_(settings),
+      utc_offset_ns_(utc_offset_ns),
+      on_closed_(std::move(on_closed)) {
+    line_.interface = std::move(interface);
+    buffer_.reserve(kBuffer + 256);
+}
+
+RawLog::~RawLog() { close(); }
+
+void RawLog::add(const FrameRecord& record) {
+    if (record.dropped_before > 0) {
+        buffer_ += fmt::format("# {} frames lost in the recorder's ring\n", record.dropped_before);
+        lose(record.dropped_before, record.time, record.time);
+        gap_.reason = "ring full";
+    }
+    line_.time_ns = record.time + utc_offset_ns_;
+    line_.extended = (record.frame.can_id & CAN_EFF_FLAG) != 0;
+    line_.remote = (record.frame.can_id & CAN_RTR_FLAG) != 0;
+    line_.error = (record.frame.can_id & CAN_ERR_FLAG) != 0;
+    line_.id = record.frame.can_id & (line_.extended || line_.error ? CAN_EFF_MASK : CAN_SFF_MASK);
+    line_.fd = record.fd;
+    line_.fd_flags =
+        record.fd ? static_cast<std::uint8_t>(record.frame.flags & 3) : std::uint8_t{0};
+    line_.size = std::min<std::uint8_t>(record.frame.len, 64);
+    std::copy_n(record.frame.data, line_.size, line_.data.begin());
+    std::string text;
+    try {
+        text = proto::candump_line(line_);
+    } catch (const proto::CandumpError&) {
+        return lose(1, record.time, record.time);
+    }
+    if (buffered_ == 0) buffer_from_ = record.time;
+    buffer_ += text;
+    buffer_ += record.sent ? " T\n" : " R\n";
+    buffer_to_ = record.time;
+    ++buffered_;
+    if (buffer_.size() >= kBuffer) flush();
+}
+
+void RawLog::lose(std::uint64_t frames, Time from, Time to) {
+    lost_ += frames;
+    if (gap_.lost == 0) gap_.from = from;
+    gap_.to = to;
+    gap_.lost += frames;
+}
+
+bool RawLog::take_gap(Gap& gap) {
+    if (gap_.lost == 0 || !good_) return false;
+    gap = gap_;
+    gap.stream = "frames";
+    gap_ = {};
+    return true;
+}
+
+void RawLog::refuse(const std::string& why) {
+    good_ = false;
+    note_ = why;
+    retry_wall_ns_ = wall_ns() + kRetryNs;
+    forget();
+}
+
+void RawLog::forget() {
+    gap_.reason = note_;
+    lose(buffered_, buffer_from_, buffer_to_);
+    buffer_.clear();
+    buffered_ = 0;
+}
+
+void RawLog::open() {
+    struct statvfs room {};
+    if (::statvfs(folder_.c_str(), &room) == 0) {
+        const double free_mb =
+            static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize) / 1e6;
+        if (free_mb < settings_.keep_free_mb)
+            return refuse(fmt::format("{}: {:.0f} MB free, expected {} at least", folder_, free_mb,
+                                      settings_.keep_free_mb));
+    }
+    segment_ = {};
+    segment_.file = fmt::format("raw-{:04d}.log", ++number_);
+    segment_.from = buffer_from_;
+    const std::string path = folder_ + "/" + segment_.file;
+    fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
+    if (fd_ < 0) refuse(path + ": " + std::strerror(errno));
+}
+
+void RawLog::flush() {
+    if (buffer_.empty()) return;
+    if (fd_ < 0) {
+        if (!good_ && wall_ns() < retry_wall_ns_) return forget();
+        open();
+        if (fd_ < 0) return;
+    }
+    std::size_t done = 0;
+    while (done < buffer_.size()) {
+        const ssize_t n = ::write(fd_, buffer_.data() + done, buffer_.size() - done);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) {
+            const int error = errno;
+            // No half line: the next segment begins where this one ends.
+            if (::ftruncate(fd_, static_cast<off_t>(segment_.bytes)) != 0) ++number_;
+            const std::string file = segment_.file;
+            end_segment();
+            return refuse(folder_ + "/" + file + ": " + std::strerror(error));
+        }
+        done += static_cast<std::size_t>(n);
+    }
+    good_ = true;
+    note_.clear();
+    frames_ += buffered_;
+    bytes_ += buffer_.size();
+    segment_.frames += buffered_;
+    segment_.bytes += buffer_.size();
+    segment_.to = buffer_to_;
+    buffer_.clear();
+    buffered_ = 0;
+    if (static_cast<double>(segment_.bytes) >= settings_.segment_mb * 1e6 ||
+        drivers::to_seconds(segment_.to - segment_.from) >= settings_.segment_s)
+        end_segment();
+}
+
+void RawLog::end_segment() {
+    if (fd_ < 0) return;
+    ::fdatasync(fd_);
+    ::close(fd_);
+    fd_ = -1;
+    if (settings_.zstd) {
+        const std::string why = compress(folder_ + "/" + segment_.file);
+        if (why.empty()) {
+            segment_.file += ".zst";
+        } else {
+            note_ = why;
+        }
+    }
+    if (on_closed_) on_closed_(segment_);
+}
+
+void RawLog::close() {
+    flush();
+    end_segment();
+}
+
+std::string compress(const std::string& path) {
+    const std::string to = path + ".zst";
+    const std::string part = to + ".part";
+    const StdFile in(std::fopen(path.c_str(), "rb"));
+    StdFile out(std::fopen(part.c_str(), "wb"));
+    if (!in || !out) return part + ": " + std::strerror(errno);
+    const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
+                                                                     ZSTD_freeCCtx);
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+    std::vector<char> from(ZSTD_CStreamInSize()), to_buffer(ZSTD_CStreamOutSize());
+    const auto failed = [&](const std::string& why) {
+        out.reset();
+        ::unlink(part.c_str());
+        return part + ": " + why;
+    };
+    for (bool last = false; !last;) {
+        const std::size_t n = std::fread(from.data(), 1, from.size(), in.get());
+        if (std::ferror(in.get()) != 0) return failed(std::strerror(errno));
+        last = n < from.size();
+        ZSTD_inBuffer input{from.data(), n, 0};
+        for (bool done = false; !done;) {
+            ZSTD_outBuffer output{to_buffer.data(), to_buffer.size(), 0};
+            const std::size_t left = ZSTD_compressStream2(context.get(), &output, &input,
+                                                          last ? ZSTD_e_end : ZSTD_e_continue);
+            if (ZSTD_isError(left) != 0) return failed(ZSTD_getErrorName(left));
+            if (std::fwrite(to_buffer.data(), 1, output.pos, out.get()) != output.pos)
+                return failed(std::strerror(errno));
+            done = last ? left == 0 : input.pos == input.size;
+        }
+    }
+    if (std::fflush(out.get()) != 0 || ::fdatasync(::fileno(out.get())) != 0)
+        return failed(std::strerror(errno));
+    out.reset();
+    if (std::rename(part.c_str(), to.c_str()) != 0) return failed(std::strerror(errno));
+    ::unlink(path.c_str());
+    return {};
+}
+
+void read_raw(const std::string& path, const std::function<bool(std::string_view)>& take) {
+    const StdFile in(std::fopen(path.c_str(), "rb"));
+    if (!in) throw std::runtime_error(path + ": " + std::strerror(errno));
+    std::vector<char> from(ZSTD_DStreamInSize());
+    const bool packed = path.ends_with(".zst");
+    const std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
+                                                                     ZSTD_freeDCtx);
+    std::vector<char> to(ZSTD_DStreamOutSize());
+    std::size_t left = 0;
+    while (const std::size_t n = std::fread(from.data(), 1, from.size(), in.get())) {
+        if (!packed) {
+            if (!take({from.data(), n})) return;
+            continue;
+        }
+        ZSTD_inBuffer input{from.data(), n, 0};
+        while (input.pos < input.size) {
+            ZSTD_outBuffer output{to.data(), to.size(), 0};
+            left = ZSTD_decompressStream(context.get(), &output, &input);
+            if (ZSTD_isError(left) != 0)
+                throw std::runtime_error(path + ": " + ZSTD_getErrorName(left));
+            if (output.pos > 0 && !take({to.data(), output.pos})) return;
+        }
+    }
+    if (std::ferror(in.get()) != 0) throw std::runtime_error(path + ": " + std::strerror(errno));
+    if (packed && left != 0)
+        throw std::runtime_error(path + ": found the end of the file, expected more of its frame");
+}
+
+}  // namespace vibrig::record

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "daemon/record/records.hpp"
+#include "daemon/record/settings.hpp"
+#include "proto/candump.hpp"
+
+namespace vibrig::record {
+
+/// One closed file of a raw log.
+struct Segment {
+    std::string file;  ///< name in the folder
+    drivers::Time from = 0, to = 0;
+    std::uint64_t frames = 0, bytes = 0;
+};
+
+/// Frames as candump logs them, in segments; both directions (R, T). One thread. A disk that
+/// refuses costs the frames that were to go there, and they are counted; nothing throws.
+class RawLog {
+  public:
+    using Closed = std::function<void(const Segment&)>;
+    RawLog(std::string folder, std::string interface, const Settings& settings,
+           std::int64_t utc_offset_ns, Closed on_closed);
+    ~RawLog();
+
+    void add(const FrameRecord& record);
+    /// Hands what is buffered to the kernel.
+    void flush();
+    void close();
+
+    [[nodiscard]] bool good() const noexcept { return good_; }
+    [[nodiscard]] const std::string& note() const noexcept { return note_; }
+    [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+    [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+    [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
+    /// What was lost since the last call; false: nothing.
+    [[nodiscard]] bool take_gap(Gap& gap);
+
+  private:
+    void open();
+    void end_segment();
+    void refuse(const std::string& why);
+    void forget();  ///< what is buffered
+    void lose(std::uint64_t frames, drivers::Time from, drivers::Time to);
+
+    std::string folder_;
+    Settings settings_;
+    std::int64_t utc_offset_ns_;
+    Closed on_closed_;
+    proto::LoggedFrame line_;  ///< keeps the interface's name
+    int fd_ = -1;
+    int number_ = 0;
+    Segment segment_;
+    std::string buffer_;
+    std::uint64_t buffered_ = 0;  ///< frames
+    drivers::Time buffer_from_ = 0, buffer_to_ = 0;
+    std::int64_t retry_wall_ns_ = 0;
+    bool good_ = true;
+    std::string note_;
+    std::uint64_t frames_ = 0, lost_ = 0, bytes_ = 0;
+    Gap gap_;
+};
+
+/// Compresses a closed file and takes it away; the compressed one appears whole or not at all.
+/// Empty: done; else why not, and the file is still there.
+[[nodiscard]] std::string compress(const std::string& path);
+/// Calls `take` with the pieces of a file, decompressed if it ends in .zst. Throws
+/// std::runtime_error. False of `take` ends it.
+void read_raw(const std::string& path, const std::function<bool(std::string_view)>& take);
+
+}  // namespace vibrig::record

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "daemon/record/campaign_file.hpp"
+
+namespace vibrig::record {
+
+struct ReplayOptions {
+    double speed = 0;  ///< times the recording's; 0: as fast as it goes
+    std::function<void(std::size_t done, std::size_t all)> progress = {};
+    std::function<void(const Dwell&)> on_dwell = {};
+};
+
+struct ReplayResult {
+    estimator::Result result;
+    std::vector<Dwell> dwells;
+    std::size_t samples = 0;
+    double recorded_s = 0, took_s = 0;
+    /// Estimates after each dwell that are not those of the recording to the last bit.
+    std::size_t compared = 0, different = 0;
+    std::string first_difference;  ///< empty: none
+};
+
+/// The recorded samples and orders through the daemon's estimator thread, its noise monitor and
+/// what the control thread does between dwells, on a virtual clock. Throws.
+[[nodiscard]] ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,
+                                  const ReplayOptions& options);
+
+/// Samples that the frames of the campaign's raw log make, with the campaign's own signals.
+/// `until`: time of the newest whole frame. Throws std::runtime_error.
+[[nodiscard]] std::vector<drivers::Sample> samples_from_raw(const Campaign& campaign,
+                                                            drivers::Time& until);
+
+/// A campaign from candump logs alone. Dwells come from `dwells` (CSV, as the recorder writes it
+/// beside its logs), signals from the configuration. Throws std::runtime_error.
+[[nodiscard]] Campaign campaign_from_candump(const std::vector<std::string>& logs,
+                                             const std::string& dwells,
+                                             const std::string& configuration,
+                                             const std::string& dbc);
+
+}  // namespace vibrig::record

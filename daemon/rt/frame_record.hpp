@@ -1,0 +1,20 @@
+#pragma once
+
+#include <linux/can.h>
+
+#include <cstdint>
+
+#include "drivers/clock.hpp"
+
+namespace vibrig::rt {
+
+/// One frame on its way to the recorder.
+struct FrameRecord {
+    canfd_frame frame{};
+    drivers::Time time = 0;
+    bool fd = false;
+    bool sent = false;  ///< by this daemon
+    std::uint32_t dropped_before = 0;
+};
+
+}  // namespace vibrig::rt

@@ -1,0 +1,292 @@
+// vibrig export and vibrig recover.
+#include <matio.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/raw_log.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/progress.hpp"
+#include "proto/recording_csv.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+void export_csv(const record::Campaign& campaign, const std::string& path) {
+    std::vector<proto::RecordingRow> rows;
+    std::size_t left_out = 0;
+    for (const auto& dwell : record::recorded_dwells(campaign)) {
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
+            const auto& sample = campaign.samples[i];
+            if (!sample.angles_good() || !sample.force_good()) {
+                ++left_out;
+                continue;
+            }
+            proto::RecordingRow row;
+            row.time_s = drivers::to_seconds(sample.time - dwell.order->from);
+            row.run = dwell.order->run;
+            row.position = dwell.order->position;
+            for (std::size_t k = 0; k < 3; ++k) {
+                row.angle_deg[k] = sample.angle[k] * kDegrees;
+                row.force_g[k] = sample.force[k];
+            }
+            rows.push_back(row);
+        }
+    }
+    if (rows.empty())
+        throw std::runtime_error(campaign.path +
+                                 ": found no good sample in a dwell, expected some");
+    proto::write_recording(path, rows);
+    std::cerr << path << ": " << rows.size() << " samples of "
+              << record::recorded_dwells(campaign).size() << " dwells";
+    if (left_out > 0) std::cerr << "; " << left_out << " without good quality are left out";
+    std::cerr << '\n';
+}
+
+/// One variable of a .mat file.
+class MatFile {
+  public:
+    explicit MatFile(const std::string& path)
+        : path_(path), file_(Mat_CreateVer(path.c_str(), nullptr, MAT_FT_MAT5)) {
+        if (file_ == nullptr) throw std::runtime_error(path + ": cannot be written");
+    }
+    ~MatFile() { Mat_Close(file_); }
+    MatFile(const MatFile&) = delete;
+    MatFile& operator=(const MatFile&) = delete;
+
+    /// `rows` of `width` numbers, row by row.
+    void add(const char* name, const std::vector<double>& values, std::size_t width = 1) {
+        const std::size_t rows = values.size() / width;
+        // MATLAB keeps columns together.
+        std::vector<double> turned(values.size());
+        for (std::size_t r = 0; r < rows; ++r) {
+            for (std::size_t c = 0; c < width; ++c) turned[c * rows + r] = values[r * width + c];
+        }
+        std::array<std::size_t, 2> size{rows, width};
+        write(name,
+              Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, size.data(), turned.data(), 0));
+    }
+    void add(const char* name, std::string text) {
+        std::array<std::size_t, 2> size{1, text.size()};
+        write(name, Mat_VarCreate(name, MAT_C_CHAR, MAT_T_UTF8, 2, size.data(), text.data(), 0));
+    }
+
+  private:
+    void write(const char* name, matvar_t* variable) {
+        const bool good =
+            variable != nullptr && Mat_VarWrite(file_, variable, MAT_COMPRESSION_ZLIB) == 0;
+        if (variable != nullptr) Mat_VarFree(variable);
+        if (!good) throw std::runtime_error(path_ + ": " + name + ": cannot be written");
+    }
+
+    std::string path_;
+    mat_t* file_;
+};
+
+void export_mat(const record::Campaign& campaign, const std::string& path) {
+    std::vector<double> time, sequence, angle, force, table, quality, run, position;
+    const auto dwells = record::recorded_dwells(campaign);
+    std::vector<std::array<int, 2>> of(campaign.samples.size());
+    for (const auto& dwell : dwells) {
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
+            of[i] = {dwell.order->run, dwell.order->position};
+    }
+    const drivers::Time origin = campaign.samples.empty() ? 0 : campaign.samples.front().time;
+    for (std::size_t i = 0; i < campaign.samples.size(); ++i) {
+        const auto& s = campaign.samples[i];
+        time.push_back(drivers::to_seconds(s.time - origin));
+        sequence.push_back(s.sequence);
+        for (const double a : s.angle) angle.push_back(a * kDegrees);
+        force.insert(force.end(), s.force.begin(), s.force.end());
+        table.push_back(s.table_accel);
+        for (std::size_t k = 0; k < drivers::kChannels; ++k)
+            quality.push_back(static_cast<double>(s.quality[k]));
+        run.push_back(of[i][0]);
+        position.push_back(of[i][1]);
+    }
+    fs::remove(path);
+    MatFile file(path);
+    file.add("name", campaign.head.name);
+    file.add("configuration", campaign.head.configuration);
+    file.add("result_json", campaign.result_json);
+    file.add("start_utc_s",
+             std::vector<double>{drivers::to_seconds(origin + campaign.head.utc_offset_ns)});
+    file.add("time_s", time);
+    file.add("sequence", sequence);
+    file.add("angle_deg", angle, 3);
+    file.add("force_g", force, 3);
+    file.add("table_accel_g", table);
+    file.add("quality", quality, drivers::kChannels);
+    file.add("run", run);
+    file.add("position", position);
+    std::vector<double> d_run, d_position, d_table, d_from, d_to, value, sigma, covariance, kappa,
+        nis;
+    for (const auto& dwell : dwells) {
+        d_run.push_back(dwell.order->run);
+        d_position.push_back(dwell.order->position);
+        d_table.push_back(dwell.order->table_g);
+        d_from.push_back(drivers::to_seconds(dwell.order->from - origin));
+        d_to.push_back(drivers::to_seconds(dwell.order->to - origin));
+    }
+    for (const auto& dwell : campaign.dwells) {
+        kappa.push_back(dwell.summary.kappa);
+        nis.push_back(dwell.summary.nis_per_dof);
+        value.insert(value.end(), dwell.value.begin(), dwell.value.end());
+        sigma.insert(sigma.end(), dwell.sigma.begin(), dwell.sigma.end());
+    }
+    if (!campaign.dwells.empty()) covariance = campaign.dwells.back().covariance;
+    std::string names;
+    for (const char* name : estimator::parameter_names())
+        names += (names.empty() ? "" : " ") + std::string(name);
+    file.add("coefficients", names);
+    file.add("dwell_run", d_run);
+    file.add("dwell_position", d_position);
+    file.add("dwell_table_g", d_table);
+    file.add("dwell_from_s", d_from);
+    file.add("dwell_to_s", d_to);
+    file.add("dwell_kappa", kappa);
+    file.add("dwell_nis_per_dof", nis);
+    file.add("dwell_value", value, estimator::kParameters);
+    file.add("dwell_sigma", sigma, estimator::kParameters);
+    file.add("covariance", covariance, estimator::kParameters);
+    std::cerr << path << ": " << campaign.samples.size() << " samples\n";
+}
+
+void export_candump(const record::Campaign& campaign, const std::string& path) {
+    const auto files = record::raw_files(campaign.folder);
+    if (files.empty())
+        throw std::runtime_error(campaign.folder +
+                                 ": found no raw-*.log, expected the campaign's raw log");
+    std::FILE* to = path == "-" ? stdout : std::fopen(path.c_str(), "wb");
+    if (to == nullptr) throw std::runtime_error(path + ": cannot be written");
+    std::size_t bytes = 0;
+    bool good = true;
+    for (const auto& file : files) {
+        record::read_raw(file, [&](std::string_view piece) {
+            good = good && std::fwrite(piece.data(), 1, piece.size(), to) == piece.size();
+            bytes += piece.size();
+            return good;
+        });
+    }
+    good = (to == stdout ? std::fflush(to) : std::fclose(to)) == 0 && good;
+    if (!good) throw std::runtime_error(path + ": cannot be written");
+    if (to != stdout)
+        std::cerr << path << ": " << bytes << " bytes of " << files.size() << " segments\n";
+}
+
+int export_campaign(const std::string& argument, const std::string& format, std::string path) {
+    record::Campaign campaign;
+    {
+        Progress progress("reading " + argument);
+        progress.show(0, 1);
+        campaign = record::read_campaign(argument);
+    }
+    if (path.empty()) path = campaign.head.name + (format == "candump" ? ".log" : "." + format);
+    if (format == "csv") {
+        export_csv(campaign, path);
+    } else if (format == "mat") {
+        export_mat(campaign, path);
+    } else {
+        export_candump(campaign, path);
+    }
+    return 0;
+}
+
+int recover(const std::string& argument, bool json) {
+    const record::Recovery found = record::recover(argument);
+    std::array<char, 200> line{};
+    if (json) {
+        nlohmann::ordered_json root;
+        root["was_closed"] = found.was_closed;
+        root["samples"] = found.samples;
+        root["samples_from_raw"] = found.samples_from_raw;
+        root["recorded_s"] = found.recorded_s;
+        root["dwells"] = found.dwells;
+        root["dwell_in_progress"] = nullptr;
+        if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
+        root["raw_beyond_s"] = found.raw_until_s;
+        root["lost"] = found.words;
+        std::cout << root.dump() << '\n';
+        return 0;
+    }
+    std::snprintf(line.data(), line.size(), "%zu samples over %.3f s, %zu dwells done\n",
+                  found.samples, found.recorded_s, found.dwells);
+    std::cout << (found.was_closed ? "closed in order: nothing to mend\n" : "mended\n")
+              << line.data();
+    if (!found.was_closed) {
+        std::snprintf(line.data(), line.size(),
+                      "%zu samples more from the raw log, which goes on %.3f s longer\n",
+                      found.samples_from_raw, found.raw_until_s);
+        std::cout << line.data()
+                  << (found.cut_dwell.empty() ? "no dwell was in progress\n"
+                                              : "lost: the end of " + found.cut_dwell + "\n");
+    }
+    for (const auto& words : found.words) std::cout << "lost: " << words << '\n';
+    return 0;
+}
+
+template <typename Run>
+void answered(int& exit_code, Run run) {
+    try {
+        exit_code = run();
+    } catch (const std::exception& error) {
+        std::cerr << error.what() << '\n';
+        exit_code = kBadInput;
+    }
+}
+
+}  // namespace
+
+void add_recordings(CLI::App& app, int& exit_code) {
+    struct Options {
+        std::string campaign, format, output;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* exporting = app.add_subcommand("export", "A recorded campaign for other programs");
+    exporting->add_option("CAMPAIGN", options->campaign, "its HDF5 file or its folder")->required();
+    exporting
+        ->add_option("--to", options->format,
+                     "csv (as `vibrig identify` reads it), mat (MATLAB, Octave) or candump "
+                     "(canplayer, Wireshark)")
+        ->required()
+        ->check(CLI::IsMember({"csv", "mat", "candump"}));
+    exporting->add_option("-o,--output", options->output,
+                          "file to write (default: the campaign's name here; candump: - is "
+                          "standard output)");
+    exporting->footer("Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv");
+    exporting->callback([options, &exit_code] {
+        answered(exit_code, [&] {
+            return export_campaign(options->campaign, options->format, options->output);
+        });
+    });
+
+    CLI::App* recovering = app.add_subcommand(
+        "recover", "Mends a campaign's file after a crash and says what was lost");
+    recovering->add_option("CAMPAIGN", options->campaign, "its HDF5 file or its folder")
+        ->required();
+    recovering->add_flag("--json", options->json, "print what was found as JSON");
+    recovering->footer(
+        "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
+        "A file that was closed in order is left as it is.");
+    recovering->callback([options, &exit_code] {
+        answered(exit_code, [&] { return recover(options->campaign, options->json); });
+    });
+}
+
+}  // namespace vibrig::tool

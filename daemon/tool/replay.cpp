@@ -1,0 +1,165 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/progress.hpp"
+#include "daemon/tool/result_json.hpp"
+#include "daemon/tool/result_table.hpp"
+#include "estimator/instruction_set.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReplayArguments {
+    std::vector<std::string> files;
+    std::string config, dwells, speed = "max";
+    std::string instruction_set = "auto";
+    bool json = false;
+};
+
+double speed_of(const std::string& text) {
+    double speed = 0;
+    if (text == "max") return 0;
+    std::string_view number = text;
+    if (number.ends_with('x')) number.remove_suffix(1);
+    if (!proto::read_number(number, speed) || !(speed >= 1e-3) || !(speed <= 1e6))
+        throw std::runtime_error("--speed: found '" + proto::printable(text) +
+                                 "', expected max or a number from 0.001 to 1000000");
+    return speed;
+}
+
+/// With --config its settings, else those of the recording.
+estimator::Settings settings_of(const ReplayArguments& arguments,
+                                const record::Campaign& campaign) {
+    if (!arguments.config.empty())
+        return configuration::load(arguments.config, false).configuration.estimator;
+    return configuration::parse(record::identification_sections(campaign.head.configuration),
+                                "configuration in " + campaign.path, false)
+        .configuration.estimator;
+}
+
+bool is_log(const std::string& path) { return path.ends_with(".log") || path.ends_with(".zst"); }
+
+record::Campaign campaign_of(const ReplayArguments& arguments) {
+    const std::string& first = arguments.files.front();
+    if (!std::ranges::any_of(arguments.files, is_log)) {
+        if (arguments.files.size() > 1)
+            throw std::runtime_error(arguments.files[1] +
+                                     ": found a second campaign, expected one (or candump logs)");
+        return record::read_campaign(first);
+    }
+    // Without words about it, what the recorder left beside the logs.
+    const fs::path folder = fs::path(first).parent_path();
+    std::string configuration, dbc;
+    if (fs::exists(folder / "campaign.h5")) {
+        const auto beside = record::read_campaign((folder / "campaign.h5").string());
+        configuration = beside.head.configuration;
+        dbc = beside.head.dbc;
+    }
+    if (!arguments.config.empty()) {
+        const auto loaded = configuration::load(arguments.config, false);
+        configuration = configuration::format_effective(loaded);
+        if (!loaded.configuration.dbc.empty())
+            dbc = proto::read_whole_file(loaded.configuration.dbc, 16 << 20);
+    }
+    const std::string dwells =
+        arguments.dwells.empty() ? (folder / "dwells.csv").string() : arguments.dwells;
+    return record::campaign_from_candump(arguments.files, dwells, configuration, dbc);
+}
+
+int replay(const ReplayArguments& arguments) {
+    estimator::use_instruction_set(arguments.instruction_set);
+    record::ReplayOptions options;
+    options.speed = speed_of(arguments.speed);
+    record::Campaign campaign;
+    {
+        Progress reading("reading " + arguments.files.front());
+        reading.show(0, 1);
+        campaign = campaign_of(arguments);
+    }
+    const estimator::Settings settings = settings_of(arguments, campaign);
+    record::ReplayResult replayed;
+    {
+        Progress progress("replaying");
+        options.progress = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
+        replayed = record::replay(campaign, settings, options);
+    }
+    std::cout << (arguments.json ? result_json(replayed.result) + "\n"
+                                 : result_table(replayed.result))
+              << std::flush;
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(),
+                  "%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
+                  replayed.samples, replayed.dwells.size(), replayed.recorded_s, replayed.took_s,
+                  replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
+    std::cerr << text.data() << '\n';
+    if (arguments.config.empty() && replayed.compared > 0) {
+        if (replayed.different == 0) {
+            std::cerr << "estimates after each of " << replayed.compared
+                      << " dwells: as recorded, to the last bit\n";
+        } else {
+            std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
+                      << " dwells are not as recorded (" << replayed.first_difference
+                      << "); recorded by " << campaign.head.compiler << ", "
+                      << campaign.head.instruction_set << "; this is " << estimator::compiler()
+                      << ", " << estimator::instruction_set() << '\n';
+        }
+    }
+    if (!std::cout) throw std::runtime_error("standard output: cannot be written");
+    return all_observable(replayed.result) ? 0 : kNo;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+    auto arguments = std::make_shared<ReplayArguments>();
+    CLI::App* command = app.add_subcommand(
+        "replay", "A recording through the daemon's own path, on a virtual clock");
+    command
+        ->add_option("FILE", arguments->files,
+                     "a campaign's HDF5 file or its folder, or candump logs in order (.log, "
+                     ".log.zst)")
+        ->required();
+    command->add_option("--speed", arguments->speed, "times the recording's own, or max (default)");
+    command->add_option("--config", arguments->config,
+                        "identify anew with these settings (TOML) instead of the recorded ones");
+    command->add_option("--dwells", arguments->dwells,
+                        "with candump logs: which times are which dwell (default: dwells.csv "
+                        "beside the first log)");
+    command
+        ->add_option("--instruction-set", arguments->instruction_set,
+                     "of the filter: auto (the best), or one of this processor's")
+        ->envname("VIBRIG_INSTRUCTION_SET");
+    command->add_flag("--json", arguments->json, "print the result as JSON");
+    command->footer(
+        "Example: vibrig replay /var/lib/vibrig/platform-17-20260301T080000Z --speed max\n"
+        "On the build and instruction set of the recording the estimates come out as they were to\n"
+        "the last bit; standard error says whether they did.\n"
+        "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
+    command->callback([arguments, &exit_code] {
+        try {
+            exit_code = replay(*arguments);
+        } catch (const std::exception& error) {
+            std::cerr << error.what() << '\n';
+            exit_code = kBadInput;
+        }
+    });
+}
+
+}  // namespace vibrig::tool
