@@ -302,6 +302,7 @@ void Daemon::take_commands(Time now) {
             waiting.reply.set_value(alarm);
             continue;
         }
+        if (waiting.request.kind == CommandRequest::Kind::arm) tell_overdue();
         const auto reply = campaign_.command(waiting.request, now);
         if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
             interlock_.acknowledge(handled);

@@ -99,6 +99,7 @@ class Daemon final : public StatusSource {
     [[nodiscard]] std::string result_configuration() const;
     [[nodiscard]] std::unique_ptr<record::Recorder> make_recorder();
     void record_begin(const std::string& by, std::size_t dwells_before);
+    void tell_overdue();  ///< instruments whose certificate has run out
     void record_dwell(const estimator::DwellSummary& summary);
     void offer_unfinished(journal::Unfinished& campaign);
     [[nodiscard]] std::string resume_gate() const;

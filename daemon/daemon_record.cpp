@@ -1,4 +1,5 @@
 // What the daemon tells the recorder.
+#include <spdlog/fmt/chrono.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
@@ -37,6 +38,17 @@ std::string plan_json(const campaign::Settings& settings) {
 }
 
 }  // namespace
+
+void Daemon::tell_overdue() {
+    const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    const std::string day = fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
+    for (const auto& instrument : configuration_.paperwork.instruments) {
+        if (instrument.overdue(day))
+            log(Severity::warning, "paperwork",
+                fmt::format("{} {}: certificate {} was due on {}", instrument.name,
+                            instrument.serial, instrument.certificate, instrument.due));
+    }
+}
 
 std::unique_ptr<record::Recorder> Daemon::make_recorder() {
     const record::Settings& settings = configuration_.record;

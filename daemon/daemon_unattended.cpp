@@ -37,7 +37,7 @@ std::string Daemon::result_configuration() const {
         const auto section = value.key.substr(0, value.key.find('.'));
         if (section == "server" || section == "log" || section == "threads" ||
             section == "journal" || section == "clock" || section == "record" ||
-            value.key == "campaign.results")
+            section == "unit" || section == "instrument" || value.key == "campaign.results")
             continue;
         text += value.key + " = " + value.value + "\n";
     }

@@ -54,6 +54,7 @@ struct Configuration {
     std::string results;  ///< [campaign] results: folder for result.json; empty: none written
     std::vector<rt::Rule> interlock = rt::default_interlock();  ///< [[interlock]]
     record::Settings record;                                    ///< [record]
+    record::Paperwork paperwork;                                ///< [unit], [[instrument]]
     int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
 };

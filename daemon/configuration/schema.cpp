@@ -11,6 +11,7 @@ const std::vector<Key>& schema() {
         add_bus_keys(all);
         add_daemon_keys(all);
         add_interlock_keys(all);
+        add_paperwork_keys(all);
         return all;
     }();
     return keys;

@@ -35,5 +35,6 @@ void add_shaker_keys(std::vector<Key>& keys);
 void add_bus_keys(std::vector<Key>& keys);
 void add_daemon_keys(std::vector<Key>& keys);
 void add_interlock_keys(std::vector<Key>& keys);
+void add_paperwork_keys(std::vector<Key>& keys);
 
 }  // namespace vibrig::configuration

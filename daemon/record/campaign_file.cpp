@@ -314,12 +314,12 @@ std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign) {
 }
 
 std::string identification_sections(const std::string& configuration) {
-    static const std::set<std::string> kSections{"site",          "vibration", "platform",
-                                                 "accelerometer", "noise",     "estimator"};
+    static const std::set<std::string> kSections{"site",  "vibration", "platform", "accelerometer",
+                                                 "noise", "estimator", "unit",     "instrument"};
     std::istringstream lines(configuration);
     std::string kept;
     for (std::string line; std::getline(lines, line);) {
-        if (kSections.contains(line.substr(0, line.find('.')))) kept += line + "\n";
+        if (kSections.contains(line.substr(0, line.find_first_of(". =")))) kept += line + "\n";
     }
     return kept;
 }

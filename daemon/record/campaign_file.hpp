@@ -38,7 +38,8 @@ struct RecordedDwell {
 /// HDF5 by its first bytes; false for what cannot be read.
 [[nodiscard]] bool is_hdf5(const std::string& path);
 [[nodiscard]] std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign);
-/// Of the effective configuration, the sections on which the identification depends.
+/// Of the effective configuration, the sections on which the identification depends,
+/// and what a report states.
 [[nodiscard]] std::string identification_sections(const std::string& configuration);
 /// The raw log's files in order, compressed or not.
 [[nodiscard]] std::vector<std::string> raw_files(const std::string& folder);

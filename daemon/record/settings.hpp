@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace vibrig::record {
 
@@ -14,6 +15,20 @@ struct Settings {
     bool zstd = true;  ///< closed segments are compressed
     double flush_s = 1;
     int keep_free_mb = 64;  ///< with less on the disk nothing is written
+};
+
+/// [[instrument]]: what is measured with.
+struct Instrument {
+    std::string name, serial, certificate;
+    std::string due;  ///< YYYY-MM-DD; empty: not stated
+    /// On a day written the same way.
+    [[nodiscard]] bool overdue(const std::string& day) const { return !due.empty() && due < day; }
+};
+
+/// [unit] and [[instrument]]: what stands in a report and changes no result.
+struct Paperwork {
+    std::string unit_type, unit_serial;
+    std::vector<Instrument> instruments;
 };
 
 }  // namespace vibrig::record

@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
     vibrig::tool::add_reproduce(app, exit_code);
     vibrig::tool::add_replay(app, exit_code);
     vibrig::tool::add_recordings(app, exit_code);
+    vibrig::tool::add_reports(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
     vibrig::tool::add_pki(app, exit_code);
     try {

@@ -53,6 +53,10 @@ def main():
         checks.check(all(abs(float(n) - 1e-3) < 4 * float(sigma) for _, n, sigma in found),
                      "N is the simulated rig's within 4 sigma", str(found))
         checks.check(os.path.exists(os.path.join(kept, "vibrigd.toml")), "--keep keeps the configuration")
+        with open(os.path.join(kept, "report.html"), encoding="utf-8") as file:
+            page = file.read()
+        checks.check(all(name in page for name in names) and page.count("<svg") > 8 and "http" not in
+                     page.replace("http://www.w3.org/2000/svg", ""), "it writes a report that needs nothing else")
         checks.equal(processes_of(kept), [], "no process is left")
         wrong = demo("--seed", "many", temporary=folder)
         checks.check(wrong.returncode == 2 and "many" in wrong.stderr, "a bad seed is refused by name", wrong.stderr)

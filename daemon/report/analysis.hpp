@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/report/compensation.hpp"
+#include "estimator/allan/deviation.hpp"
+
+namespace vibrig::report {
+
+/// Drift of one gyro in a dwell on which the coefficients were not fitted.
+struct HeldOut {
+    int run = 0, position = 0;
+    double table_g = 0;
+    std::array<double, 3> before_dph{};  ///< Earth's rate taken out, nothing compensated
+    std::array<double, 3> after_dph{};   ///< with the coefficients of the other positions
+    std::array<double, 3> sigma_dph{};   ///< expected of after: coefficients and noise
+    bool determined = true;              ///< by the other positions
+};
+
+/// Innovations of the whole campaign, thinned for the eye; statistics over all.
+struct Innovations {
+    std::vector<double> time_s;                      ///< since the first sample
+    std::array<std::vector<double>, 3> arcsec;       ///< outer, inner, azimuth
+    std::array<std::vector<double>, 3> correlation;  ///< by lag, from 0; between used neighbours
+    std::array<double, 3> deviation_arcsec{};
+    std::size_t count = 0;
+};
+
+struct Analysis {
+    record::ReplayResult replayed;
+    Coefficients coefficients;
+    estimator::Settings settings;
+    Innovations innovations;
+    std::vector<HeldOut> held_out;
+    /// Overlapping Allan deviation of each gyro's residual rate, deg/h, mean over the dwells.
+    std::array<std::vector<estimator::allan::Point>, 3> allan;
+    std::array<double, estimator::kParameters> expected_sigma{};  ///< of the plan; infinite: none
+};
+
+using Progress = std::function<void(double fraction)>;
+
+/// Replays the campaign, and identifies it several times more without some of its positions.
+/// Throws.
+[[nodiscard]] Analysis analyse(const record::Campaign& campaign,
+                               const estimator::Settings& settings, const Progress& progress);
+
+[[nodiscard]] estimator::Settings settings_of(const record::Campaign& campaign);
+/// Coefficients after the last dwell of the recording; throws without one.
+[[nodiscard]] Coefficients final_coefficients(const std::string& path,
+                                              const std::vector<record::Dwell>& dwells);
+
+}  // namespace vibrig::report

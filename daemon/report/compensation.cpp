@@ -1,0 +1,41 @@
+#include "daemon/report/compensation.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "estimator/drift_model.hpp"
+#include "estimator/kinematics.hpp"
+#include "estimator/parameters.hpp"
+
+namespace vibrig::report {
+
+using estimator::kGroups;
+using estimator::kParameters;
+
+Prediction predict(const estimator::Settings& settings, const Coefficients& of,
+                   const std::array<double, 3>& attitude_deg, double kappa) {
+    const estimator::Kinematics kinematics(settings);
+    const estimator::DriftModel model(settings);
+    std::array<double, 3> raw{};
+    for (std::size_t i = 0; i < 3; ++i) raw[i] = attitude_deg[i] * std::numbers::pi / 180;
+    const auto pose = kinematics.pose(kinematics.gimbal_angles(raw));
+    const auto h = model.regressors(pose.up, kappa);
+    Prediction out;
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        const auto weight = [&](std::size_t k) { return h[estimator::kPublicGroup[k]][gyro]; };
+        double variance = 0;
+        for (std::size_t k = 0; k < kGroups; ++k) {
+            const std::size_t i = gyro * kGroups + k;
+            out.drift_dph[gyro] += weight(k) * of.value[i];
+            if (!of.observable[i] && std::abs(weight(k)) > 1e-9) out.determined[gyro] = false;
+            for (std::size_t l = 0; l < kGroups; ++l) {
+                const std::size_t j = gyro * kGroups + l;
+                variance += weight(k) * of.covariance[i * kParameters + j] * weight(l);
+            }
+        }
+        out.residual_dph[gyro] = std::sqrt(std::max(0.0, variance));
+    }
+    return out;
+}
+
+}  // namespace vibrig::report

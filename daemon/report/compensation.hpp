@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "estimator/identification.hpp"
+
+namespace vibrig::report {
+
+/// Coefficients as they are at the end of a campaign.
+struct Coefficients {
+    std::array<double, estimator::kParameters> value{}, sigma{};
+    std::array<bool, estimator::kParameters> observable{};
+    std::vector<double> covariance;  ///< 30 x 30, row-major, order of parameter_names()
+};
+
+/// Drift of the three gyros at one attitude under one vibration.
+struct Prediction {
+    std::array<double, 3> drift_dph{};     ///< without compensation, deg/h
+    std::array<double, 3> residual_dph{};  ///< 1 sigma of what is left after it, deg/h
+    /// It rests on coefficients that the data do not determine: sigma is the prior's there.
+    std::array<bool, 3> determined{{true, true, true}};
+};
+
+/// Drift h . D of eqs 8-9 of Tang et al. 2009 with k1 = 1, k2 = kappa, and sqrt(h' P h) of the
+/// coefficients' covariance; encoder angles in deg, kappa = 1 + a^2 / 2 with a in g at the
+/// platform.
+[[nodiscard]] Prediction predict(const estimator::Settings& settings, const Coefficients& of,
+                                 const std::array<double, 3>& attitude_deg, double kappa);
+
+}  // namespace vibrig::report

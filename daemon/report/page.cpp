@@ -1,0 +1,107 @@
+#include "daemon/report/page.hpp"
+
+namespace vibrig::report {
+
+namespace {
+
+constexpr const char* kStyle = R"(
+:root{color-scheme:light dark;--ink:#1b1b1b;--paper:#ffffff;--soft:#5a5f66;--rule:#d9d9d9;--band:#f4f5f7;--bad:#b3261e;--link:#0072b2}
+@media (prefers-color-scheme:dark){:root{--ink:#e6e6e6;--paper:#16181c;--soft:#a4abb5;--rule:#3a3d44;--band:#1f2228;--bad:#ff8a80;--link:#56b4e9}}
+*{box-sizing:border-box}
+body{margin:0 auto;padding:2rem 1.5rem 4rem;max-width:62rem;background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,sans-serif}
+h1{font-size:1.7rem;line-height:1.2;margin:0 0 .3rem}
+h2{font-size:1.2rem;margin:2.4rem 0 .6rem;padding-bottom:.25rem;border-bottom:1px solid var(--rule)}
+p{margin:.5rem 0;max-width:48rem}
+.sub,figcaption,.fine-print{color:var(--soft)}
+nav{margin:1rem 0;display:flex;flex-wrap:wrap;gap:.2rem 1rem;font-size:.9rem}
+a{color:var(--link);text-decoration:none}a:hover{text-decoration:underline}
+.wide{overflow-x:auto;margin:.6rem 0}
+table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.86rem}
+th,td{padding:.22rem .7rem;text-align:right;border-bottom:1px solid var(--rule);white-space:nowrap}
+th{font-weight:600;vertical-align:bottom;border-bottom:2px solid var(--rule)}
+th:first-child,td:first-child{text-align:left;padding-left:.2rem}
+table.words th,table.words td{text-align:left;white-space:normal;vertical-align:top}
+table.words td:first-child{white-space:nowrap;color:var(--soft)}
+tr:nth-child(even) td{background:var(--band)}
+.bad{color:var(--bad);font-weight:600}
+figure{margin:1rem 0}figure svg{max-width:100%;height:auto;display:block}
+figcaption{font-size:.86rem;max-width:48rem}
+pre{font-size:.75rem;overflow-x:auto;background:var(--band);padding:.8rem;border-radius:4px}
+summary{cursor:pointer;color:var(--link)}
+.sign{display:grid;grid-template-columns:1fr 1fr;gap:3rem;margin-top:3.5rem}
+.sign div{border-top:1px solid var(--ink);padding-top:.3rem;color:var(--soft);font-size:.86rem}
+@page{size:A4;margin:16mm 14mm}
+@media print{:root{--ink:#000;--paper:#fff;--soft:#444;--rule:#bbb;--band:#f4f4f4;--bad:#900;--link:#000}
+body{max-width:none;padding:0;font-size:10pt}nav,details{display:none}figure,tr{break-inside:avoid}h2{break-after:avoid}
+table{font-size:7.6pt}th,td{padding:.12rem .4rem}.wide{overflow:visible}}
+)";
+
+std::string cell(const std::string& tag, const std::string& text) {
+    const bool bad = text.starts_with('!');
+    return "<" + tag + (bad ? " class=\"bad\">" : ">") + escape(bad ? text.substr(1) : text) +
+           "</" + tag + ">";
+}
+
+}  // namespace
+
+std::string escape(const std::string& text) {
+    std::string out;
+    for (const char c : text) {
+        switch (c) {
+            case '&':
+                out += "&amp;";
+                break;
+            case '<':
+                out += "&lt;";
+                break;
+            case '>':
+                out += "&gt;";
+                break;
+            case '"':
+                out += "&quot;";
+                break;
+            default:
+                out += static_cast<unsigned char>(c) < 0x20 && c != '\n' ? ' ' : c;
+        }
+    }
+    return out;
+}
+
+void Page::section(const std::string& id, const std::string& title) {
+    body_ += "<h2 id=\"" + id + "\">" + escape(title) + "</h2>\n";
+    contents_ += "<a href=\"#" + id + "\">" + escape(title) + "</a>\n";
+}
+
+void Page::paragraph(const std::string& text) { body_ += "<p>" + escape(text) + "</p>\n"; }
+
+void Page::table(const std::vector<std::vector<std::string>>& rows, const std::string& kind) {
+    body_ += "<div class=\"wide\"><table" + (kind.empty() ? "" : " class=\"" + kind + "\"") + ">\n";
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        body_ += i == 0 ? "<thead><tr>" : "<tr>";
+        for (const auto& text : rows[i]) body_ += cell(i == 0 ? "th" : "td", text);
+        body_ += i == 0 ? "</tr></thead><tbody>\n" : "</tr>\n";
+    }
+    body_ += "</tbody></table></div>\n";
+}
+
+void Page::figure(const std::string& svg, const std::string& caption) {
+    body_ += "<figure>" + svg + "<figcaption>" + escape(caption) + "</figcaption></figure>\n";
+}
+
+void Page::details(const std::string& summary, const std::string& preformatted) {
+    body_ += "<details><summary>" + escape(summary) + "</summary><pre>" + escape(preformatted) +
+             "</pre></details>\n";
+}
+
+std::string Page::html(const std::string& title) const {
+    const std::size_t head = body_.find("<h2");
+    return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+           "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
+           escape(title) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
+           escape(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ + "</nav>\n" +
+           (head == std::string::npos ? "" : body_.substr(head)) +
+           "<div class=\"sign\"><div>Operator, date</div><div>Approved by, date</div></div>\n"
+           "</body></html>\n";
+}
+
+}  // namespace vibrig::report

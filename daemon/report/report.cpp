@@ -1,0 +1,576 @@
+#include "daemon/report/report.hpp"
+
+#include <openssl/evp.h>
+#include <spdlog/fmt/chrono.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/report/page.hpp"
+#include "daemon/tool/plot/chart.hpp"
+#include "daemon/version.hpp"
+#include "estimator/instruction_set.hpp"
+
+namespace vibrig::report {
+
+using estimator::kParameters;
+using record::Campaign;
+using tool::plot::Axis;
+using tool::plot::Chart;
+using tool::plot::Curve;
+using tool::plot::Look;
+
+namespace {
+
+constexpr double k95 = 1.959963984540054;
+constexpr std::array<const char*, 3> kGyro{"x", "y", "z"};
+constexpr std::size_t kMostPoints = 300;
+
+std::string num(double value, int digits) {
+    return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
+}
+
+double correlation(const Coefficients& c, std::size_t i, std::size_t j) {
+    return c.covariance[i * kParameters + j] /
+           std::sqrt(c.covariance[i * kParameters + i] * c.covariance[j * kParameters + j]);
+}
+
+std::string position_text(const Campaign& campaign, const record::RecordedDwell& dwell) {
+    if (dwell.count == 0) return "-";
+    const auto& angle = campaign.samples[dwell.first].angle;
+    std::string text;
+    for (const double a : angle)
+        text += (text.empty() ? "" : ", ") +
+                fmt::format("{:.1f}", std::remainder(a * 180 / std::numbers::pi, 360.0) + 0.0);
+    return text;
+}
+
+void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
+    const auto& head = campaign.head;
+    const auto observable =
+        static_cast<std::size_t>(std::ranges::count(a.coefficients.observable, true));
+    page.paragraph(fmt::format(
+        "Gyro error coefficients of an inertial platform, identified under linear vibration (Tang "
+        "et al. 2009). Campaign {} of {}, {}; {} dwells, {} samples; {} of 30 coefficients are "
+        "determined by the data.",
+        head.name, utc_text(head.utc_ns), campaign.state, a.replayed.dwells.size(),
+        campaign.samples.size(), observable));
+    page.section("campaign", "Campaign");
+    const auto loaded = configuration::parse(record::identification_sections(head.configuration),
+                                             "configuration in " + campaign.path, false);
+    const auto& unit = loaded.configuration.paperwork;
+    const auto or_dash = [](const std::string& text) { return text.empty() ? "not stated" : text; };
+    std::vector<std::vector<std::string>> rows{
+        {"", ""},
+        {"Unit under test",
+         or_dash(unit.unit_type) + ", serial number " + or_dash(unit.unit_serial)},
+        {"Operator", or_dash(head.started_by)},
+        {"Started", utc_text(head.utc_ns)},
+        {"Ended", campaign.ended_utc_ns > 0 ? utc_text(campaign.ended_utc_ns) : "not closed"},
+        {"State", campaign.state + (campaign.reason.empty() ? "" : ": " + campaign.reason)},
+        {"Recorded by",
+         "vibrigd " + head.version + ", " + head.compiler + ", " + head.instruction_set},
+        {"Report by", std::string("vibrig ") + kVersion + ", " +
+                          std::string(estimator::compiler()) + ", " +
+                          std::string(estimator::instruction_set())},
+        {"Replay",
+         a.replayed.compared == 0 ? "no dwell to compare"
+         : a.replayed.different == 0
+             ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",
+                           a.replayed.compared)
+             : "!differs from the recording: " + a.replayed.first_difference},
+        {"Configuration", "SHA-256 " + sha256_of_text(head.configuration)},
+        {"Recording", campaign.path.substr(campaign.path.rfind('/') + 1) + ", SHA-256 " +
+                          sha256_of_file(campaign.path)}};
+    page.table(rows, "words");
+    if (!unit.instruments.empty()) {
+        std::vector<std::vector<std::string>> table{
+            {"Instrument", "Serial number", "Certificate", "Due", ""}};
+        const std::string day = utc_text(head.utc_ns).substr(0, 10);
+        for (const auto& i : unit.instruments)
+            table.push_back({i.name, or_dash(i.serial), or_dash(i.certificate), or_dash(i.due),
+                             i.overdue(day) ? "!overdue at the time of the campaign" : ""});
+        page.table(table, "words");
+    } else {
+        page.paragraph("Instruments: none are stated in the configuration ([[instrument]]).");
+    }
+}
+
+void add_coefficients(Page& page, const Analysis& a) {
+    page.section("coefficients", "Coefficients");
+    std::vector<std::vector<std::string>> rows{{"coefficient", "value", "sigma", "95 % from",
+                                                "95 % to", "unit", "expected sigma", "efficiency",
+                                                "strongest correlation"}};
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const char* name = estimator::parameter_names()[i];
+        if (!a.coefficients.observable[i]) {
+            rows.push_back({name, "!not determined", "-", "-", "-", estimator::parameter_unit(i),
+                            "-", "-", "-"});
+            continue;
+        }
+        const double v = a.coefficients.value[i], s = a.coefficients.sigma[i];
+        std::size_t partner = i == 0 ? 1 : 0;
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            if (j != i && a.coefficients.observable[j] &&
+                std::abs(correlation(a.coefficients, i, j)) >
+                    std::abs(correlation(a.coefficients, i, partner)))
+                partner = j;
+        }
+        const double expected = a.expected_sigma[i];
+        rows.push_back({name, num(v, 6), num(s, 6), num(v - k95 * s, 6), num(v + k95 * s, 6),
+                        estimator::parameter_unit(i), num(expected, 6), num(expected / s, 2),
+                        fmt::format("{} {:+.2f}", estimator::parameter_names()[partner],
+                                    correlation(a.coefficients, i, partner))});
+    }
+    page.table(rows);
+    page.paragraph(
+        "Expected sigma: Cramer-Rao bound of the plan as it was run, without prior. "
+        "Efficiency: that bound over sigma; near 1 the filter takes from the plan what "
+        "there is.");
+    for (const auto& c : a.replayed.result.combinations) {
+        std::string sum;
+        for (const auto& [name, weight] : c.weights)
+            sum += (sum.empty() ? "" : " + ") + fmt::format("{:.4g} {}", weight, name);
+        page.paragraph(
+            fmt::format("Determined together: {} = {:.6f}, sigma {:.6f}", sum, c.value, c.sigma));
+    }
+    for (const auto& warning : a.replayed.result.warnings) page.paragraph("Warning: " + warning);
+    Chart chart;
+    chart.title = "Correlation of the coefficients";
+    chart.x = Axis("coefficient, in the order of the table");
+    chart.y = Axis("coefficient");
+    tool::plot::HeatMap map;
+    map.label = "absolute correlation";
+    for (std::size_t i = 0; i <= kParameters; ++i) {
+        map.x.push_back(static_cast<double>(i) + 0.5);
+        map.y.push_back(static_cast<double>(i) + 0.5);
+    }
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        map.value.emplace_back();
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            const bool both = a.coefficients.observable[i] && a.coefficients.observable[j];
+            map.value.back().push_back(both ? std::abs(correlation(a.coefficients, i, j))
+                                            : std::nan(""));
+        }
+    }
+    chart.maps.push_back(std::move(map));
+    page.figure(chart.svg(), "1 to 10 gyro x, 11 to 20 gyro y, 21 to 30 gyro z.");
+}
+
+void add_held_out(Page& page, const Analysis& a) {
+    page.section("drift", "Drift before and after");
+    if (a.held_out.empty()) return page.paragraph("One position only: nothing can be held out.");
+    Chart chart;
+    chart.title = "Drift on positions held out from the fit";
+    chart.x = Axis("dwell");
+    chart.y = Axis("drift, absolute, deg/h", true);
+    std::array<double, 2> square{};
+    std::size_t count = 0, within = 0;
+    Curve before, after;
+    before.name = "before";
+    after.name = "after";
+    before.look = after.look = Look::dots;
+    for (std::size_t k = 0; k < 3; ++k) {
+        for (std::size_t i = 0; i < a.held_out.size(); ++i) {
+            const HeldOut& h = a.held_out[i];
+            before.x.push_back(static_cast<double>(i + 1));
+            after.x.push_back(static_cast<double>(i + 1));
+            before.y.push_back(std::abs(h.before_dph[k]));
+            after.y.push_back(h.determined ? std::abs(h.after_dph[k]) : std::nan(""));
+            if (!h.determined) continue;
+            square[0] += h.before_dph[k] * h.before_dph[k];
+            square[1] += h.after_dph[k] * h.after_dph[k];
+            ++count;
+            if (std::abs(h.after_dph[k]) <= k95 * h.sigma_dph[k]) ++within;
+        }
+    }
+    chart.curves = {before, after};
+    page.figure(chart.svg(),
+                "All three gyros. Every dwell is judged with coefficients from the other "
+                "positions. Before: what the "
+                "gyros drift beyond the Earth's rate. After: what is left with the drift model "
+                "taken out.");
+    if (count > 0) {
+        page.paragraph(fmt::format(
+            "Root mean square over {} rates: {:.4f} deg/h before, {:.4f} deg/h after, {:.0f} times "
+            "less. {} of {} ({:.0f} %) lie within their 95 % interval.",
+            count, std::sqrt(square[0] / static_cast<double>(count)),
+            std::sqrt(square[1] / static_cast<double>(count)), std::sqrt(square[0] / square[1]),
+            within, count, 100.0 * static_cast<double>(within) / static_cast<double>(count)));
+    }
+    std::vector<std::vector<std::string>> rows{{"run, position", "table g", "before x", "y", "z",
+                                                "after x", "y", "z", "sigma x", "y", "z"}};
+    for (const auto& h : a.held_out) {
+        std::vector<std::string> row{fmt::format("{}, {}", h.run, h.position), num(h.table_g, 2)};
+        for (const double v : h.before_dph) row.push_back(num(v, 4));
+        for (std::size_t k = 0; k < 3; ++k)
+            row.push_back(!h.determined
+                              ? "-"
+                              : (std::abs(h.after_dph[k]) > 3 * h.sigma_dph[k] ? "!" : "") +
+                                    num(h.after_dph[k], 4));
+        for (const double v : h.sigma_dph) row.push_back(num(v, 4));
+        rows.push_back(std::move(row));
+    }
+    page.table(rows);
+    page.paragraph(
+        "deg/h about the input axes; -: the other positions do not determine it. Sigma: of what is "
+        "left, from the coefficients' "
+        "covariance, the resolvers and the gyros' random walk.");
+}
+
+void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
+    page.section("convergence", "Convergence");
+    const auto& rows = campaign.estimates;
+    if (rows.size() < 2) return page.paragraph("No estimates were recorded along the way.");
+    const double origin = drivers::to_seconds(campaign.samples.front().time);
+    const std::size_t every = std::max<std::size_t>(1, rows.size() / kMostPoints);
+    struct Group {
+        const char* title;
+        const char* unit;
+        std::vector<std::size_t> of;  ///< within a gyro
+    };
+    for (const Group& group :
+         {Group{"Biases", "deg/h", {0}}, Group{"Linear terms", "deg/h/g", {1, 2, 3}},
+          Group{"Quadratic terms", "deg/h/g^2", {4, 5, 6, 7, 8, 9}}}) {
+        Chart chart;
+        chart.title = std::string(group.title) + ": standard deviation";
+        chart.x = Axis("time, s");
+        chart.y = Axis(std::string("1 sigma, ") + group.unit, true);
+        for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+            // The best and the worst of a gyro; all between them.
+            Curve curve;
+            curve.name = std::string("gyro ") + kGyro[gyro];
+            for (std::size_t i = 0; i < rows.size(); i += every) {
+                double least = std::numeric_limits<double>::infinity(), most = 0, log_sum = 0;
+                for (const std::size_t k : group.of) {
+                    const double s = rows[i].sigma[gyro * 10 + k];
+                    least = std::min(least, s);
+                    most = std::max(most, s);
+                    log_sum += std::log(std::max(s, 1e-300));
+                }
+                curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
+                curve.y.push_back(std::exp(log_sum / static_cast<double>(group.of.size())));
+                curve.low.push_back(least);
+                curve.high.push_back(most);
+            }
+            chart.curves.push_back(std::move(curve));
+        }
+        page.figure(chart.svg(),
+                    group.of.size() > 1
+                        ? "Line: geometric mean of the gyro's terms; band: best to worst."
+                        : "");
+    }
+    Chart chart;
+    chart.title = "Estimates on the way to their final values";
+    chart.x = Axis("time, s");
+    chart.y = Axis("distance from the final value, final sigmas", true);
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        Curve curve;
+        curve.name = std::string("gyro ") + kGyro[gyro];
+        for (std::size_t i = 0; i < rows.size(); i += every) {
+            double square = 0;
+            for (std::size_t k = 0; k < 10; ++k) {
+                const std::size_t p = gyro * 10 + k;
+                const double d =
+                    (rows[i].value[p] - a.coefficients.value[p]) / a.coefficients.sigma[p];
+                square += d * d / 10;
+            }
+            curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
+            curve.y.push_back(std::sqrt(square));
+        }
+        chart.curves.push_back(std::move(curve));
+    }
+    page.figure(chart.svg(), "Root mean square over the ten coefficients of a gyro.");
+}
+
+void add_innovations(Page& page, const Analysis& a) {
+    page.section("innovations", "Innovations");
+    const Innovations& found = a.innovations;
+    if (found.count == 0) return page.paragraph("No sample came into the filter.");
+    constexpr std::array<const char*, 3> kAxis{"outer", "inner", "azimuth"};
+    Chart chart;
+    chart.title = "Innovations";
+    chart.x = Axis("time, s");
+    chart.y = Axis("arcsec");
+    for (std::size_t k = 0; k < 3; ++k) {
+        Curve curve;
+        curve.name = kAxis[k];
+        curve.look = Look::dots;
+        curve.x = found.time_s;
+        curve.y = found.arcsec[k];
+        chart.curves.push_back(std::move(curve));
+    }
+    const double band = 2 * std::max({found.deviation_arcsec[0], found.deviation_arcsec[1],
+                                      found.deviation_arcsec[2]});
+    for (const double sign : {-1.0, 1.0}) {
+        Curve curve;
+        curve.name = sign > 0 ? "2 sigma" : "";
+        curve.look = Look::dashed;
+        curve.x = {found.time_s.front(), found.time_s.back()};
+        curve.y = {sign * band, sign * band};
+        chart.curves.push_back(std::move(curve));
+    }
+    page.figure(
+        chart.svg(),
+        fmt::format("Every {}th of {} innovations.",
+                    std::max<std::size_t>(1, found.count / found.time_s.size()), found.count));
+    Chart white;
+    white.title = "Whiteness: autocorrelation of the innovations";
+    white.x = Axis("lag, samples");
+    white.y = Axis("correlation");
+    const double limit = k95 / std::sqrt(static_cast<double>(found.count));
+    std::size_t outside = 0, all = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        Curve curve;
+        curve.name = kAxis[k];
+        for (std::size_t lag = 1; lag < found.correlation[k].size(); ++lag) {
+            curve.x.push_back(static_cast<double>(lag));
+            curve.y.push_back(found.correlation[k][lag]);
+            ++all;
+            if (std::abs(found.correlation[k][lag]) > limit) ++outside;
+        }
+        white.curves.push_back(std::move(curve));
+    }
+    for (const double sign : {-1.0, 1.0}) {
+        Curve curve;
+        curve.name = sign > 0 ? "95 % if white" : "";
+        curve.look = Look::dashed;
+        curve.x = {1,
+                   static_cast<double>(std::max<std::size_t>(2, found.correlation[0].size()) - 1)};
+        curve.y = {sign * limit, sign * limit};
+        white.curves.push_back(std::move(curve));
+    }
+    page.figure(white.svg(), fmt::format("{} of {} lie outside; 5 % are expected of white noise.",
+                                         outside, all));
+    Chart nis;
+    nis.title = "Normalised innovations squared, dwell by dwell";
+    nis.x = Axis("dwell");
+    nis.y = Axis("per degree of freedom");
+    Curve values, low, high;
+    values.look = Look::dots;
+    values.name = "dwell";
+    low.look = high.look = Look::dashed;
+    high.name = "95 % if consistent";
+    for (std::size_t i = 0; i < a.replayed.dwells.size(); ++i) {
+        const auto& s = a.replayed.dwells[i].summary;
+        if (s.used == 0) continue;
+        // chi-square with 3 n degrees of freedom: variance 2 / (3 n) of its mean.
+        const double spread = k95 * std::sqrt(2.0 / (3.0 * s.used));
+        const auto x = static_cast<double>(i + 1);
+        values.x.push_back(x);
+        values.y.push_back(s.nis_per_dof);
+        low.x.push_back(x);
+        low.y.push_back(1 - spread);
+        high.x.push_back(x);
+        high.y.push_back(1 + spread);
+    }
+    nis.curves = {values, low, high};
+    page.figure(nis.svg(), fmt::format("Over the campaign {:.4f}.", a.replayed.result.nis_per_dof));
+}
+
+void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
+    page.section("vibration", "Vibration");
+    const auto& rows = campaign.estimates;
+    if (!rows.empty()) {
+        const double origin = drivers::to_seconds(campaign.samples.front().time);
+        const std::size_t every = std::max<std::size_t>(1, rows.size() / (2 * kMostPoints));
+        Curve amplitude, frequency;
+        for (std::size_t i = 0; i < rows.size(); i += every) {
+            amplitude.x.push_back(drivers::to_seconds(rows[i].time) - origin);
+            amplitude.y.push_back(rows[i].amplitude_g);
+            frequency.x.push_back(drivers::to_seconds(rows[i].time) - origin);
+            frequency.y.push_back(rows[i].frequency_hz > 0 ? rows[i].frequency_hz : std::nan(""));
+        }
+        amplitude.look = frequency.look = Look::dots;
+        for (auto* curve : {&amplitude, &frequency}) {
+            Chart chart;
+            const bool is_amplitude = curve == &amplitude;
+            chart.title = is_amplitude ? "Amplitude" : "Frequency";
+            chart.x = Axis("time, s");
+            chart.y = Axis(is_amplitude ? "peak at the platform, g" : "Hz");
+            chart.curves.push_back(*curve);
+            page.figure(chart.svg(), "As the filter saw it in its dwells.");
+        }
+    }
+    std::vector<std::vector<std::string>> table{{"run, position", "angles deg", "table g",
+                                                 "platform g", "Hz", "kappa", "samples", "rejected",
+                                                 "NIS", "force g", ""}};
+    const auto dwells = record::recorded_dwells(campaign);
+    for (std::size_t i = 0; i < dwells.size() && i < a.replayed.dwells.size(); ++i) {
+        const auto& s = a.replayed.dwells[i].summary;
+        table.push_back({fmt::format("{}, {}", s.run, s.position),
+                         position_text(campaign, dwells[i]), num(dwells[i].order->table_g, 2),
+                         num(s.amplitude_g, 5), num(s.frequency_hz, 3), num(s.kappa, 5),
+                         fmt::to_string(s.samples), fmt::to_string(s.rejected),
+                         num(s.nis_per_dof, 3), num(s.mean_force_g, 4),
+                         s.flagged ? "!" + a.replayed.dwells[i].reason : ""});
+    }
+    page.table(table);
+}
+
+void add_noise(Page& page, const Campaign& campaign, const Analysis& a) {
+    page.section("noise", "Gyro noise");
+    Chart chart;
+    chart.title = "Allan deviation of the residual rates";
+    chart.x = Axis("averaging time, s", true);
+    chart.y = Axis("deg/h", true);
+    for (std::size_t k = 0; k < 3; ++k) {
+        Curve curve;
+        curve.name = std::string("gyro ") + kGyro[k];
+        for (const auto& point : a.allan[k]) {
+            curve.x.push_back(point.tau);
+            curve.y.push_back(point.dev);
+            curve.low.push_back(point.lo);
+            curve.high.push_back(point.hi);
+        }
+        chart.curves.push_back(std::move(curve));
+    }
+    page.figure(chart.svg(),
+                "Overlapping, of one-second means, from all dwells together. At short "
+                "times the resolvers, at long times the gyros.");
+    std::size_t alarms = 0;
+    for (const auto& event : campaign.events) {
+        if (event.source != "noise") continue;
+        page.paragraph(event.text);
+        if (event.severity != Severity::info) ++alarms;
+    }
+    page.paragraph(fmt::format("Alarms of the noise monitor: {}.", alarms));
+}
+
+void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
+              const std::optional<Earlier>& earlier) {
+    page.section("accelerometers", "Levelling and accelerometer zeros");
+    const auto& zero = a.settings.accelerometer_zero_g;
+    page.paragraph(
+        fmt::format("Accelerometer zeros in force: {:.6f}, {:.6f}, {:.6f} g, from the "
+                    "configuration.",
+                    zero[0], zero[1], zero[2]));
+    std::size_t told = 0;
+    for (const auto& event : campaign.events) {
+        if (event.text.find("level") == std::string::npos &&
+            event.text.find("zero") == std::string::npos)
+            continue;
+        page.paragraph(event.text);
+        ++told;
+    }
+    if (told == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
+
+    page.section("comparison", "Comparison with an earlier campaign");
+    if (!earlier) {
+        page.paragraph("None was given (--compare CAMPAIGN).");
+    } else {
+        page.paragraph(
+            fmt::format("{} of {}. E_n is the difference over the root of the sum of the "
+                        "squared 95 % uncertainties (ISO 13528); up to 1 agrees.",
+                        earlier->name, earlier->when));
+        std::vector<std::vector<std::string>> rows{
+            {"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
+        double square = 0;
+        std::size_t count = 0, apart = 0;
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            if (!a.coefficients.observable[i] || !earlier->coefficients.observable[i]) continue;
+            const double difference = a.coefficients.value[i] - earlier->coefficients.value[i];
+            const double u =
+                k95 * std::hypot(a.coefficients.sigma[i], earlier->coefficients.sigma[i]);
+            const double score = difference / u;
+            ++count;
+            square += difference * difference / (u * u / k95 / k95);
+            if (std::abs(score) > 1) ++apart;
+            rows.push_back({estimator::parameter_names()[i], num(a.coefficients.value[i], 6),
+                            num(earlier->coefficients.value[i], 6), num(difference, 6),
+                            estimator::parameter_unit(i),
+                            (std::abs(score) > 1 ? "!" : "") + num(score, 2)});
+        }
+        page.table(rows);
+        if (count > 0)
+            page.paragraph(
+                fmt::format("Repeatability: differences are {:.2f} of their expected "
+                            "standard deviations, root mean square; {} of {} beyond E_n = "
+                            "1, where 5 % are expected.",
+                            std::sqrt(square / static_cast<double>(count)), apart, count));
+    }
+
+    page.section("events", "Events");
+    std::vector<std::vector<std::string>> rows{{"UTC", "", "from", "what"}};
+    for (const auto& event : campaign.events) {
+        const std::string severity = name_of(event.severity);
+        const bool bad = event.severity == Severity::alarm || event.severity == Severity::trip;
+        rows.push_back({utc_text(event.utc_ns).substr(11, 8), (bad ? "!" : "") + severity,
+                        event.source, event.text});
+    }
+    page.table(rows, "words");
+    if (!campaign.gaps.empty()) {
+        page.paragraph("Missing in the recording:");
+        std::vector<std::vector<std::string>> gaps{{"stream", "lost", "why"}};
+        for (const auto& gap : campaign.gaps)
+            gaps.push_back({gap.stream, fmt::to_string(gap.lost), gap.reason});
+        page.table(gaps, "words");
+    }
+    page.section("configuration", "Configuration");
+    page.paragraph("Hash of what the results depend on: " + campaign.head.configuration_hash);
+    page.details("Effective configuration", campaign.head.configuration);
+}
+
+std::string hex(const unsigned char* bytes, unsigned size) {
+    std::string text;
+    for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", bytes[i]);
+    return text;
+}
+
+using Digest = std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)>;
+
+std::string finish(Digest& digest) {
+    std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
+    unsigned size = 0;
+    EVP_DigestFinal_ex(digest.get(), bytes.data(), &size);
+    return hex(bytes.data(), size);
+}
+
+Digest begin_digest() {
+    Digest digest(EVP_MD_CTX_new(), EVP_MD_CTX_free);
+    EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr);
+    return digest;
+}
+
+}  // namespace
+
+std::string sha256_of_file(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error(path + ": cannot be read");
+    Digest digest = begin_digest();
+    std::vector<char> piece(1 << 16);
+    while (file.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file.gcount() > 0)
+        EVP_DigestUpdate(digest.get(), piece.data(), static_cast<std::size_t>(file.gcount()));
+    return finish(digest);
+}
+
+std::string sha256_of_text(const std::string& text) {
+    Digest digest = begin_digest();
+    EVP_DigestUpdate(digest.get(), text.data(), text.size());
+    return finish(digest);
+}
+
+std::string utc_text(std::int64_t utc_ns) {
+    return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
+                       fmt::gmtime(static_cast<std::time_t>(utc_ns / drivers::kSecond)));
+}
+
+std::string make_page(const Campaign& campaign, const Analysis& analysis,
+                      const std::optional<Earlier>& earlier) {
+    Page page;
+    add_head(page, campaign, analysis);
+    add_coefficients(page, analysis);
+    add_held_out(page, analysis);
+    add_convergence(page, campaign, analysis);
+    add_innovations(page, analysis);
+    add_vibration(page, campaign, analysis);
+    add_noise(page, campaign, analysis);
+    add_rest(page, campaign, analysis, earlier);
+    return page.html("Vibration test of " + campaign.head.name);
+}
+
+}  // namespace vibrig::report

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/report/analysis.hpp"
+
+namespace vibrig::report {
+
+/// Another campaign of the same unit.
+struct Earlier {
+    std::string path, name, when;
+    Coefficients coefficients;
+};
+
+/// One page that needs nothing else: HTML with its plots as inline SVG, light and dark, for print
+/// too.
+[[nodiscard]] std::string make_page(const record::Campaign& campaign, const Analysis& analysis,
+                                    const std::optional<Earlier>& earlier);
+
+/// SHA-256 of a file, hexadecimal. Throws std::runtime_error.
+[[nodiscard]] std::string sha256_of_file(const std::string& path);
+[[nodiscard]] std::string sha256_of_text(const std::string& text);
+/// "2026-03-01 08:00:00 UTC"
+[[nodiscard]] std::string utc_text(std::int64_t utc_ns);
+
+}  // namespace vibrig::report

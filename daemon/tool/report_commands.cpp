@@ -1,0 +1,309 @@
+// vibrig report and vibrig compensate.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/report/report.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/plot/chart.hpp"
+#include "daemon/tool/progress.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using estimator::kParameters;
+
+struct ReportArguments {
+    std::string campaign, output = "report.html", config, compare, pdf;
+};
+
+struct CompensateArguments {
+    std::string campaign, format = "text", output, config;
+    std::vector<double> attitude;
+    double platform_g = -1, table_g = -1;
+};
+
+std::string line(const char* format, auto... values) {
+    std::array<char, 256> text{};
+    std::snprintf(text.data(), text.size(), format, values...);
+    return text.data();
+}
+
+estimator::Settings settings_of(const record::Campaign& campaign, const std::string& config) {
+    return config.empty() ? report::settings_of(campaign)
+                          : configuration::load(config, false).configuration.estimator;
+}
+
+/// Chromium prints it; HOME elsewhere, so that nothing is left behind.
+void print_pdf(const std::string& html, const std::string& pdf) {
+    char folder[] = "/tmp/vibrig-print.XXXXXX";
+    if (::mkdtemp(folder) == nullptr) throw std::runtime_error("/tmp: no temporary folder");
+    const std::string profile = std::string("--user-data-dir=") + folder;
+    const std::string to = "--print-to-pdf=" + fs::absolute(pdf).string();
+    const std::string from = "file://" + fs::absolute(html).string();
+    const pid_t child = ::fork();
+    if (child == 0) {
+        if (std::freopen("/dev/null", "w", stderr) == nullptr) ::_exit(127);
+        for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
+            ::execlp(name, name, "--headless", "--no-sandbox", "--disable-gpu",
+                     "--no-pdf-header-footer", profile.c_str(), to.c_str(), from.c_str(), nullptr);
+        ::_exit(127);
+    }
+    int status = -1;
+    ::waitpid(child, &status, 0);
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || !fs::exists(pdf))
+        throw std::runtime_error(pdf + (WIFEXITED(status) && WEXITSTATUS(status) == 127
+                                            ? ": found no chromium, expected it to print"
+                                            : ": chromium could not print it"));
+}
+
+int make_report(const ReportArguments& arguments) {
+    const auto campaign = record::read_campaign(arguments.campaign);
+    const auto settings = settings_of(campaign, arguments.config);
+    std::optional<report::Earlier> earlier;
+    if (!arguments.compare.empty()) {
+        const auto other = record::read_campaign(arguments.compare);
+        earlier = {other.path, other.head.name, report::utc_text(other.head.utc_ns),
+                   report::final_coefficients(other.path, other.dwells)};
+    }
+    report::Analysis analysis;
+    {
+        Progress progress("analysing " + campaign.head.name);
+        analysis = report::analyse(campaign, settings, [&](double fraction) {
+            progress.show(static_cast<std::size_t>(100 * fraction), 100);
+        });
+    }
+    plot::write_file(arguments.output, report::make_page(campaign, analysis, earlier));
+    std::cerr << arguments.output << ": " << fs::file_size(arguments.output) / 1000 << " kB\n";
+    if (!arguments.pdf.empty()) {
+        print_pdf(arguments.output, arguments.pdf);
+        std::cerr << arguments.pdf << ": " << fs::file_size(arguments.pdf) / 1000 << " kB\n";
+    }
+    return 0;
+}
+
+Json prediction_json(const report::Prediction& predicted, const CompensateArguments& arguments,
+                     double kappa) {
+    Json root;
+    root["attitude_deg"] = arguments.attitude;
+    root["platform_g"] = std::sqrt(2 * (kappa - 1));
+    root["kappa"] = kappa;
+    Json gyros = Json::array();
+    for (std::size_t k = 0; k < 3; ++k) {
+        gyros.push_back({{"gyro", std::string(1, "xyz"[k])},
+                         {"drift_dph", predicted.drift_dph[k]},
+                         {"residual_sigma_dph", predicted.residual_dph[k]},
+                         {"determined", predicted.determined[k]}});
+    }
+    root["gyros"] = std::move(gyros);
+    return root;
+}
+
+std::string as_json(const record::Campaign& campaign, const report::Coefficients& c,
+                    const Json& prediction) {
+    Json root;
+    root["campaign"] = campaign.head.name;
+    root["started"] = report::utc_text(campaign.head.utc_ns);
+    root["file"] = campaign.path;
+    root["model"] =
+        "D = F + I aI + O aO + S aS + II aI^2 + OO aO^2 + SS aS^2 + IO aI aO + IS aI aS "
+        "+ OS aO aS; a: specific force along input, output, spin axis, g";
+    Json list = Json::array();
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const bool known = c.observable[i];
+        list.push_back({{"name", estimator::parameter_names()[i]},
+                        {"value", known ? Json(c.value[i]) : Json(nullptr)},
+                        {"sigma", known ? Json(c.sigma[i]) : Json(nullptr)},
+                        {"unit", estimator::parameter_unit(i)}});
+    }
+    root["coefficients"] = std::move(list);
+    root["prediction"] = prediction;
+    return root.dump(2) + "\n";
+}
+
+std::string as_csv(const report::Coefficients& c) {
+    std::string text = "name,value,sigma,unit\n";
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        text += estimator::parameter_names()[i];
+        text +=
+            c.observable[i] ? line(",%.17g,%.17g,", c.value[i], c.sigma[i]) : std::string(",,,");
+        text += std::string(estimator::parameter_unit(i)) + "\n";
+    }
+    return text;
+}
+
+std::string as_header(const record::Campaign& campaign, const report::Coefficients& c) {
+    // A name in a comment must not end it.
+    std::string name;
+    for (const char ch : campaign.head.name)
+        name += std::isalnum(static_cast<unsigned char>(ch)) != 0 ? ch : '_';
+    std::string text = "/* Gyro error coefficients of campaign " + name + ", " +
+                       report::utc_text(campaign.head.utc_ns) +
+                       ".\n * deg/h, deg/h/g, deg/h/g^2. Drift about the input axis of a gyro:\n"
+                       " *   D = c[0] + c[1] aI + c[2] aO + c[3] aS + c[4] aI^2 + c[5] aO^2 + c[6] "
+                       "aS^2\n *       + c[7] aI aO + c[8] aI aS + c[9] aO aS\n"
+                       " * with a the specific force along input, output and spin axis, g.\n */\n"
+                       "#ifndef VIBRIG_COEFFICIENTS_H\n#define VIBRIG_COEFFICIENTS_H\n\n";
+    for (const bool sigma : {false, true}) {
+        text += std::string("static const double vibrig_coefficient") + (sigma ? "_sigma" : "") +
+                "[3][10] = {\n";
+        for (std::size_t g = 0; g < 3; ++g) {
+            text += "    {";
+            for (std::size_t k = 0; k < 10; ++k)
+                text += line("%s%.17g", k == 0 ? "" : ", ",
+                             sigma ? c.sigma[g * 10 + k] : c.value[g * 10 + k]);
+            text += g == 2 ? "} /* z */\n" : g == 1 ? "}, /* y */\n" : "}, /* x */\n";
+        }
+        text += "};\n";
+    }
+    return text + "\n#endif\n";
+}
+
+std::string as_text(const report::Coefficients& c, const report::Prediction& predicted,
+                    const CompensateArguments& arguments, double kappa) {
+    std::string text = line("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        text += c.observable[i] ? line("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
+                                       c.value[i], c.sigma[i], estimator::parameter_unit(i))
+                                : line("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
+                                       "not determined", "-", estimator::parameter_unit(i));
+    }
+    text += line("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
+                 arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                 std::sqrt(2 * (kappa - 1)));
+    text += line("%-6s %14s %26s\n", "gyro", "drift", "left after compensation");
+    for (std::size_t k = 0; k < 3; ++k)
+        text += line("%-6c %14.6f         0 +- %.6f (1 sigma)%s\n", "xyz"[k],
+                     predicted.drift_dph[k], predicted.residual_dph[k],
+                     predicted.determined[k] ? "" : "  rests on what is not determined");
+    return text;
+}
+
+int compensate(CompensateArguments arguments) {
+    if (arguments.platform_g >= 0 && arguments.table_g >= 0)
+        throw std::runtime_error("--table-g: found it beside --platform-g, expected one of them");
+    if (arguments.attitude.empty()) arguments.attitude = {0, 0, 0};
+    for (const double angle : arguments.attitude) {
+        if (!std::isfinite(angle) || std::abs(angle) > 360)
+            throw std::runtime_error("--attitude: found " + line("%g", angle) +
+                                     ", expected -360 to 360 deg");
+    }
+    for (const double level : {arguments.platform_g, arguments.table_g}) {
+        if (!std::isfinite(level) || level > 1000)
+            throw std::runtime_error("vibration: found " + line("%g", level) +
+                                     " g, expected 0 to 1000 g");
+    }
+    const auto campaign = record::read_campaign(arguments.campaign);
+    report::Coefficients coefficients;
+    estimator::Settings settings = settings_of(campaign, arguments.config);
+    if (arguments.config.empty()) {
+        coefficients = report::final_coefficients(campaign.path, campaign.dwells);
+    } else {
+        const auto replayed = record::replay(campaign, settings, {});
+        coefficients = report::final_coefficients(campaign.path, replayed.dwells);
+    }
+    double level = std::max(0.0, arguments.platform_g);
+    if (arguments.table_g >= 0) level = arguments.table_g * settings.transmission;
+    const double kappa = 1 + level * level / 2;
+    const auto predicted = report::predict(
+        settings, coefficients,
+        {arguments.attitude[0], arguments.attitude[1], arguments.attitude[2]}, kappa);
+    const bool all = std::ranges::all_of(coefficients.observable, [](bool b) { return b; });
+    if (arguments.format == "c" && !all)
+        throw std::runtime_error(
+            campaign.path +
+            ": found coefficients that are not determined, expected all 30 for "
+            "a C header");
+    const std::string text =
+        arguments.format == "json"
+            ? as_json(campaign, coefficients, prediction_json(predicted, arguments, kappa))
+        : arguments.format == "csv" ? as_csv(coefficients)
+        : arguments.format == "c"   ? as_header(campaign, coefficients)
+                                    : as_text(coefficients, predicted, arguments, kappa);
+    if (arguments.output.empty()) {
+        std::cout << text << std::flush;
+    } else {
+        plot::write_file(arguments.output, text);
+    }
+    return all ? 0 : kNo;
+}
+
+template <typename Run>
+void told(int& exit_code, Run run) {
+    try {
+        exit_code = run();
+    } catch (const std::exception& error) {
+        std::cerr << error.what() << '\n';
+        exit_code = kBadInput;
+    }
+}
+
+}  // namespace
+
+void add_reports(CLI::App& app, int& exit_code) {
+    auto report = std::make_shared<ReportArguments>();
+    CLI::App* reporting =
+        app.add_subcommand("report", "One page of a recorded campaign, to be signed and filed");
+    reporting->add_option("CAMPAIGN", report->campaign, "its HDF5 file or its folder")->required();
+    reporting->add_option("-o,--output", report->output,
+                          "HTML file to write (default report.html)");
+    reporting->add_option("--compare", report->compare,
+                          "an earlier campaign of the same unit: repeatability and E_n");
+    reporting->add_option("--config", report->config,
+                          "identify anew with these settings instead of the recorded ones");
+    reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");
+    reporting->footer(
+        "Example: vibrig report demo-20260301T080000Z -o report.html --pdf report.pdf");
+    reporting->callback(
+        [report, &exit_code] { told(exit_code, [&] { return make_report(*report); }); });
+
+    auto compensation = std::make_shared<CompensateArguments>();
+    CLI::App* compensating = app.add_subcommand(
+        "compensate", "Coefficients for a navigation computer, and what drift they leave");
+    compensating->add_option("CAMPAIGN", compensation->campaign, "its HDF5 file or its folder")
+        ->required();
+    compensating
+        ->add_option("--to", compensation->format, "text (default), json, csv or c (a header)")
+        ->check(CLI::IsMember({"text", "json", "csv", "c"}));
+    compensating->add_flag_callback(
+        "--json", [compensation] { compensation->format = "json"; }, "as --to json");
+    compensating->add_option("-o,--output", compensation->output,
+                             "file to write (default: standard output)");
+    compensating
+        ->add_option("--attitude", compensation->attitude,
+                     "outer, inner, azimuth in deg at which the drift is predicted (default 0,0,0)")
+        ->delimiter(',')
+        ->expected(3);
+    compensating->add_option("--platform-g", compensation->platform_g,
+                             "vibration, peak at the platform (default 0)");
+    compensating->add_option("--table-g", compensation->table_g, "or peak at the table");
+    compensating->add_option("--config", compensation->config,
+                             "identify anew with these settings instead of the recorded ones");
+    compensating->footer(
+        "Example: vibrig compensate demo-20260301T080000Z --attitude 45,0,90 --platform-g 6\n"
+        "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
+    compensating->callback(
+        [compensation, &exit_code] { told(exit_code, [&] { return compensate(*compensation); }); });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,318 @@
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/hdf5.hpp"
+#include "daemon/record/raw_log.hpp"
+#include "daemon/record/recorder.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/rt/real_clock.hpp"
+
+namespace vibrig::record {
+namespace {
+
+namespace fs = std::filesystem;
+using drivers::Time;
+
+constexpr Time kPeriod = 25 * drivers::kMillisecond;
+
+class Recording : public ::testing::Test {
+  protected:
+    Recording() {
+        std::string name = (fs::temp_directory_path() / "vibrig-record.XXXXXX").string();
+        folder_ = ::mkdtemp(name.data());
+    }
+    ~Recording() override {
+        std::error_code ignored;
+        fs::remove_all(folder_, ignored);
+    }
+
+    static Head head() {
+        Head head;
+        head.name = "test";
+        head.started_by = "A. Person";
+        head.utc_ns = 1'767'225'600 * drivers::kSecond;
+        head.utc_offset_ns = head.utc_ns - 5 * drivers::kSecond;
+        head.clock = "real";
+        head.version = "0";
+        head.configuration = "site.latitude_deg = 45.75 # deg\nnoise.resolver_arcsec = 5.0\n";
+        head.interface = "vcan0";
+        return head;
+    }
+    /// A platform that drifts slowly on a shaking table.
+    static std::vector<drivers::Sample> samples(std::size_t count, Time from, unsigned seed = 1) {
+        std::mt19937 random(seed);
+        std::normal_distribution<double> noise;
+        std::vector<drivers::Sample> made(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            drivers::Sample& s = made[i];
+            s.time = from + static_cast<Time>(i) * kPeriod;
+            s.sequence = static_cast<std::uint32_t>(i);
+            const double t = drivers::to_seconds(s.time - from);
+            for (std::size_t k = 0; k < 3; ++k)
+                s.angle[k] = 0.1 + 1e-5 * t + 2.4e-5 * noise(random);
+            const double shake = 6 * std::sin(2 * std::numbers::pi * 15 * t);
+            s.force = {1e-4 * noise(random), 1 + shake, 1e-4 * noise(random)};
+            s.table_accel = 1.5 * shake;
+        }
+        return made;
+    }
+    static void put_order(CampaignWriter& writer, int position, Time from, Time to) {
+        writer.order({from - drivers::kSecond, from, to, 1, position, 9.0, false});
+    }
+    static std::string file(const fs::path& path) {
+        std::ifstream in(path, std::ios::binary);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+
+    fs::path folder_;
+};
+
+bool same(const drivers::Sample& a, const drivers::Sample& b) {
+    const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v); };
+    bool equal = a.time == b.time && a.sequence == b.sequence && a.quality == b.quality &&
+                 bits(a.table_accel) == bits(b.table_accel);
+    for (std::size_t k = 0; k < 3; ++k)
+        equal =
+            equal && bits(a.angle[k]) == bits(b.angle[k]) && bits(a.force[k]) == bits(b.force[k]);
+    return equal;
+}
+
+TEST_F(Recording, ComesBackToTheLastBitWhileItIsWrittenAndAfterwards) {
+    // GIVEN a campaign's file with samples, one of them bad and one not a number
+    const std::string path = (folder_ / "campaign.h5").string();
+    auto written = samples(3000, 7 * drivers::kSecond);
+    written[5].quality[3] = drivers::Quality::stale;
+    written[6].force[1] = std::nan("");
+    CampaignWriter writer(path, head());
+    for (const auto& sample : written) writer.sample(sample);
+    put_order(writer, 1, written[100].time, written[2000].time);
+    writer.gap({1, 2, "samples", 17, "ring full"});
+    EventRecord event;
+    event.text = "Umlaut \xc3\xa4";
+    event.source = "test";
+    event.severity = Severity::alarm;
+    writer.event(event);
+    writer.commit();
+    for (const bool ended : {false, true}) {
+        SCOPED_TRACE(ended ? "closed" : "open");
+        if (ended) writer.end("finished", "", R"({"a":1})", head().utc_ns + 1);
+        // WHEN it is read, first beside its writer
+        const Campaign read = read_campaign(folder_.string());
+        // THEN everything is there
+        ASSERT_EQ(read.samples.size(), written.size());
+        for (std::size_t i = 0; i < written.size(); ++i)
+            ASSERT_TRUE(same(read.samples[i], written[i])) << "sample " << i;
+        EXPECT_EQ(read.state, ended ? "finished" : "running");
+        EXPECT_EQ(read.result_json, ended ? R"({"a":1})" : "");
+        EXPECT_EQ(read.head.started_by, "A. Person");
+        ASSERT_EQ(read.gaps.size(), 1U);
+        EXPECT_EQ(read.gaps[0].lost, 17U);
+        ASSERT_EQ(read.events.size(), 1U);
+        EXPECT_EQ(read.events[0].text, event.text);
+        EXPECT_EQ(read.events[0].severity, Severity::alarm);
+        const auto dwells = recorded_dwells(read);
+        ASSERT_EQ(dwells.size(), 1U);
+        EXPECT_EQ(dwells[0].first, 100U);
+        EXPECT_EQ(dwells[0].count, 1900U);
+    }
+}
+
+TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
+    // GIVEN what is on the disk while a campaign is written
+    const std::string path = (folder_ / "campaign.h5").string();
+    {
+        CampaignWriter writer((folder_ / "living.h5").string(), head());
+        for (const auto& sample : samples(500, 0)) writer.sample(sample);
+        put_order(writer, 3, 2 * drivers::kSecond, 100 * drivers::kSecond);
+        writer.commit();
+        fs::copy_file(folder_ / "living.h5", path);
+    }
+    // WHEN it is mended
+    const Recovery recovery = recover(path);
+    // THEN it says what there is and what is lost
+    EXPECT_FALSE(recovery.was_closed);
+    EXPECT_EQ(recovery.samples, 500U);
+    EXPECT_EQ(recovery.cut_dwell, "run 1 position 3");
+    const Campaign read = read_campaign(path);
+    EXPECT_EQ(read.state, "recovered");
+    EXPECT_EQ(read.samples.size(), 500U);
+    ASSERT_EQ(read.gaps.size(), 1U);
+    EXPECT_EQ(read.gaps[0].stream, "end");
+    // AND a second time there is nothing to do
+    const std::string bytes = file(path);
+    EXPECT_TRUE(recover(path).was_closed);
+    EXPECT_EQ(file(path), bytes);
+}
+
+TEST_F(Recording, ThatIsNoneIsRefusedByName) {
+    std::ofstream(folder_ / "text.h5") << "time_s,run\n";
+    std::ofstream(folder_ / "empty.h5");
+    { hdf5::File::create((folder_ / "foreign.h5").string()).close(); }
+    for (const auto& [name, part] :
+         std::vector<std::pair<std::string, std::string>>{{"text.h5", "no HDF5 file"},
+                                                          {"empty.h5", "no HDF5 file"},
+                                                          {"foreign.h5", "vibrig-campaign"},
+                                                          {"nowhere", "found nothing"},
+                                                          {"", "no campaign.h5"}}) {
+        const std::string path = name.empty() ? folder_.string() : (folder_ / name).string();
+        try {
+            static_cast<void>(read_campaign(path));
+            ADD_FAILURE() << path << " was read";
+        } catch (const std::runtime_error& error) {
+            EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+            EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
+        }
+    }
+}
+
+FrameRecord frame(std::uint32_t id, Time time, bool sent = false) {
+    FrameRecord record;
+    record.frame.can_id = id;
+    record.frame.len = 2;
+    record.frame.data[0] = 0xab;
+    record.frame.data[1] = static_cast<std::uint8_t>(id);
+    record.time = time;
+    record.sent = sent;
+    return record;
+}
+
+TEST_F(Recording, OfFramesIsACandumpLogInSegmentsThatAreCompressed) {
+    Settings settings;
+    settings.segment_s = 1;
+    std::vector<Segment> closed;
+    RawLog log(folder_.string(), "vcan0", settings, 1'700'000'000 * drivers::kSecond,
+               [&closed](const Segment& segment) { closed.push_back(segment); });
+    // GIVEN frames of both directions over more than two segments
+    for (int i = 0; i < 25; ++i) {
+        log.add(frame(0x101, i * 100 * drivers::kMillisecond + 123'456'000, i % 5 == 4));
+        log.flush();
+    }
+    log.close();
+    // THEN the segments hold them all, in order and as candump writes them
+    ASSERT_EQ(closed.size(), 3U);
+    const auto files = raw_files(folder_.string());
+    ASSERT_EQ(files.size(), 3U);
+    std::string text;
+    for (const auto& name : files) {
+        EXPECT_TRUE(name.ends_with(".log.zst")) << name;
+        read_raw(name, [&text](std::string_view piece) {
+            text += piece;
+            return true;
+        });
+    }
+    EXPECT_EQ(std::ranges::count(text, '\n'), 25);
+    EXPECT_TRUE(text.starts_with("(1700000000.123456) vcan0 101#AB01 R\n")) << text.substr(0, 80);
+    EXPECT_NE(text.find("(1700000000.523456) vcan0 101#AB01 T\n"), std::string::npos);
+    EXPECT_EQ(log.frames(), 25U);
+    EXPECT_EQ(log.lost(), 0U);
+}
+
+TEST_F(Recording, OfFramesCountsWhatTheDiskRefusesAndGoesOnWhenItDoesNot) {
+    // GIVEN a folder that is not there
+    const fs::path gone = folder_ / "gone";
+    RawLog log(gone.string(), "vcan0", Settings{}, 0, {});
+    for (int i = 0; i < 3; ++i) log.add(frame(1, i * drivers::kSecond));
+    log.flush();
+    Gap gap;
+    EXPECT_FALSE(log.good());
+    EXPECT_EQ(log.lost(), 3U);
+    EXPECT_FALSE(log.take_gap(gap)) << "nobody could read it yet";
+    // WHEN it comes back, and the time to try again has come
+    fs::create_directory(gone);
+    for (int i = 0; i < 100 && !log.good(); ++i) {
+        log.add(frame(1, (10 + i) * drivers::kSecond));
+        log.flush();
+        ::usleep(50'000);
+    }
+    // THEN it writes, and tells what is missing
+    EXPECT_TRUE(log.good());
+    ASSERT_TRUE(log.take_gap(gap));
+    EXPECT_EQ(gap.lost, log.lost());
+    EXPECT_GE(gap.lost, 3U);
+    EXPECT_EQ(gap.from, 0);
+    EXPECT_NE(gap.reason.find("gone"), std::string::npos) << gap.reason;
+    EXPECT_FALSE(log.take_gap(gap));
+}
+
+TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
+    rt::RealClock clock;
+    const auto waiter = clock.make_waiter();
+    std::vector<std::string> told;
+    Settings settings;
+    settings.keep_free_mb = 0;
+    Recorder recorder(settings, folder_.string(), clock, *waiter,
+                      [&told](Severity, const std::string& text) { told.push_back(text); });
+    // GIVEN more samples than the ring holds before the recorder comes to look
+    const auto made = samples(20'000, drivers::kSecond);
+    recorder.campaign_begun(head());
+    Recorder* const running = &recorder;
+    for (const auto& sample : made) running->samples().try_push(sample);
+    for (int i = 0; i < 10; ++i) running->received().try_push(frame(0x80, i * kPeriod));
+    running->sent().try_push(frame(0x200, 3 * kPeriod + 1, true));
+    const auto counts = recorder.samples().counts();
+    ASSERT_GT(counts.dropped, 0U);
+    // WHEN it begins to look: what was there before the campaign is not of it, so once more
+    recorder.start();
+    while (recorder.samples().counts().popped < counts.pushed) ::usleep(1000);
+    for (std::size_t i = 0; i < 100; ++i) {
+        auto sample = made[i];
+        sample.time += 1000 * drivers::kSecond;
+        running->samples().try_push(sample);
+    }
+    recorder.campaign_ended("finished", "", "{}", head().utc_ns);
+    recorder.stop();
+    // THEN the file has what came after the beginning, and the gap
+    const Campaign read = read_campaign(folder_.string());
+    EXPECT_EQ(read.state, "finished");
+    ASSERT_GE(read.samples.size(), 100U);
+    EXPECT_EQ(read.samples.back().time, made[99].time + 1000 * drivers::kSecond);
+    std::uint64_t lost = 0;
+    for (const auto& gap : read.gaps) lost += gap.lost;
+    EXPECT_EQ(lost, counts.dropped);
+    EXPECT_EQ(recorder.status().samples_lost, counts.dropped);
+    ASSERT_FALSE(told.empty());
+}
+
+TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
+    // GIVEN a campaign of two dwells, as it was the first time
+    Campaign campaign;
+    campaign.samples = samples(4000, drivers::kSecond);
+    for (const int position : {1, 2}) {
+        const std::size_t first = position == 1 ? 100 : 2100;
+        campaign.orders.push_back({campaign.samples[first - 50].time, campaign.samples[first].time,
+                                   campaign.samples[first + 1500].time, 1, position, 9.0, false});
+    }
+    estimator::Settings settings;
+    const auto once = replay(campaign, settings, {});
+    ASSERT_EQ(once.dwells.size(), 2U);
+    EXPECT_EQ(once.dwells[0].summary.samples, 1500U);
+    EXPECT_GT(once.dwells[0].summary.used, 1400U);
+    campaign.dwells = once.dwells;
+    // WHEN it is replayed, at another speed too
+    for (const double speed : {0.0, 2000.0}) {
+        const auto again = replay(campaign, settings, {.speed = speed});
+        EXPECT_EQ(again.compared, 2U);
+        EXPECT_EQ(again.different, 0U) << again.first_difference;
+    }
+    // THEN one last bit in one sample is seen
+    double& angle = campaign.samples[900].angle[1];
+    angle = std::nextafter(angle, 1.0);
+    EXPECT_GT(replay(campaign, settings, {}).different, 0U);
+}
+
+TEST_F(Recording, OfARestartedCampaignIsNotReplayedAsAWhole) {
+    Campaign campaign;
+    campaign.head.dwells_before = 3;
+    EXPECT_THROW(static_cast<void>(replay(campaign, {}, {})), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace vibrig::record
