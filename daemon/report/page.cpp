@@ -17,7 +17,7 @@ nav{margin:1rem 0;display:flex;flex-wrap:wrap;gap:.2rem 1rem;font-size:.9rem}
 a{color:var(--link);text-decoration:none}a:hover{text-decoration:underline}
 .wide{overflow-x:auto;margin:.6rem 0}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.86rem}
-th,td{padding:.22rem .7rem;text-align:right;border-bottom:1px solid var(--rule);white-space:nowrap}
+th,td{padding:.22rem .45rem;text-align:right;border-bottom:1px solid var(--rule);white-space:nowrap}
 th{font-weight:600;vertical-align:bottom;border-bottom:2px solid var(--rule)}
 th:first-child,td:first-child{text-align:left;padding-left:.2rem}
 table.words th,table.words td{text-align:left;white-space:normal;vertical-align:top}

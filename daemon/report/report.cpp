@@ -104,7 +104,7 @@ void add_coefficients(Page& page, const Analysis& a) {
     page.section("coefficients", "Coefficients");
     std::vector<std::vector<std::string>> rows{{"coefficient", "value", "sigma", "95 % from",
                                                 "95 % to", "unit", "expected sigma", "efficiency",
-                                                "strongest correlation"}};
+                                                "correlates with"}};
     for (std::size_t i = 0; i < kParameters; ++i) {
         const char* name = estimator::parameter_names()[i];
         if (!a.coefficients.observable[i]) {

@@ -51,6 +51,21 @@ StatusData full_status() {
     }
     s.resume_offer = "5 of 28 positions done";
     s.journal = {"/var/lib/vibrig/journal.sqlite3", true, "disk full", 80, 81, 82};
+    s.recorder = {"/var/lib/vibrig",
+                  "/var/lib/vibrig/a/campaign.h5",
+                  true,
+                  true,
+                  "disk full",
+                  91,
+                  92,
+                  93,
+                  94,
+                  95,
+                  96,
+                  97,
+                  98,
+                  99,
+                  100};
     s.interlock.tripped = "amplitude_abort";
     s.interlock.rows = {{"amplitude_abort", "amplitude_off_command", "abort", "dB", 1, 0.5, true,
                          true, true, 1.25}};
