@@ -25,7 +25,7 @@ namespace vibrig::tool {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 void export_csv(const record::Campaign& campaign, const std::string& path) {
     std::vector<proto::RecordingRow> rows;
@@ -42,7 +42,7 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
             row.run = dwell.order->run;
             row.position = dwell.order->position;
             for (std::size_t k = 0; k < 3; ++k) {
-                row.angle_deg[k] = sample.angle[k] * kDegrees;
+                row.angle_deg[k] = sample.angle[k] * kDegreesPerRadian;
                 row.force_g[k] = sample.force[k];
             }
             rows.push_back(row);
@@ -111,7 +111,7 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
         const auto& s = campaign.samples[i];
         time.push_back(drivers::to_seconds(s.time - origin));
         sequence.push_back(s.sequence);
-        for (const double a : s.angle) angle.push_back(a * kDegrees);
+        for (const double a : s.angle) angle.push_back(a * kDegreesPerRadian);
         force.insert(force.end(), s.force.begin(), s.force.end());
         table.push_back(s.table_accel);
         for (std::size_t k = 0; k < drivers::kChannels; ++k)

@@ -33,7 +33,7 @@ struct ReplayArguments {
     bool json = false;
 };
 
-double speed_of(const std::string& text) {
+double replay_speed(const std::string& text) {
     double speed = 0;
     if (text == "max") return 0;
     std::string_view number = text;
@@ -45,8 +45,8 @@ double speed_of(const std::string& text) {
 }
 
 /// With --config its settings, else those of the recording.
-estimator::Settings settings_of(const ReplayArguments& arguments,
-                                const record::Campaign& campaign) {
+estimator::Settings replay_settings(const ReplayArguments& arguments,
+                                    const record::Campaign& campaign) {
     if (!arguments.config.empty())
         return configuration::load(arguments.config, false).configuration.estimator;
     return configuration::parse(record::identification_sections(campaign.head.configuration),
@@ -56,7 +56,7 @@ estimator::Settings settings_of(const ReplayArguments& arguments,
 
 bool is_log(const std::string& path) { return path.ends_with(".log") || path.ends_with(".zst"); }
 
-record::Campaign campaign_of(const ReplayArguments& arguments) {
+record::Campaign replayed_campaign(const ReplayArguments& arguments) {
     const std::string& first = arguments.files.front();
     if (!std::ranges::any_of(arguments.files, is_log)) {
         if (arguments.files.size() > 1)
@@ -86,14 +86,14 @@ record::Campaign campaign_of(const ReplayArguments& arguments) {
 int replay(const ReplayArguments& arguments) {
     estimator::use_instruction_set(arguments.instruction_set);
     record::ReplayOptions options;
-    options.speed = speed_of(arguments.speed);
+    options.speed = replay_speed(arguments.speed);
     record::Campaign campaign;
     {
         Progress reading("reading " + arguments.files.front());
         reading.show(0, 1);
-        campaign = campaign_of(arguments);
+        campaign = replayed_campaign(arguments);
     }
-    const estimator::Settings settings = settings_of(arguments, campaign);
+    const estimator::Settings settings = replay_settings(arguments, campaign);
     record::ReplayResult replayed;
     {
         Progress progress("replaying");

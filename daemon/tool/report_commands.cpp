@@ -41,13 +41,13 @@ struct CompensateArguments {
     double platform_g = -1, table_g = -1;
 };
 
-std::string line(const char* format, auto... values) {
+std::string filled_in(const char* format, auto... values) {
     std::array<char, 256> text{};
     std::snprintf(text.data(), text.size(), format, values...);
     return text.data();
 }
 
-estimator::Settings settings_of(const record::Campaign& campaign, const std::string& config) {
+estimator::Settings report_settings(const record::Campaign& campaign, const std::string& config) {
     return config.empty() ? report::settings_of(campaign)
                           : configuration::load(config, false).configuration.estimator;
 }
@@ -79,7 +79,7 @@ void print_pdf(const std::string& html, const std::string& pdf) {
 
 int make_report(const ReportArguments& arguments) {
     const auto campaign = record::read_campaign(arguments.campaign);
-    const auto settings = settings_of(campaign, arguments.config);
+    const auto settings = report_settings(campaign, arguments.config);
     std::optional<report::Earlier> earlier;
     if (!arguments.compare.empty()) {
         const auto other = record::read_campaign(arguments.compare);
@@ -119,8 +119,8 @@ Json prediction_json(const report::Prediction& predicted, const CompensateArgume
     return root;
 }
 
-std::string as_json(const record::Campaign& campaign, const report::Coefficients& c,
-                    const Json& prediction) {
+std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
+                              const Json& prediction) {
     Json root;
     root["campaign"] = campaign.head.name;
     root["started"] = report::utc_text(campaign.head.utc_ns);
@@ -141,18 +141,18 @@ std::string as_json(const record::Campaign& campaign, const report::Coefficients
     return root.dump(2) + "\n";
 }
 
-std::string as_csv(const report::Coefficients& c) {
+std::string coefficients_csv(const report::Coefficients& c) {
     std::string text = "name,value,sigma,unit\n";
     for (std::size_t i = 0; i < kParameters; ++i) {
         text += estimator::parameter_names()[i];
-        text +=
-            c.observable[i] ? line(",%.17g,%.17g,", c.value[i], c.sigma[i]) : std::string(",,,");
+        text += c.observable[i] ? filled_in(",%.17g,%.17g,", c.value[i], c.sigma[i])
+                                : std::string(",,,");
         text += std::string(estimator::parameter_unit(i)) + "\n";
     }
     return text;
 }
 
-std::string as_header(const record::Campaign& campaign, const report::Coefficients& c) {
+std::string coefficients_header(const record::Campaign& campaign, const report::Coefficients& c) {
     // A name in a comment must not end it.
     std::string name;
     for (const char ch : campaign.head.name)
@@ -170,8 +170,8 @@ std::string as_header(const record::Campaign& campaign, const report::Coefficien
         for (std::size_t g = 0; g < 3; ++g) {
             text += "    {";
             for (std::size_t k = 0; k < 10; ++k)
-                text += line("%s%.17g", k == 0 ? "" : ", ",
-                             sigma ? c.sigma[g * 10 + k] : c.value[g * 10 + k]);
+                text += filled_in("%s%.17g", k == 0 ? "" : ", ",
+                                  sigma ? c.sigma[g * 10 + k] : c.value[g * 10 + k]);
             text += g == 2 ? "} /* z */\n" : g == 1 ? "}, /* y */\n" : "}, /* x */\n";
         }
         text += "};\n";
@@ -179,23 +179,24 @@ std::string as_header(const record::Campaign& campaign, const report::Coefficien
     return text + "\n#endif\n";
 }
 
-std::string as_text(const report::Coefficients& c, const report::Prediction& predicted,
-                    const CompensateArguments& arguments, double kappa) {
-    std::string text = line("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
+std::string coefficients_text(const report::Coefficients& c, const report::Prediction& predicted,
+                              const CompensateArguments& arguments, double kappa) {
+    std::string text = filled_in("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
     for (std::size_t i = 0; i < kParameters; ++i) {
-        text += c.observable[i] ? line("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
-                                       c.value[i], c.sigma[i], estimator::parameter_unit(i))
-                                : line("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
-                                       "not determined", "-", estimator::parameter_unit(i));
+        text += c.observable[i]
+                    ? filled_in("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
+                                c.value[i], c.sigma[i], estimator::parameter_unit(i))
+                    : filled_in("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
+                                "not determined", "-", estimator::parameter_unit(i));
     }
-    text += line("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
-                 arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
-                 std::sqrt(2 * (kappa - 1)));
-    text += line("%-6s %14s %26s\n", "gyro", "drift", "left after compensation");
+    text += filled_in("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
+                      arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                      std::sqrt(2 * (kappa - 1)));
+    text += filled_in("%-6s %14s %26s\n", "gyro", "drift", "left after compensation");
     for (std::size_t k = 0; k < 3; ++k)
-        text += line("%-6c %14.6f         0 +- %.6f (1 sigma)%s\n", "xyz"[k],
-                     predicted.drift_dph[k], predicted.residual_dph[k],
-                     predicted.determined[k] ? "" : "  rests on what is not determined");
+        text += filled_in("%-6c %14.6f         0 +- %.6f (1 sigma)%s\n", "xyz"[k],
+                          predicted.drift_dph[k], predicted.residual_dph[k],
+                          predicted.determined[k] ? "" : "  rests on what is not determined");
     return text;
 }
 
@@ -205,17 +206,17 @@ int compensate(CompensateArguments arguments) {
     if (arguments.attitude.empty()) arguments.attitude = {0, 0, 0};
     for (const double angle : arguments.attitude) {
         if (!std::isfinite(angle) || std::abs(angle) > 360)
-            throw std::runtime_error("--attitude: found " + line("%g", angle) +
+            throw std::runtime_error("--attitude: found " + filled_in("%g", angle) +
                                      ", expected -360 to 360 deg");
     }
     for (const double level : {arguments.platform_g, arguments.table_g}) {
         if (!std::isfinite(level) || level > 1000)
-            throw std::runtime_error("vibration: found " + line("%g", level) +
+            throw std::runtime_error("vibration: found " + filled_in("%g", level) +
                                      " g, expected 0 to 1000 g");
     }
     const auto campaign = record::read_campaign(arguments.campaign);
     report::Coefficients coefficients;
-    estimator::Settings settings = settings_of(campaign, arguments.config);
+    estimator::Settings settings = report_settings(campaign, arguments.config);
     if (arguments.config.empty()) {
         coefficients = report::final_coefficients(campaign.path, campaign.dwells);
     } else {
@@ -235,11 +236,11 @@ int compensate(CompensateArguments arguments) {
             ": found coefficients that are not determined, expected all 30 for "
             "a C header");
     const std::string text =
-        arguments.format == "json"
-            ? as_json(campaign, coefficients, prediction_json(predicted, arguments, kappa))
-        : arguments.format == "csv" ? as_csv(coefficients)
-        : arguments.format == "c"   ? as_header(campaign, coefficients)
-                                    : as_text(coefficients, predicted, arguments, kappa);
+        arguments.format == "json"  ? coefficients_json(campaign, coefficients,
+                                                        prediction_json(predicted, arguments, kappa))
+        : arguments.format == "csv" ? coefficients_csv(coefficients)
+        : arguments.format == "c"   ? coefficients_header(campaign, coefficients)
+                                    : coefficients_text(coefficients, predicted, arguments, kappa);
     if (arguments.output.empty()) {
         std::cout << text << std::flush;
     } else {
@@ -249,7 +250,7 @@ int compensate(CompensateArguments arguments) {
 }
 
 template <typename Run>
-void told(int& exit_code, Run run) {
+void reported(int& exit_code, Run run) {
     try {
         exit_code = run();
     } catch (const std::exception& error) {
@@ -275,7 +276,7 @@ void add_reports(CLI::App& app, int& exit_code) {
     reporting->footer(
         "Example: vibrig report demo-20260301T080000Z -o report.html --pdf report.pdf");
     reporting->callback(
-        [report, &exit_code] { told(exit_code, [&] { return make_report(*report); }); });
+        [report, &exit_code] { reported(exit_code, [&] { return make_report(*report); }); });
 
     auto compensation = std::make_shared<CompensateArguments>();
     CLI::App* compensating = app.add_subcommand(
@@ -302,8 +303,9 @@ void add_reports(CLI::App& app, int& exit_code) {
     compensating->footer(
         "Example: vibrig compensate demo-20260301T080000Z --attitude 45,0,90 --platform-g 6\n"
         "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
-    compensating->callback(
-        [compensation, &exit_code] { told(exit_code, [&] { return compensate(*compensation); }); });
+    compensating->callback([compensation, &exit_code] {
+        reported(exit_code, [&] { return compensate(*compensation); });
+    });
 }
 
 }  // namespace vibrig::tool
