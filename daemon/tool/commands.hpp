@@ -21,7 +21,5 @@ void add_remote(
 void add_replay(CLI::App& app, int& exit_code);
 void add_reports(CLI::App& app, int& exit_code);     ///< report, compensate
 void add_recordings(CLI::App& app, int& exit_code);  ///< export, recover
-void add_remote(CLI::App& app,
-                int& exit_code);  ///< status, watch, events, arm, start, pause, resume, abort, ack
 
 }  // namespace vibrig::tool
