@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -81,9 +82,15 @@ Daemon::Daemon(configuration::Loaded loaded)
       noise_monitor_(
           configuration_.estimator,
           [this](Severity severity, const std::string& text) { log(severity, "noise", text); }),
-      acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
-                   {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_}),
+      stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign), control_waiter_.get()),
+      acquisition_(
+          io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
+          {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_}),
       gimbal_(dbc_, configuration_.gimbal, *port_),
+      torquer_(configuration_.campaign.levelling
+                   ? std::make_unique<drivers::Torquer>(dbc_, configuration_.campaign.level.torquer,
+                                                        *port_)
+                   : nullptr),
       adaptive_(adaptive_plan(configuration_)),
       plan_(plan_data(configuration_)),
       campaign_(
@@ -129,7 +136,8 @@ Daemon::Daemon(configuration::Loaded loaded)
                auto result = identification_.result();
                const std::lock_guard lock(mutex_);
                result_ = std::move(result);
-           }}) {}
+           },
+           torquer_.get(), &stage_feed_}) {}
 
 campaign::Next Daemon::next_dwell(const std::array<double, 3>& here_deg, double elapsed_s) {
     // Between two dwells the identification is this thread's; the shaker is at rest.
@@ -149,6 +157,8 @@ void Daemon::check_bindings(const configuration::Configuration& configuration) {
     boost::asio::io_context io;
     const auto port = drivers::make_can_port(io, configuration.can);
     const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port);
+    const auto why = campaign::check_stages(configuration.campaign, dbc, *port);
+    if (!why.empty()) throw configuration::ConfigurationError(why);
 }
 
 std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
@@ -418,7 +428,8 @@ void Daemon::check_balance(Time now) {
     };
     equal("frames received", a.port.received,
           a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
-    equal("frames delivered", a.port.delivered, a.assembler.received + a.rig_ticks + a.in_hand);
+    equal("frames delivered", a.port.delivered,
+          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
     equal("frames for samples", a.assembler.received,
           a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
               a.assembler.wrong_length);
@@ -453,6 +464,7 @@ StatusData Daemon::status() const {
     const auto ring = estimator_stage_.ring();
     status.estimator_ring = {ring.pushed, ring.popped, ring.dropped};
     status.rig_ticks = acquired.rig_ticks;
+    status.increment_frames = acquired.increments;
     status.estimator_in_dwell = estimated.in_dwell;
     status.estimator_idle = estimated.idle;
     status.sample = acquired.sample;

@@ -119,8 +119,10 @@ class Daemon final : public StatusSource {
     std::int64_t interrupted_id_ = 0;
     rt::EstimatorStage estimator_stage_;
     noise::NoiseMonitor noise_monitor_;  ///< control thread
+    rt::StageFeed stage_feed_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
+    std::unique_ptr<drivers::Torquer> torquer_;  ///< null: no levelling
     std::optional<plan::AdaptivePlan> adaptive_;
     const PlanData plan_;
     campaign::Campaign campaign_;

@@ -61,17 +61,25 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
     for (const auto& frame : frames) {
         --shown_.in_hand;
         if (!rig_link_) {
-            assembler_.feed(frame);
+            feed(frame);
         } else if (rig_link_->is_time(frame.frame)) {
             ++shown_.rig_ticks;
             if (const auto tick = rig_link_->decode(frame.frame)) on_tick(*tick);
         } else {
             drivers::ReceivedFrame stamped = frame;
             stamped.time = rig_->now();
-            assembler_.feed(stamped);
+            feed(stamped);
         }
     }
     if (!rig_link_) hand_on();
+}
+
+void Acquisition::feed(const drivers::ReceivedFrame& frame) noexcept {
+    if (to_.stages != nullptr && to_.stages->take(frame)) {
+        ++shown_.increments;
+    } else {
+        assembler_.feed(frame);
+    }
 }
 
 void Acquisition::on_tick(const RigTimeLink::Tick& tick) noexcept {
@@ -91,6 +99,7 @@ void Acquisition::on_time(Time now) noexcept {
 
 void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     to_.interlock.check(sample, assembler_.platform());
+    if (to_.stages != nullptr) to_.stages->take(sample);
     batch_[batched_++] = sample;
     if (batched_ == batch_.size()) push_batch();
 }
