@@ -82,7 +82,8 @@ Daemon::Daemon(configuration::Loaded loaded)
       noise_monitor_(
           configuration_.estimator,
           [this](Severity severity, const std::string& text) { log(severity, "noise", text); }),
-      stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign), control_waiter_.get()),
+      stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign),
+                  control_waiter_.get()),
       acquisition_(
           io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
           {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_}),
@@ -333,6 +334,7 @@ void Daemon::take_done_dwells() {
         if (--dwells_with_estimator_ == 0) take_noise(done.summary);
         campaign_.on_dwell_done(done.summary);
         auto result = identification_.result();
+        campaign_.qualify(result);
         const std::lock_guard lock(mutex_);
         result_ = std::move(result);
     }
@@ -391,6 +393,8 @@ void Daemon::write_result() {
     std::string text;
     {
         const std::lock_guard lock(mutex_);
+        if (!campaign_.mark().empty())
+            result_.warnings.push_back("campaign marked: " + campaign_.mark());
         text = tool::result_json(result_);
     }
     if (journal_) {

@@ -200,6 +200,7 @@ void Campaign::begin(Time now) {
     pause_asked_ = false;
     zeroed_ = false;
     mark_.clear();
+    level_variances_.clear();
     if (zero_) zero_->reset();
     started_ = now;
     enter(State::waiting, now);
@@ -541,6 +542,10 @@ void Campaign::end(State state, const std::string& why, Time now) {
 void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
     dwell_done_ = true;
     dwells_.push_back(summary);
+    if (zero_ && zero_->status().known && at_ < stops_.size()) {
+        const double sigma = zero_->level_sigma(here().stop.position_deg);
+        level_variances_.emplace_back(summary.run, sigma * sigma);
+    }
     if (summary.flagged) {
         ports_.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
                                                     summary.position, summary.reason));

@@ -86,6 +86,10 @@ class Campaign {
     void shut_down(drivers::Time now);
     [[nodiscard]] bool done() const;
     void fill(StatusData& status, drivers::Time now) const;
+    /// Adds the zeros' share of the amplitudes' uncertainty.
+    void qualify(estimator::Result& result) const;
+    /// Why the campaign is marked; empty: it is not.
+    [[nodiscard]] const std::string& mark() const { return mark_; }
 
   private:
     /// Within zeroing and levelling.
@@ -180,6 +184,8 @@ class Campaign {
     bool zeroed_ = false;       ///< in this campaign, before the first dwell
     drivers::Time last_motion_ = 0, torque_sent_ = 0, zero_since_ = 0;
     std::string mark_;  ///< why the campaign is marked
+    /// Of each dwell in which zeros were in force: run, and variance of the relative level.
+    std::vector<std::pair<int, double>> level_variances_;
 };
 
 }  // namespace vibrig::campaign

@@ -171,6 +171,12 @@ Vector ZeroingStage::raw_zero_g() const {
     return frame_.to_raw(zero);
 }
 
+double ZeroingStage::level_sigma(const Vector& encoder_deg) const {
+    if (!present_.known) return 0;
+    const Vector up = frame_.up_at_deg(encoder_deg);
+    return 1e-3 * std::sqrt(std::max(0.0, quadratic(present_.covariance_mg2, up)));
+}
+
 void ZeroingStage::fill(ZeroStatus& status) const {
     status = present_;
     status.time_s = time_s();

@@ -38,6 +38,9 @@ class ZeroingStage {
     [[nodiscard]] const ZeroStatus& status() const { return present_; }
     /// On top of the configuration's zeros, as the raw readings show them, g.
     [[nodiscard]] Vector raw_zero_g() const;
+    /// Relative standard deviation of the vibration level at these angles that the zeros leave:
+    /// delta = u.b.
+    [[nodiscard]] double level_sigma(const Vector& encoder_deg) const;
     void fill(ZeroStatus& status) const;
     [[nodiscard]] double expected_s() const {
         return settings_.duration_s * (settings_.both_ways ? 2 : 1);

@@ -161,10 +161,11 @@ def effect(checks, programs, truth):
     campaign = {"name": "effect", "positions_deg": TABLE1, "table_g": [9.0, 7.0], "dwell_s": 20.0}
     zero_g = [0.005, 0.005, 0.005]
     # Little noise, so that 1 % of it does not hide 1 % of the coefficients.
-    quiet = {"noise": {"resolver_arcsec": 0.3, "gyro_random_walk_deg_per_rt_h": 1e-5, "accelerometer_g": 1e-4}}
-    exact = Run(programs, campaign, quiet)
-    wrong = Run(programs, campaign, {**quiet, "accelerometer": {"zero_g": zero_g}})
-    right = Run(programs, {**campaign, "zeroing": True}, {**quiet, "accelerometer": {"zero_g": zero_g}})
+    noise = {"resolver_arcsec": 0.3, "gyro_random_walk_deg_per_rt_h": 1e-5, "accelerometer_g": 1e-4}
+    zeros = {"noise": noise, "accelerometer": {"zero_g": zero_g}}
+    exact = Run(programs, campaign, {"noise": noise}, noise=noise)
+    wrong = Run(programs, campaign, zeros, noise=noise)
+    right = Run(programs, {**campaign, "zeroing": True}, zeros, noise=noise)
     if not all([exact.ended(checks, "finished", "a campaign with exact accelerometers finishes"),
                 wrong.ended(checks, "finished", "one with 5 mg zeros and no zeroing finishes"),
                 right.ended(checks, "finished", "one with 5 mg zeros and zeroing finishes")]):
