@@ -88,6 +88,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
     }
 
     void begin() {
+        for (int i = 0; campaign && i < 40; ++i) tick();  // the last one's shaker comes to rest
         settings.positions_deg = {{0, 0, 0}, {0, 0, 0}};
         settings.table_g = {9};
         settings.dwell_s = 10;
@@ -300,8 +301,10 @@ TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     ZeroingStage stage({}, rig);
     feed_unit(stage, frame, 5, 1);
     ASSERT_EQ(stage.finish(false), "");
-    for (std::size_t i = 0; i < 3; ++i)
-        EXPECT_NEAR(stage.raw_zero_g()[i], 1e-3 * std::array{5, -3, 2}[i], 5e-5) << i;
+    const Vector found = stage.raw_zero_g();
+    EXPECT_NEAR(found[0], 5e-3, 5e-5);
+    EXPECT_NEAR(found[1], -3e-3, 5e-5);
+    EXPECT_NEAR(found[2], 2e-3, 5e-5);
     // WHEN it is repeated with the same zeros
     feed_unit(stage, frame, 5, 2);
     ASSERT_EQ(stage.finish(true), "");
