@@ -2,7 +2,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/levelling_stage.hpp"
@@ -233,30 +232,6 @@ Time Campaign::levelling(Time now) {
         static_cast<void>(ports_.torquer->command({}));
     }
     return now + kPoll / 2;
-}
-
-void Campaign::qualify(estimator::Result& result) const {
-    for (auto& amplitude : result.amplitudes) {
-        double sum = 0;
-        std::size_t n = 0;
-        for (const auto& [run, variance] : level_variances_) {
-            if (run != amplitude.run) continue;
-            sum += variance;
-            ++n;
-        }
-        if (n == 0) continue;
-        // The same zeros in every dwell: they do not average out.
-        amplitude.sigma_g = std::hypot(
-            amplitude.sigma_g, amplitude.amplitude_g * std::sqrt(sum / static_cast<double>(n)));
-    }
-}
-
-void Campaign::fill_stages(StatusData& status) const {
-    status.levelling = {};
-    status.zeros = {};
-    if (level_) level_->fill(status.levelling);
-    if (zero_) zero_->fill(status.zeros);
-    if (!mark_.empty()) status.zeros.mark = mark_;
 }
 
 }  // namespace vibrig::campaign

@@ -66,8 +66,7 @@ std::string angles(const v1::Angles& at) {
 
 /// What the stage with the table at rest is at; empty: there is none.
 std::string stage_line(const v1::Campaign& campaign) {
-    if (campaign.state() == v1::Campaign::levelling &&
-        campaign.level().tilt_arcmin_size() == 2) {
+    if (campaign.state() == v1::Campaign::levelling && campaign.level().tilt_arcmin_size() == 2) {
         const v1::Levelling& level = campaign.level();
         return format("%s, %.0f s, %+.2f' %+.2f' of %.2f'", level.verdict().c_str(), level.time_s(),
                       level.tilt_arcmin(0), level.tilt_arcmin(1), level.tolerance_arcmin());

@@ -205,8 +205,7 @@ struct Calibration::Impl {
     }
 
     [[nodiscard]] bool outside(const InnovationStatistic& v) const {
-        return v.mean_nis > v.high ||
-               (v.mean_nis < v.low && !settings.noise.reference_is_bound);
+        return v.mean_nis > v.high || (v.mean_nis < v.low && !settings.noise.reference_is_bound);
     }
 
     void account(const ZeroFilter::Innovation& found) {

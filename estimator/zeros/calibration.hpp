@@ -69,7 +69,7 @@ struct AxisResult {
 struct InnovationStatistic {
     double mean_nis = 0;  ///< of the last whole block of 60 updates, 6 when consistent
     double low = 0, high = 0;
-    std::size_t blocks = 0, outside = 0;  ///< with a bound for a reference: above only
+    std::size_t blocks = 0, outside = 0;        ///< with a bound for a reference: above only
     Triple velocity_ratio{}, position_ratio{};  ///< of squares to expected squares, last block
 };
 
