@@ -32,7 +32,7 @@ struct LevellingSettings {
     double torquer_limit_deg_h = 3000;
     std::uint32_t block = 4;  ///< samples per step of the loop, about 0.1 s
     double sample_s = 0.025;
-    std::array<double, 3> slow{};  ///< K1, K2, K3 to ramp to once settled; all 0: stay fast
+    std::vector<double> slow;  ///< K1, K2, K3 to ramp to once settled; empty: stay fast
     double slow_ramp_s = 60;
     drivers::TorquerSettings torquer;
 };

@@ -26,11 +26,6 @@ void add_levelling_keys(std::vector<Key>& keys) {
           &L::tolerance_arcmin);
     level("torquer_limit_deg_h", "deg/h", {0.1, 1e6}, "largest rate commanded",
           &L::torquer_limit_deg_h);
-    keys.push_back(triple(
-        "levelling.slow", "", {0, 1e9},
-        "K1, K2, K3 to ramp to once settled; all 0: the fast gains stay",
-        [](C & c) -> auto& { return c.campaign.level.slow; }));
-    level("slow_ramp_s", "s", {1, 3600}, "length of that ramp", &L::slow_ramp_s);
     keys.push_back(text(
         "levelling.torque_message", "a message name",
         "command with signals X, Y, Z in deg/h, Counter", identifier_rule,

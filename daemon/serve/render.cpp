@@ -231,8 +231,6 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     if (!campaign.reason().empty()) lines.push_back("why: " + campaign.reason());
     if (const std::string stage = stage_line(campaign); !stage.empty())
         lines.push_back(labelled("stage", stage));
-    if (!campaign.zeros().mark().empty())
-        lines.push_back(labelled("marked", campaign.zeros().mark()));
     lines.push_back(progress_line(campaign, width));
     lines.push_back(labelled(
         "campaign",
