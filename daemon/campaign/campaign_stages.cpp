@@ -16,7 +16,7 @@ using State = CampaignState;
 
 namespace {
 
-constexpr Time kPoll = 200 * drivers::kMillisecond;
+constexpr Time kStagePoll = 200 * drivers::kMillisecond;
 // Blocks and increments come ten and a hundred times a second.
 constexpr Time kSilence = kSecond;
 // From the zero command to the platform's word that nothing is torqued.
@@ -80,7 +80,7 @@ void Campaign::leave_stage() {
 void Campaign::insist_on_zero_torque(Time now) {
     if (ports_.torquer == nullptr || state_ == State::levelling) return;
     if (ports_.torquer->zero() && !(active() && torquing())) return;
-    if (now - torque_sent_ < kPoll) return;
+    if (now - torque_sent_ < kStagePoll) return;
     torque_sent_ = now;
     static_cast<void>(ports_.torquer->command({}));
 }
@@ -127,7 +127,7 @@ Time Campaign::zeroing(Time now) {
             ports_.gimbal.slew_to(zero_->target_deg(), now, true);
         }
     }
-    return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+    return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
 }
 
 Time Campaign::end_zeroing(Time now) {
@@ -177,7 +177,7 @@ Time Campaign::levelling(Time now) {
     const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
     if (part_ == Part::go) {
         if (gimbal == drivers::GimbalState::commanding)
-            return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+            return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
         if (gimbal != drivers::GimbalState::idle) {
             abort(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)), now);
             return now;
@@ -205,13 +205,13 @@ Time Campaign::levelling(Time now) {
             ports_.event(Severity::info, level_->words());
             part_ = Part::zero;
             torque_sent_ = zero_since_ = now;
-            return now + kPoll;
+            return now + kStagePoll;
         }
         if (any) static_cast<void>(ports_.torquer->command(rate));
         if (now - last_motion_ > kSilence) {
             abort("levelling: no specific force on the bus for 1 s", now);
         }
-        return now + kPoll;
+        return now + kStagePoll;
     }
     // A dwell is free drift: it begins only when the platform itself says that nothing is torqued.
     const auto torque = ports_.feed->torque();
@@ -227,11 +227,11 @@ Time Campaign::levelling(Time now) {
               now);
         return now;
     }
-    if (now - torque_sent_ >= kPoll) {
+    if (now - torque_sent_ >= kStagePoll) {
         torque_sent_ = now;
         static_cast<void>(ports_.torquer->command({}));
     }
-    return now + kPoll / 2;
+    return now + kStagePoll / 2;
 }
 
 }  // namespace vibrig::campaign

@@ -13,14 +13,14 @@ namespace zeros = estimator::zeros;
 
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
+constexpr double kRadian = 3.14159265358979323846 / 180;
 constexpr double kSureness = 3;  // standard deviations
 
 }  // namespace
 
 zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
     zeros::CalibrationSettings s;
-    s.site.latitude_rad = kRadPerDeg * rig_.latitude_deg;
+    s.site.latitude_rad = kRadian * rig_.latitude_deg;
     s.site.gravity_mps2 = rig_.gravity_mps2;
     s.plan.rate_deg_s = settings_.slew_deg_per_s;
     s.plan.duration_s = settings_.duration_s;
