@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -84,12 +85,17 @@ Daemon::Daemon(configuration::Loaded loaded)
       recorder_(make_recorder()),
       sent_tap_(recorder_ ? std::make_unique<record::SentTap>(*port_, clock_, recorder_->sent())
                           : nullptr),
+      stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign),
+                  control_waiter_.get()),
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
-                   {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_,
+                   {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_,
                     recorder_ ? &recorder_->received() : nullptr,
                     recorder_ ? &recorder_->samples() : nullptr}),
-      gimbal_(dbc_, configuration_.gimbal,
-              sent_tap_ ? static_cast<drivers::CanPort&>(*sent_tap_) : *port_),
+      gimbal_(dbc_, configuration_.gimbal, sending_port()),
+      torquer_(configuration_.campaign.levelling
+                   ? std::make_unique<drivers::Torquer>(dbc_, configuration_.campaign.level.torquer,
+                                                        sending_port())
+                   : nullptr),
       adaptive_(adaptive_plan(configuration_)),
       plan_(plan_data(configuration_)),
       campaign_(
@@ -137,7 +143,8 @@ Daemon::Daemon(configuration::Loaded loaded)
                auto result = identification_.result();
                const std::lock_guard lock(mutex_);
                result_ = std::move(result);
-           }}) {}
+           },
+           torquer_.get(), &stage_feed_}) {}
 
 campaign::Next Daemon::next_dwell(const std::array<double, 3>& here_deg, double elapsed_s) {
     // Between two dwells the identification is this thread's; the shaker is at rest.
@@ -157,6 +164,8 @@ void Daemon::check_bindings(const configuration::Configuration& configuration) {
     boost::asio::io_context io;
     const auto port = drivers::make_can_port(io, configuration.can);
     const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port);
+    const auto why = campaign::check_stages(configuration.campaign, dbc, *port);
+    if (!why.empty()) throw configuration::ConfigurationError(why);
 }
 
 std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
@@ -338,6 +347,7 @@ void Daemon::take_done_dwells() {
         record_dwell(done.summary);
         campaign_.on_dwell_done(done.summary);
         auto result = identification_.result();
+        campaign_.qualify(result);
         const std::lock_guard lock(mutex_);
         result_ = std::move(result);
     }
@@ -396,6 +406,8 @@ void Daemon::write_result() {
     std::string text;
     {
         const std::lock_guard lock(mutex_);
+        if (!campaign_.mark().empty())
+            result_.warnings.push_back("campaign marked: " + campaign_.mark());
         text = tool::result_json(result_);
     }
     StatusData ended;
@@ -438,7 +450,8 @@ void Daemon::check_balance(Time now) {
     };
     equal("frames received", a.port.received,
           a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
-    equal("frames delivered", a.port.delivered, a.assembler.received + a.rig_ticks + a.in_hand);
+    equal("frames delivered", a.port.delivered,
+          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
     equal("frames for samples", a.assembler.received,
           a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
               a.assembler.wrong_length);
@@ -473,6 +486,7 @@ StatusData Daemon::status() const {
     const auto ring = estimator_stage_.ring();
     status.estimator_ring = {ring.pushed, ring.popped, ring.dropped};
     status.rig_ticks = acquired.rig_ticks;
+    status.increment_frames = acquired.increments;
     status.estimator_in_dwell = estimated.in_dwell;
     status.estimator_idle = estimated.idle;
     status.sample = acquired.sample;

@@ -98,6 +98,8 @@ class Daemon final : public StatusSource {
     /// Everything that results depend on; not where things are kept or how one talks to the daemon.
     [[nodiscard]] std::string result_configuration() const;
     [[nodiscard]] std::unique_ptr<record::Recorder> make_recorder();
+    /// The bus, by way of the recorder if there is one.
+    [[nodiscard]] drivers::CanPort& sending_port() noexcept;
     void record_begin(const std::string& by, std::size_t dwells_before);
     void tell_overdue();  ///< instruments whose certificate has run out
     void record_dwell(const estimator::DwellSummary& summary);
@@ -130,8 +132,10 @@ class Daemon final : public StatusSource {
     std::unique_ptr<drivers::Waiter> recorder_waiter_;
     std::unique_ptr<record::Recorder> recorder_;  ///< null: nothing is recorded
     std::unique_ptr<record::SentTap> sent_tap_;
+    rt::StageFeed stage_feed_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
+    std::unique_ptr<drivers::Torquer> torquer_;  ///< null: no levelling
     std::optional<plan::AdaptivePlan> adaptive_;
     const PlanData plan_;
     campaign::Campaign campaign_;

@@ -50,6 +50,10 @@ void Daemon::tell_overdue() {
     }
 }
 
+drivers::CanPort& Daemon::sending_port() noexcept {
+    return sent_tap_ ? static_cast<drivers::CanPort&>(*sent_tap_) : *port_;
+}
+
 std::unique_ptr<record::Recorder> Daemon::make_recorder() {
     const record::Settings& settings = configuration_.record;
     const std::string& folder = settings.folder.empty() ? configuration_.results : settings.folder;

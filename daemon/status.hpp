@@ -26,7 +26,9 @@ enum class CampaignState : std::uint8_t {
     paused,   ///< at rest between positions, by command
     finished,
     aborted,
-    tripped,  ///< stopped by an interlock; latched until acknowledged
+    tripped,    ///< stopped by an interlock; latched until acknowledged
+    zeroing,    ///< azimuth slews at rest, for the accelerometers' zeros
+    levelling,  ///< at rest in position
 };
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
@@ -91,6 +93,35 @@ struct NoiseStatus {
     std::vector<Alarm> alarms;  ///< the newest
 };
 
+/// The levelling of the present position, or the last one.
+struct LevellingStatus {
+    bool begun = false;
+    const char* verdict = "";                ///< settling, settled, not settled, cannot settle
+    const char* phase = "";                  ///< fast, ramp, slow, undamped
+    double time_s = 0;                       ///< since it began, or until settled
+    std::array<double, 2> tilt_arcmin{};     ///< mean specific force, both channels
+    std::array<double, 2> to_come_arcmin{};  ///< tilt that the integrator has still to take up
+    std::array<double, 2> drift_deg_h{};
+    double tolerance_arcmin = 0, noise_arcmin = 0;
+    double limit_arcmin = 0;  ///< 1 sigma of the tilt left by the accelerometers' zeros; 0: unknown
+    std::uint32_t done = 0;   ///< positions levelled
+    std::string message;
+};
+
+/// The accelerometers' zeros in force, platform axes, on top of the configuration's.
+struct ZeroStatus {
+    bool running = false;
+    bool known = false;  ///< taken off the samples of the dwells
+    double time_s = 0;   ///< of the run that is under way
+    std::array<double, 3> zero_mg{}, sigma_mg{};
+    std::array<std::array<double, 3>, 3> covariance_mg2{};
+    double scale_z = 0, scale_z_sigma = 0;  ///< 0: not separated
+    bool repeated = false;                  ///< at the end of the campaign
+    std::array<double, 3> change_mg{}, change_sigma_mg{};
+    std::string mark;  ///< why the campaign is marked; empty: it is not
+    std::string message;
+};
+
 /// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
 /// not in real-time threads.
 struct StatusData {
@@ -123,7 +154,8 @@ struct StatusData {
     drivers::PortState can = drivers::PortState::absent;
     drivers::CanPortCounters can_counters;
     drivers::AssemblerCounters assembler;
-    std::uint64_t rig_ticks = 0;  ///< delivered frames that were the simulated rig's time
+    std::uint64_t rig_ticks = 0;         ///< delivered frames that were the simulated rig's time
+    std::uint64_t increment_frames = 0;  ///< delivered frames that were increments
     RingCounters estimator_ring;
     std::uint64_t estimator_in_dwell = 0, estimator_idle = 0;  ///< popped = in a dwell + idle
     drivers::Sample sample;                                    ///< the newest
@@ -133,6 +165,8 @@ struct StatusData {
     estimator::Estimate estimate;
     NoiseStatus noise;
     std::vector<estimator::DwellSummary> dwells;
+    LevellingStatus levelling;
+    ZeroStatus zeros;
 };
 
 enum class Severity : std::uint8_t { info, warning, alarm, trip };

@@ -41,9 +41,10 @@ Gimbal::Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& p
     counter_signal_ = bind("Counter");
 }
 
-void Gimbal::slew_to(const std::array<double, 3>& position_deg, Time now) noexcept {
+void Gimbal::slew_to(const std::array<double, 3>& position_deg, Time now,
+                     bool increments) noexcept {
     target_deg_ = position_deg;
-    command(Mode::slew, now);
+    command(increments ? Mode::slew_with_increments : Mode::slew, now);
 }
 
 void Gimbal::release(Time now) noexcept { command(Mode::free_drift, now); }

@@ -33,8 +33,10 @@ class Gimbal {
     /// Throws BindingError if the DBC lacks the message or one of its signals. The Dbc and the port
     /// must outlive this.
     Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& port);
-    /// Starts a slew to outer, inner, azimuth in deg, as the encoders count.
-    void slew_to(const std::array<double, 3>& position_deg, Time now) noexcept;
+    /// Starts a slew to outer, inner, azimuth in deg, as the encoders count. `increments`: the
+    /// platform sends the increments of its gyros and accelerometers until the next command.
+    void slew_to(const std::array<double, 3>& position_deg, Time now,
+                 bool increments = false) noexcept;
     /// Lets the platform drift freely under its gyros: no torquing.
     void release(Time now) noexcept;
     /// Follows the platform's status; sends again what was not echoed. To be called at
@@ -44,7 +46,7 @@ class Gimbal {
     [[nodiscard]] GimbalState state() const noexcept { return state_; }
 
   private:
-    enum class Mode : std::uint8_t { free_drift = 0, slew = 1 };
+    enum class Mode : std::uint8_t { free_drift = 0, slew = 1, slew_with_increments = 2 };
     void command(Mode mode, Time now) noexcept;
     void send(Time now) noexcept;
     [[nodiscard]] GimbalState follow(const PlatformStatus& status, Time now) noexcept;

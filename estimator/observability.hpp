@@ -11,7 +11,6 @@
 
 namespace vibrig::estimator {
 
-
 /// How far the vibration levels of the dwells are apart.
 struct KappaSpread {
     double mean = 0, least = 0, largest = 0;

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
+
 namespace vibrig::campaign {
 
 using drivers::from_seconds;
@@ -40,6 +43,8 @@ rt::Guard guard_in(State state) {
         case State::armed:
         case State::waiting:
         case State::slewing:
+        case State::zeroing:
+        case State::levelling:
         case State::paused:
             return rt::Guard::armed;
         default:
@@ -52,6 +57,7 @@ rt::Guard guard_in(State state) {
 Campaign::Campaign(const Settings& settings, Ports ports)
     : settings_(settings), ports_(std::move(ports)) {
     plan_stops();
+    make_stages();
 }
 
 void Campaign::add_stop(const Stop& stop) {
@@ -103,7 +109,7 @@ bool Campaign::choose_next(Time now) {
 bool Campaign::active() const {
     return state_ == State::waiting || state_ == State::slewing || state_ == State::ramping ||
            state_ == State::settling || state_ == State::recording || state_ == State::resting ||
-           state_ == State::paused;
+           state_ == State::zeroing || state_ == State::levelling || state_ == State::paused;
 }
 
 bool Campaign::done() const {
@@ -192,6 +198,10 @@ void Campaign::begin(Time now) {
     at_ = positions_done_;
     temperatures_.clear();
     pause_asked_ = false;
+    zeroed_ = false;
+    mark_.clear();
+    level_variances_.clear();
+    if (zero_) zero_->reset();
     started_ = now;
     enter(State::waiting, now);
 }
@@ -244,9 +254,14 @@ Time Campaign::step_once(Time now) {
     if ((active() || state_ == State::armed) && !shutting_down_ && !ports_.shaker.reading().valid) {
         abort("no valid read-back from the shaker", now);
     }
+    insist_on_zero_torque(now);
     switch (state_) {
         case State::waiting:
             return wait_for_platform(now);
+        case State::zeroing:
+            return zeroing(now);
+        case State::levelling:
+            return levelling(now);
         case State::slewing:
             return slew(now);
         case State::ramping:
@@ -317,8 +332,9 @@ void Campaign::start_position(Time now) {
         }
         return;
     }
+    if (zero_ && !zeroed_) return begin_zeroing(false, now);
     if (at_ == stops_.size() && !choose_next(now)) {
-        if (positions_done_ > 0) return finish(now);
+        if (positions_done_ > 0) return conclude(now);
         armed_by_.clear();
         return end(State::aborted, "nothing to do", now);
     }
@@ -346,7 +362,8 @@ Time Campaign::slew(Time now) {
     switch (ports_.gimbal.update(ports_.platform(), now)) {
         case drivers::GimbalState::in_position:
             ports_.gimbal.release(now);
-            enter(State::ramping, now);
+            part_ = Part::go;
+            enter(level_ ? State::levelling : State::ramping, now);
             return now;
         case drivers::GimbalState::timed_out:
             abort("gimbals did not reach the position in time", now);
@@ -406,6 +423,7 @@ Time Campaign::record(Time now) {
         order.from = dwell_from_;
         order.to = dwell_to_;
         order.dwell = {here().run, here().position, table_g()};
+        if (zero_) order.zero_g = zero_->raw_zero_g();
         if (!ports_.order_dwell(order)) abort("the estimator takes no order", now);
         return now + kPoll;
     }
@@ -414,6 +432,10 @@ Time Campaign::record(Time now) {
         abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                           reading.state, reading.measured_g, table_g()),
               now);
+        return now;
+    }
+    if (torquing()) {
+        abort("the platform is torqued during a dwell, expected free drift", now);
         return now;
     }
     if (state_ == State::settling) {
@@ -448,7 +470,7 @@ Time Campaign::rest(Time now) {
         if (shutting_down_) {
             end(State::aborted, "the daemon is shutting down", now);
         } else if (at_ == stops_.size() && at_ > 0 && !choose_next(now)) {
-            finish(now);
+            conclude(now);
         } else {
             start_position(now);
         }
@@ -471,6 +493,11 @@ Time Campaign::rest(Time now) {
         }
     }
     return now + kPoll;
+}
+
+void Campaign::conclude(Time now) {
+    if (zero_) return begin_zeroing(true, now);
+    finish(now);
 }
 
 void Campaign::finish(Time now) {
@@ -497,8 +524,9 @@ void Campaign::abort(const std::string& why, Time now) {
 
 void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
-    const bool slewing = state_ == State::slewing;
+    const bool slewing = state_ == State::slewing || state_ == State::zeroing;
     leave_dwell();
+    leave_stage();
     armed_by_.clear();
     reason_ = why;
     enter(state, now);
@@ -514,6 +542,10 @@ void Campaign::end(State state, const std::string& why, Time now) {
 void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
     dwell_done_ = true;
     dwells_.push_back(summary);
+    if (zero_ && zero_->status().known && at_ < stops_.size()) {
+        const double sigma = zero_->level_sigma(here().stop.position_deg);
+        level_variances_.emplace_back(summary.run, sigma * sigma);
+    }
     if (summary.flagged) {
         ports_.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
                                                     summary.position, summary.reason));
@@ -531,48 +563,11 @@ void Campaign::shut_down(Time now) {
     shutting_down_ = true;
     if (!active()) return;
     leave_dwell();
+    leave_stage();
     if (state_ == State::slewing) ports_.gimbal.release(now);
     if (!may_move_) return end(State::aborted, "the daemon is shutting down", now);
     ports_.event(Severity::warning, "shutting down: ramping the shaker down");
     enter(State::resting, now);
-}
-
-void Campaign::fill(StatusData& status, Time now) const {
-    status.campaign_name = settings_.name;
-    status.state = state_;
-    status.reason = reason_;
-    status.armed_by = armed_by_;
-    status.resume_offer = resume_offer();
-    status.runs = static_cast<int>(runs());
-    status.positions = static_cast<int>(positions());
-    status.dwells = dwells_;
-    const auto total = static_cast<double>(std::max<std::size_t>(expected_, 1));
-    const bool begun = active() || state_ == State::finished || !dwells_.empty();
-    if (begun && at_ < stops_.size()) {
-        status.run = here().run;
-        status.position = here().position;
-        status.position_deg = here().stop.position_deg;
-    }
-    double done = static_cast<double>(positions_done_);
-    if (state_ == State::recording && dwell_to_ > dwell_from_) {
-        done += std::clamp(
-            static_cast<double>(now - dwell_from_) / static_cast<double>(dwell_to_ - dwell_from_),
-            0.0, 1.0);
-    }
-    status.progress = begun ? done / total : 0;
-    if (active()) {
-        // What is left at the pace so far, at first at the nominal one.
-        const double nominal = settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
-        const auto before = static_cast<double>(positions_before_);
-        const double pace = positions_done_ > positions_before_
-                                ? drivers::to_seconds(now - started_) / (done - before)
-                                : nominal;
-        status.remaining_s = (total - done) * pace;
-        const bool vibrating =
-            state_ == State::ramping || state_ == State::settling || state_ == State::recording;
-        status.command_table_g = vibrating ? table_g() : 0;
-        status.command_frequency_hz = settings_.frequency_hz;
-    }
 }
 
 }  // namespace vibrig::campaign

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,11 +13,21 @@
 #include "daemon/campaign/settings.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/interlock.hpp"
+#include "daemon/rt/stage_feed.hpp"
 #include "daemon/status.hpp"
 #include "drivers/gimbal.hpp"
 #include "drivers/shaker.hpp"
+#include "drivers/torquer.hpp"
 
 namespace vibrig::campaign {
+
+class LevellingStage;
+class ZeroingStage;
+
+/// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
+[[nodiscard]] std::string check_stages(const Settings& settings, const proto::Dbc& dbc,
+                                       drivers::CanPort& port);
+[[nodiscard]] rt::StageFeedSettings stage_feed_settings(const Settings& settings);
 
 /// What an adaptive campaign does next.
 struct Next {
@@ -48,9 +59,13 @@ struct Ports {
     std::function<std::string()> resume_gate = {};
     /// It goes on, by this person: take the filter as it was.
     std::function<void(const std::string& by)> resume = {};
+    /// What levelling and zeroing act on and are fed from; null: no such stage.
+    drivers::Torquer* torquer = nullptr;
+    rt::StageFeed* feed = nullptr;
 };
 
-/// The campaign as a state machine: for each run and position slew, ramp, settle, record, rest.
+/// The campaign as a state machine: zeros of the accelerometers, then for each run and position
+/// slew, level, ramp, settle, record, rest; in the end the zeros again.
 /// Moved on by step(), which never waits. The shaker moves only between a named person's arm() and
 /// the end of that campaign; gimbals slew only while it is at rest. Control thread only.
 class Campaign {
@@ -71,8 +86,15 @@ class Campaign {
     void shut_down(drivers::Time now);
     [[nodiscard]] bool done() const;
     void fill(StatusData& status, drivers::Time now) const;
+    /// Adds the zeros' share of the amplitudes' uncertainty.
+    void qualify(estimator::Result& result) const;
+    /// Why the campaign is marked; empty: it is not.
+    [[nodiscard]] const std::string& mark() const { return mark_; }
 
   private:
+    /// Within zeroing and levelling.
+    enum class Part : std::uint8_t { go, slew, measure, zero };
+
     /// A stop and what the estimator and people call it, from 1.
     struct NumberedStop {
         Stop stop;
@@ -82,6 +104,18 @@ class Campaign {
     drivers::Time step_once(drivers::Time now);
     drivers::Time wait_for_platform(drivers::Time now);
     drivers::Time slew(drivers::Time now);
+    drivers::Time zeroing(drivers::Time now);
+    drivers::Time end_zeroing(drivers::Time now);
+    drivers::Time fail_zeroing(const std::string& why, drivers::Time now);
+    void leave_zeroing(drivers::Time now);
+    drivers::Time levelling(drivers::Time now);
+    void make_stages();
+    void begin_zeroing(bool at_end, drivers::Time now);
+    void leave_stage();
+    void insist_on_zero_torque(drivers::Time now);
+    [[nodiscard]] bool take_motion(rt::Motion& motion, drivers::Time now);
+    [[nodiscard]] bool torquing() const;
+    void fill_stages(StatusData& status) const;
     drivers::Time ramp(drivers::Time now);
     drivers::Time record(drivers::Time now);
     drivers::Time rest(drivers::Time now);
@@ -92,6 +126,7 @@ class Campaign {
     void end(CampaignState state, const std::string& why, drivers::Time now);
     void leave_dwell();
     void begin(drivers::Time now);
+    void conclude(drivers::Time now);
     void finish(drivers::Time now);
     CommandReply resume_interrupted(const CommandRequest& request, drivers::Time now);
     [[nodiscard]] std::string resume_offer() const;
@@ -141,6 +176,16 @@ class Campaign {
     std::vector<estimator::DwellSummary> offer_;
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
+    // shared: their types are known where they are made
+    std::shared_ptr<LevellingStage> level_;
+    std::shared_ptr<ZeroingStage> zero_;
+    Part part_ = Part::go;
+    bool zeroing_end_ = false;  ///< within zeroing: the one after the last dwell
+    bool zeroed_ = false;       ///< in this campaign, before the first dwell
+    drivers::Time last_motion_ = 0, torque_sent_ = 0, zero_since_ = 0;
+    std::string mark_;  ///< why the campaign is marked
+    /// Of each dwell in which zeros were in force: run, and variance of the relative level.
+    std::vector<std::pair<int, double>> level_variances_;
 };
 
 }  // namespace vibrig::campaign

@@ -1,8 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
+
+#include "drivers/torquer.hpp"
+#include "estimator/identification.hpp"
 
 namespace vibrig::campaign {
 
@@ -15,6 +19,37 @@ inline const std::vector<std::array<double, 3>> kTable1Positions{
 struct Stop {
     std::array<double, 3> position_deg{};
     double table_g = 0;
+};
+
+/// Before each position: the platform's two channels across the vertical are brought level by fast
+/// external damping (Zha et al. 2019), reference velocity zero.
+struct LevellingSettings {
+    double settling_s = 100;
+    double residual = 0.005;
+    double damping = 0.7;
+    double window_s = 10;           ///< of the means that the verdict rests on
+    double tolerance_arcmin = 0.2;  ///< of both observables
+    double torquer_limit_deg_h = 3000;
+    std::uint32_t block = 4;  ///< samples per step of the loop, about 0.1 s
+    double sample_s = 0.025;
+    std::vector<double> slow;  ///< K1, K2, K3 to ramp to once settled; empty: stay fast
+    double slow_ramp_s = 60;
+    drivers::TorquerSettings torquer;
+};
+
+/// At the start and the end: the accelerometers' zeros from azimuth slews with the azimuth axis
+/// vertical.
+struct ZeroingSettings {
+    double duration_s = 180;
+    double slew_deg_per_s = 5;   ///< what the gimbals do; the filter checks it
+    bool both_ways = false;      ///< z down too: zero and scale of the z accelerometer apart
+    double scale_factor = 1e-4;  ///< of the accelerometers, not known better, 1 sigma
+    /// How still the platform stands, 1 sigma at most.
+    double velocity_reference_mps = 0.005, position_reference_m = 0.01;
+    double angle_random_walk = 0.01;  ///< of the gyros while they turn, deg/sqrt(h)
+    std::array<double, 3> target_mg{0.15, 0.05, 0.01};
+    std::string gyro_message = "GyroIncrements";
+    std::string accelerometer_message = "AccelerometerIncrements";
 };
 
 /// What the campaign does; amplitudes are peak at the table.
@@ -32,7 +67,12 @@ struct Settings {
     double target_linear = 0;     ///< deg/h/g
     double target_quadratic = 0;  ///< deg/h/g^2
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
-    double frequency_hz = 15.0;   ///< [vibration] frequency_hz
+    bool levelling = false;       ///< before each position
+    bool zeroing = false;         ///< at start and end
+    LevellingSettings level;
+    ZeroingSettings zero;
+    estimator::Settings rig;     ///< [site], [platform], [accelerometer], [noise]
+    double frequency_hz = 15.0;  ///< [vibration] frequency_hz
     double dwell_s = 100.0;
     double settle_s = 3.0;  ///< after the ramp, 2 s at least
     double ramp_s = 2.0;

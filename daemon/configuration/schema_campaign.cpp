@@ -10,6 +10,66 @@ using C = Configuration;
 constexpr std::size_t kMostPositions = 10'000;
 constexpr std::size_t kMostRuns = 100;
 
+void add_levelling_keys(std::vector<Key>& keys) {
+    const auto level = [&keys](const char* name, const char* unit, Range range, const char* doc,
+                               double campaign::LevellingSettings::*member) {
+        keys.push_back(number(std::string("levelling.") + name, unit, range, doc,
+                              [member](C& c) -> double& { return c.campaign.level.*member; }));
+    };
+    using L = campaign::LevellingSettings;
+    level("settling_s", "s", {5, 10'000}, "settling time that the gains are designed for",
+          &L::settling_s);
+    level("residual", "", {1e-5, 0.5}, "fraction of the initial tilt left then", &L::residual);
+    level("damping", "", {0.1, 0.99}, "damping ratio of the loop", &L::damping);
+    level("window_s", "s", {1, 3600}, "of the means that the verdict rests on", &L::window_s);
+    level("tolerance_arcmin", "arcmin", {0.001, 60}, "of mean specific force and rate of z",
+          &L::tolerance_arcmin);
+    level("torquer_limit_deg_h", "deg/h", {0.1, 1e6}, "largest rate commanded",
+          &L::torquer_limit_deg_h);
+    keys.push_back(text(
+        "levelling.torque_message", "a message name",
+        "command with signals X, Y, Z in deg/h, Counter", identifier_rule,
+        [](C & c) -> auto& { return c.campaign.level.torquer.message; }));
+    keys.push_back(signs(
+        "levelling.torque_sign", "of the platform's rate over the rate commanded, per axis",
+        [](C & c) -> auto& { return c.campaign.level.torquer.sign; }));
+}
+
+void add_zeroing_keys(std::vector<Key>& keys) {
+    const auto zero = [&keys](const char* name, const char* unit, Range range, const char* doc,
+                              double campaign::ZeroingSettings::*member) {
+        keys.push_back(number(std::string("zeroing.") + name, unit, range, doc,
+                              [member](C& c) -> double& { return c.campaign.zero.*member; }));
+    };
+    using Z = campaign::ZeroingSettings;
+    zero("duration_s", "s", {60, 7200}, "of the azimuth slews 0, 90, -90, 90 deg and so on",
+         &Z::duration_s);
+    zero("slew_deg_per_s", "deg/s", {0.1, 25}, "rate of the azimuth gimbal, checked",
+         &Z::slew_deg_per_s);
+    keys.push_back(boolean("zeroing.both_ways",
+                           "platform z down too: zero and scale of the z accelerometer apart",
+                           [](C& c) -> bool& { return c.campaign.zero.both_ways; }));
+    zero("scale_factor", "", {0, 0.1}, "of the accelerometers, not known better, 1 sigma",
+         &Z::scale_factor);
+    zero("velocity_reference_mps", "m/s", {1e-6, 1}, "how still the platform stands, 1 sigma",
+         &Z::velocity_reference_mps);
+    zero("position_reference_m", "m", {1e-6, 1}, "how still the platform stands, 1 sigma",
+         &Z::position_reference_m);
+    zero("angle_random_walk_deg_per_rt_h", "deg/sqrt(h)", {1e-6, 10},
+         "of the gyros while they turn", &Z::angle_random_walk);
+    keys.push_back(triple(
+        "zeroing.target_mg", "mg", {1e-6, 10}, "standard deviations and movement to be reached",
+        [](C & c) -> auto& { return c.campaign.zero.target_mg; }));
+    keys.push_back(text(
+        "zeroing.gyro_message", "a message name",
+        "angle increments at 100 Hz: signals X, Y, Z in arcsec, Counter", identifier_rule,
+        [](C & c) -> auto& { return c.campaign.zero.gyro_message; }));
+    keys.push_back(text(
+        "zeroing.accelerometer_message", "a message name",
+        "velocity increments at 100 Hz: signals X, Y, Z in m/s, Counter", identifier_rule,
+        [](C & c) -> auto& { return c.campaign.zero.accelerometer_message; }));
+}
+
 }  // namespace
 
 void add_campaign_keys(std::vector<Key>& keys) {
@@ -49,6 +109,12 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(number("campaign.time_limit_s", "s", {0, 1e7},
                           "an adaptive campaign ends before it; 0: none",
                           [](C& c) -> double& { return c.campaign.time_limit_s; }));
+    keys.push_back(boolean("campaign.levelling",
+                           "the platform is levelled before each position; see [levelling]",
+                           [](C& c) -> bool& { return c.campaign.levelling; }));
+    keys.push_back(boolean("campaign.zeroing",
+                           "the accelerometers' zeros are taken at start and end; see [zeroing]",
+                           [](C& c) -> bool& { return c.campaign.zeroing; }));
     keys.push_back(number("campaign.dwell_s", "s", {2, 86'400}, "recorded at each position",
                           [](C& c) -> double& { return c.campaign.dwell_s; }));
     keys.push_back(number("campaign.settle_s", "s", {2, 3600},
@@ -76,6 +142,8 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(text(
         "campaign.results", "a folder", "for result.json; empty: none written", path_rule,
         [](C & c) -> auto& { return c.results; }));
+    add_levelling_keys(keys);
+    add_zeroing_keys(keys);
 }
 
 }  // namespace vibrig::configuration

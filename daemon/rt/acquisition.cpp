@@ -62,7 +62,7 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
         --shown_.in_hand;
         if (!rig_link_) {
             record(frame, frame.time);
-            assembler_.feed(frame);
+            feed(frame);
         } else if (rig_link_->is_time(frame.frame)) {
             ++shown_.rig_ticks;
             const auto tick = rig_link_->decode(frame.frame);
@@ -72,7 +72,7 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
             drivers::ReceivedFrame stamped = frame;
             stamped.time = rig_->now();
             record(frame, stamped.time);
-            assembler_.feed(stamped);
+            feed(stamped);
         }
     }
     if (!rig_link_) hand_on();
@@ -81,6 +81,14 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
 void Acquisition::record(const drivers::ReceivedFrame& frame, Time time) noexcept {
     if (to_.recorder_frames != nullptr)
         to_.recorder_frames->try_push({frame.frame, time, frame.fd, false, 0});
+}
+
+void Acquisition::feed(const drivers::ReceivedFrame& frame) noexcept {
+    if (to_.stages != nullptr && to_.stages->take(frame)) {
+        ++shown_.increments;
+    } else {
+        assembler_.feed(frame);
+    }
 }
 
 void Acquisition::on_tick(const RigTimeLink::Tick& tick) noexcept {
@@ -100,6 +108,7 @@ void Acquisition::on_time(Time now) noexcept {
 
 void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     to_.interlock.check(sample, assembler_.platform());
+    if (to_.stages != nullptr) to_.stages->take(sample);
     batch_[batched_++] = sample;
     if (batched_ == batch_.size()) push_batch();
 }

@@ -14,6 +14,7 @@
 #include "daemon/rt/rig_time_link.hpp"
 #include "daemon/rt/ring.hpp"
 #include "daemon/rt/snapshot.hpp"
+#include "daemon/rt/stage_feed.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
 
@@ -26,6 +27,7 @@ struct AcquisitionView {
     drivers::AssemblerCounters assembler;
     drivers::CanPortCounters port;  ///< of the same moment as the assembler's
     std::uint64_t rig_ticks = 0;    ///< delivered frames that were the rig's time
+    std::uint64_t increments = 0;   ///< delivered frames that were increments
     std::uint64_t in_hand = 0;      ///< delivered frames of the batch at work, not looked at yet
     std::uint64_t samples_offered = 0;  ///< to the ring: pushed + dropped
     std::array<drivers::Time, drivers::kChannels> last_good{};
@@ -41,6 +43,7 @@ class Acquisition {
         drivers::Waiter& estimator;
         drivers::Waiter& control;
         Interlock& interlock;
+        StageFeed* stages = nullptr;
         // To the recorder, which looks into them by itself; null: none.
         Ring<FrameRecord>* recorder_frames = nullptr;
         Ring<drivers::Sample>* recorder_samples = nullptr;
@@ -63,6 +66,7 @@ class Acquisition {
     void on_sample(const drivers::Sample& sample) noexcept;
     void record(const drivers::ReceivedFrame& frame, drivers::Time time) noexcept;
     void on_tick(const RigTimeLink::Tick& tick) noexcept;
+    void feed(const drivers::ReceivedFrame& frame) noexcept;
     void push_batch() noexcept;
     void hand_on() noexcept;
     void on_time(drivers::Time now) noexcept;

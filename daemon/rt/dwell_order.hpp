@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "drivers/clock.hpp"
@@ -13,6 +14,8 @@ struct DwellOrder {
     drivers::Time from = 0;
     drivers::Time to = 0;
     estimator::DwellInfo dwell;
+    /// Taken off the raw specific force, on top of the configuration's zeros; g.
+    std::array<double, 3> zero_g{};
     bool cancel = false;  ///< end the dwell in progress with what it has
     std::uint32_t dropped_before = 0;
 };

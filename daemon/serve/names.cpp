@@ -28,6 +28,10 @@ const char* name_of(CampaignState state) noexcept {
             return "aborted";
         case CampaignState::tripped:
             return "tripped";
+        case CampaignState::zeroing:
+            return "zeroing";
+        case CampaignState::levelling:
+            return "levelling";
     }
     return "unknown";
 }

@@ -64,6 +64,21 @@ std::string angles(const v1::Angles& at) {
     return format("(%g, %g, %g deg)", at.outer_deg(), at.inner_deg(), at.azimuth_deg());
 }
 
+/// What the stage with the table at rest is at; empty: there is none.
+std::string stage_line(const v1::Campaign& campaign) {
+    if (campaign.state() == v1::Campaign::levelling && campaign.level().tilt_arcmin_size() == 2) {
+        const v1::Levelling& level = campaign.level();
+        return format("%s, %.0f s, %+.2f' %+.2f' of %.2f'", level.verdict().c_str(), level.time_s(),
+                      level.tilt_arcmin(0), level.tilt_arcmin(1), level.tolerance_arcmin());
+    }
+    if (campaign.state() == v1::Campaign::zeroing && campaign.zeros().sigma_mg_size() == 3) {
+        const v1::Zeros& zeros = campaign.zeros();
+        return format("azimuth slews, %.0f s, x %+.3f y %+.3f z %+.3f mg", zeros.time_s(),
+                      zeros.zero_mg(0), zeros.zero_mg(1), zeros.zero_mg(2));
+    }
+    return {};
+}
+
 std::string progress_line(const v1::Campaign& campaign, int width) {
     const double part = std::clamp(campaign.has_progress() ? campaign.progress() : 0.0, 0.0, 1.0);
     std::string text = format(" %5.1f %%", 100 * part);
@@ -214,6 +229,8 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     if (!where.empty()) head += "  " + where + ' ' + angles(campaign.position_angles());
     lines.push_back(head);
     if (!campaign.reason().empty()) lines.push_back("why: " + campaign.reason());
+    if (const std::string stage = stage_line(campaign); !stage.empty())
+        lines.push_back(labelled("stage", stage));
     lines.push_back(progress_line(campaign, width));
     lines.push_back(labelled(
         "campaign",
@@ -297,6 +314,7 @@ std::string render_line(const v1::Status& status) {
         text += "  shaker " + v1::Link::State_Name(status.shaker().link());
     }
     if (!campaign.reason().empty()) text += "  " + campaign.reason();
+    if (const std::string stage = stage_line(campaign); !stage.empty()) text += "  " + stage;
     return clipped(text, 500);
 }
 

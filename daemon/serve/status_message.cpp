@@ -15,7 +15,7 @@ Wire wire_enum(Enum value) {
     const int number = static_cast<int>(value) + 1;
     return static_cast<Wire>(number);
 }
-static_assert(static_cast<int>(CampaignState::tripped) + 1 == v1::Campaign::tripped);
+static_assert(static_cast<int>(CampaignState::levelling) + 1 == v1::Campaign::levelling);
 static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::Quality::unbound) + 1 == v1::Channel::unbound);
@@ -267,6 +267,40 @@ void fill(v1::Dwell& out, const estimator::DwellSummary& dwell) {
 
 }  // namespace
 
+void fill(v1::Levelling& out, const LevellingStatus& levelling) {
+    out.set_verdict(levelling.verdict);
+    out.set_phase(levelling.phase);
+    set(out, &v1::Levelling::set_time_s, levelling.time_s);
+    for (const double tilt : levelling.tilt_arcmin) out.add_tilt_arcmin(finite(tilt));
+    for (const double tilt : levelling.to_come_arcmin) out.add_to_come_arcmin(finite(tilt));
+    for (const double drift : levelling.drift_deg_h) out.add_drift_deg_h(finite(drift));
+    set(out, &v1::Levelling::set_tolerance_arcmin, levelling.tolerance_arcmin);
+    set(out, &v1::Levelling::set_noise_arcmin, levelling.noise_arcmin);
+    if (levelling.limit_arcmin > 0)
+        set(out, &v1::Levelling::set_limit_arcmin, levelling.limit_arcmin);
+    out.set_done(levelling.done);
+    out.set_message(mend_utf8(levelling.message));
+}
+
+void fill(v1::Zeros& out, const ZeroStatus& zeros) {
+    out.set_running(zeros.running);
+    out.set_known(zeros.known);
+    set(out, &v1::Zeros::set_time_s, zeros.time_s);
+    for (const double zero : zeros.zero_mg) out.add_zero_mg(finite(zero));
+    for (const double sigma : zeros.sigma_mg) out.add_sigma_mg(finite(sigma));
+    if (zeros.scale_z_sigma > 0) {
+        set(out, &v1::Zeros::set_scale_z_ppm, 1e6 * zeros.scale_z);
+        set(out, &v1::Zeros::set_scale_z_sigma_ppm, 1e6 * zeros.scale_z_sigma);
+    }
+    out.set_repeated_at_end(zeros.repeated);
+    for (const double change : zeros.repeated ? zeros.change_mg : std::array<double, 3>{})
+        out.add_change_mg(finite(change));
+    for (const double sigma : zeros.repeated ? zeros.change_sigma_mg : std::array<double, 3>{})
+        out.add_change_sigma_mg(finite(sigma));
+    out.set_mark(mend_utf8(zeros.mark));
+    out.set_message(mend_utf8(zeros.message));
+}
+
 void fill(v1::Campaign& out, const StatusData& status) {
     out.set_name(mend_utf8(status.campaign_name));
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
@@ -288,6 +322,9 @@ void fill(v1::Campaign& out, const StatusData& status) {
     set(out, &v1::Campaign::set_command_table_g, status.command_table_g);
     set(out, &v1::Campaign::set_command_frequency_hz, status.command_frequency_hz);
     for (const estimator::DwellSummary& dwell : status.dwells) fill(*out.add_dwells(), dwell);
+    if (status.levelling.begun) fill(*out.mutable_level(), status.levelling);
+    if (status.zeros.running || status.zeros.known || !status.zeros.message.empty())
+        fill(*out.mutable_zeros(), status.zeros);
 }
 
 void fill(v1::Status& out, const StatusData& status) {
@@ -306,6 +343,7 @@ void fill(v1::Status& out, const StatusData& status) {
     out.mutable_estimator_ring()->set_in_dwell(status.estimator_in_dwell);
     out.mutable_estimator_ring()->set_idle(status.estimator_idle);
     out.mutable_assembler()->set_rig_ticks(status.rig_ticks);
+    out.mutable_assembler()->set_increments(status.increment_frames);
     fill(*out.mutable_sample(), status);
     fill(*out.mutable_platform(), status.platform);
     fill(*out.mutable_estimate(), status.estimate);

@@ -92,7 +92,8 @@ bool is_bad_end(v1::Campaign::State state) {
 }
 
 bool is_under_way(v1::Campaign::State state) {
-    return state >= v1::Campaign::waiting && state <= v1::Campaign::paused;
+    return (state >= v1::Campaign::waiting && state <= v1::Campaign::paused) ||
+           state == v1::Campaign::zeroing || state == v1::Campaign::levelling;
 }
 
 class Watch {

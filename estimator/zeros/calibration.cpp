@@ -204,6 +204,10 @@ struct Calibration::Impl {
             level, kAxisNames[static_cast<std::size_t>(worst)], now_s, settings.vibration_limit_g));
     }
 
+    [[nodiscard]] bool outside(const InnovationStatistic& v) const {
+        return v.mean_nis > v.high || (v.mean_nis < v.low && !settings.noise.reference_is_bound);
+    }
+
     void account(const ZeroFilter::Innovation& found) {
         nis_sum += found.nis;
         ratio_sum += found.ratio;
@@ -214,9 +218,7 @@ struct Calibration::Impl {
         innovation.low = chi_square(6 * n, -k999) / n;
         innovation.high = chi_square(6 * n, k999) / n;
         ++innovation.blocks;
-        if (innovation.mean_nis < innovation.low || innovation.mean_nis > innovation.high) {
-            ++innovation.outside;
-        }
+        if (outside(innovation)) ++innovation.outside;
         for (std::size_t i = 0; i < 3; ++i) {
             innovation.velocity_ratio[i] = ratio_sum[static_cast<Eigen::Index>(i)] / n;
             innovation.position_ratio[i] = ratio_sum[static_cast<Eigen::Index>(i + 3)] / n;
@@ -340,7 +342,7 @@ struct Calibration::Impl {
                         "be warm"));
         }
         const InnovationStatistic& v = innovation;
-        const bool last_outside = v.blocks > 0 && (v.mean_nis < v.low || v.mean_nis > v.high);
+        const bool last_outside = v.blocks > 0 && outside(v);
         if (!last_outside && v.outside < 2) return;
         const bool large = v.mean_nis > 6;
         double worst = 0;

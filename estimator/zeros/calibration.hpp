@@ -20,6 +20,8 @@ struct Noise {
     double velocity_random_walk = 2e-5;  ///< g/sqrt(Hz)
     double velocity_reference = 0.005;   ///< m/s, per update
     double position_reference = 0.01;    ///< m, per update
+    /// They are upper bounds of how still a unit stands: smaller innovations are no fault.
+    bool reference_is_bound = false;
     double gyro_drift = 0;               ///< of the biases, deg/h per sqrt(h)
     double accelerometer_drift = 0;      ///< of the zeros, mg per sqrt(h)
     double scale_factor = 100 * kMicro;  ///< of the vertical accelerometer, not known better
@@ -67,7 +69,7 @@ struct AxisResult {
 struct InnovationStatistic {
     double mean_nis = 0;  ///< of the last whole block of 60 updates, 6 when consistent
     double low = 0, high = 0;
-    std::size_t blocks = 0, outside = 0;
+    std::size_t blocks = 0, outside = 0;        ///< with a bound for a reference: above only
     Triple velocity_ratio{}, position_ratio{};  ///< of squares to expected squares, last block
 };
 

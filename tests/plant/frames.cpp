@@ -57,11 +57,14 @@ Frames::Frames(const proto::Dbc& dbc)
       accelerometers_xy_(dbc, "AccelerometersXY", {"X", "Y", "XValid", "YValid", "SyncLow"}),
       accelerometer_z_(dbc, "AccelerometerZ", {"Z", "ZValid", "SyncLow"}),
       table_(dbc, "TableAccelerometer", {"Axial", "SyncLow"}),
-      gimbal_status_(dbc, "GimbalStatus", {"InPosition", "Slewing", "Mode", "CommandEcho"}),
+      gimbal_status_(dbc, "GimbalStatus",
+                     {"InPosition", "Slewing", "Mode", "CommandEcho", "Torquing", "TorqueEcho"}),
       platform_status_(dbc, "PlatformStatus",
                        {"Ready", "LoopClosed", "GyrosAtSpeed", "Fault", "Temperature"}),
       gimbal_command_(dbc, "GimbalCommand", {"Outer", "Inner", "Azimuth", "Mode", "Counter"}),
-      torque_command_(dbc, "TorqueCommand", {"X", "Y", "Z"}) {
+      torque_command_(dbc, "TorqueCommand", {"X", "Y", "Z", "Counter"}),
+      gyro_increments_(dbc, "GyroIncrements", {"X", "Y", "Z", "Counter"}),
+      accelerometer_increments_(dbc, "AccelerometerIncrements", {"X", "Y", "Z", "Counter"}) {
     for (const char* sensor : {"Case", "GyroX", "GyroY", "GyroZ"}) {
         temperatures_.emplace_back(dbc, "PlatformTemperatures",
                                    std::initializer_list<const char*>{"Sensor", sensor});
@@ -73,7 +76,8 @@ can_frame Frames::rig_time(std::int64_t time_us, bool tick_end) const noexcept {
 }
 
 void Frames::encode(const Rig& rig, const Sample& sample, const Faults& faults,
-                    std::uint8_t command_echo, std::vector<can_frame>& out) const {
+                    std::uint8_t command_echo, std::uint8_t torque_echo,
+                    std::vector<can_frame>& out) const {
     const std::int64_t tick = rig.tick();
     const double time_s = 1e-6 * static_cast<double>(rig.time_us());
     const auto count = static_cast<double>(static_cast<std::uint32_t>(tick));
@@ -89,12 +93,20 @@ void Frames::encode(const Rig& rig, const Sample& sample, const Faults& faults,
     out.push_back(accelerometers_xy_.encode({force[0], force[1], valid(3), valid(4), low}));
     out.push_back(accelerometer_z_.encode({force[2], valid(5), low}));
     out.push_back(table_.encode({sample.readings.table_g, low}));
+    for (const Increment& i : rig.increments()) {
+        const auto counter = static_cast<double>(static_cast<std::uint8_t>(i.count));
+        const Vec3& a = i.turn_arcsec;
+        const Vec3& v = i.velocity_mps;
+        out.push_back(gyro_increments_.encode({a[0], a[1], a[2], counter}));
+        out.push_back(accelerometer_increments_.encode({v[0], v[1], v[2], counter}));
+    }
     const double temperature = sample.readings.temperature_c;
     if (tick % 4 == 0) {  // 10 Hz
         const Gimbals& gimbals = rig.gimbals();
-        out.push_back(gimbal_status_.encode({bit(gimbals.in_position()), bit(gimbals.slewing()),
-                                             static_cast<double>(gimbals.mode()),
-                                             static_cast<double>(command_echo)}));
+        out.push_back(gimbal_status_.encode(
+            {bit(gimbals.in_position()), bit(gimbals.slewing()),
+             static_cast<double>(gimbals.mode()), static_cast<double>(command_echo),
+             bit(rig.torque() != Vec3{}), static_cast<double>(torque_echo)}));
         out.push_back(platform_status_.encode(
             {bit(rig.ready()),
              bit(rig.gyros_at_speed() && faults.active(FaultKind::loop_open, time_s) == nullptr),
@@ -115,17 +127,19 @@ std::optional<std::int64_t> Frames::acknowledged_us(const canfd_frame& frame) co
 
 std::optional<GimbalCommand> Frames::gimbal_command(const canfd_frame& frame) const noexcept {
     std::array<double, 5> value{};
-    if (!gimbal_command_.decode(frame, value) || (value[3] != 0 && value[3] != 1))
+    if (!gimbal_command_.decode(frame, value) ||
+        (value[3] != 0 && value[3] != 1 && value[3] != 2)) {
         return std::nullopt;
+    }
     return GimbalCommand{{value[0], value[1], value[2]},
-                         value[3] == 1 ? GimbalMode::slew : GimbalMode::free_drift,
+                         static_cast<GimbalMode>(static_cast<std::uint8_t>(value[3])),
                          static_cast<std::uint8_t>(value[4])};
 }
 
-std::optional<Vec3> Frames::torque_command(const canfd_frame& frame) const noexcept {
-    Vec3 value{};
+std::optional<TorqueCommand> Frames::torque_command(const canfd_frame& frame) const noexcept {
+    std::array<double, 4> value{};
     if (!torque_command_.decode(frame, value)) return std::nullopt;
-    return value;
+    return TorqueCommand{{value[0], value[1], value[2]}, static_cast<std::uint8_t>(value[3])};
 }
 
 }  // namespace vibrig::plant

@@ -28,6 +28,11 @@ class FrameLayout {
     std::vector<proto::Signal> signals_;
 };
 
+struct TorqueCommand {
+    Vec3 deg_per_h{};
+    std::uint8_t counter = 0;
+};
+
 struct GimbalCommand {
     Vec3 encoder_deg{};
     GimbalMode mode = GimbalMode::free_drift;
@@ -42,18 +47,20 @@ class Frames {
     [[nodiscard]] can_frame rig_time(std::int64_t time_us, bool tick_end) const noexcept;
     /// Sync first, then the sample; status frames when their cycle time has come.
     void encode(const Rig& rig, const Sample& sample, const Faults& faults,
-                std::uint8_t command_echo, std::vector<can_frame>& out) const;
+                std::uint8_t command_echo, std::uint8_t torque_echo,
+                std::vector<can_frame>& out) const;
 
     [[nodiscard]] std::optional<std::int64_t> acknowledged_us(
         const canfd_frame& frame) const noexcept;
     [[nodiscard]] std::optional<GimbalCommand> gimbal_command(
         const canfd_frame& frame) const noexcept;
-    [[nodiscard]] std::optional<Vec3> torque_command(const canfd_frame& frame) const noexcept;
+    [[nodiscard]] std::optional<TorqueCommand> torque_command(
+        const canfd_frame& frame) const noexcept;
 
   private:
     FrameLayout rig_time_, rig_ack_, sync_, resolvers_, azimuth_, accelerometers_xy_,
         accelerometer_z_, table_, gimbal_status_, platform_status_, gimbal_command_,
-        torque_command_;
+        torque_command_, gyro_increments_, accelerometer_increments_;
     std::vector<FrameLayout> temperatures_;
 };
 

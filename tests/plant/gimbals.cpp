@@ -9,9 +9,9 @@ namespace {
 constexpr double kInPosition = 0.005;  ///< deg
 }
 
-void Gimbals::slew_to(const Vec3& encoder_deg) noexcept {
+void Gimbals::slew_to(const Vec3& encoder_deg, GimbalMode mode) noexcept {
     target_ = encoder_deg;
-    mode_ = GimbalMode::slew;
+    mode_ = mode;
     moving_ = true;
 }
 

@@ -6,7 +6,11 @@
 
 namespace vibrig::plant {
 
-enum class GimbalMode : std::uint8_t { free_drift = 0, slew = 1 };
+enum class GimbalMode : std::uint8_t {
+    free_drift = 0,
+    slew = 1,
+    calibrate = 2  ///< slew, and the platform sends increments
+};
 
 /// Servo of the three gimbals: slews to encoder angles at a finite rate and holds (caged), or lets
 /// the platform go.
@@ -15,7 +19,7 @@ class Gimbals {
     explicit Gimbals(double rate_deg_per_s) : rate_(rate_deg_per_s) {}
 
     /// Target in encoder degrees, any turn of it; taken the shorter way round.
-    void slew_to(const Vec3& encoder_deg) noexcept;
+    void slew_to(const Vec3& encoder_deg, GimbalMode mode = GimbalMode::slew) noexcept;
     void release() noexcept { mode_ = GimbalMode::free_drift; }
 
     /// Moves encoder angles (deg) on by dt; nothing in free drift. True if a slew came to its end
@@ -23,9 +27,11 @@ class Gimbals {
     bool advance(double dt_s, Vec3& encoder_deg) noexcept;
 
     [[nodiscard]] GimbalMode mode() const noexcept { return mode_; }
-    [[nodiscard]] bool slewing() const noexcept { return mode_ == GimbalMode::slew && moving_; }
+    [[nodiscard]] bool slewing() const noexcept {
+        return mode_ != GimbalMode::free_drift && moving_;
+    }
     [[nodiscard]] bool in_position() const noexcept {
-        return mode_ == GimbalMode::slew && !moving_;
+        return mode_ != GimbalMode::free_drift && !moving_;
     }
 
   private:

@@ -22,6 +22,7 @@ class PlatformModel {
     /// A vector of the reference frame seen in platform axes.
     [[nodiscard]] static Vec3 to_platform(const Vec3& angles, const Vec3& reference) noexcept;
     [[nodiscard]] Vec3 up_in_platform() const noexcept { return to_platform(angles_, up_); }
+    [[nodiscard]] Vec3 up_at(const Vec3& angles) const noexcept { return to_platform(angles, up_); }
     /// Rate of the Earth in platform axes, deg/h.
     [[nodiscard]] Vec3 earth_rate_in_platform(const Vec3& angles) const noexcept {
         return to_platform(angles, earth_);
@@ -29,6 +30,8 @@ class PlatformModel {
     /// Drift of the three gyros in deg/h, without drift_sign. `a1` is the platform's vibration
     /// along up in g.
     [[nodiscard]] Vec3 gyro_drift(const Vec3& up_platform, double a1) const noexcept;
+    /// Rate of the Earth in the reference frame, deg/h.
+    [[nodiscard]] const Vec3& earth_rate() const noexcept { return earth_; }
     /// d angles / dt in rad/s; `extra` is a rate of the platform in its axes, deg/h (noise,
     /// torquing).
     [[nodiscard]] Vec3 angle_rates(const Vec3& angles, double a1, const Vec3& extra) const noexcept;

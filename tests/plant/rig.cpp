@@ -18,7 +18,9 @@ Rig::Rig(const Truth& truth)
       isolator_(truth.transmission, truth.frequency_hz, truth.damping, kTick / (2 * kSteps)),
       shaker_(truth.limit_g, truth.limit_mm),
       sensors_(truth, truth.seed),
-      gyro_noise_(truth.seed, 0) {
+      increments_(truth),
+      gyro_noise_(truth.seed, 0),
+      slew_noise_(truth.seed, 7) {
     read();
 }
 
@@ -36,10 +38,25 @@ Vec3 Rig::encoder_deg() const noexcept {
     return encoder;
 }
 
+void Rig::slew_to(const Vec3& encoder_deg, GimbalMode mode) {
+    // A command said again is the same slew.
+    if (encoder_deg != commanded_deg_ || gimbals_.mode() == GimbalMode::free_drift) {
+        for (double& error : slew_error_deg_) error = truth_.slew_error_deg * slew_noise_.normal();
+    }
+    commanded_deg_ = encoder_deg;
+    gimbals_.slew_to(encoder_deg + slew_error_deg_, mode);
+}
+
 void Rig::advance() {
     ++tick_;
     vibrate();
+    const Vec3 before = platform_.angles();
     move();
+    if (gimbals_.mode() == GimbalMode::calibrate) {
+        increments_.advance(time_us(), {before, platform_.angles()}, platform_, a1_);
+    } else {
+        increments_.stop();
+    }
     read();
 }
 
@@ -70,7 +87,8 @@ void Rig::move() {
     const double rate_sigma = 60 * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(kTick);
     const Vec3 noise{gyro_noise_.normal(), gyro_noise_.normal(), gyro_noise_.normal()};
     if (gimbals_.mode() == GimbalMode::free_drift) {
-        const Vec3 extra = rate_sigma * noise + torque_;
+        Vec3 extra = rate_sigma * noise;
+        for (std::size_t i = 0; i < 3; ++i) extra[i] += truth_.torquer_scale[i] * torque_[i];
         if (still_) {
             const std::array<double, 3> rest{};
             platform_.advance(kTick, rest, extra);

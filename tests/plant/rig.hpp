@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "tests/plant/gimbals.hpp"
+#include "tests/plant/increments.hpp"
 #include "tests/plant/isolator.hpp"
 #include "tests/plant/platform_model.hpp"
 #include "tests/plant/sensors.hpp"
@@ -19,7 +20,7 @@ class Rig {
   public:
     explicit Rig(const Truth& truth);
 
-    void slew_to(const Vec3& encoder_deg) noexcept { gimbals_.slew_to(encoder_deg); }
+    void slew_to(const Vec3& encoder_deg, GimbalMode mode = GimbalMode::slew);
     void release() noexcept { gimbals_.release(); }
     void torque(const Vec3& deg_per_h) noexcept { torque_ = deg_per_h; }
     [[nodiscard]] ShakerController& shaker() noexcept { return shaker_; }
@@ -31,6 +32,11 @@ class Rig {
     [[nodiscard]] std::int64_t time_us() const noexcept { return tick_ * kTickUs; }
     [[nodiscard]] std::int64_t tick() const noexcept { return tick_; }
     [[nodiscard]] const Readings& readings() const noexcept { return readings_; }
+    /// Of the tick just past; in mode calibrate only.
+    [[nodiscard]] const std::vector<Increment>& increments() const noexcept {
+        return increments_.made();
+    }
+    [[nodiscard]] const Vec3& torque() const noexcept { return torque_; }
     [[nodiscard]] const Gimbals& gimbals() const noexcept { return gimbals_; }
     [[nodiscard]] bool ready() const noexcept;
     [[nodiscard]] bool gyros_at_speed() const noexcept;
@@ -54,8 +60,12 @@ class Rig {
     Isolator isolator_;
     ShakerController shaker_;
     Sensors sensors_;
+    Increments increments_;
     Random gyro_noise_;
+    Random slew_noise_;
     Vec3 torque_{};
+    Vec3 commanded_deg_{};  ///< of the last slew, and its error
+    Vec3 slew_error_deg_{};
     double frequency_hz_ = 0;  ///< the isolator is set to
     std::array<double, 2 * kSteps + 1> a1_{};
     bool still_ = true;  ///< no vibration in this tick

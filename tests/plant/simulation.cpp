@@ -64,7 +64,7 @@ void Simulation::make_tick() {
     sample.readings = shared_.rig.readings();
     shared_.faults.spoil(sample, now);
     std::vector<can_frame> data;
-    frames_.encode(shared_.rig, sample, shared_.faults, command_echo_, data);
+    frames_.encode(shared_.rig, sample, shared_.faults, command_echo_, torque_echo_, data);
     shared_.faults.spoil(data, now);
     time_us_ = shared_.rig.time_us();
     counters_.frames += data.size();
@@ -132,8 +132,8 @@ void Simulation::handle(const canfd_frame& frame) {
         const std::scoped_lock lock(shared_.mutex);
         ++counters_.commands;
         command_echo_ = command->counter;
-        if (command->mode == GimbalMode::slew) {
-            shared_.rig.slew_to(command->encoder_deg);
+        if (command->mode != GimbalMode::free_drift) {
+            shared_.rig.slew_to(command->encoder_deg, command->mode);
         } else {
             shared_.rig.release();
         }
@@ -142,7 +142,8 @@ void Simulation::handle(const canfd_frame& frame) {
     if (const auto torque = frames_.torque_command(frame)) {
         const std::scoped_lock lock(shared_.mutex);
         ++counters_.commands;
-        shared_.rig.torque(*torque);
+        torque_echo_ = torque->counter;
+        shared_.rig.torque(torque->deg_per_h);
     }
 }
 

@@ -56,6 +56,7 @@ class Simulation {
     std::int64_t time_us_ = 0;
     std::optional<std::int64_t> acknowledged_us_;
     std::uint8_t command_echo_ = 0;
+    std::uint8_t torque_echo_ = 0;
     Counters counters_;
 };
 

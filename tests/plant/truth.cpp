@@ -20,6 +20,7 @@ template <class T, class Field>
 void for_each_field(T& t, Field&& field) {
     field("site", "latitude_deg", t.latitude_deg, -89.0, 89.0);
     field("site", "azimuth_deg", t.azimuth_deg, -360.0, 360.0);
+    field("site", "gravity_mps2", t.gravity_mps2, 1.0, 30.0);
     field("platform", "up", t.up, 0, 0);
     field("platform", "gyro_x_axes", t.gyro_axes[0], 0, 0);
     field("platform", "gyro_y_axes", t.gyro_axes[1], 0, 0);
@@ -28,6 +29,9 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "encoder_sign", t.encoder_sign, -1, 1);
     field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
     field("platform", "slew_deg_per_s", t.slew_deg_per_s, 0.01, 360.0);
+    field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
+    field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);
+    field("platform", "increment_sign", t.increment_sign, -1, 1);
     field("platform", "warm_up_s", t.warm_up_s, 0.0, 1e6);
     field("platform", "start_temperature_c", t.start_temperature_c, -60.0, 150.0);
     field("platform", "steady_temperature_c", t.steady_temperature_c, -60.0, 150.0);

@@ -39,6 +39,7 @@ struct Truth {
     // site
     double latitude_deg = 45.75;
     double azimuth_deg = 0;  ///< of the rig's north axis, from true north towards east
+    double gravity_mps2 = 9.80665;
 
     // platform
     Axis up{1, 1};  ///< platform axis that points up at zero gimbal angles
@@ -50,7 +51,11 @@ struct Truth {
     std::array<int, 3> encoder_sign{1, 1, 1};
     Vec3 encoder_zero_deg{0, 0, 0};  ///< angle = sign * (encoder - zero)
     double slew_deg_per_s = 5;       ///< per gimbal
-    double warm_up_s = 30;           ///< until the platform reports ready
+    double slew_error_deg = 0;       ///< 1 sigma of where a slew ends, per gimbal
+    /// Rate of the platform over the rate commanded to the torquers; -1: wired the wrong way round.
+    Vec3 torquer_scale{1, 1, 1};
+    std::array<int, 3> increment_sign{1, 1, 1};  ///< of the gyros' angle increments
+    double warm_up_s = 30;                       ///< until the platform reports ready
     double start_temperature_c = 25;
     double steady_temperature_c = 45;
     double thermal_time_constant_s = 20;

@@ -149,6 +149,90 @@ TEST(Rig, TorqueTurnsThePlatformAtTheCommandedRate) {
                 0.1);
 }
 
+/// Sums of the increments over so many seconds in mode calibrate.
+Increment sum_of_increments(Rig& rig, double seconds) {
+    Increment sum;
+    sum.count = 0;
+    for (double t = 0; t < seconds - 1e-9; t += 0.025) {
+        rig.advance();
+        for (const Increment& i : rig.increments()) {
+            ++sum.count;
+            sum.turn_arcsec = sum.turn_arcsec + i.turn_arcsec;
+            sum.velocity_mps = sum.velocity_mps + i.velocity_mps;
+        }
+    }
+    return sum;
+}
+
+TEST(Rig, IncrementsAreThoseOfTheEarthTheDriftTheSlewAndGravity) {
+    // GIVEN a rig without noise with the azimuth axis vertical, zeros and a wrong sign somewhere
+    Truth truth = without_noise();
+    truth.zero_g = {0.005, -0.005, 0.002};
+    for (const int sign : {1, -1}) {
+        truth.increment_sign = {sign, 1, 1};
+        Rig rig(truth);
+        rig.slew_to({90, 0, 0});
+        run_for(rig, 30);
+        EXPECT_TRUE(rig.increments().empty()) << "not asked for";
+        rig.slew_to({90, 0, 0}, GimbalMode::calibrate);
+        run_for(rig, 1);
+        // WHEN it stands for 100 s
+        const Increment still = sum_of_increments(rig, 100);
+        // THEN 100 a second, the Earth's rate plus drift (1 deg/h is 1 arcsec/s), g plus the zeros
+        EXPECT_EQ(still.count, 10'000U);
+        const PlatformModel& platform = rig.platform();
+        const Vec3 rate = platform.earth_rate_in_platform(platform.angles()) +
+                          platform.gyro_drift(platform.up_in_platform(), 0);
+        const Vec3 up = platform.up_in_platform();
+        for (std::size_t i = 0; i < 3; ++i) {
+            EXPECT_NEAR(still.turn_arcsec[i], (i == 0 ? sign : 1) * 100 * rate[i], 0.01) << i;
+            EXPECT_NEAR(still.velocity_mps[i], 100 * 9.80665 * (up[i] + truth.zero_g[i]), 1e-4);
+        }
+        // WHEN the azimuth slews by 90 deg, 18 s, and stands for 2 s
+        rig.slew_to({90, 0, 90}, GimbalMode::calibrate);
+        const Increment turned = sum_of_increments(rig, 20);
+        // THEN the platform has turned by that much against its gimbal, besides what it does anyway
+        EXPECT_NEAR(turned.turn_arcsec[2] - 20 * rate[2], -90 * 3600, 0.05);
+        // AND the vertical accelerometer saw gravity only
+        EXPECT_NEAR(turned.velocity_mps[2], 20 * 9.80665 * 1.002, 0.01);
+        // AND released it says nothing
+        rig.release();
+        rig.advance();
+        EXPECT_TRUE(rig.increments().empty());
+    }
+}
+
+TEST(Rig, TorquersTheWrongWayRoundAndSlewErrorsAreAsTheTruthSays) {
+    Truth truth = without_noise();
+    truth.torquer_scale = {1, 1, -0.5};
+    Rig plain(truth);
+    Rig torqued(truth);
+    plain.release();
+    torqued.release();
+    torqued.torque({0, 0, 100});
+    run_for(plain, 10);
+    run_for(torqued, 10);
+    const double arcsec = 180 * 3600 / 3.14159265358979;
+    EXPECT_NEAR((torqued.platform().angles()[2] - plain.platform().angles()[2]) * arcsec, 500, 0.1);
+    // A slew ends off by its error, each slew by another one, a command said again by the same.
+    truth.slew_error_deg = 0.2;
+    double squares = 0;
+    for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+        truth.seed = seed;
+        Rig rig(truth);
+        rig.slew_to({1, 0, 0});
+        run_for(rig, 1);
+        const Vec3 first = rig.platform().angles();
+        rig.slew_to({1, 0, 0});
+        run_for(rig, 1);
+        for (std::size_t i = 0; i < 3; ++i)
+            EXPECT_NEAR(rig.platform().angles()[i], first[i], 0.005 / 57.2);  // in position
+        squares += std::pow(first[1] * arcsec / 3600, 2);
+    }
+    // chi-square of 100: 99.9 % band
+    EXPECT_NEAR(std::sqrt(squares / 100), 0.2, 0.2 * 3.29 / std::sqrt(200.0));
+}
+
 TEST(Rig, VibratesWithTwoThirdsOfTheTable) {
     // GIVEN 9 g at the table after the transient
     Rig rig(without_noise());

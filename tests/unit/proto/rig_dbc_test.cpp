@@ -13,7 +13,7 @@ const Dbc& rig() {
     return dbc;
 }
 
-TEST(RigDbc, IsReadWithoutComplaint) { EXPECT_EQ(rig().messages.size(), 14U); }
+TEST(RigDbc, IsReadWithoutComplaint) { EXPECT_EQ(rig().messages.size(), 15U); }
 
 TEST(RigDbc, HasTheResolutionOfTwentyBitEncoders) {
     // GIVEN half a turn and one least significant bit on the outer axis, a quarter turn inside

@@ -32,6 +32,19 @@ StatusData full_status() {
     s.estimator_in_dwell = 30;
     s.estimator_idle = 12;
     s.rig_ticks = 44;
+    s.increment_frames = 47;
+    s.levelling = {true, "settled", "fast", 122.5, {0.25, -0.125}, {0.5, -0.5}, {-2.5, 10.5},
+                   0.2,  0.0125,    0.025,  3,     "torque limit"};
+    s.zeros.running = s.zeros.known = s.zeros.repeated = true;
+    s.zeros.time_s = 90;
+    s.zeros.zero_mg = {5, -5, 0.5};
+    s.zeros.sigma_mg = {0.004, 0.005, 0.1};
+    s.zeros.scale_z = 5e-5;
+    s.zeros.scale_z_sigma = 1e-6;
+    s.zeros.change_mg = {0.001, -0.002, 0.003};
+    s.zeros.change_sigma_mg = {0.006, 0.007, 0.008};
+    s.zeros.mark = "zero of accelerometer x moved";
+    s.zeros.message = "y has not converged";
     s.stop_pending = true;
     s.shaker_counters.wrong_replies = 45;
     s.shaker_counters.lost = 46;

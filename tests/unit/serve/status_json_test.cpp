@@ -16,7 +16,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool has(const std::string& text, const std::string& part) {
+bool carries(const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
 }
 
@@ -98,14 +98,14 @@ TEST(StatusJson, SaysTheNumbersInTheUnitsOfTheEdge) {
 
 TEST(StatusJson, PrintsZerosAndOriginalNames) {
     const std::string json = status_json(StatusData{});
-    EXPECT_TRUE(has(json, "\"uptime_s\":0")) << json;
-    EXPECT_TRUE(has(json, "\"state\":\"idle\"")) << json;
-    EXPECT_TRUE(has(json, "\"armed_by\":\"\"")) << json;
-    EXPECT_TRUE(has(json, "\"progress\":0")) << json;
-    EXPECT_TRUE(has(json, "\"kernel_dropped\":\"0\"")) << json;
-    EXPECT_TRUE(has(json, "\"dwells\":[]")) << json;
-    EXPECT_TRUE(has(json, "\"command_table_g\":0")) << json;
-    EXPECT_FALSE(has(json, "uptimeS")) << json;
+    EXPECT_TRUE(carries(json, "\"uptime_s\":0")) << json;
+    EXPECT_TRUE(carries(json, "\"state\":\"idle\"")) << json;
+    EXPECT_TRUE(carries(json, "\"armed_by\":\"\"")) << json;
+    EXPECT_TRUE(carries(json, "\"progress\":0")) << json;
+    EXPECT_TRUE(carries(json, "\"kernel_dropped\":\"0\"")) << json;
+    EXPECT_TRUE(carries(json, "\"dwells\":[]")) << json;
+    EXPECT_TRUE(carries(json, "\"command_table_g\":0")) << json;
+    EXPECT_FALSE(carries(json, "uptimeS")) << json;
 }
 
 TEST(StatusJson, LeavesOutWhatIsNotValid) {
@@ -127,8 +127,8 @@ TEST(StatusJson, LeavesOutWhatIsNotValid) {
     // WHEN it becomes JSON
     const std::string json = status_json(data);
     // THEN it has no word for NaN, and what is not valid is absent
-    EXPECT_FALSE(has(json, "NaN")) << json;
-    EXPECT_FALSE(has(json, "Infinity")) << json;
+    EXPECT_FALSE(carries(json, "NaN")) << json;
+    EXPECT_FALSE(carries(json, "Infinity")) << json;
     const auto status = parsed<v1::Status>(json);
     EXPECT_FALSE(status.shaker().has_measured_g());
     EXPECT_FALSE(status.shaker().has_emergency_stop_open());
@@ -154,8 +154,8 @@ TEST(StatusJson, WritesNullWhereTheCovarianceIsNotDetermined) {
     result.covariance.col(0).setConstant(kNaN);
     result.combinations[0].sigma = kNaN;
     const std::string json = parameters_json(result);
-    EXPECT_FALSE(has(json, "NaN")) << json;
-    EXPECT_TRUE(has(json, "[null,1,0")) << json.substr(0, 6000);
+    EXPECT_FALSE(carries(json, "NaN")) << json;
+    EXPECT_TRUE(carries(json, "[null,1,0")) << json.substr(0, 6000);
 }
 
 TEST(StatusJson, EveryEnumValueHasItsName) {
@@ -163,14 +163,14 @@ TEST(StatusJson, EveryEnumValueHasItsName) {
     for (int i = 0; i <= static_cast<int>(CampaignState::tripped); ++i) {
         data.state = static_cast<CampaignState>(i);
         const std::string name = name_of(data.state);
-        EXPECT_TRUE(has(campaign_json(data), "\"state\":\"" + name + "\"")) << name;
+        EXPECT_TRUE(carries(campaign_json(data), "\"state\":\"" + name + "\"")) << name;
     }
     const char* const qualities[] = {"good",    "missing",      "stale",
                                      "flagged", "out_of_range", "unbound"};
     for (std::size_t i = 0; i < 6; ++i) {
         data.sample.quality[0] = static_cast<drivers::Quality>(i);
         const std::string expected = std::string("\"quality\":\"") + qualities[i] + '"';
-        EXPECT_TRUE(has(status_json(data), expected)) << expected;
+        EXPECT_TRUE(carries(status_json(data), expected)) << expected;
     }
 }
 
@@ -184,7 +184,7 @@ TEST(StatusJson, MendsTextThatIsNotUtf8) {
     EXPECT_EQ(mend_utf8("\xF4\x90\x80\x80"), "????");  // beyond U+10FFFF
     StatusData data;
     data.reason = "broken \xFE text";
-    EXPECT_TRUE(has(status_json(data), "broken ? text"));
+    EXPECT_TRUE(carries(status_json(data), "broken ? text"));
 }
 
 TEST(StatusJson, CarriesEventsWithUtcAndId) {

@@ -1,0 +1,237 @@
+// The campaign's stages with the table at rest: zeroing and levelling.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
+#include "estimator/levelling/design.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::kSecond;
+using drivers::Time;
+using State = CampaignState;
+
+namespace {
+
+constexpr Time kStagePoll = 200 * drivers::kMillisecond;
+// Blocks and increments come ten and a hundred times a second.
+constexpr Time kSilence = kSecond;
+// From the zero command to the platform's word that nothing is torqued.
+constexpr Time kZeroTimeout = 2 * kSecond;
+
+}  // namespace
+
+std::string check_stages(const Settings& settings, const proto::Dbc& dbc, drivers::CanPort& port) {
+    if (!settings.levelling && !settings.zeroing) return {};
+    try {
+        double limit = settings.level.torquer_limit_deg_h;
+        if (settings.levelling) {
+            const drivers::Torquer torquer(dbc, settings.level.torquer, port);
+            limit = torquer.limit();
+            const LevellingStage stage(settings.level, settings.rig, limit);
+        }
+        if (settings.zeroing) const ZeroingStage stage(settings.zero, settings.rig);
+        const rt::StageFeed feed(dbc, stage_feed_settings(settings), nullptr);
+    } catch (const estimator::levelling::DesignError& error) {
+        return std::string("levelling: ") + error.what();
+    } catch (const estimator::zeros::ZeroError& error) {
+        return std::string("zeroing: ") + error.what();
+    }
+    return {};
+}
+
+rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
+    rt::StageFeedSettings feed;
+    feed.increments = settings.zeroing;
+    feed.gyro_message = settings.zero.gyro_message;
+    feed.accelerometer_message = settings.zero.accelerometer_message;
+    feed.block = settings.level.block;
+    return feed;
+}
+
+void Campaign::make_stages() {
+    if (settings_.levelling && ports_.torquer != nullptr && ports_.feed != nullptr) {
+        level_ = std::make_shared<LevellingStage>(settings_.level, settings_.rig,
+                                                  ports_.torquer->limit());
+    }
+    if (settings_.zeroing && ports_.feed != nullptr)
+        zero_ = std::make_shared<ZeroingStage>(settings_.zero, settings_.rig);
+}
+
+bool Campaign::take_motion(rt::Motion& motion, Time now) {
+    if (!ports_.feed->pop(motion)) return false;
+    last_motion_ = now;
+    return true;
+}
+
+bool Campaign::torquing() const {
+    return ports_.feed != nullptr && ports_.feed->knows_torque() && ports_.feed->torque().torquing;
+}
+
+void Campaign::leave_stage() {
+    if (ports_.feed != nullptr) ports_.feed->order(rt::StageFeed::Mode::off);
+    if (ports_.torquer != nullptr && !ports_.torquer->zero())
+        static_cast<void>(ports_.torquer->command({}));
+}
+
+void Campaign::insist_on_zero_torque(Time now) {
+    if (ports_.torquer == nullptr || state_ == State::levelling) return;
+    if (ports_.torquer->zero() && !(active() && torquing())) return;
+    if (now - torque_sent_ < kStagePoll) return;
+    torque_sent_ = now;
+    static_cast<void>(ports_.torquer->command({}));
+}
+
+void Campaign::begin_zeroing(bool at_end, Time now) {
+    zeroing_end_ = at_end;
+    part_ = Part::go;
+    zero_->begin();
+    ports_.event(Severity::info,
+                 at_end ? "accelerometer zeros again" : "accelerometer zeros by azimuth slews");
+    enter(State::zeroing, now);
+}
+
+Time Campaign::zeroing(Time now) {
+    if (!ports_.shaker.reading().at_rest()) {
+        abort("the shaker left rest while the accelerometer zeros were taken", now);
+        return now;
+    }
+    if (part_ == Part::go) {
+        ports_.gimbal.slew_to(zero_->target_deg(), now);
+        part_ = Part::slew;
+    }
+    const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
+    if (gimbal == drivers::GimbalState::timed_out || gimbal == drivers::GimbalState::no_status) {
+        return fail_zeroing(fmt::format("gimbals: {}", drivers::name_of(gimbal)), now);
+    }
+    const bool there = gimbal == drivers::GimbalState::in_position;
+    if (part_ == Part::slew && there) {
+        ports_.feed->order(rt::StageFeed::Mode::increments);
+        last_motion_ = now;
+        zero_->arrived();
+        ports_.gimbal.slew_to(zero_->target_deg(), now, true);
+        part_ = Part::measure;
+    } else if (part_ == Part::measure) {
+        rt::Motion motion;
+        while (!zero_->over() && take_motion(motion, now)) zero_->add(motion);
+        if (zero_->over()) return end_zeroing(now);
+        if (now - last_motion_ > kSilence) {
+            return fail_zeroing("no increments of gyros and accelerometers on the bus for 1 s",
+                                now);
+        }
+        if (there) {
+            zero_->arrived();
+            ports_.gimbal.slew_to(zero_->target_deg(), now, true);
+        }
+    }
+    return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
+}
+
+Time Campaign::end_zeroing(Time now) {
+    if (zero_->another()) {
+        ports_.feed->order(rt::StageFeed::Mode::off);
+        zero_->begin_other_way();
+        part_ = Part::go;
+        return now;
+    }
+    leave_stage();
+    if (const auto failure = zero_->finish(zeroing_end_); !failure.empty())
+        return fail_zeroing(failure, now);
+    ports_.event(Severity::info, zero_->words());
+    if (zeroing_end_) {
+        mark_ = zero_->status().mark;
+        leave_zeroing(now);
+    } else {
+        zeroed_ = true;
+        start_position(now);
+    }
+    return now;
+}
+
+Time Campaign::fail_zeroing(const std::string& why, Time now) {
+    if (zeroing_end_) {
+        // The dwells are done: the campaign stands, but nobody can say that the zeros stayed.
+        mark_ = "zeros not confirmed at the end: " + why;
+        leave_zeroing(now);
+    } else {
+        abort("zeroing: " + why, now);
+    }
+    return now;
+}
+
+void Campaign::leave_zeroing(Time now) {
+    leave_stage();
+    ports_.gimbal.release(now);
+    if (!mark_.empty()) ports_.event(Severity::alarm, "campaign marked: " + mark_);
+    finish(now);
+}
+
+Time Campaign::levelling(Time now) {
+    if (!ports_.shaker.reading().at_rest()) {
+        abort("the shaker left rest while the platform was levelled", now);
+        return now;
+    }
+    const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
+    if (part_ == Part::go) {
+        if (gimbal == drivers::GimbalState::commanding)
+            return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
+        if (gimbal != drivers::GimbalState::idle) {
+            abort(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)), now);
+            return now;
+        }
+        level_->begin(here().stop.position_deg, zero_ ? zero_->status() : ZeroStatus{});
+        ports_.feed->order(rt::StageFeed::Mode::force);
+        last_motion_ = now;
+        part_ = Part::measure;
+    }
+    if (part_ == Part::measure) {
+        rt::Motion motion;
+        std::array<double, 3> rate{};
+        bool any = false;
+        while (!level_->done() && level_->failure().empty() && take_motion(motion, now)) {
+            rate = level_->step(motion);
+            any = true;
+        }
+        if (const auto why = level_->failure(); !why.empty()) {
+            leave_stage();
+            abort("levelling: " + why, now);
+            return now;
+        }
+        if (level_->done()) {
+            leave_stage();
+            ports_.event(Severity::info, level_->words());
+            part_ = Part::zero;
+            torque_sent_ = zero_since_ = now;
+            return now + kStagePoll;
+        }
+        if (any) static_cast<void>(ports_.torquer->command(rate));
+        if (now - last_motion_ > kSilence) {
+            abort("levelling: no specific force on the bus for 1 s", now);
+        }
+        return now + kStagePoll;
+    }
+    // A dwell is free drift: it begins only when the platform itself says that nothing is torqued.
+    const auto torque = ports_.feed->torque();
+    const bool confirmed =
+        !ports_.feed->knows_torque() ||
+        (torque.time > zero_since_ && !torque.torquing && torque.echo == ports_.torquer->counter());
+    if (ports_.torquer->zero() && confirmed) {
+        enter(State::ramping, now);
+        return now;
+    }
+    if (now - zero_since_ > kZeroTimeout) {
+        abort("levelling: torquing commanded to zero, not confirmed by the platform within 2 s",
+              now);
+        return now;
+    }
+    if (now - torque_sent_ >= kStagePoll) {
+        torque_sent_ = now;
+        static_cast<void>(ports_.torquer->command({}));
+    }
+    return now + kStagePoll / 2;
+}
+
+}  // namespace vibrig::campaign

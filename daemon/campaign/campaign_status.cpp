@@ -1,0 +1,78 @@
+// What the campaign says of itself.
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::Time;
+using State = CampaignState;
+
+void Campaign::fill(StatusData& status, Time now) const {
+    status.campaign_name = settings_.name;
+    status.state = state_;
+    status.reason = reason_;
+    status.armed_by = armed_by_;
+    status.resume_offer = resume_offer();
+    status.runs = static_cast<int>(runs());
+    status.positions = static_cast<int>(positions());
+    status.dwells = dwells_;
+    const auto total = static_cast<double>(std::max<std::size_t>(expected_, 1));
+    const bool begun = active() || state_ == State::finished || !dwells_.empty();
+    if (begun && at_ < stops_.size()) {
+        status.run = here().run;
+        status.position = here().position;
+        status.position_deg = here().stop.position_deg;
+    }
+    fill_stages(status);
+    double done = static_cast<double>(positions_done_);
+    if (state_ == State::recording && dwell_to_ > dwell_from_) {
+        done += std::clamp(
+            static_cast<double>(now - dwell_from_) / static_cast<double>(dwell_to_ - dwell_from_),
+            0.0, 1.0);
+    }
+    status.progress = begun ? done / total : 0;
+    if (active()) {
+        // What is left at the pace so far, at first at the nominal one.
+        const double nominal = settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s +
+                               (level_ ? level_->expected_s() : 0);
+        const auto before = static_cast<double>(positions_before_);
+        const double pace = positions_done_ > positions_before_
+                                ? drivers::to_seconds(now - started_) / (done - before)
+                                : nominal;
+        status.remaining_s = (total - done) * pace;
+        const bool vibrating =
+            state_ == State::ramping || state_ == State::settling || state_ == State::recording;
+        status.command_table_g = vibrating ? table_g() : 0;
+        status.command_frequency_hz = settings_.frequency_hz;
+    }
+}
+
+void Campaign::qualify(estimator::Result& result) const {
+    for (auto& amplitude : result.amplitudes) {
+        double sum = 0;
+        std::size_t n = 0;
+        for (const auto& [run, variance] : level_variances_) {
+            if (run != amplitude.run) continue;
+            sum += variance;
+            ++n;
+        }
+        if (n == 0) continue;
+        // The same zeros in every dwell: they do not average out.
+        amplitude.sigma_g = std::hypot(
+            amplitude.sigma_g, amplitude.amplitude_g * std::sqrt(sum / static_cast<double>(n)));
+    }
+}
+
+void Campaign::fill_stages(StatusData& status) const {
+    status.levelling = {};
+    status.zeros = {};
+    if (level_) level_->fill(status.levelling);
+    if (zero_) zero_->fill(status.zeros);
+    if (!mark_.empty()) status.zeros.mark = mark_;
+}
+
+}  // namespace vibrig::campaign

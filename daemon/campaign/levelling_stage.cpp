@@ -1,0 +1,166 @@
+#include "daemon/campaign/levelling_stage.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vibrig::campaign {
+
+namespace level = estimator::levelling;
+
+namespace {
+
+constexpr double kSmallAngle = 5 * level::kPi / 180;
+
+level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Settings& rig,
+                                double torquer_limit_deg_h) {
+    level::LevellerSettings loop;
+    loop.earth.gravity_mps2 = rig.gravity_mps2;
+    loop.fast = level::design({s.settling_s, s.residual, s.damping}, loop.earth).gains;
+    loop.settling_s = s.settling_s;
+    if (s.slow.size() == 3) loop.slow = level::Gains{s.slow[0], s.slow[1], s.slow[2]};
+    loop.ramp_s = s.slow_ramp_s;
+    loop.period_s = s.block * s.sample_s;
+    loop.window_s = s.window_s;
+    loop.tolerance_rad = s.tolerance_arcmin * level::kArcmin;
+    loop.torquer_limit = std::min(s.torquer_limit_deg_h, torquer_limit_deg_h) * level::kDegPerHour;
+    loop.noise.accelerometer_mps2 =
+        rig.accelerometer_g * rig.gravity_mps2 / std::sqrt(static_cast<double>(s.block));
+    loop.noise.gyro_random_walk = rig.gyro_random_walk_deg_per_rt_h * level::kPi / 180 / 60;
+    return loop;
+}
+
+}  // namespace
+
+LevellingStage::LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
+                               double torquer_limit_deg_h)
+    : settings_(settings),
+      rig_(rig),
+      frame_(rig),
+      loop_(loop_of(settings, rig, torquer_limit_deg_h)),
+      leveller_(loop_) {}
+
+void LevellingStage::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
+    leveller_.emplace(loop_);
+    largest_at_first_ = 0;
+    counted_ = false;
+    const Vector up = frame_.up_at_deg(encoder_deg);
+    // Any two directions normal to the vertical: first x second = up.
+    std::size_t least = 0;
+    for (std::size_t i = 1; i < 3; ++i)
+        if (std::abs(up[i]) < std::abs(up[least])) least = i;
+    Vector first{};
+    first[least] = 1;
+    const double share = up[least];
+    for (std::size_t i = 0; i < 3; ++i) first[i] -= share * up[i];
+    const double length = std::sqrt(dot(first, first));
+    for (double& part : first) part /= length;
+    channel_ = {first, cross(up, first)};
+    zero_g_ = {};
+    limit_rad_ = 0;
+    if (zeros.known) {
+        for (std::size_t i = 0; i < 3; ++i) zero_g_[i] = 1e-3 * zeros.zero_mg[i];
+        // What is left in the end is minus the zero over g.
+        for (const Vector& c : channel_) {
+            limit_rad_ = std::max(
+                limit_rad_, 1e-3 * std::sqrt(std::max(0.0, quadratic(zeros.covariance_mg2, c))));
+        }
+    }
+}
+
+Vector LevellingStage::to_axes(const level::Pair& rate) const {
+    // The vertical goes round against the platform: u' = u x w. So a turn about the second channel
+    // takes the first down, and one about the first takes the second up.
+    Vector axes{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        axes[i] = (rate[0] * channel_[1][i] - rate[1] * channel_[0][i]) / level::kDegPerHour;
+    }
+    return axes;
+}
+
+Vector LevellingStage::step(const rt::Motion& motion) {
+    level::LevelInput input;
+    for (std::uint32_t i = 0; i < std::min<std::uint32_t>(motion.dropped_before, 100); ++i) {
+        input.missing = true;
+        static_cast<void>(leveller_->step(input));
+    }
+    input.missing = !motion.good;
+    if (motion.good) {
+        Vector force = frame_.force(motion.force, 1);
+        for (std::size_t i = 0; i < 3; ++i) force[i] -= zero_g_[i];
+        for (std::size_t i = 0; i < 2; ++i)
+            input.force[i] = rig_.gravity_mps2 * dot(channel_[i], force);
+        if (leveller_->time_s() < 1) {
+            const double tilt = std::max(std::abs(input.force[0]), std::abs(input.force[1]));
+            largest_at_first_ = std::max(largest_at_first_, tilt / rig_.gravity_mps2);
+        }
+    }
+    const auto output = leveller_->step(input);
+    if (done() && !std::exchange(counted_, true)) ++done_;
+    return to_axes(output.rate);
+}
+
+bool LevellingStage::done() const {
+    const auto& l = *leveller_;
+    if (l.verdict() != level::Verdict::settled) return false;
+    return !loop_.slow || l.time_s() - l.settled_s().value_or(0) >= loop_.ramp_s;
+}
+
+std::string LevellingStage::failure() const {
+    const level::Verdict verdict = leveller_->verdict();
+    if (verdict != level::Verdict::cannot_settle && verdict != level::Verdict::not_settled)
+        return {};
+    std::string why = leveller_->message();
+    if (verdict == level::Verdict::cannot_settle && why.find("cannot settle") == std::string::npos)
+        why = "cannot settle: " + why;
+    if (leveller_->trouble() == level::Trouble::tilt_too_large && largest_at_first_ < kSmallAngle) {
+        why += fmt::format(
+            "; it was {:.3g} deg at first and grows under the torquing: sign or axes of the "
+            "torquers",
+            largest_at_first_ * 180 / level::kPi);
+    }
+    return why;
+}
+
+std::string LevellingStage::words() const {
+    const auto& l = *leveller_;
+    const auto drift = l.drift();
+    std::string text = fmt::format(
+        "level after {:.1f} s: mean specific force {:+.3f}' and {:+.3f}', tolerance {:.3g}'; drift "
+        "{:+.3f} and {:+.3f} deg/h",
+        l.settled_s().value_or(l.time_s()), l.observables().force_rad[0] / level::kArcmin,
+        l.observables().force_rad[1] / level::kArcmin, l.tolerance() / level::kArcmin,
+        drift[0] / level::kDegPerHour, drift[1] / level::kDegPerHour);
+    if (limit_rad_ > 0)
+        text += fmt::format("; {:.3g}' (1 sigma) from the zeros", limit_rad_ / level::kArcmin);
+    if (const auto note = l.message(); !note.empty()) text += "; " + note;
+    return text;
+}
+
+void LevellingStage::fill(LevellingStatus& status) const {
+    const auto& l = *leveller_;
+    status.begun = l.time_s() > 0;
+    status.verdict = level::name_of(l.verdict());
+    status.time_s = l.settled_s().value_or(l.time_s());
+    for (std::size_t i = 0; i < 2; ++i) {
+        status.tilt_arcmin[i] = l.observables().force_rad[i] / level::kArcmin;
+        status.to_come_arcmin[i] = l.observables().rate_rad[i] / level::kArcmin;
+        status.drift_deg_h[i] = l.drift()[i] / level::kDegPerHour;
+    }
+    status.phase = l.verdict() == level::Verdict::settled && loop_.slow ? "ramp" : "fast";
+    status.tolerance_arcmin = l.tolerance() / level::kArcmin;
+    status.noise_arcmin = l.budget().total / level::kArcmin;
+    status.limit_arcmin = limit_rad_ / level::kArcmin;
+    status.done = done_;
+    status.message = failure();
+    if (status.message.empty()) status.message = l.message();
+}
+
+double LevellingStage::expected_s() const noexcept {
+    return settings_.settling_s + settings_.window_s + 1 / level::mean_decay(loop_.fast) +
+           (loop_.slow ? loop_.ramp_s : 0);
+}
+
+}  // namespace vibrig::campaign

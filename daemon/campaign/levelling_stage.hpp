@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/settings.hpp"
+#include "daemon/rt/stage_feed.hpp"
+#include "daemon/status.hpp"
+#include "estimator/levelling/leveller.hpp"
+
+namespace vibrig::campaign {
+
+/// Levels the platform at one position: the two channels are the platform directions normal to the
+/// position's nominal vertical. Control thread only.
+class LevellingStage {
+  public:
+    /// Throws estimator::levelling::DesignError.
+    LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
+                   double torquer_limit_deg_h);
+
+    /// `zeros`: of the accelerometers, platform axes.
+    void begin(const Vector& encoder_deg, const ZeroStatus& zeros);
+    /// Torquing rates in platform axes, deg/h, that answer this mean.
+    [[nodiscard]] Vector step(const rt::Motion& motion);
+    [[nodiscard]] bool done() const;
+    /// Why it has failed; empty: it has not.
+    [[nodiscard]] std::string failure() const;
+    /// What it has found, for the log.
+    [[nodiscard]] std::string words() const;
+    void fill(LevellingStatus& status) const;
+    /// s, by design
+    [[nodiscard]] double expected_s() const noexcept;
+
+  private:
+    [[nodiscard]] Vector to_axes(const estimator::levelling::Pair& rate) const;
+
+    LevellingSettings settings_;
+    estimator::Settings rig_;
+    RigFrame frame_;
+    estimator::levelling::LevellerSettings loop_;
+    std::optional<estimator::levelling::Leveller> leveller_;
+    std::array<Vector, 2> channel_{};
+    Vector zero_g_{};
+    double largest_at_first_ = 0;  ///< |tilt|, rad
+    double limit_rad_ = 0;
+    std::uint32_t done_ = 0;
+    bool counted_ = false;
+};
+
+}  // namespace vibrig::campaign

@@ -1,0 +1,72 @@
+#include "daemon/campaign/rig_frame.hpp"
+
+#include <cmath>
+
+#include "estimator/kinematics.hpp"
+
+namespace vibrig::campaign {
+namespace {
+
+constexpr double kRadPerDeg = estimator::kPi / 180;
+
+}  // namespace
+
+RigFrame::RigFrame(const estimator::Settings& settings) : settings_(settings) {
+    const Matrix& m = settings.accelerometer_matrix;
+    const Vector c0 = cross(m[1], m[2]), c1 = cross(m[2], m[0]), c2 = cross(m[0], m[1]);
+    const double k = 1 / dot(m[0], c0);
+    for (std::size_t i = 0; i < 3; ++i) inverse_[i] = {k * c0[i], k * c1[i], k * c2[i]};
+}
+
+Vector RigFrame::up(const Vector& encoder_rad) const {
+    const estimator::Kinematics kinematics(settings_);
+    const auto pose = kinematics.pose(kinematics.gimbal_angles(encoder_rad));
+    return {pose.up[0], pose.up[1], pose.up[2]};
+}
+
+Vector RigFrame::up_at_deg(const Vector& encoder_deg) const {
+    return up(
+        {kRadPerDeg * encoder_deg[0], kRadPerDeg * encoder_deg[1], kRadPerDeg * encoder_deg[2]});
+}
+
+double RigFrame::azimuth(const Vector& encoder_rad) const {
+    const estimator::Kinematics kinematics(settings_);
+    const auto pose = kinematics.pose(kinematics.gimbal_angles(encoder_rad));
+    // North is the axis before `up`, east the one after it; turning `up` over turns east over too.
+    const int axis = settings_.up.axis;
+    const double north = pose.c(0, (axis + 2) % 3);
+    const double east = settings_.up.sign * pose.c(0, (axis + 1) % 3);
+    const double from_north = std::atan2(east, north) + kRadPerDeg * settings_.azimuth_deg;
+    return std::remainder(0.5 * estimator::kPi - from_north, 2 * estimator::kPi);
+}
+
+Vector RigFrame::azimuth_vertical_deg(double azimuth_deg, bool down) const {
+    // The outer gimbal turns about x: it takes y to z, never x.
+    if (settings_.up.axis == 0) {
+        throw estimator::SettingsError(
+            "platform.up: x, expected y or z for zeroing: the azimuth axis cannot be vertical "
+            "without the inner gimbal beyond 80 deg");
+    }
+    double outer = settings_.up.axis == 1 ? 90 * settings_.up.sign : 90 - 90 * settings_.up.sign;
+    if (down) outer += 180;
+    const Vector angle{std::remainder(outer, 360.0), 0, azimuth_deg};
+    Vector encoder{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        encoder[i] = std::remainder(
+            settings_.encoder_sign[i] * angle[i] + settings_.encoder_zero_deg[i], 360.0);
+    }
+    return encoder;
+}
+
+Vector RigFrame::force(const Vector& raw, double one) const {
+    Vector off{};
+    for (std::size_t i = 0; i < 3; ++i) off[i] = raw[i] - one * settings_.accelerometer_zero_g[i];
+    const Matrix& m = settings_.accelerometer_matrix;
+    return {dot(m[0], off), dot(m[1], off), dot(m[2], off)};
+}
+
+Vector RigFrame::to_raw(const Vector& platform) const {
+    return {dot(inverse_[0], platform), dot(inverse_[1], platform), dot(inverse_[2], platform)};
+}
+
+}  // namespace vibrig::campaign

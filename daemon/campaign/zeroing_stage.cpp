@@ -1,0 +1,193 @@
+#include "daemon/campaign/zeroing_stage.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/zeros/observability.hpp"
+
+namespace vibrig::campaign {
+
+namespace zeros = estimator::zeros;
+
+namespace {
+
+constexpr double kRadian = 3.14159265358979323846 / 180;
+constexpr double kSureness = 3;  // standard deviations
+
+}  // namespace
+
+zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
+    zeros::CalibrationSettings s;
+    s.site.latitude_rad = kRadian * rig_.latitude_deg;
+    s.site.gravity_mps2 = rig_.gravity_mps2;
+    s.plan.rate_deg_s = settings_.slew_deg_per_s;
+    s.plan.duration_s = settings_.duration_s;
+    s.inverted = down;
+    s.noise.scale_factor = settings_.scale_factor;
+    s.noise.velocity_reference = settings_.velocity_reference_mps;
+    s.noise.position_reference = settings_.position_reference_m;
+    s.noise.reference_is_bound = true;
+    s.noise.angle_random_walk =
+        std::max(settings_.angle_random_walk, rig_.gyro_random_walk_deg_per_rt_h);
+    // The samples' noise at 40 a second as a density.
+    s.noise.velocity_random_walk = std::max(2e-5, rig_.accelerometer_g * std::sqrt(0.025));
+    // All the drift that the gyros may have is a bias here.
+    s.initial.gyro_bias_deg_h = std::hypot(rig_.prior_bias, rig_.prior_linear);
+    s.target_mg = settings_.target_mg;
+    return s;
+}
+
+ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig)
+    : settings_(settings), rig_(rig), frame_(rig) {
+    static_cast<void>(frame_.azimuth_vertical_deg(0, false));
+    const auto s = plan(false);
+    zeros::check_observable(s.plan, s.site);
+}
+
+void ZeroingStage::begin() {
+    up_result_.reset();
+    start_run(false);
+}
+
+void ZeroingStage::begin_other_way() {
+    up_result_ = calibration_->result();
+    start_run(true);
+}
+
+void ZeroingStage::start_run(bool down) {
+    down_ = down;
+    target_ = 0;
+    first_time_ = last_time_ = 0;
+    failure_.clear();
+    calibration_.emplace(plan(down));
+    present_.running = true;
+}
+
+Vector ZeroingStage::target_deg() const {
+    const auto& targets = zeros::SlewPlan{}.targets_deg;
+    const std::size_t n = targets.size();
+    const std::size_t k = target_ < n ? target_ : n - 2 + (target_ - n) % 2;
+    return frame_.azimuth_vertical_deg(targets[k], down_);
+}
+
+void ZeroingStage::add(const rt::Motion& motion) {
+    if (first_time_ == 0) first_time_ = motion.time;
+    const double dt = last_time_ == 0 ? 0 : drivers::to_seconds(motion.time - last_time_);
+    last_time_ = motion.time;
+    zeros::Increment in;
+    in.time_s = drivers::to_seconds(motion.time);
+    in.turn_rad = motion.turn;
+    in.velocity_mps = frame_.force(motion.force, rig_.gravity_mps2 * dt);
+    in.azimuth_rad = frame_.azimuth(motion.angle);
+    if (!motion.good) in.turn_rad[0] = std::nan("");
+    static_cast<void>(calibration_->add(in));
+}
+
+bool ZeroingStage::over() const {
+    return calibration_->given_up() || time_s() >= settings_.duration_s;
+}
+
+double ZeroingStage::time_s() const { return drivers::to_seconds(last_time_ - first_time_); }
+
+std::string ZeroingStage::finish(bool at_end) {
+    result_ = calibration_->result();
+    present_.running = false;
+    const auto problems = [](const zeros::CalibrationResult& r) {
+        std::string text;
+        for (const auto& problem : r.problems) text += (text.empty() ? "" : "; ") + problem;
+        return text;
+    };
+    if (up_result_ && !up_result_->valid) return failure_ = problems(*up_result_);
+    if (!result_.valid) return failure_ = problems(result_);
+    const zeros::CalibrationResult& r = up_result_ ? *up_result_ : result_;
+    Found found;
+    ZeroStatus now;
+    now.covariance_mg2 = r.covariance_mg2;
+    for (std::size_t i = 0; i < 3; ++i) {
+        found.zero_mg[i] = r.axis[i].zero_mg;
+        found.filter_sigma_mg[i] = r.axis[i].filter_sigma_mg;
+        now.sigma_mg[i] = r.axis[i].sigma_mg;
+    }
+    if (up_result_) {
+        const auto z = zeros::separate(up_result_->axis[2], result_.axis[2]);
+        found.zero_mg[2] = z.zero_mg;
+        found.filter_sigma_mg[2] = now.sigma_mg[2] = z.zero_sigma_mg;
+        now.scale_z = z.scale;
+        now.scale_z_sigma = z.scale_sigma;
+        now.covariance_mg2[2] = {0, 0, z.zero_sigma_mg * z.zero_sigma_mg};
+        now.covariance_mg2[0][2] = now.covariance_mg2[1][2] = 0;
+    }
+    now.zero_mg = found.zero_mg;
+    now.known = true;
+    now.mark = present_.mark;
+    if (at_end && first_) {
+        now.repeated = true;
+        for (std::size_t i = 0; i < 3; ++i) {
+            now.change_mg[i] = found.zero_mg[i] - first_->zero_mg[i];
+            now.change_sigma_mg[i] =
+                std::hypot(found.filter_sigma_mg[i], first_->filter_sigma_mg[i]);
+            if (std::abs(now.change_mg[i]) > kSureness * now.change_sigma_mg[i]) {
+                now.mark += fmt::format(
+                    "{}zero of accelerometer {} moved by {:+.4f} mg during the campaign, expected "
+                    "less than {:.4f} mg (3 standard deviations)",
+                    now.mark.empty() ? "" : "; ", "xyz"[i], now.change_mg[i],
+                    kSureness * now.change_sigma_mg[i]);
+            }
+        }
+        // What was in force during the dwells stays on show.
+        now.zero_mg = present_.zero_mg;
+        now.sigma_mg = present_.sigma_mg;
+        now.covariance_mg2 = present_.covariance_mg2;
+    } else if (!at_end) {
+        first_ = found;
+    }
+    present_ = now;
+    return {};
+}
+
+std::string ZeroingStage::words() const {
+    std::string text = fmt::format("zeros after {:.0f} s:", time_s());
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto& axis = (up_result_ ? *up_result_ : result_).axis[i];
+        text += fmt::format("{} {} {:+.4f} mg (sigma {:.4f})", i == 0 ? "" : ",", "xyz"[i],
+                            axis.zero_mg, axis.sigma_mg);
+    }
+    if (up_result_) {
+        text += fmt::format("; z apart: zero {:+.4f} mg, scale {:+.1f} ppm", present_.zero_mg[2],
+                            1e6 * present_.scale_z);
+    } else {
+        text += "; z: zero + 1 g x scale error";
+    }
+    for (const auto& note : result_.notes) text += "; " + note;
+    return text;
+}
+
+Vector ZeroingStage::raw_zero_g() const {
+    if (!present_.known) return {};
+    Vector zero{};
+    for (std::size_t i = 0; i < 3; ++i) zero[i] = 1e-3 * present_.zero_mg[i];
+    return frame_.to_raw(zero);
+}
+
+double ZeroingStage::level_sigma(const Vector& encoder_deg) const {
+    if (!present_.known) return 0;
+    const Vector up = frame_.up_at_deg(encoder_deg);
+    return 1e-3 * std::sqrt(std::max(0.0, quadratic(present_.covariance_mg2, up)));
+}
+
+void ZeroingStage::fill(ZeroStatus& status) const {
+    status = present_;
+    status.time_s = time_s();
+    status.message = failure_;
+    if (present_.running && calibration_) {
+        const auto& trace = calibration_->trace();
+        if (!trace.empty() && !present_.known) {
+            status.zero_mg = trace.back().zero_mg;
+            status.sigma_mg = trace.back().sigma_mg;
+        }
+    }
+}
+
+}  // namespace vibrig::campaign

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/settings.hpp"
+#include "daemon/rt/stage_feed.hpp"
+#include "daemon/status.hpp"
+#include "estimator/zeros/calibration.hpp"
+
+namespace vibrig::campaign {
+
+/// One calibration of the accelerometers' zeros by azimuth slews: where the gimbals go next, what
+/// the filter makes of the increments, and the comparison of the end with the start. Control thread
+/// only.
+class ZeroingStage {
+  public:
+    /// Throws estimator::SettingsError or estimator::zeros::ZeroError if the plan cannot work.
+    ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig);
+
+    void reset() { first_.reset(), present_ = {}; }  ///< a new campaign
+    void begin();
+    /// Encoder angles to slew to, deg; after the last one of the plan there and back again.
+    [[nodiscard]] Vector target_deg() const;
+    void arrived() { ++target_; }
+    void add(const rt::Motion& motion);
+    /// The planned time is over, or the filter has given up.
+    [[nodiscard]] bool over() const;
+    /// A second run with z down is to follow.
+    [[nodiscard]] bool another() const { return settings_.both_ways && !down_; }
+    void begin_other_way();
+    /// Takes the result over; the reason why it is not to be used, else empty.
+    [[nodiscard]] std::string finish(bool at_end);
+    [[nodiscard]] double time_s() const;
+    [[nodiscard]] std::string words() const;
+    [[nodiscard]] const ZeroStatus& status() const { return present_; }
+    /// On top of the configuration's zeros, as the raw readings show them, g.
+    [[nodiscard]] Vector raw_zero_g() const;
+    /// Relative standard deviation of the vibration level at these angles that the zeros leave:
+    /// delta = u.b.
+    [[nodiscard]] double level_sigma(const Vector& encoder_deg) const;
+    void fill(ZeroStatus& status) const;
+    [[nodiscard]] double expected_s() const {
+        return settings_.duration_s * (settings_.both_ways ? 2 : 1);
+    }
+
+  private:
+    struct Found {
+        Vector zero_mg{}, filter_sigma_mg{};
+    };
+    void start_run(bool down);
+    [[nodiscard]] estimator::zeros::CalibrationSettings plan(bool down) const;
+
+    ZeroingSettings settings_;
+    estimator::Settings rig_;
+    RigFrame frame_;
+    std::optional<estimator::zeros::Calibration> calibration_;
+    std::optional<estimator::zeros::CalibrationResult> up_result_;
+    estimator::zeros::CalibrationResult result_;
+    bool down_ = false;
+    std::size_t target_ = 0;
+    drivers::Time first_time_ = 0, last_time_ = 0;
+    std::optional<Found> first_;  ///< of the campaign's start
+    ZeroStatus present_;
+    std::string failure_;
+};
+
+}  // namespace vibrig::campaign

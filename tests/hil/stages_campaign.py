@@ -1,0 +1,221 @@
+#!/usr/bin/python3
+"""The stages with the table at rest, levelling and zeroing, over the seqpacket bus on the rig's clock.
+
+usage: stages_campaign.py PROGRAMS
+"""
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+TABLE1 = [[0, 0, 0], [0, 0, 45], [0, 0, 90], [0, 0, 180], [180, 0, 45], [45, 0, 0], [45, 0, 90], [90, 0, 90],
+          [90, 0, 180], [180, 0, 270], [270, 0, 0], [270, 0, 90], [-45, 0, 0], [-45, 0, 90]]
+SHORT = {"name": "stages", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0],
+         "dwell_s": 10.0}
+LEVELLING = {**SHORT, "levelling": True}
+TRANSMISSION = 2 / 3
+NAMES = ("F", "I", "O", "S", "II", "OO", "SS", "IO", "IS", "OS")
+
+
+class Run:
+    """One campaign from arming to its end."""
+
+    def __init__(self, programs, campaign, truth=None, timeout_s=120, **tables):
+        with tempfile.TemporaryDirectory() as folder:
+            rig = r.Rig(programs, "seqpacket", "rig", folder)
+            try:
+                rig.start_plant("--seed", "3", "--truth", self.truth_file(programs, folder, truth or {}))
+                rig.configure(campaign, **tables)
+                rig.start_daemon()
+                rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+                self.commands = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+                self.last = rig.wait_for_state(("finished", "aborted", "tripped"), timeout_s)
+                self.text, (_, result) = rig.daemon.text(), rig.result()
+                self.result = json.loads(result) if result else None
+                self.plant = rig.plant.text()
+            finally:
+                rig.stop()
+
+    @staticmethod
+    def truth_file(programs, folder, changes):
+        """The rig's own truth with some keys changed."""
+        path = os.path.join(folder, "truth.json")
+        subprocess.run([os.path.join(programs, "vibrig-plant"), "run", "--can", "seqpacket:" + os.path.join(folder, "t"),
+                        "--modbus", "tcp:127.0.0.1:0", "--clock", "real", "--duration", "0", "--write-truth", path],
+                       check=True, capture_output=True, timeout=30)
+        with open(path, encoding="utf-8") as file:
+            truth = json.load(file)
+        for section, keys in changes.items():
+            truth[section].update(keys)
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(truth, file)
+        return path
+
+    def ended(self, checks, state, text):
+        return checks.check(self.last is not None and self.last["campaign"]["state"] == state, text,
+                            f"{r.state_of(self.last)} {[c.stderr for c in self.commands]}\n{self.text[-4000:]}")
+
+    def reason(self):
+        return self.last["campaign"].get("reason", "") if self.last else ""
+
+    def events(self, word):
+        return [line for line in self.text.splitlines() if word in line]
+
+    def kappas(self):
+        return [dwell["kappa"] for dwell in self.last["campaign"]["dwells"]]
+
+
+def failed_once(checks, run, words, text):
+    """Aborted, said once, and the table has not moved."""
+    run.ended(checks, "aborted", text + ": the campaign is aborted")
+    for word in words:
+        checks.check(word in run.reason(), f"{text}: the reason names \"{word}\"", run.reason())
+    checks.equal(len(run.events("error campaign")), 1, f"{text}: one event says so")
+    checks.check(not run.last["campaign"]["dwells"], f"{text}: no data were taken")
+
+
+def levelling(checks, programs):
+    run = Run(programs, LEVELLING, {"platform": {"slew_error_deg": 0.2}})
+    if run.ended(checks, "finished", "a levelled campaign finishes"):
+        checks.equal(len(run.events("level after")), 2, "each position was levelled")
+        level = run.last["campaign"]["level"]
+        checks.check(level["verdict"] == "settled" and level["done"] == 2, "the status says so", level)
+        # Ts + W + 1/sigma + 5 %, sigma = 5.25 / Ts
+        checks.check(level["time_s"] <= 1.05 * (100 + 10 + 100 / 5.25), "within Ts + W + 1/sigma + 5 %", level["time_s"])
+        checks.check(max(abs(t) for t in level["tilt_arcmin"]) <= level["tolerance_arcmin"], "within the tolerance", level)
+    run = Run(programs, LEVELLING, {"platform": {"slew_error_deg": 0.2, "torquer_scale": [-1, -1, -1]}})
+    failed_once(checks, run, ["cannot settle", "sign or axes of the torquers"], "torquers the wrong way round")
+    run = Run(programs, {**LEVELLING, "positions_deg": [[0, 0, 0]]}, {"platform": {"torquer_scale": [-1, -1, -1]}},
+              levelling={"torque_sign": [-1, -1, -1]})
+    run.ended(checks, "finished", "levelling.torque_sign turns them round")
+    run = Run(programs, {**LEVELLING, "positions_deg": [[0, 0, 0]]}, {"platform": {"torquer_scale": [0, 0, 0]}})
+    failed_once(checks, run, ["not settled within 300 s"], "dead torquers")
+
+
+def zero_failures(checks, programs):
+    zeroing = {**SHORT, "zeroing": True}
+    run = Run(programs, zeroing, {"platform": {"slew_deg_per_s": 4}})
+    failed_once(checks, run, ["azimuth turns at", "commanded 5 deg/s"], "a slow azimuth")
+    run = Run(programs, zeroing, {"platform": {"increment_sign": [-1, -1, -1]}})
+    failed_once(checks, run, ["zeroing"], "gyro increments of the wrong sign")
+    run = Run(programs, zeroing, {"accelerometer": {"zero_g": [0.02, 0, 0]}})
+    failed_once(checks, run, ["outside the small-error range"], "a zero of 20 mg")
+
+
+def vertical(position):
+    """In platform axes: outer about x, then azimuth about z (the inner gimbal at zero), up = +y."""
+    a, g = math.radians(position[0]), math.radians(position[2])
+    return [-math.sin(g) * math.cos(a), math.cos(g) * math.cos(a), math.sin(a)]
+
+
+def regressor(u, gyro, kappa):
+    """Tang et al. 2009, averaged model; order F I O S II OO SS IO IS OS, axes input, output, spin in turn."""
+    i, o, s = (u[(gyro + k) % 3] for k in range(3))
+    return [1, i, o, s, kappa * i * i, kappa * o * o, kappa * s * s, kappa * i * o, kappa * i * s, kappa * o * s]
+
+
+def solve(a, b):
+    n = len(b)
+    m = [row[:] + [value] for row, value in zip(a, b)]
+    for k in range(n):
+        pivot = max(range(k, n), key=lambda row: abs(m[row][k]))
+        m[k], m[pivot] = m[pivot], m[k]
+        for row in range(k + 1, n):
+            factor = m[row][k] / m[k][k]
+            m[row] = [x - factor * y for x, y in zip(m[row], m[k])]
+    x = [0.0] * n
+    for k in reversed(range(n)):
+        x[k] = (m[k][n] - sum(m[k][j] * x[j] for j in range(k + 1, n))) / m[k][k]
+    return x
+
+
+def level_error(position, table_g, zero_g):
+    """dk/k = 2 delta a0^2 / (a0^2 + 2), delta = u.b. The projection on the vertical divides by the mean, so
+    that the zero makes the amplitude too small by what eq. 12-13 of Tang et al. 2009 make it too large."""
+    square = (TRANSMISSION * table_g) ** 2
+    return -2 * sum(x * y for x, y in zip(vertical(position), zero_g)) * square / (square + 2)
+
+
+def predicted_bias(gyro, truth, dwells, zero_g):
+    """Least squares over the dwells' rates with wrong levels minus truth."""
+    normal, right = [[0.0] * 10 for _ in range(10)], [0.0] * 10
+    for position, table_g in dwells:
+        kappa = 1 + (TRANSMISSION * table_g) ** 2 / 2
+        u = vertical(position)
+        rate = sum(h * d for h, d in zip(regressor(u, gyro, kappa), truth))
+        h = regressor(u, gyro, kappa * (1 + level_error(position, table_g, zero_g)))
+        for j in range(10):
+            right[j] += h[j] * rate
+            for k in range(10):
+                normal[j][k] += h[j] * h[k]
+    return [x - d for x, d in zip(solve(normal, right), truth)]
+
+
+def effect(checks, programs, truth):
+    """5 mg zeros: what they do to the coefficients, and what is left of it with zeroing."""
+    campaign = {"name": "effect", "positions_deg": TABLE1, "table_g": [9.0, 7.0], "dwell_s": 20.0}
+    zero_g = [0.005, 0.005, 0.005]
+    # Little noise, so that 1 % of it does not hide 1 % of the coefficients.
+    noise = {"resolver_arcsec": 0.3, "gyro_random_walk_deg_per_rt_h": 1e-5, "accelerometer_g": 1e-4}
+    zeros = {"noise": noise, "accelerometer": {"zero_g": zero_g}}
+    exact = Run(programs, campaign, {"noise": noise}, noise=noise)
+    wrong = Run(programs, campaign, zeros, noise=noise)
+    right = Run(programs, {**campaign, "zeroing": True}, zeros, noise=noise)
+    if not all([exact.ended(checks, "finished", "a campaign with exact accelerometers finishes"),
+                wrong.ended(checks, "finished", "one with 5 mg zeros and no zeroing finishes"),
+                right.ended(checks, "finished", "one with 5 mg zeros and zeroing finishes")]):
+        return
+    dwells = [(position, g) for g in campaign["table_g"] for position in TABLE1]
+    worst = seen = 0
+    for (position, g), a, b in zip(dwells, exact.kappas(), wrong.kappas()):
+        expected = level_error(position, g, zero_g)
+        if abs(expected) > 2e-3:
+            seen += 1
+            worst = max(worst, abs((b / a - 1) / expected - 1))
+    checks.check(seen >= 14 and worst <= 0.1, f"the level of {seen} dwells is wrong as predicted, within 10 %", worst)
+
+    worst, largest = 0, 0
+    value = {run: {p["name"]: p["value"] for p in run.result["parameters"]} for run in (exact, wrong, right)}
+    for gyro in range(3):
+        bias = predicted_bias(gyro, truth[gyro], dwells, zero_g)
+        for k in range(4, 10):
+            name = f"D_{NAMES[k]}{'xyz'[gyro]}"
+            moved = value[wrong][name] - value[exact][name]
+            largest = max(largest, abs(bias[k]))
+            worst = max(worst, abs(moved - bias[k]))
+    checks.check(largest > 1e-4 and worst <= 0.1 * largest,
+                 "the quadratic coefficients are biased as predicted, within 10 % of the largest bias",
+                 f"largest {largest:.3g}, off by {worst:.3g} deg/h/g^2")
+
+    zeros = right.last["campaign"]["zeros"]
+    off = [abs(z - 1e3 * b) for z, b in zip(zeros["zero_mg"], zero_g)]
+    checks.check(max(off[:2]) <= 0.02 and off[2] <= 0.01, "the zeros are found to 0.02 mg (x, y) and 0.01 mg (z)", zeros)
+    checks.check(zeros["repeated_at_end"] and not zeros.get("mark"), "and again at the end: the campaign is not marked", zeros)
+    worst = max(abs(b / a - 1) for a, b in zip(exact.kappas(), right.kappas()))
+    checks.check(worst <= 1e-4, "with zeroing the level of every dwell is right to 1e-4", worst)
+
+
+def coefficients(programs):
+    """Of the simulated rig, by gyro."""
+    with tempfile.TemporaryDirectory() as folder:
+        with open(Run.truth_file(programs, folder, {}), encoding="utf-8") as file:
+            truth = json.load(file)["coefficients"]
+    return [[truth[f"D_{name}{axis}"] for name in NAMES] for axis in "xyz"]
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    levelling(checks, programs)
+    zero_failures(checks, programs)
+    effect(checks, programs, coefficients(programs))
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+#include "tests/plant/increments.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace vibrig::plant {
+namespace {
+
+constexpr std::int64_t kIncrementUs = 10'000;
+constexpr double kIncrement = 1e-6 * kIncrementUs;
+constexpr std::int64_t kSpanUs = 25'000;
+constexpr double kArcsecOfRad = 180 * 3600 / std::numbers::pi;
+// Counts of the frames, see rig.dbc. The instrument counts pulses: what is left of one stays in it.
+constexpr double kTurnCount = 0.002;     ///< arcsec
+constexpr double kVelocityCount = 1e-5;  ///< m/s
+constexpr double kLargestCount = 131071;
+
+double counted(double value, double& rest, double count) {
+    const double whole = std::round((value + rest) / count);
+    rest += value - whole * count;
+    return std::clamp(whole, -kLargestCount, kLargestCount) * count;
+}
+
+/// Columns: the axes of the reference frame in platform axes.
+std::array<Vec3, 3> attitude(const Vec3& angles) {
+    return {PlatformModel::to_platform(angles, {1, 0, 0}),
+            PlatformModel::to_platform(angles, {0, 1, 0}),
+            PlatformModel::to_platform(angles, {0, 0, 1})};
+}
+
+}  // namespace
+
+Increments::Increments(const Truth& truth)
+    : truth_(truth),
+      platform_to_raw_(inverse(truth.matrix)),
+      gyro_noise_(truth.seed, 5),
+      accelerometer_noise_(truth.seed, 6) {}
+
+void Increments::stop() noexcept {
+    made_.clear();
+    begun_ = false;
+}
+
+void Increments::advance(std::int64_t end_us, const Motion& motion, const PlatformModel& platform,
+                         std::span<const double> a1) {
+    made_.clear();
+    const std::int64_t begin_us = end_us - kSpanUs;
+    const double step_s = 1e-6 * kSpanUs / static_cast<double>(a1.size() - 1);
+    const auto at = [&](std::int64_t us) {
+        return motion.from +
+               (static_cast<double>(us - begin_us) / kSpanUs) * (motion.to - motion.from);
+    };
+    std::int64_t from = begin_us;
+    while (from < end_us) {
+        const std::int64_t boundary = (from / kIncrementUs + 1) * kIncrementUs;
+        const std::int64_t to = std::min(boundary, end_us);
+        const auto index = [&](std::int64_t us) {
+            return static_cast<std::size_t>((us - begin_us) *
+                                            static_cast<std::int64_t>(a1.size() - 1) / kSpanUs);
+        };
+        for (std::size_t i = index(from); i < index(to); ++i)
+            shaken_s_ += 0.5 * step_s * (a1[i] + a1[i + 1]);
+        if (to == boundary) {
+            const Vec3 angles = at(to);
+            if (begun_) make(begin_, angles, platform, shaken_s_);
+            begun_ = true;
+            begin_ = angles;
+            shaken_s_ = 0;
+        }
+        from = to;
+    }
+}
+
+void Increments::make(const Vec3& from, const Vec3& to, const PlatformModel& platform,
+                      double shaken_s) {
+    const auto before = attitude(from);
+    auto after = attitude(to);
+    // Seen from inertial space the reference frame turns with the Earth, by an angle so small that
+    // its square does not count: an axis r of it has become r + w x r.
+    const Vec3 earth =
+        (kIncrement / kArcsecOfRad) * PlatformModel::to_platform(to, platform.earth_rate());
+    // The platform's turn takes its axes of before to those of after: half the difference of the
+    // matrix (before)(after turned back)^T and its transpose.
+    for (Vec3& axis : after) axis = axis - cross(earth, axis);
+    Vec3 turn{};
+    for (std::size_t i = 0; i < 3; ++i) turn = turn + 0.5 * cross(after[i], before[i]);
+    const double sine = std::sqrt(dot(turn, turn));
+    if (sine > 1e-9) turn = (std::asin(std::min(1.0, sine)) / sine) * turn;
+
+    const Vec3 up = platform.up_at(0.5 * (from + to));
+    const double a1 = shaken_s / kIncrement;
+    const Vec3 drift = platform.gyro_drift(up, a1);
+    const Vec3 velocity =
+        (truth_.gravity_mps2 * (kIncrement + shaken_s)) * (platform_to_raw_ * up) +
+        (truth_.gravity_mps2 * kIncrement) * truth_.zero_g;
+    const double random_walk = 60 * truth_.gyro_random_walk_deg_per_rt_h * std::sqrt(kIncrement);
+    // Same density as the samples' noise, which is one value per 25 ms.
+    const double noise = truth_.accelerometer_g * truth_.gravity_mps2 * std::sqrt(1e-6 * kSpanUs) *
+                         std::sqrt(kIncrement);
+    Increment increment;
+    increment.count = count_++;
+    for (std::size_t i = 0; i < 3; ++i) {
+        // A gyro that is not nulled by the loop shows the rate and its drift, whose sign is such
+        // that nulling the output leaves the platform with drift_sign times the drift.
+        const double angle = kArcsecOfRad * turn[i] - truth_.drift_sign * drift[i] * kIncrement +
+                             random_walk * gyro_noise_.normal();
+        increment.turn_arcsec[i] =
+            truth_.increment_sign[i] * counted(angle, rest_turn_[i], kTurnCount);
+        increment.velocity_mps[i] = counted(velocity[i] + noise * accelerometer_noise_.normal(),
+                                            rest_velocity_[i], kVelocityCount);
+    }
+    made_.push_back(increment);
+}
+
+}  // namespace vibrig::plant
