@@ -30,6 +30,7 @@ enum class CampaignState : std::uint8_t {
     zeroing,    ///< azimuth slews at rest, for the accelerometers' zeros
     levelling,  ///< at rest in position
 };
+inline constexpr CampaignState kLastCampaignState = CampaignState::levelling;
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
 /// The interlock's table as it stands, and how long stops took.

@@ -68,7 +68,7 @@ double yes(bool value) { return value ? 1 : 0; }
 
 void add_campaign(Families& to, const StatusData& s) {
     std::vector<std::pair<Labels, double>> states;
-    for (int i = 0; i <= static_cast<int>(CampaignState::tripped); ++i) {
+    for (int i = 0; i <= static_cast<int>(kLastCampaignState); ++i) {
         const auto state = static_cast<CampaignState>(i);
         states.push_back({{{"state", name_of(state)}}, yes(state == s.state)});
     }
