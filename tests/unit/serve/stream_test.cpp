@@ -1,7 +1,6 @@
-#include <google/protobuf/struct.pb.h>
-#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "daemon/serve/metrics.hpp"
@@ -146,7 +145,7 @@ TEST(Stream, OfOneWhoNeverReadsHoldsNobodyUpAndEnds) {
     const Socket deaf(folder.file("s"), "?rate_hz=20");
     Socket reads(folder.file("s"), "?rate_hz=20");
     bool ended = false;
-    for (int i = 0; i < 200 && !ended; ++i) {
+    for (int i = 0; i < 20 && !ended; ++i) {  // 5 MB: more than the socket holds
         for (int k = 0; k < 400; ++k)
             source.log.append({0, 0, 0, Severity::info, "x", std::string(500, 'x')});
         // THEN who reads is served; all 400, or with the next ones more than 500 would wait for him
@@ -207,9 +206,9 @@ TEST(Metrics, CarryWhatIsValidAndAddUp) {
 }
 
 TEST(OpenApi, IsOneJsonObject) {
-    google::protobuf::Struct tree;
-    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(openapi_json(), &tree).ok());
-    EXPECT_EQ(tree.fields().count("paths"), 1u);
+    const auto tree = nlohmann::json::parse(openapi_json(), nullptr, false);
+    ASSERT_TRUE(tree.is_object());
+    EXPECT_TRUE(tree.contains("paths"));
 }
 
 }  // namespace
