@@ -120,15 +120,7 @@ struct CampaignTest : testing::Test {
             platform.slewing = false;
             platform.in_position = true;
         }
-        if (shaker.stop_waits.exchange(false)) shaker.requests.push_back({15, 0, 0});
-        shaker.now.time = now;
-        if (!shaker.requests.empty()) {
-            const auto& wanted = shaker.requests.back();
-            shaker.now.amplitude_g = shaker.now.measured_g = wanted.amplitude_g;
-            shaker.now.frequency_hz = wanted.frequency_hz;
-            shaker.now.running = wanted.amplitude_g > 0;
-            shaker.now.state = wanted.amplitude_g > 0 ? 2 : 0;
-        }
+        shaker.obey(now);
         if (!orders.empty() && !orders.back().cancel && now > orders.back().to &&
             reported != orders.size()) {
             reported = orders.size();

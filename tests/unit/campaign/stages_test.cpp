@@ -145,15 +145,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
         sample.time = now;
         sample.force = up;
         if (!silent) feed->take(sample);
-        if (shaker.stop_waits.exchange(false)) shaker.requests.push_back({15, 0, 0});
-        shaker.now.time = now;
-        if (!shaker.requests.empty()) {
-            const auto& wanted = shaker.requests.back();
-            shaker.now.amplitude_g = shaker.now.measured_g = wanted.amplitude_g;
-            shaker.now.frequency_hz = wanted.frequency_hz;
-            shaker.now.running = wanted.amplitude_g > 0;
-            shaker.now.state = wanted.amplitude_g > 0 ? 2 : 0;
-        }
+        shaker.obey(now);
         if (orders.size() > reported && !orders.back().cancel && now > orders.back().to) {
             reported = orders.size();
             estimator::DwellSummary summary;

@@ -61,8 +61,14 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     const auto port = drivers::make_can_port(io, can);
     drivers::AssemblerSettings settings;
     settings.sample_period = kMillisecond;  // faster than life, to be done soon
+    StageFeedSettings with_increments;
+    with_increments.increments = true;
+    StageFeed stages(dbc, with_increments, control.get());
+    Ring<FrameRecord> recorder_frames(1024);  // nobody takes: what does not fit is dropped
+    Ring<drivers::Sample> recorder_samples(1024);
     Acquisition acquisition(io, *port, dbc, settings, clock, nullptr,
-                            {ring, *estimator_waiter, *control, interlock});
+                            {ring, *estimator_waiter, *control, interlock, &stages,
+                             &recorder_frames, &recorder_samples});
     acquisition.start([](drivers::PortState, const char*) {});
     DwellOrder order;
     // Long enough for the test, short enough for blocks of a second.
@@ -85,6 +91,9 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     std::uint64_t before = 0;  // taken after start-up
     for (std::uint32_t n = 0; n < kSamples; ++n) {
         if (n == kSamples / 4) before = test::watched_allocations();
+        // Each stage of the campaign in turn; their pieces wait for nobody.
+        if (n == kSamples / 2) stages.order(StageFeed::Mode::force);
+        if (n == kSamples * 3 / 4) stages.order(StageFeed::Mode::increments);
         const double low = n % 256;
         const double f = std::sin(0.37 * n);
         std::vector<canfd_frame> frames{
@@ -104,6 +113,13 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
         if (n % 4 == 0)
             frames.push_back(frame_of(dbc, "PlatformStatus",
                                       {{"LoopClosed", 1}, {"Ready", 1}, {"Temperature", 20}}));
+        if (n > kSamples * 3 / 4) {
+            const double counter = n % 256;
+            frames.push_back(frame_of(dbc, "GyroIncrements", {{"X", 1}, {"Counter", counter}}));
+            frames.push_back(
+                frame_of(dbc, "AccelerometerIncrements", {{"Z", 0.1}, {"Counter", counter}}));
+        }
+        if (n % 10 == 0) frames.push_back(frame_of(dbc, "GimbalStatus", {{"Torquing", 1}}));
         if (n % 50 == 7) frames.erase(frames.begin() + n % 6);
         if (n % 70 == 3) frames[1].can_id = 0x7ff;
         for (const auto& frame : frames)
@@ -125,6 +141,14 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     EXPECT_GT(stage.view().in_dwell, kSamples * 9 / 10);
     EXPECT_GT(stage.view().estimate.used, kSamples / 2);
     EXPECT_EQ(after - before, 0U);
+    // and so did the frames and samples for the recorder and the pieces for the stages
+    EXPECT_GT(recorder_frames.counts().pushed + recorder_frames.counts().dropped, 6 * kSamples);
+    EXPECT_GT(recorder_samples.counts().dropped, 0U);
+    EXPECT_GT(stages.counters().pairs, kSamples / 5);
+    EXPECT_TRUE(stages.torque().torquing);
+    Motion motion;
+    ASSERT_TRUE(stages.pop(motion));
+    EXPECT_TRUE(motion.increment);
     // and means of their angles, of one second each, have come to the control thread's side
     BlockRecord block;
     ASSERT_TRUE(stage.take_block(block));

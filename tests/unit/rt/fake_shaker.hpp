@@ -31,6 +31,18 @@ class FakeShaker final : public drivers::Shaker {
     void on_reading(std::function<void()>) override {}
     void shut_down() noexcept override {}
 
+    /// Reads back at once what was asked last; a stop that waits comes first.
+    void obey(drivers::Time time) {
+        if (stop_waits.exchange(false)) requests.push_back({15, 0, 0});
+        now.time = time;
+        if (requests.empty()) return;
+        const drivers::ShakerSetPoint& wanted = requests.back();
+        now.amplitude_g = now.measured_g = wanted.amplitude_g;
+        now.frequency_hz = wanted.frequency_hz;
+        now.running = wanted.amplitude_g > 0;
+        now.state = wanted.amplitude_g > 0 ? 2 : 0;
+    }
+
     drivers::ShakerReading now;
     std::vector<drivers::ShakerSetPoint> requests;
     std::atomic<int> stops{0};
