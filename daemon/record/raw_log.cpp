@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <spdlog/fmt/fmt.h>
-#include <sys/statvfs.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -13,7 +12,7 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/record/wall_clock.hpp"
+#include "daemon/record/disk.hpp"
 
 namespace vibrig::record {
 
@@ -103,14 +102,8 @@ void RawLog::forget() {
 }
 
 void RawLog::open() {
-    struct statvfs room {};
-    if (::statvfs(folder_.c_str(), &room) == 0) {
-        const double free_mb =
-            static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize) / 1e6;
-        if (free_mb < settings_.keep_free_mb)
-            return refuse(fmt::format("{}: {:.0f} MB free, expected {} at least", folder_, free_mb,
-                                      settings_.keep_free_mb));
-    }
+    if (const std::string why = lack_of_room(folder_, settings_.keep_free_mb); !why.empty())
+        return refuse(why);
     segment_ = {};
     segment_.file = fmt::format("raw-{:04d}.log", ++number_);
     segment_.from = buffer_from_;

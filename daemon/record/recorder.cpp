@@ -3,14 +3,13 @@
 #include <pthread.h>
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
-#include <sys/statvfs.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <utility>
 
-#include "daemon/record/wall_clock.hpp"
+#include "daemon/record/disk.hpp"
 
 namespace vibrig::record {
 
@@ -193,14 +192,9 @@ void Recorder::take(const drivers::Sample& sample) {
 }
 
 bool Recorder::room() {
-    struct statvfs room {};
-    if (::statvfs(campaign_folder_.c_str(), &room) != 0) return true;
-    const double free_mb =
-        static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize) / 1e6;
-    if (free_mb >= settings_.keep_free_mb) return true;
-    refuse(fmt::format("{}: {:.0f} MB free, expected {} at least", campaign_folder_, free_mb,
-                       settings_.keep_free_mb));
-    return false;
+    const std::string why = lack_of_room(campaign_folder_, settings_.keep_free_mb);
+    if (!why.empty()) refuse(why);
+    return why.empty();
 }
 
 /// What was not written yet is lost. The file so far stays; another goes on when the disk does.
@@ -242,7 +236,9 @@ void Recorder::take(Head& head) {
     head_ = std::move(head);
     std::string base = folder_ + "/" + head_->name + "-" + stamp(head_->utc_ns);
     campaign_folder_ = base;
-    for (int i = 2; std::filesystem::exists(campaign_folder_); ++i)
+    // A folder that cannot be looked at is met again, and told, when the file is opened.
+    std::error_code unknown;
+    for (int i = 2; std::filesystem::exists(campaign_folder_, unknown); ++i)
         campaign_folder_ = fmt::format("{}-{}", base, i);
     part_ = 0;
     lost_ = {};
@@ -256,15 +252,10 @@ void Recorder::take(Head& head) {
     }
     before_.clear();
     if (settings_.raw)
-        raw_ = std::make_unique<RawLog>(
-            campaign_folder_, head_->interface, settings_, head_->utc_offset_ns,
-            [this](const Segment& segment) { closed_segment(segment); });
+        raw_ = std::make_unique<RawLog>(campaign_folder_, head_->interface, settings_,
+                                        head_->utc_offset_ns,
+                                        [this](const Segment&) { ++shown_.segments; });
     committed_wall_ns_ = wall_ns();
-}
-
-void Recorder::closed_segment(const Segment& segment) {
-    ++shown_.segments;
-    segments_bytes_ += segment.bytes;
 }
 
 /// Beside the raw log, in its times: which frames belong to which dwell.

@@ -100,7 +100,6 @@ class Recorder {
     void refuse(const std::string& why);
     void write_gap(const Gap& gap);
     void write_order_line(const Order& order);
-    void closed_segment(const Segment& segment);
     void show();
     [[nodiscard]] bool room();
 
@@ -128,7 +127,6 @@ class Recorder {
     Gap lost_;  ///< samples that could not be written
     bool told_bad_ = false;
     RecorderStatus shown_;
-    std::uint64_t segments_bytes_ = 0;
 
     std::atomic<bool> stop_{false};
     mutable std::mutex mutex_;

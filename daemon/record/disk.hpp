@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 
 namespace vibrig::record {
 
@@ -14,5 +15,8 @@ inline std::int64_t wall_ns() {
                std::chrono::steady_clock::now().time_since_epoch())
         .count();
 }
+
+/// Empty if `folder` has `keep_free_mb` left, or if nobody knows; else what was found and expected.
+[[nodiscard]] std::string lack_of_room(const std::string& folder, double keep_free_mb);
 
 }  // namespace vibrig::record
