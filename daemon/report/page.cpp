@@ -1,6 +1,10 @@
 #include "daemon/report/page.hpp"
 
+#include "daemon/tool/plot/xml_text.hpp"
+
 namespace vibrig::report {
+
+using tool::plot::xml_text;
 
 namespace {
 
@@ -38,41 +42,18 @@ table{font-size:7.6pt}th,td{padding:.12rem .4rem}.wide{overflow:visible}}
 
 std::string cell(const std::string& tag, const std::string& text) {
     const bool bad = text.starts_with('!');
-    return "<" + tag + (bad ? " class=\"bad\">" : ">") + escape(bad ? text.substr(1) : text) +
+    return "<" + tag + (bad ? " class=\"bad\">" : ">") + xml_text(bad ? text.substr(1) : text) +
            "</" + tag + ">";
 }
 
 }  // namespace
 
-std::string escape(const std::string& text) {
-    std::string out;
-    for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            default:
-                out += static_cast<unsigned char>(c) < 0x20 && c != '\n' ? ' ' : c;
-        }
-    }
-    return out;
-}
-
 void Page::section(const std::string& id, const std::string& title) {
-    body_ += "<h2 id=\"" + id + "\">" + escape(title) + "</h2>\n";
-    contents_ += "<a href=\"#" + id + "\">" + escape(title) + "</a>\n";
+    body_ += "<h2 id=\"" + id + "\">" + xml_text(title) + "</h2>\n";
+    contents_ += "<a href=\"#" + id + "\">" + xml_text(title) + "</a>\n";
 }
 
-void Page::paragraph(const std::string& text) { body_ += "<p>" + escape(text) + "</p>\n"; }
+void Page::paragraph(const std::string& text) { body_ += "<p>" + xml_text(text) + "</p>\n"; }
 
 void Page::table(const std::vector<std::vector<std::string>>& rows, const std::string& kind) {
     body_ += "<div class=\"wide\"><table" + (kind.empty() ? "" : " class=\"" + kind + "\"") + ">\n";
@@ -85,11 +66,11 @@ void Page::table(const std::vector<std::vector<std::string>>& rows, const std::s
 }
 
 void Page::figure(const std::string& svg, const std::string& caption) {
-    body_ += "<figure>" + svg + "<figcaption>" + escape(caption) + "</figcaption></figure>\n";
+    body_ += "<figure>" + svg + "<figcaption>" + xml_text(caption) + "</figcaption></figure>\n";
 }
 
 void Page::details(const std::string& summary, const std::string& preformatted) {
-    body_ += "<details><summary>" + escape(summary) + "</summary><pre>" + escape(preformatted) +
+    body_ += "<details><summary>" + xml_text(summary) + "</summary><pre>" + xml_text(preformatted) +
              "</pre></details>\n";
 }
 
@@ -97,8 +78,8 @@ std::string Page::html(const std::string& title) const {
     const std::size_t head = body_.find("<h2");
     return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
            "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
-           escape(title) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
-           escape(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ + "</nav>\n" +
+           xml_text(title) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
+           xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ + "</nav>\n" +
            (head == std::string::npos ? "" : body_.substr(head)) +
            "<div class=\"sign\"><div>Operator, date</div><div>Approved by, date</div></div>\n"
            "</body></html>\n";

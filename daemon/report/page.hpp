@@ -20,6 +20,4 @@ class Page {
     std::string body_, contents_;
 };
 
-[[nodiscard]] std::string escape(const std::string& text);
-
 }  // namespace vibrig::report

@@ -373,20 +373,6 @@ int run_simulate(const Options& options) {
     return fast && run.settled_s < 0 ? kNo : 0;
 }
 
-int guarded(int (*run)(const Options&), const Options& options) {
-    try {
-        const int code = run(options);
-        std::cout << std::flush;
-        if (std::cout) {
-            return code;
-        }
-        std::cerr << "standard output: cannot be written\n";
-    } catch (const std::exception& error) {
-        std::cerr << error.what() << '\n';
-    }
-    return kBadInput;
-}
-
 void add_design_options(CLI::App& command, Options& o) {
     command.add_option("--settling", o.specification.settling_s, "settling time in s (100)");
     command.add_option("--residual", o.specification.residual,
@@ -460,7 +446,8 @@ void add_level(CLI::App& app, int& exit_code) {
         "Example: vibrig level design --settling 600 --period 1 --reference-noise 0.2\n"
         "Method: Zha et al. 2019, eqs. 11-15.\n"
         "Exit codes: 0 done, 1 cannot settle with these figures, 2 bad usage or input.");
-    design->callback([options, &exit_code] { exit_code = guarded(run_design, *options); });
+    design->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run_design(*options); }); });
     CLI::App* simulate =
         command->add_subcommand("simulate", "Starts of two channels under the loop");
     add_design_options(*simulate, *options);
@@ -469,7 +456,8 @@ void add_level(CLI::App& app, int& exit_code) {
         "Example: vibrig level simulate --tilt 30,30 --step 2 --window 10 --tolerance 0.2 --runs "
         "1000\n"
         "Exit codes: 0 settled, 1 not settled, 2 bad usage or input.");
-    simulate->callback([options, &exit_code] { exit_code = guarded(run_simulate, *options); });
+    simulate->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run_simulate(*options); }); });
 }
 
 }  // namespace vibrig::tool

@@ -132,14 +132,8 @@ void add_pki(CLI::App& app, int& exit_code) {
         "  certificate = \"server.crt\"\n"
         "  key = \"server.key\"\n"
         "  clients_ca = \"authority.crt\"");
-    making.callback([options, &exit_code] {
-        try {
-            exit_code = init(*options);
-        } catch (const std::exception& error) {
-            std::cerr << "vibrig: " << error.what() << '\n';
-            exit_code = kBadInput;
-        }
-    });
+    making.callback(
+        [options, &exit_code] { exit_code = guarded([&] { return init(*options); }, "vibrig: "); });
 }
 
 }  // namespace vibrig::tool

@@ -17,6 +17,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/progress.hpp"
 #include "proto/recording_csv.hpp"
 
@@ -240,16 +241,6 @@ int recover(const std::string& argument, bool json) {
     return 0;
 }
 
-template <typename Run>
-void answered(int& exit_code, Run run) {
-    try {
-        exit_code = run();
-    } catch (const std::exception& error) {
-        std::cerr << error.what() << '\n';
-        exit_code = kBadInput;
-    }
-}
-
 }  // namespace
 
 void add_recordings(CLI::App& app, int& exit_code) {
@@ -271,9 +262,8 @@ void add_recordings(CLI::App& app, int& exit_code) {
                           "standard output)");
     exporting->footer("Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv");
     exporting->callback([options, &exit_code] {
-        answered(exit_code, [&] {
-            return export_campaign(options->campaign, options->format, options->output);
-        });
+        exit_code = guarded(
+            [&] { return export_campaign(options->campaign, options->format, options->output); });
     });
 
     CLI::App* recovering = app.add_subcommand(
@@ -285,7 +275,7 @@ void add_recordings(CLI::App& app, int& exit_code) {
         "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
         "A file that was closed in order is left as it is.");
     recovering->callback([options, &exit_code] {
-        answered(exit_code, [&] { return recover(options->campaign, options->json); });
+        exit_code = guarded([&] { return recover(options->campaign, options->json); });
     });
 }
 

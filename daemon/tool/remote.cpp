@@ -15,9 +15,12 @@
 
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/exit_status.hpp"
 
 namespace vibrig::tool {
 namespace {
+
+constexpr const char* kWho = "vibrig: ";  // before what a daemon has refused, too
 
 using Steady = std::chrono::steady_clock;
 
@@ -117,19 +120,8 @@ int send_command(const CommandOptions& options) {
         return 0;
     }
     constexpr int kRefused = 409;
-    std::cerr << "vibrig: " << problem_of(reply) << '\n';
+    std::cerr << kWho << problem_of(reply) << '\n';
     return reply.status == kRefused ? kNo : kBadInput;
-}
-
-/// Runs a command's body; what it throws becomes one line and exit code 2.
-template <typename Body>
-void guarded(int& exit_code, Body&& body) {
-    try {
-        exit_code = body();
-    } catch (const std::exception& error) {
-        std::cerr << "vibrig: " << error.what() << '\n';
-        exit_code = kBadInput;
-    }
 }
 
 void add_socket(CLI::App& command, serve::Address& at) {
@@ -165,8 +157,9 @@ void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const ch
         example += " trip";
     }
     command.footer(example + " --by 'Ada Lovelace'");
-    command.callback(
-        [options, &exit_code] { guarded(exit_code, [&] { return send_command(*options); }); });
+    command.callback([options, &exit_code] {
+        exit_code = guarded([&] { return send_command(*options); }, kWho);
+    });
 }
 
 }  // namespace
@@ -207,7 +200,7 @@ void add_remote(CLI::App& app, int& exit_code) {
         "Example: vibrig status --json\n"
         "Remotely: vibrig status --host rig.lab --identity vibrig-pki/ada");
     status.callback([status_options, &exit_code] {
-        guarded(exit_code, [&] { return show_status(*status_options); });
+        exit_code = guarded([&] { return show_status(*status_options); }, kWho);
     });
 
     CLI::App& testing = *app.add_subcommand(
@@ -217,7 +210,7 @@ void add_remote(CLI::App& app, int& exit_code) {
     testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
     testing.footer("Example: vibrig selftest && vibrig arm --by 'Ada Lovelace'");
     testing.callback([test_options, &exit_code] {
-        guarded(exit_code, [&] { return self_test(*test_options); });
+        exit_code = guarded([&] { return self_test(*test_options); }, kWho);
     });
 
     CLI::App& watching = *app.add_subcommand("watch", "The status as a live table");
@@ -230,8 +223,9 @@ void add_remote(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(0.05, 3600.0))
         ->capture_default_str();
     watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
-    watching.callback(
-        [watch_options, &exit_code] { guarded(exit_code, [&] { return watch(*watch_options); }); });
+    watching.callback([watch_options, &exit_code] {
+        exit_code = guarded([&] { return watch(*watch_options); }, kWho);
+    });
 
     CLI::App& events = *app.add_subcommand("events", "What happened, oldest first");
     auto event_options = std::make_shared<EventOptions>();
@@ -240,7 +234,7 @@ void add_remote(CLI::App& app, int& exit_code) {
     events.add_flag("--json", event_options->json, "One JSON object per line (vibrig.v1.Event)");
     events.footer("Example: vibrig events --follow");
     events.callback([event_options, &exit_code] {
-        guarded(exit_code, [&] { return show_events(*event_options); });
+        exit_code = guarded([&] { return show_events(*event_options); }, kWho);
     });
 
     add_command(app, exit_code, v1::Command::arm, "arm", "Arm the shaker for one campaign");

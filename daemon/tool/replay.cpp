@@ -14,6 +14,7 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
@@ -152,14 +153,8 @@ void add_replay(CLI::App& app, int& exit_code) {
         "On the build and instruction set of the recording the estimates come out as they were to\n"
         "the last bit; standard error says whether they did.\n"
         "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
-    command->callback([arguments, &exit_code] {
-        try {
-            exit_code = replay(*arguments);
-        } catch (const std::exception& error) {
-            std::cerr << error.what() << '\n';
-            exit_code = kBadInput;
-        }
-    });
+    command->callback(
+        [arguments, &exit_code] { exit_code = guarded([&] { return replay(*arguments); }); });
 }
 
 }  // namespace vibrig::tool

@@ -20,6 +20,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
 
@@ -249,16 +250,6 @@ int compensate(CompensateArguments arguments) {
     return all ? 0 : kNo;
 }
 
-template <typename Run>
-void reported(int& exit_code, Run run) {
-    try {
-        exit_code = run();
-    } catch (const std::exception& error) {
-        std::cerr << error.what() << '\n';
-        exit_code = kBadInput;
-    }
-}
-
 }  // namespace
 
 void add_reports(CLI::App& app, int& exit_code) {
@@ -276,7 +267,7 @@ void add_reports(CLI::App& app, int& exit_code) {
     reporting->footer(
         "Example: vibrig report demo-20260301T080000Z -o report.html --pdf report.pdf");
     reporting->callback(
-        [report, &exit_code] { reported(exit_code, [&] { return make_report(*report); }); });
+        [report, &exit_code] { exit_code = guarded([&] { return make_report(*report); }); });
 
     auto compensation = std::make_shared<CompensateArguments>();
     CLI::App* compensating = app.add_subcommand(
@@ -304,7 +295,7 @@ void add_reports(CLI::App& app, int& exit_code) {
         "Example: vibrig compensate demo-20260301T080000Z --attitude 45,0,90 --platform-g 6\n"
         "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
     compensating->callback([compensation, &exit_code] {
-        reported(exit_code, [&] { return compensate(*compensation); });
+        exit_code = guarded([&] { return compensate(*compensation); });
     });
 }
 

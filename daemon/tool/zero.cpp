@@ -269,20 +269,6 @@ int run_simulate(const Options& options) {
     return report(options, up, apart);
 }
 
-int guarded(int (*run)(const Options&), const Options& options) {
-    try {
-        const int code = run(options);
-        std::cout << std::flush;
-        if (std::cout) {
-            return code;
-        }
-        std::cerr << "standard output: cannot be written\n";
-    } catch (const std::exception& error) {
-        std::cerr << error.what() << '\n';
-    }
-    return kBadInput;
-}
-
 void add_common(CLI::App& command, Options& o) {
     zeros::CalibrationSettings& s = o.calibration;
     command.add_option("--latitude", o.latitude_deg, "deg (45.75)");
@@ -347,9 +333,10 @@ void add_zero(CLI::App& app, int& exit_code) {
     simulate->add_option("--write", options->write,
                          "write the increments to this CSV file instead");
     simulate->footer("Example: vibrig zero simulate --scale 0,0,100 --both-ways");
-    simulate->callback([options, &exit_code] { exit_code = guarded(run_simulate, *options); });
+    simulate->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run_simulate(*options); }); });
     command->callback([options, simulate, &exit_code] {
-        if (!simulate->parsed()) exit_code = guarded(run_file, *options);
+        if (!simulate->parsed()) exit_code = guarded([&] { return run_file(*options); });
     });
 }
 

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "daemon/tool/plot/xml_text.hpp"
+
 namespace vibrig::tool::plot {
 
 namespace {
@@ -67,27 +69,6 @@ std::string number(double value) {
     std::array<char, 32> text{};
     std::snprintf(text.data(), text.size(), "%.2f", value);
     return text.data();
-}
-
-std::string escaped(const std::string& text) {
-    std::string out;
-    for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            default:
-                // Control characters are not allowed in XML at all.
-                out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-        }
-    }
-    return out;
 }
 
 /// Viridis, sampled; interpolated in between.
@@ -218,7 +199,7 @@ class Drawing {
     void text(double x, double y, const std::string& words, const char* anchor,
               const std::string& more = "") {
         out_ += "<text x=\"" + number(x) + "\" y=\"" + number(y) + "\" text-anchor=\"" + anchor +
-                "\"" + more + ">" + escaped(words) + "</text>\n";
+                "\"" + more + ">" + xml_text(words) + "</text>\n";
     }
 
     [[nodiscard]] static double bottom() { return kTop + kPlotHeight; }
@@ -314,7 +295,7 @@ std::string Chart::svg() const {
     }
     return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + number(kWidth) + "\" height=\"" +
            number(height) + "\" viewBox=\"0 0 " + number(kWidth) + " " + number(height) +
-           "\" role=\"img\">\n<title>" + escaped(title) + "</title>\n" + style() +
+           "\" role=\"img\">\n<title>" + xml_text(title) + "</title>\n" + style() +
            "<clipPath id=\"plot\"><rect x=\"" + number(kLeft) + "\" y=\"" + number(kTop) +
            "\" width=\"" + number(kWidth - kRight - kLeft) + "\" height=\"" + number(kPlotHeight) +
            "\"/></clipPath>\n<rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n" +
