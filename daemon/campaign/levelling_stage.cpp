@@ -20,7 +20,9 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
     loop.earth.gravity_mps2 = rig.gravity_mps2;
     loop.fast = level::design({s.settling_s, s.residual, s.damping}, loop.earth).gains;
     loop.settling_s = s.settling_s;
-    if (s.slow.size() == 3) loop.slow = level::Gains{s.slow[0], s.slow[1], s.slow[2]};
+    if (s.slow_settling_s > 0) {
+        loop.slow = level::design({s.slow_settling_s, s.residual, s.damping}, loop.earth).gains;
+    }
     loop.ramp_s = s.slow_ramp_s;
     loop.period_s = s.block * s.sample_s;
     loop.window_s = s.window_s;

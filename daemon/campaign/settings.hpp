@@ -32,8 +32,8 @@ struct LevellingSettings {
     double torquer_limit_deg_h = 3000;
     std::uint32_t block = 4;  ///< samples per step of the loop, about 0.1 s
     double sample_s = 0.025;
-    std::vector<double> slow;  ///< K1, K2, K3 to ramp to once settled; empty: stay fast
-    double slow_ramp_s = 60;
+    double slow_settling_s = 0;  ///< of the gains to go over to once settled; 0: stay fast
+    double slow_ramp_s = 60;     ///< that it takes to go over
     drivers::TorquerSettings torquer;
 };
 

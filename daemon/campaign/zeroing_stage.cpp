@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/zeros/observability.hpp"
 
@@ -13,7 +14,7 @@ namespace zeros = estimator::zeros;
 
 namespace {
 
-constexpr double kRadian = 3.14159265358979323846 / 180;
+constexpr double kRadian = std::numbers::pi / 180;
 constexpr double kSureness = 3;  // standard deviations
 
 }  // namespace

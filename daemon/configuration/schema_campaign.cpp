@@ -21,6 +21,9 @@ void add_levelling_keys(std::vector<Key>& keys) {
           &L::settling_s);
     level("residual", "", {1e-5, 0.5}, "fraction of the initial tilt left then", &L::residual);
     level("damping", "", {0.1, 0.99}, "damping ratio of the loop", &L::damping);
+    level("slow_settling_s", "s", {0, 100'000},
+          "of the quieter gains to go over to once settled; 0: stay fast", &L::slow_settling_s);
+    level("slow_ramp_s", "s", {1, 3600}, "that it takes to go over", &L::slow_ramp_s);
     level("window_s", "s", {1, 3600}, "of the means that the verdict rests on", &L::window_s);
     level("tolerance_arcmin", "arcmin", {0.001, 60}, "of mean specific force and rate of z",
           &L::tolerance_arcmin);

@@ -189,6 +189,24 @@ TEST_F(StagesTest, LevelsBeforeEachPositionAndLetsThePlatformDriftFreelyDuringTh
     EXPECT_NEAR(std::hypot(found[0], found[1]), std::hypot(drift[0], drift[2]), 0.2);
 }
 
+TEST_F(StagesTest, GoesOverToQuieterGainsOnceSettledAndOnlyThenBeginsTheDwell) {
+    // GIVEN gains of 300 s to go over to within 20 s
+    settings.levelling = true;
+    settings.level.slow_settling_s = 300;
+    settings.level.slow_ramp_s = 20;
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    // WHEN it has settled
+    while (status().levelling.verdict != std::string("settled") && now < 400 * kSecond) tick();
+    const Time settled = now;
+    EXPECT_EQ(status().levelling.phase, std::string("ramp"));
+    // THEN the table shakes 20 s later at the earliest, the platform still level
+    ASSERT_TRUE(run_until(CampaignState::ramping, 60)) << testing::PrintToString(events);
+    EXPECT_GE(now - settled, 20 * kSecond);
+    EXPECT_LT(now - settled, 23 * kSecond);
+    EXPECT_LT(std::hypot(up[0], up[2]), 2 * 0.2 / 60 * kRadPerDeg);
+}
+
 TEST_F(StagesTest, TorquersTheWrongWayRoundCannotSettleAndNoDataAreTaken) {
     settings.levelling = true;
     torquer_sign = -1;
