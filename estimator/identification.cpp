@@ -33,6 +33,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
       prior(prior_sigma(s)),
       filters{RunFilter(s, s.method == Method::joint ? prior : two_step_prior(prior)),
               RunFilter(s, two_step_prior(prior))},
+      noise(noise_levels(s)),
       kinematics_(s),
       accelerometer_zero_(s.accelerometer_zero_g[0], s.accelerometer_zero_g[1],
                           s.accelerometer_zero_g[2]),
@@ -275,6 +276,7 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             }
         }
     }
+    verdict.summary.noise = noise;
     samples += verdict.summary.samples;
     used += verdict.summary.used;
     rejected += verdict.summary.rejected;
@@ -335,8 +337,10 @@ StepResult Identification::add(const Measurement& measurement) noexcept {
 DwellSummary Identification::end_dwell() noexcept { return impl_->end_dwell(); }
 void Identification::estimate(Estimate& out) const noexcept { impl_->estimate(out); }
 void Identification::set_noise(const NoiseLevels& levels) noexcept {
+    impl_->noise = levels;
     for (RunFilter& run : impl_->filters) run.filter.set_noise(FilterNoise::of(levels));
 }
+const NoiseLevels& Identification::noise() const noexcept { return impl_->noise; }
 Result Identification::result() const { return impl_->result(); }
 
 std::vector<double> Identification::covariance() const {

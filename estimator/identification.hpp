@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace vibrig::estimator {
@@ -117,6 +118,7 @@ struct DwellSummary {
     bool flagged =
         false;  ///< more than 1 % rejected, or vertical force not 1 g, or excluded frequency
     const char* reason = "";  ///< static text; empty when not flagged
+    NoiseLevels noise;        ///< that the filter took in this dwell
 };
 
 /// Fixed-size state of the identification for displays; copied without allocation.
@@ -171,6 +173,11 @@ struct Result {
     std::vector<std::string> warnings;
 };
 
+/// Adds what uncertain zeros of the accelerometers do to the runs' amplitudes. `level_variances`:
+/// for each dwell with known zeros its run and the variance of the vertical force, relative. The
+/// zeros are the same in every dwell: they do not average out.
+void widen_amplitudes(Result& result, const std::vector<std::pair<int, double>>& level_variances);
+
 /// D_Fx D_Ix D_Ox D_Sx D_IIx D_OOx D_SSx D_IOx D_ISx D_OSx, then y, z (IEEE Std 517 usage).
 [[nodiscard]] const std::array<const char*, kParameters>& parameter_names() noexcept;
 /// "deg/h", "deg/h/g" or "deg/h/g^2".
@@ -192,6 +199,7 @@ class Identification {
     void estimate(Estimate& out) const noexcept;
     /// In place of the settings' noise, from the next dwell on; between dwells only.
     void set_noise(const NoiseLevels& levels) noexcept;
+    [[nodiscard]] const NoiseLevels& noise() const noexcept;
     /// Final result over all ended dwells. Allocates; does not change the filter.
     [[nodiscard]] Result result() const;
     /// Of the coefficients after the last ended dwell, 30 x 30 row-major in the order of

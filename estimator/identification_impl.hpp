@@ -55,6 +55,7 @@ struct Identification::Impl {
     Settings settings;
     ParameterArray prior;  ///< standard deviations, filter order
     std::array<RunFilter, 2> filters;
+    NoiseLevels noise;  ///< that the filters take
     Solution solution;  ///< after the last ended dwell
     std::vector<DwellSummary> dwells;
     std::size_t dwells_not_kept = 0;  ///< summaries beyond max_dwells

@@ -101,6 +101,21 @@ std::string unobservable_warning(const std::array<bool, kParameters>& observable
 
 }  // namespace
 
+void widen_amplitudes(Result& result, const std::vector<std::pair<int, double>>& level_variances) {
+    for (RunAmplitude& amplitude : result.amplitudes) {
+        double sum = 0;
+        std::size_t n = 0;
+        for (const auto& [run, variance] : level_variances) {
+            if (run != amplitude.run) continue;
+            sum += variance;
+            ++n;
+        }
+        if (n == 0) continue;
+        amplitude.sigma_g = std::hypot(
+            amplitude.sigma_g, amplitude.amplitude_g * std::sqrt(sum / static_cast<double>(n)));
+    }
+}
+
 bool Identification::Impl::two_runs() const noexcept {
     return filters[0].kappa.dwells > 0 && filters[1].kappa.dwells > 0;
 }

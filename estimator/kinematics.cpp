@@ -45,6 +45,22 @@ Eigen::Vector3d Kinematics::gimbal_angles(const std::array<double, 3>& encoder_r
     return angles;
 }
 
+std::array<double, 3> gimbal_deg(const Settings& settings,
+                                 const std::array<double, 3>& encoder_deg) noexcept {
+    std::array<double, 3> angles{};
+    for (std::size_t k = 0; k < 3; ++k)
+        angles[k] = settings.encoder_sign[k] * (encoder_deg[k] - settings.encoder_zero_deg[k]);
+    return angles;
+}
+
+std::array<double, 3> encoder_deg(const Settings& settings,
+                                  const std::array<double, 3>& gimbal_deg) noexcept {
+    std::array<double, 3> angles{};
+    for (std::size_t k = 0; k < 3; ++k)
+        angles[k] = settings.encoder_sign[k] * gimbal_deg[k] + settings.encoder_zero_deg[k];
+    return angles;
+}
+
 Pose Kinematics::pose(const Eigen::Vector3d& angles_rad) const noexcept {
     const double ca = std::cos(angles_rad[0]), sa = std::sin(angles_rad[0]);
     const double cb = std::cos(angles_rad[1]), sb = std::sin(angles_rad[1]);

@@ -49,4 +49,10 @@ class Kinematics {
     Eigen::Vector3d up_, earth_rate_, encoder_sign_, encoder_zero_;
 };
 
+/// Gimbal angles of encoder angles, and back, deg, without wrapping.
+[[nodiscard]] std::array<double, 3> gimbal_deg(const Settings& settings,
+                                               const std::array<double, 3>& encoder_deg) noexcept;
+[[nodiscard]] std::array<double, 3> encoder_deg(const Settings& settings,
+                                                const std::array<double, 3>& gimbal_deg) noexcept;
+
 }  // namespace vibrig::estimator

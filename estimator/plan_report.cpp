@@ -31,15 +31,11 @@ PlanReport report_plan(const Settings& settings, const std::vector<PlannedDwell>
 std::vector<PlannedDwell> campaign_plan(const Settings& settings,
                                         const std::vector<std::array<double, 3>>& positions_deg,
                                         const std::vector<double>& table_g, double dwell_s) {
-    const Kinematics kinematics(settings);
     std::vector<PlannedDwell> plan;
     for (const double level : table_g) {
         const double a0 = settings.transmission * level;
         for (const std::array<double, 3>& position : positions_deg) {
-            std::array<double, 3> encoder{};
-            for (std::size_t k = 0; k < 3; ++k) encoder[k] = position[k] * kPi / 180.0;
-            const Eigen::Vector3d angles = kinematics.gimbal_angles(encoder) * (180.0 / kPi);
-            plan.push_back({{angles[0], angles[1], angles[2]}, 1.0 + 0.5 * a0 * a0, dwell_s});
+            plan.push_back({gimbal_deg(settings, position), 1.0 + 0.5 * a0 * a0, dwell_s});
         }
     }
     return plan;

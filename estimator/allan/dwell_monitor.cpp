@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "estimator/allan/edf.hpp"
 
@@ -24,6 +25,13 @@ double squared(double x) { return x * x; }
 /// q [arcsec^2/s] of N [deg/sqrt(h)] and back.
 double walk_of(double n) { return squared(60 * n); }
 double n_of(double walk) { return std::sqrt(walk) / 60; }
+
+/// An offset common to all cancels in differences, but not its rounding.
+VectorXd centred(const DwellAngles& dwell) {
+    const Eigen::Map<const VectorXd> angle(dwell.angle_arcsec.data(),
+                                           static_cast<Eigen::Index>(dwell.angle_arcsec.size()));
+    return (angle.array() - angle[0]).matrix();
+}
 
 double scale_of(std::size_t slow_term, double block_s) {
     return std::pow(block_s, static_cast<double>(slow_term) + 2);
@@ -173,9 +181,33 @@ std::array<double, 2> DwellMonitor::bounds(const DwellAngles& dwell,
     // The reference is uncertain too; variances of the logarithm add.
     const double degrees = trace * trace / norm * taught / (1 + taught);
     const double tail =
-        settings_.alpha / (2 * kSharers * static_cast<double>(dwell.basis->octaves.size()));
+        settings_.alpha / (2 * kSharers * static_cast<double>(tests_of(*dwell.basis)));
     return {chi_square_quantile(tail, degrees) / degrees,
             chi_square_quantile(1 - tail, degrees) / degrees};
+}
+
+std::vector<DwellPoint> DwellMonitor::points() const {
+    struct Sums {
+        double measured = 0, expected = 0, differences = 0;
+    };
+    std::map<double, Sums> by_tau;
+    for (const Kept& kept : dwells_) {
+        const DwellAngles& dwell = kept.dwell;
+        for (const DwellBasis::Octave& octave : dwell.basis->octaves) {
+            Sums& sums = by_tau[static_cast<double>(octave.m) * dwell.block_s];
+            sums.measured += (octave.differences * centred(dwell)).squaredNorm();
+            sums.expected += dwell.white_share * solution_.white[kept.level] * octave.white_trace +
+                             solution_.walk * dwell.block_s * octave.walk_trace;
+            sums.differences += static_cast<double>(octave.differences.rows());
+        }
+    }
+    std::vector<DwellPoint> points;
+    for (const auto& [tau, sums] : by_tau) {
+        // MVAR = <(second difference of averages)^2> / (2 tau^2); 1 arcsec/s is 1 deg/h.
+        const double scale = std::sqrt(1 / (2 * sums.differences)) / tau;
+        points.push_back({tau, scale * std::sqrt(sums.measured), scale * std::sqrt(sums.expected)});
+    }
+    return points;
 }
 
 std::vector<Alarm> DwellMonitor::check(const DwellAngles& dwell) const {
@@ -185,15 +217,12 @@ std::vector<Alarm> DwellMonitor::check(const DwellAngles& dwell) const {
     });
     const auto level = static_cast<std::size_t>(at - levels_.begin());
     if (at == levels_.end() || dwells_at(level) < settings_.reference_dwells) return alarms;
-    const Eigen::Map<const VectorXd> angle(dwell.angle_arcsec.data(),
-                                           static_cast<Eigen::Index>(dwell.angle_arcsec.size()));
-    const VectorXd centred = (angle.array() - angle[0]).matrix();
     const std::size_t count = dwell.basis->octaves.size();
     for (std::size_t i = 0; i < count; ++i) {
         const DwellBasis::Octave& octave = dwell.basis->octaves[i];
         const double expected = dwell.white_share * solution_.white[level] * octave.white_trace +
                                 solution_.walk * dwell.block_s * octave.walk_trace;
-        const double ratio = (octave.differences * centred).squaredNorm() / expected;
+        const double ratio = (octave.differences * centred(dwell)).squaredNorm() / expected;
         const auto [low, high] = bounds(dwell, octave, level);
         if (ratio >= low && ratio <= high) continue;
         const std::size_t part = 3 * i / count;

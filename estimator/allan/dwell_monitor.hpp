@@ -23,8 +23,15 @@ struct DwellAngles {
     double level = 0;        ///< vibration; dwells of different levels are never compared
 };
 
+/// Modified Allan deviation of the angle residuals, all kept dwells together.
+struct DwellPoint {
+    double tau_s = 0;
+    double deviation = 0;  ///< deg/h
+    double expected = 0;   ///< of the identified resolver noise and random walk, deg/h
+};
+
 struct DwellMonitorSettings {
-    double alpha = 1e-3;               ///< of one dwell, shared by the octaves and the gyros
+    double alpha = 1e-3;               ///< of one dwell, shared by the tests and the gyros
     std::size_t reference_dwells = 5;  ///< of one level, before alarms are raised
     std::size_t keep = 64;             ///< dwells, the newest
     double angle_arcsec = 5;           ///< where the search begins
@@ -39,6 +46,10 @@ class DwellMonitor {
   public:
     explicit DwellMonitor(const DwellMonitorSettings& settings) : settings_(settings) {}
 
+    /// Of one gyro in one dwell: its octaves, and the mean of the dwell, which is not judged here.
+    [[nodiscard]] static std::size_t tests_of(const DwellBasis& basis) {
+        return basis.octaves.size() + 1;
+    }
     /// Octaves whose MDEV is not that of the earlier dwells of the same level. Changes nothing.
     [[nodiscard]] std::vector<Alarm> check(const DwellAngles& dwell) const;
     void learn(const DwellAngles& dwell);
@@ -47,6 +58,8 @@ class DwellMonitor {
     /// In the units of kTermUnits, `below` two standard errors above the estimate; Q is the one of
     /// the newest dwell's level. Zeros before learn().
     [[nodiscard]] const std::array<FittedTerm, kTerms>& terms() const { return terms_; }
+    /// Measured, by growing averaging time; none before learn().
+    [[nodiscard]] std::vector<DwellPoint> points() const;
     /// How many times N must grow for one dwell like the newest to raise an alarm when its ratio is
     /// as expected; 0: not known.
     [[nodiscard]] double smallest_change() const { return smallest_change_; }

@@ -266,6 +266,15 @@ LevelOutput Leveller::step(const LevelInput& input) noexcept {
     return {output.rate, phase_, verdict_};
 }
 
+double Leveller::drift_sigma() const noexcept {
+    double left = 0;
+    for (std::size_t i = 0; i < 2; ++i) {
+        left = std::max(left,
+                        std::abs(observables_.force_rad[i]) + std::abs(observables_.rate_rad[i]));
+    }
+    return std::hypot(budget_.drift, sigma_ * left);
+}
+
 std::string Leveller::message() const {
     const char* channel = trouble_channel_ % 2 == 0 ? "first" : "second";
     const auto failure = [&]() -> std::string {

@@ -72,6 +72,8 @@ class Leveller {
     };
     [[nodiscard]] const Observables& observables() const noexcept { return observables_; }
     [[nodiscard]] Pair drift() const noexcept { return {axis_[0].drift(), axis_[1].drift()}; }
+    /// 1 sigma of drift(): by the noise, and what z has still to take up by the observables; rad/s.
+    [[nodiscard]] double drift_sigma() const noexcept;
     [[nodiscard]] const FastNetwork& axis(std::size_t i) const noexcept { return axis_[i]; }
     [[nodiscard]] const NoiseBudget& budget() const noexcept { return budget_; }
     [[nodiscard]] double tolerance() const noexcept { return tolerance_; }  ///< rad

@@ -35,6 +35,11 @@ NoiseBudget noise_budget(const Gains& gains, const Noise& noise, double period_s
     budget.accelerometer = deviation(noise.accelerometer_mps2 * noise.accelerometer_mps2 * period_s,
                                      0, (1 + gains.k2) / r, gains.k3 / r);
     budget.gyro = deviation(noise.gyro_random_walk * noise.gyro_random_walk, 1, gains.k1, 0);
+    // z / R as the drift found: K3 s / (R D) from the accelerometer, K3 ws^2 / D from the gyro.
+    const double accelerometer_drift = deviation(
+        noise.accelerometer_mps2 * noise.accelerometer_mps2 * period_s, 0, gains.k3 / r, 0);
+    const double gyro_drift = deviation(noise.gyro_random_walk * noise.gyro_random_walk, 0, 0, d0);
+    budget.drift = std::hypot(accelerometer_drift, gyro_drift);
     budget.total = std::hypot(budget.reference, budget.accelerometer, budget.gyro);
     return budget;
 }

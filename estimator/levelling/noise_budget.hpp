@@ -17,6 +17,7 @@ struct NoiseBudget {
     double accelerometer = 0;
     double gyro = 0;
     double total = 0;
+    double drift = 0;  ///< of the drift that z shows, rad/s
 
     [[nodiscard]] const char* dominant() const noexcept;
 };

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kDeg = std::numbers::pi / 180;
 constexpr double kDust = 1e-9;
+constexpr double kLargestInner_deg = 80;  // beyond, the kinematics come near their singularity
 
 /// In (-180, 180], without rounding dust.
 double wrapped_deg(double deg) {
@@ -27,6 +28,12 @@ bool within(double deg, double low, double high) {
         if (deg + turn >= low - kDust && deg + turn <= high + kDust) return true;
     }
     return false;
+}
+
+Vec3 position_of(const Settings& settings, const Vec3& gimbal) {
+    Vec3 position = encoder_deg(settings, gimbal);
+    for (double& angle : position) angle = wrapped_deg(angle);
+    return position;
 }
 
 /// Both ways to put the vertical along `d` with as little inner angle as possible.
@@ -67,11 +74,9 @@ std::vector<Vec3> ways(const SignedAxis& up, Vec3 d) {
 
 }  // namespace
 
-Vec3 up_at(const SignedAxis& up, const Vec3& position_deg) {
-    Settings settings;
-    settings.up = up;
-    const Eigen::Vector3d angles(position_deg[0] * kDeg, position_deg[1] * kDeg,
-                                 position_deg[2] * kDeg);
+Vec3 up_at(const Settings& settings, const Vec3& position_deg) {
+    const Vec3 gimbal = gimbal_deg(settings, position_deg);
+    const Eigen::Vector3d angles(gimbal[0] * kDeg, gimbal[1] * kDeg, gimbal[2] * kDeg);
     const Eigen::Vector3d u = Kinematics(settings).pose(angles).up;
     return {u[0], u[1], u[2]};
 }
@@ -105,34 +110,32 @@ bool GimbalLimits::allow(const Vec3& position_deg) const {
     });
 }
 
-std::optional<Vec3> position_for(const SignedAxis& up, const Vec3& direction,
+std::optional<Vec3> position_for(const Settings& settings, const Vec3& direction,
                                  const GimbalLimits& limits) {
-    for (const Vec3& way : ways(up, direction)) {
-        if (limits.allow(way)) return way;
+    for (const Vec3& way : ways(settings.up, direction)) {
+        const Vec3 position = position_of(settings, way);
+        if (limits.allow(position)) return position;
     }
     return std::nullopt;
 }
 
-std::vector<Vec3> position_grid(const SignedAxis& up, double step_deg, const GimbalLimits& limits) {
+std::vector<Vec3> position_grid(const Settings& settings, double step_deg,
+                                const GimbalLimits& limits) {
     std::vector<Vec3> result;
     std::set<std::array<long, 3>> seen;
-    const auto angles = [&](std::size_t k) {
-        std::vector<double> list;
-        for (double a = 0; a < 180 + kDust; a += step_deg) {
-            if (within(a, limits.low[k], limits.high[k])) list.push_back(wrapped_deg(a));
-            if (a > 0 && a < 180 - kDust && within(-a, limits.low[k], limits.high[k])) {
-                list.push_back(wrapped_deg(-a));
-            }
-        }
-        return list;
-    };
+    std::vector<double> angles;
+    for (double a = 0; a < 180 + kDust; a += step_deg) {
+        angles.push_back(wrapped_deg(a));
+        if (a > 0 && a < 180 - kDust) angles.push_back(wrapped_deg(-a));
+    }
     // Inner angle zero first: of several ways to one vertical the simplest is kept.
-    for (const double beta : angles(1)) {
-        for (const double alpha : angles(0)) {
-            for (const double gamma : angles(2)) {
-                const Vec3 position{alpha, beta, gamma};
+    for (const double beta : angles) {
+        if (std::abs(beta) > kLargestInner_deg) continue;
+        for (const double alpha : angles) {
+            for (const double gamma : angles) {
+                const Vec3 position = position_of(settings, {alpha, beta, gamma});
                 if (!limits.allow(position)) continue;
-                const Vec3 u = up_at(up, position);
+                const Vec3 u = up_at(settings, position);
                 if (seen.insert({std::lround(u[0] * 1e6), std::lround(u[1] * 1e6),
                                  std::lround(u[2] * 1e6)})
                         .second) {

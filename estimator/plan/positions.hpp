@@ -8,8 +8,11 @@
 
 namespace vibrig::estimator::plan {
 
-/// Direction of the vertical in platform axes at outer, inner, azimuth angles in deg.
-[[nodiscard]] Vec3 up_at(const SignedAxis& up, const Vec3& position_deg);
+// Positions are what the encoders of outer, inner and azimuth gimbal show, in deg; the settings say
+// how they count and which platform axis is up.
+
+/// Direction of the vertical in platform axes.
+[[nodiscard]] Vec3 up_at(const Settings& settings, const Vec3& position_deg);
 
 /// Faces, edges and corners of the cube: 6 + 12 + 8 unit vectors.
 [[nodiscard]] std::vector<Vec3> cube_directions();
@@ -25,13 +28,13 @@ struct GimbalLimits {
     [[nodiscard]] bool allow(const Vec3& position_deg) const;
 };
 
-/// Gimbal angles with the vertical along `direction`, the inner angle zero if that is possible;
+/// The position with the vertical along `direction`, the inner angle zero if that is possible;
 /// nothing if the limits leave none.
-[[nodiscard]] std::optional<Vec3> position_for(const SignedAxis& up, const Vec3& direction,
+[[nodiscard]] std::optional<Vec3> position_for(const Settings& settings, const Vec3& direction,
                                                const GimbalLimits& limits);
 
-/// All combinations of angles `step_deg` apart within the limits whose verticals differ.
-[[nodiscard]] std::vector<Vec3> position_grid(const SignedAxis& up, double step_deg,
+/// All combinations of gimbal angles `step_deg` apart within the limits whose verticals differ.
+[[nodiscard]] std::vector<Vec3> position_grid(const Settings& settings, double step_deg,
                                               const GimbalLimits& limits);
 
 }  // namespace vibrig::estimator::plan
