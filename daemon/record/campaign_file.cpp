@@ -38,6 +38,8 @@ class Columns {
     std::vector<std::int64_t> integers(const char* name, std::size_t width = 1) {
         auto found = file_.integers(group_ + "/" + name);
         check(name, found.dimensions, width);
+        const auto end = std::ranges::find(found.values, hdf5::kUnwritten);
+        rows_ = std::min(rows_, static_cast<std::size_t>(end - found.values.begin()) / width);
         return std::move(found.values);
     }
     std::vector<std::string> texts(const char* name) {
@@ -99,10 +101,20 @@ void read_orders(const File& file, Campaign& to) {
     const auto announced = c.integers("announced_ns"), from = c.integers("from_ns"),
                until = c.integers("to_ns"), run = c.integers("run"),
                position = c.integers("position"), cancel = c.integers("cancel");
-    const auto table = c.doubles("table_g");
+    const auto table = c.doubles("table_g"), zero = c.doubles("zero_g", 3),
+               level = c.doubles("level_sigma_g"), angle = c.doubles("noise_angle_arcsec"),
+               walk = c.doubles("noise_walk", 3);
     for (std::size_t i = 0; i < c.rows(); ++i) {
-        to.orders.push_back({announced[i], from[i], until[i], static_cast<int>(run[i]),
-                             static_cast<int>(position[i]), table[i], cancel[i] != 0});
+        to.orders.push_back({announced[i],
+                             from[i],
+                             until[i],
+                             static_cast<int>(run[i]),
+                             static_cast<int>(position[i]),
+                             table[i],
+                             cancel[i] != 0,
+                             row<3>(zero, i),
+                             level[i],
+                             {angle[i], row<3>(walk, i)}});
     }
 }
 
@@ -206,9 +218,9 @@ void read_head(const File& file, Campaign& to) {
         throw hdf5::Error(to.path + ": attribute format: found " +
                           (format.empty() ? "nothing" : "\"" + format + "\"") +
                           ", expected \"vibrig-campaign\"");
-    if (const auto version = file.number("/", "format_version"); version > kFormatVersion)
-        throw hdf5::Error(fmt::format("{}: format_version: found {}, expected at most {}", to.path,
-                                      version, kFormatVersion));
+    if (const auto version = file.number("/", "format_version"); version != kFormatVersion)
+        throw hdf5::Error(fmt::format("{}: format_version: found {}, expected {}", to.path, version,
+                                      kFormatVersion));
     Head& head = to.head;
     head.name = file.text("/", "name");
     head.started_by = file.text("/", "started_by");
@@ -220,6 +232,9 @@ void read_head(const File& file, Campaign& to) {
     head.instruction_set = file.text("/", "instruction_set");
     head.configuration_hash = file.text("/", "configuration_hash");
     head.dwells_before = static_cast<std::size_t>(file.number("/", "dwells_before"));
+    head.campaign = file.text("/", "campaign");
+    head.part = static_cast<int>(file.number("/", "part"));
+    head.restart = file.number("/", "restart") != 0;
     head.configuration = file.read_text("/configuration");
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
@@ -227,6 +242,7 @@ void read_head(const File& file, Campaign& to) {
     if (to.state != "running") {
         to.reason = file.text("/", "reason");
         to.ended_utc_ns = file.number("/", "ended_utc_ns");
+        to.mark = file.text("/", "mark");
     }
     if (file.has("/result")) to.result_json = file.read_text("/result");
 }
@@ -241,37 +257,10 @@ bool is_hdf5(const std::string& path) {
     return file.good() && head == kSignature;
 }
 
-std::string campaign_path(const std::string& argument) {
-    std::error_code error;
-    if (fs::is_regular_file(argument, error)) {
-        if (!is_hdf5(argument))
-            throw std::runtime_error(argument + ": found no HDF5 file, expected a campaign's");
-        return argument;
-    }
-    if (!fs::is_directory(argument, error))
-        throw std::runtime_error(argument +
-                                 ": found nothing, expected a campaign's HDF5 file or its folder");
-    const fs::path folder(argument);
-    if (fs::exists(folder / "campaign.h5", error)) return (folder / "campaign.h5").string();
-    std::vector<std::string> found;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-        if (fs::exists(entry.path() / "campaign.h5", error))
-            found.push_back((entry.path() / "campaign.h5").string());
-    }
-    if (found.size() == 1) return found.front();
-    std::ranges::sort(found);
-    std::string names;
-    for (const auto& name : found) names += " " + name;
-    throw std::runtime_error(found.empty()
-                                 ? argument + ": found no campaign.h5 in it, expected one"
-                                 : argument + ": found several campaigns, expected one of" + names);
-}
-
-Campaign read_campaign(const std::string& argument) {
+Campaign read_part(const std::string& path) {
     Campaign campaign;
-    campaign.path = campaign_path(argument);
-    campaign.folder = fs::path(campaign.path).parent_path().string();
-    if (campaign.folder.empty()) campaign.folder = ".";
+    campaign.path = path;
+    campaign.folder = folder_of(path);
     const File file = File::open(campaign.path, File::Mode::read);
     read_head(file, campaign);
     read_samples(file, campaign);
@@ -283,34 +272,18 @@ Campaign read_campaign(const std::string& argument) {
     return campaign;
 }
 
-std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign) {
-    std::vector<RecordedDwell> dwells;
-    const auto& samples = campaign.samples;
-    const auto at = [&](drivers::Time time) {
-        return static_cast<std::size_t>(
-            std::ranges::lower_bound(samples, time, {}, &drivers::Sample::time) - samples.begin());
-    };
-    std::size_t done = 0;
-    for (std::size_t i = 0; i < campaign.orders.size(); ++i) {
-        const Order& order = campaign.orders[i];
-        if (order.cancel) continue;
-        RecordedDwell dwell{&order, at(order.from), 0, false};
-        dwell.count = at(order.to) - dwell.first;
-        const bool cancelled = i + 1 < campaign.orders.size() && campaign.orders[i + 1].cancel;
-        // As many as the filter saw, wherever in time the end was ordered.
-        if (done < campaign.dwells.size()) {
-            const auto& summary = campaign.dwells[done].summary;
-            if (summary.run == order.run && summary.position == order.position) {
-                ++done;
-                if (cancelled) {
-                    dwell.cut_short = summary.samples < dwell.count;
-                    dwell.count = std::min<std::size_t>(dwell.count, summary.samples);
-                }
-            }
-        }
-        dwells.push_back(dwell);
-    }
-    return dwells;
+Campaign read_part_head(const std::string& path) {
+    Campaign campaign;
+    campaign.path = path;
+    campaign.folder = folder_of(path);
+    read_head(File::open(path, File::Mode::read), campaign);
+    return campaign;
+}
+
+Span part_span(const std::string& path) {
+    const auto times = File::open(path, File::Mode::read).integers("/samples/time_ns").values;
+    if (times.empty()) return {};
+    return {times.front(), times.back(), times.size()};
 }
 
 std::string identification_sections(const std::string& configuration) {
@@ -322,82 +295,6 @@ std::string identification_sections(const std::string& configuration) {
         if (kSections.contains(line.substr(0, line.find_first_of(". =")))) kept += line + "\n";
     }
     return kept;
-}
-
-std::vector<std::string> raw_files(const std::string& folder) {
-    std::vector<std::string> files;
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-        const std::string name = entry.path().filename().string();
-        if (name.starts_with("raw-") && (name.ends_with(".log") || name.ends_with(".log.zst")))
-            files.push_back(entry.path().string());
-    }
-    std::ranges::sort(files);
-    // Between the compressed one and the end of the other both are there for a moment.
-    std::erase_if(files, [&](const std::string& name) {
-        return name.ends_with(".log") && std::ranges::find(files, name + ".zst") != files.end();
-    });
-    return files;
-}
-
-Recovery recover(const std::string& argument) {
-    Recovery recovery;
-    const std::string path = campaign_path(argument);
-    {
-        const File file = File::open(path, File::Mode::read);
-        if (file.text("/", "format") == "vibrig-campaign" && file.text("/", "state") != "running") {
-            recovery.was_closed = true;
-        }
-    }
-    if (!recovery.was_closed) File::open(path, File::Mode::mend).close();
-    Campaign campaign = read_campaign(path);
-    recovery.samples = campaign.samples.size();
-    recovery.dwells = campaign.dwells.size();
-    if (!campaign.samples.empty())
-        recovery.recorded_s =
-            drivers::to_seconds(campaign.samples.back().time - campaign.samples.front().time);
-    for (const Gap& gap : campaign.gaps)
-        recovery.words.push_back(
-            fmt::format("{} {} lost while recording: {}", gap.lost, gap.stream, gap.reason));
-    if (recovery.was_closed) return recovery;
-
-    // What the raw log has beyond the last sample comes from the frames themselves.
-    std::vector<drivers::Sample> more;
-    drivers::Time raw_until = 0;
-    std::string raw_trouble;
-    try {
-        more = samples_from_raw(campaign, raw_until);
-    } catch (const std::exception& error) {
-        raw_trouble = error.what();
-    }
-    const drivers::Time last = campaign.samples.empty() ? 0 : campaign.samples.back().time;
-    std::erase_if(more, [last](const drivers::Sample& s) { return s.time <= last; });
-    File file = File::open(path, File::Mode::write);
-    {
-        hdf5::Table samples(file, "/samples", sample_columns());
-        for (const auto& sample : more) put_sample(samples, sample);
-        samples.commit();
-        recovery.samples_from_raw = more.size();
-        hdf5::Table gaps(file, "/gaps", gap_columns());
-        const drivers::Time end = more.empty() ? last : more.back().time;
-        put_gap(gaps, {end, end, "end", 0, "the recorder died; nothing is recorded after this"});
-        gaps.commit();
-    }
-    for (const auto& order : campaign.orders) {
-        const bool done = std::ranges::any_of(campaign.dwells, [&](const Dwell& d) {
-            return d.summary.run == order.run && d.summary.position == order.position;
-        });
-        if (!done && !order.cancel)
-            recovery.cut_dwell = fmt::format("run {} position {}", order.run, order.position);
-    }
-    if (raw_until > last) recovery.raw_until_s = drivers::to_seconds(raw_until - last);
-    if (!raw_trouble.empty()) recovery.words.push_back("raw log: " + raw_trouble);
-    file.set("/", "state", "recovered");
-    file.set("/", "reason", "the recorder died before the campaign was over");
-    file.set("/", "ended_utc_ns",
-             (more.empty() ? last : more.back().time) + campaign.head.utc_offset_ns);
-    file.close();
-    return recovery;
 }
 
 }  // namespace vibrig::record

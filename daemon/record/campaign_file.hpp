@@ -1,18 +1,31 @@
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/record/index.hpp"
 #include "daemon/record/records.hpp"
 
 namespace vibrig::record {
 
-/// A recorded campaign in memory.
+/// One file of a campaign.
+struct Part {
+    std::string path, state;
+    std::size_t samples = 0, dwells = 0;
+};
+
+/// A recorded campaign in memory. Times are those of the first part's clock.
 struct Campaign {
-    std::string path;    ///< of the HDF5 file
+    std::string path;  ///< of the first HDF5 file
+    std::vector<Part> parts;
     std::string folder;  ///< where it and its raw log are
     Head head;
-    std::string state, reason;  ///< "running" when it was not closed
+    std::string state, reason;     ///< "running" when it was not closed
+    std::string mark;              ///< why it is marked; empty: it is not
+    std::string incomplete;        ///< what is missing for its result; empty: nothing
+    std::size_t restarted_at = 0;  ///< dwells done when the daemon was last started
     std::int64_t ended_utc_ns = 0;
     std::string result_json;
     std::vector<drivers::Sample> samples;
@@ -30,11 +43,34 @@ struct RecordedDwell {
     bool cut_short = false;
 };
 
-/// The file that CAMPAIGN names: itself, or campaign.h5 in that folder (or in its only subfolder
-/// that has one). Throws std::runtime_error with what was found and expected.
+/// "campaign.h5", "campaign-2.h5" ...
+[[nodiscard]] std::string part_name(int part);
+[[nodiscard]] std::string folder_of(const std::string& path);
+/// The files in a folder that are called so, by their numbers.
+[[nodiscard]] std::map<int, std::string> part_files(const std::string& folder);
+/// The first file that CAMPAIGN names: itself, or campaign.h5 in that folder (or in its only
+/// subfolder that has one). Throws std::runtime_error with what was found and expected.
 [[nodiscard]] std::string campaign_path(const std::string& argument);
-/// Reads all of it, while it is being written too. Throws hdf5::Error or std::runtime_error.
+/// Reads all parts of it, while it is being written too: what came again after a restart takes the
+/// place of what was not finished before. Throws hdf5::Error or std::runtime_error; a part that is
+/// missing is named.
 [[nodiscard]] Campaign read_campaign(const std::string& argument);
+/// One file alone.
+[[nodiscard]] Campaign read_part(const std::string& path);
+/// Without its tables.
+[[nodiscard]] Campaign read_part_head(const std::string& path);
+/// Times of the first and the last sample of a file, and how many there are.
+struct Span {
+    drivers::Time first = 0, last = 0;
+    std::size_t samples = 0;
+};
+[[nodiscard]] Span part_span(const std::string& path);
+/// The last part of the newest campaign in `folder` that `head` goes on with: of the same name and
+/// configuration and not finished; without its tables.
+[[nodiscard]] std::optional<Campaign> interrupted_campaign(const std::string& folder,
+                                                           const Head& head);
+/// Makes a part whose writer died readable for every program; nothing if it is closed. Throws.
+void close_part(const std::string& path, const std::string& next);
 /// HDF5 by its first bytes; false for what cannot be read.
 [[nodiscard]] bool is_hdf5(const std::string& path);
 [[nodiscard]] std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign);
@@ -46,18 +82,22 @@ struct RecordedDwell {
 
 /// What mending did, and what is not there.
 struct Recovery {
+    std::string path;  ///< of the campaign's first file
     bool was_closed = false;
     std::size_t samples = 0, dwells = 0;
     double recorded_s = 0;
-    std::size_t rows_cut = 0;  ///< rows that were only half there
+    std::int64_t ends_utc_ns = 0;  ///< of the last sample; 0: there is none
+    std::size_t parts = 1;
     std::size_t samples_from_raw = 0;
-    double raw_until_s = 0;  ///< the raw log goes on so long after the last sample
-    std::string cut_dwell;   ///< the dwell that was in progress; empty: none
+    double raw_until_s = 0;     ///< the raw log goes on so long after the file's last sample
+    std::uint64_t missing = 0;  ///< sync counts that are not there between the first and the last
+    std::string cut_dwell;      ///< the dwell that was in progress; empty: none
     std::vector<std::string> words;
 };
 
-/// Makes a file whose writer died readable for every program again, takes what the raw log has
-/// beyond it, and says what is lost. Does nothing to a closed file. Throws.
-[[nodiscard]] Recovery recover(const std::string& argument);
+/// Makes the files of a campaign whose writer died readable for every program again, takes what the
+/// raw log has beyond them, and says what is lost. Does nothing to closed files. Of a folder with
+/// several campaigns all, and its index is made anew. Throws.
+[[nodiscard]] std::vector<Recovery> recover(const std::string& argument, const Index::Tell& tell);
 
 }  // namespace vibrig::record

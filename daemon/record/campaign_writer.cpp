@@ -1,6 +1,7 @@
 #include "daemon/record/campaign_writer.hpp"
 
 #include <algorithm>
+#include <filesystem>
 
 namespace vibrig::record {
 
@@ -21,7 +22,11 @@ std::vector<ColumnSpec> order_columns() {
             {"run", Type::i32, {}, "", "from 1"},
             {"position", Type::i32, {}, "", "from 1"},
             {"table_g", Type::f64, {}, "g", "commanded peak at the table"},
-            {"cancel", Type::u8, {}, "", "1: the dwell in progress ends with what it has"}};
+            {"cancel", Type::u8, {}, "", "1: the dwell in progress ends with what it has"},
+            {"zero_g", Type::f64, {3}, "g", "taken off the raw specific force: zeros in place"},
+            {"level_sigma_g", Type::f64, {}, "g", "of the vertical, by those zeros; 0: none"},
+            {"noise_angle_arcsec", Type::f64, {}, "arcsec", "noise of a reading, for the filter"},
+            {"noise_walk", Type::f64, {3}, "deg/sqrt(h)", "gyros' random walk, for the filter"}};
 }
 
 std::vector<ColumnSpec> dwell_columns() {
@@ -72,6 +77,14 @@ void put(Table& table, const std::array<T, N>& values) {
 
 std::uint8_t byte(bool value) { return value ? 1 : 0; }
 
+/// Under another name until others can open it: whoever is killed meanwhile leaves nothing that
+/// looks like a recording.
+std::string new_file(const std::string& path) {
+    std::error_code ignored;
+    std::filesystem::remove(path + ".new", ignored);
+    return path + ".new";
+}
+
 }  // namespace
 
 std::vector<ColumnSpec> sample_columns() {
@@ -111,7 +124,8 @@ void put_gap(Table& table, const Gap& gap) {
 }
 
 CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
-    : file_(std::make_unique<File>(File::create(path))) {
+    : file_(std::make_unique<File>(File::create(new_file(path)))),
+      lock_(std::make_unique<WriterLock>(file_->path())) {
     write_head(head);
     const auto table = [this](const char* name, std::vector<ColumnSpec> columns, std::size_t chunk,
                               const char* description) {
@@ -123,7 +137,7 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     estimates_ = table("/estimates", estimate_columns(), 64, "the filter while it works");
     events_ = table("/events", event_columns(), 16, "what happened");
     gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
-    file_->start_swmr();
+    file_->start_swmr(path);
 }
 
 void CampaignWriter::write_head(const Head& head) {
@@ -141,6 +155,9 @@ void CampaignWriter::write_head(const Head& head) {
     file_->set("/", "compiler", head.compiler);
     file_->set("/", "instruction_set", head.instruction_set);
     file_->set("/", "configuration_hash", head.configuration_hash);
+    file_->set("/", "campaign", head.campaign);
+    file_->set("/", "part", static_cast<std::int64_t>(head.part));
+    file_->set("/", "restart", static_cast<std::int64_t>(head.restart));
     file_->set("/", "dwells_before", static_cast<std::int64_t>(head.dwells_before));
     file_->set("/", "state", "running");
     std::string names;
@@ -156,6 +173,9 @@ void CampaignWriter::order(const Order& order) {
     orders_->put(order.announced).put(order.from).put(order.to);
     orders_->put(std::int32_t{order.run}).put(std::int32_t{order.position}).put(order.table_g);
     orders_->put(byte(order.cancel));
+    put(*orders_, order.zero_g);
+    orders_->put(order.level_sigma_g).put(order.noise.angle_arcsec);
+    put(*orders_, order.noise.gyro_random_walk_deg_per_rt_h);
 }
 
 void CampaignWriter::dwell(const Dwell& dwell) {
@@ -195,8 +215,7 @@ void CampaignWriter::commit() {
     file_->flush();
 }
 
-void CampaignWriter::end(const std::string& state, const std::string& reason,
-                         const std::string& result_json, std::int64_t utc_ns) {
+void CampaignWriter::end(const Ended& ended) {
     commit();
     for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &samples_})
         table->reset();
@@ -204,10 +223,11 @@ void CampaignWriter::end(const std::string& state, const std::string& reason,
     file_->close();
     // While a file is written with readers, no attribute can be added.
     File file = File::open(path, File::Mode::write);
-    file.set("/", "state", state);
-    file.set("/", "reason", reason);
-    file.set("/", "ended_utc_ns", utc_ns);
-    file.write_text("/result", result_json, "final result, JSON as vibrig identify --json");
+    file.set("/", "state", ended.state);
+    file.set("/", "reason", ended.reason);
+    file.set("/", "mark", ended.mark);
+    file.set("/", "ended_utc_ns", ended.utc_ns);
+    file.write_text("/result", ended.result_json, "final result, JSON as vibrig identify --json");
     file.close();
 }
 

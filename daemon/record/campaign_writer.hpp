@@ -3,12 +3,13 @@
 #include <memory>
 #include <string>
 
+#include "daemon/record/disk.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/records.hpp"
 
 namespace vibrig::record {
 
-inline constexpr std::int64_t kFormatVersion = 1;
+inline constexpr std::int64_t kFormatVersion = 2;
 
 /// Columns of the tables of a campaign's file, for writing and for mending.
 [[nodiscard]] std::vector<hdf5::ColumnSpec> sample_columns();
@@ -31,8 +32,7 @@ class CampaignWriter {
 
     void commit();
     /// Writes how it ended and closes the file.
-    void end(const std::string& state, const std::string& reason, const std::string& result_json,
-             std::int64_t utc_ns);
+    void end(const Ended& ended);
 
     [[nodiscard]] std::size_t samples_waiting() const { return samples_->waiting(); }
     [[nodiscard]] std::size_t samples_written() const { return samples_->written(); }
@@ -42,6 +42,7 @@ class CampaignWriter {
     void write_head(const Head& head);
 
     std::unique_ptr<hdf5::File> file_;
+    std::unique_ptr<WriterLock> lock_;
     std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, estimates_, events_, gaps_;
 };
 

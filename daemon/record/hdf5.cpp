@@ -1,8 +1,11 @@
 #include "daemon/record/hdf5.hpp"
 
+#include <fcntl.h>
 #include <hdf5.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <utility>
 
@@ -27,12 +30,21 @@ std::string what_it_says() {
     std::string text;
     const auto take = [](unsigned, const H5E_error2_t* error, void* to) -> herr_t {
         auto& out = *static_cast<std::string*>(to);
-        if (error->desc != nullptr && out.size() < 300)
-            out += (out.empty() ? "" : "; ") + std::string(error->desc);
+        if (error->desc == nullptr || out.size() >= 300) return 0;
+        std::string_view words = error->desc;
+        // The system's own words stand behind time, file and numbers.
+        constexpr std::string_view kSystem = "error message = '";
+        if (const auto at = words.find(kSystem); at != std::string_view::npos) {
+            words.remove_prefix(at + kSystem.size());
+            out = words.substr(0, words.find('\''));
+            return 1;  // who called whom adds nothing
+        }
+        out += (out.empty() ? "" : "; ") + std::string(words);
         return 0;
     };
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take, &text);
-    return text.empty() ? "HDF5 gives no reason" : text;
+    // A close on the way out may have taken its words with it.
+    return text.empty() ? std::string("HDF5 gives no reason; ") + std::strerror(errno) : text;
 }
 
 std::int64_t native(Type type) {
@@ -73,6 +85,13 @@ Handle text_type(std::size_t size) {
     Handle type(H5Tcopy(H5T_C_S1), close_type);
     H5Tset_size(type.get(), std::max<std::size_t>(size, 1));
     H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+    return type;
+}
+
+/// Of an attribute. All texts are UTF-8; of datasets HDF5 is told the default, ASCII, since Octave
+/// refuses a whole file with a dataset that says UTF-8, and other readers hand over the bytes.
+Handle attribute_type(std::size_t size) {
+    Handle type = text_type(size);
     H5Tset_cset(type.get(), H5T_CSET_UTF8);
     return type;
 }
@@ -143,8 +162,12 @@ File File::open(const std::string& path, Mode mode) {
     return file;
 }
 
-void File::start_swmr() {
+void File::start_swmr(const std::string& path) {
     if (H5Fstart_swmr_write(file_.get()) < 0) fail("SWMR");
+    // Never over another file.
+    if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) != 0)
+        throw Error(path + ": " + std::strerror(errno));
+    path_ = path;
 }
 
 void File::flush() {
@@ -184,7 +207,7 @@ void File::attribute(const std::string& object, const char* name, std::int64_t t
 void File::set(const std::string& object, const char* name, std::string_view text) {
     std::string padded(text);
     padded.resize(std::max<std::size_t>(text.size(), 1));
-    attribute(object, name, text_type(padded.size()).get(), padded.data());
+    attribute(object, name, attribute_type(padded.size()).get(), padded.data());
 }
 
 void File::set(const std::string& object, const char* name, std::int64_t number) {
@@ -200,8 +223,7 @@ std::string File::text(const std::string& object, const char* name) const {
         throw Error(path_ + ": " + object + ": attribute " + name +
                     ": found no text, expected one");
     std::string text(H5Tget_size(type.get()), '\0');
-    if (H5Aread(found.get(), text_type(text.size()).get(), text.data()) < 0)
-        fail(object + ": attribute " + name);
+    if (H5Aread(found.get(), type.get(), text.data()) < 0) fail(object + ": attribute " + name);
     return text.c_str();
 }
 
@@ -288,8 +310,7 @@ std::vector<std::string> File::texts(const std::string& name) const {
     std::size_t count = 1;
     for (const std::size_t d : dimensions_of(set.get())) count *= d;
     std::string all(size * count, '\0');
-    if (count > 0 &&
-        H5Dread(set.get(), text_type(size).get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0)
+    if (count > 0 && H5Dread(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, all.data()) < 0)
         fail(name);
     std::vector<std::string> texts;
     for (std::size_t i = 0; i < count; ++i) {
@@ -315,6 +336,16 @@ std::size_t row_size(const ColumnSpec& spec) {
     return bytes;
 }
 
+/// What a dying disk did not take must not look like a measurement: no number, no time, and a
+/// quality that is not good.
+void set_fill(std::int64_t list, Type type) {
+    constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+    constexpr std::uint8_t kNotGood = 1;
+    if (type == Type::f64) H5Pset_fill_value(list, H5T_NATIVE_DOUBLE, &kNoNumber);
+    if (type == Type::i64) H5Pset_fill_value(list, H5T_NATIVE_INT64, &kUnwritten);
+    if (type == Type::u8) H5Pset_fill_value(list, H5T_NATIVE_UINT8, &kNotGood);
+}
+
 }  // namespace
 
 Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std::size_t chunk_rows,
@@ -338,6 +369,7 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns, std
             H5Screate_simple(static_cast<int>(size.size()), size.data(), most.data()), close_space);
         const Handle list(H5Pcreate(H5P_DATASET_CREATE), close_list);
         H5Pset_chunk(list.get(), static_cast<int>(chunk.size()), chunk.data());
+        set_fill(list.get(), spec.type);
         const std::string name = group_ + "/" + spec.name;
         column.dataset = Handle(H5Dcreate2(file.id(), name.c_str(), column.type.get(), space.get(),
                                            H5P_DEFAULT, list.get(), H5P_DEFAULT),
@@ -364,6 +396,17 @@ Table::Table(File& file, std::string group, std::vector<ColumnSpec> columns)
         column.spec = std::move(spec);
         columns_.push_back(std::move(column));
     }
+}
+
+void Table::keep(std::size_t rows) {
+    for (Column& column : columns_) {
+        const auto found = dimensions_of(column.dataset.get());
+        std::vector<hsize_t> size(found.begin(), found.end());
+        size.at(0) = std::min<hsize_t>(size.at(0), rows);
+        if (H5Dset_extent(column.dataset.get(), size.data()) < 0)
+            file_->fail(group_ + "/" + column.spec.name);
+    }
+    rows_ = rows;
 }
 
 void Table::cell(const void* value, std::size_t size) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -33,6 +34,9 @@ class Handle {
     Close close_ = nullptr;
 };
 
+/// In a column of i64: a row that never reached the disk.
+inline constexpr std::int64_t kUnwritten = std::numeric_limits<std::int64_t>::min();
+
 enum class Type : std::uint8_t { f64, i64, u64, i32, u32, u8, text };
 
 /// Values of one array, row by row.
@@ -54,8 +58,8 @@ class File {
     [[nodiscard]] static File create(const std::string& path);
     [[nodiscard]] static File open(const std::string& path, Mode mode);
 
-    /// From now on readers may read; nothing but rows is added.
-    void start_swmr();
+    /// From now on readers find it at `path` and may read; nothing but rows is added.
+    void start_swmr(const std::string& path);
     void flush();
     void close();
 
@@ -126,6 +130,8 @@ class Table {
         return *this;
     }
     void commit();
+    /// Forgets the rows behind the first `rows`, which every column has.
+    void keep(std::size_t rows);
     [[nodiscard]] std::size_t waiting() const noexcept { return waiting_; }
     [[nodiscard]] std::size_t written() const noexcept { return rows_; }
     [[nodiscard]] std::size_t row_bytes() const noexcept;

@@ -9,7 +9,9 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "daemon/record/disk.hpp"
@@ -31,12 +33,22 @@ using StdFile = std::unique_ptr<std::FILE, CloseFile>;
 }  // namespace
 
 RawLog::RawLog(std::string folder, std::string interface, const Settings& settings,
-               std::int64_t utc_offset_ns, Closed on_closed)
+               std::int64_t utc_offset_ns, Closed on_closed, std::function<void()> on_progress)
     : folder_(std::move(folder)),
       settings_(settings),
       utc_offset_ns_(utc_offset_ns),
-      on_closed_(std::move(on_closed)) {
+      on_closed_(std::move(on_closed)),
+      on_progress_(std::move(on_progress)) {
     line_.interface = std::move(interface);
+    // A campaign that goes on after a restart: its earlier segments stay.
+    std::error_code unknown;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_, unknown)) {
+        int number = 0;
+        const std::string name = entry.path().filename().string();
+        if (std::sscanf(name.c_str(), "raw-%d.log", &number) == 1)
+            number_ = std::max(number_, number);
+    }
+    goes_on_ = number_ > 0;
     buffer_.reserve(kBuffer + 256);
 }
 
@@ -109,7 +121,8 @@ void RawLog::open() {
     segment_.from = buffer_from_;
     const std::string path = folder_ + "/" + segment_.file;
     fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-    if (fd_ < 0) refuse(path + ": " + std::strerror(errno));
+    if (fd_ < 0) return refuse(path + ": " + std::strerror(errno));
+    if (std::exchange(goes_on_, false)) buffer_.insert(0, std::string(kStartLine) + "\n");
 }
 
 void RawLog::flush() {
@@ -153,7 +166,7 @@ void RawLog::end_segment() {
     ::close(fd_);
     fd_ = -1;
     if (settings_.zstd) {
-        const std::string why = compress(folder_ + "/" + segment_.file);
+        const std::string why = compress(folder_ + "/" + segment_.file, on_progress_);
         if (why.empty()) {
             segment_.file += ".zst";
         } else {
@@ -168,7 +181,7 @@ void RawLog::close() {
     end_segment();
 }
 
-std::string compress(const std::string& path) {
+std::string compress(const std::string& path, const std::function<void()>& on_progress) {
     const std::string to = path + ".zst";
     const std::string part = to + ".part";
     const StdFile in(std::fopen(path.c_str(), "rb"));
@@ -188,6 +201,7 @@ std::string compress(const std::string& path) {
         const std::size_t n = std::fread(from.data(), 1, from.size(), in.get());
         if (std::ferror(in.get()) != 0) return failed(std::strerror(errno));
         last = n < from.size();
+        if (on_progress) on_progress();
         ZSTD_inBuffer input{from.data(), n, 0};
         for (bool done = false; !done;) {
             ZSTD_outBuffer output{to_buffer.data(), to_buffer.size(), 0};

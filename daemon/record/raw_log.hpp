@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 
 #include "daemon/record/records.hpp"
 #include "daemon/record/settings.hpp"
@@ -17,13 +18,17 @@ struct Segment {
     std::uint64_t frames = 0, bytes = 0;
 };
 
+/// In a log: the daemon was started again here.
+inline constexpr std::string_view kStartLine = "# the daemon was started again";
+
 /// Frames as candump logs them, in segments; both directions (R, T). One thread. A disk that
 /// refuses costs the frames that were to go there, and they are counted; nothing throws.
 class RawLog {
   public:
     using Closed = std::function<void(const Segment&)>;
+    /// `on_progress` is called while a segment is compressed.
     RawLog(std::string folder, std::string interface, const Settings& settings,
-           std::int64_t utc_offset_ns, Closed on_closed);
+           std::int64_t utc_offset_ns, Closed on_closed, std::function<void()> on_progress = {});
     ~RawLog();
 
     void add(const FrameRecord& record);
@@ -50,9 +55,11 @@ class RawLog {
     Settings settings_;
     std::int64_t utc_offset_ns_;
     Closed on_closed_;
+    std::function<void()> on_progress_;
     proto::LoggedFrame line_;  ///< keeps the interface's name
     int fd_ = -1;
     int number_ = 0;
+    bool goes_on_ = false;  ///< from segments of an earlier start
     Segment segment_;
     std::string buffer_;
     std::uint64_t buffered_ = 0;  ///< frames
@@ -66,7 +73,9 @@ class RawLog {
 
 /// Compresses a closed file and takes it away; the compressed one appears whole or not at all.
 /// Empty: done; else why not, and the file is still there.
-[[nodiscard]] std::string compress(const std::string& path);
+/// `on_progress` is called now and then.
+[[nodiscard]] std::string compress(const std::string& path,
+                                   const std::function<void()>& on_progress = {});
 /// Calls `take` with the pieces of a file, decompressed if it ends in .zst. Throws
 /// std::runtime_error. False of `take` ends it.
 void read_raw(const std::string& path, const std::function<bool(std::string_view)>& take);

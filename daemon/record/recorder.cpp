@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
 
 namespace vibrig::record {
@@ -24,6 +25,10 @@ constexpr Time kEstimatePeriod = drivers::kSecond;
 constexpr std::size_t kMostRows = 4096;
 // Who armed and started it belongs to the campaign, too.
 constexpr std::size_t kEventsBefore = 32;
+// While the disk refuses: at 8 kB for a dwell 32 MB.
+constexpr std::size_t kMostKept = 4096;
+// A disk that takes longer for one thing does not answer.
+constexpr std::int64_t kPatience_ns = 400'000'000;
 
 std::string stamp(std::int64_t utc_ns) {
     return fmt::format("{:%Y%m%dT%H%M%SZ}",
@@ -83,20 +88,21 @@ void Recorder::put(Entry entry) {
 }
 
 void Recorder::campaign_begun(Head head) { put(std::move(head)); }
-void Recorder::ordered(const rt::DwellOrder& order, Time now) {
+void Recorder::ordered(const rt::DwellOrder& order, Time now, const estimator::NoiseLevels& noise) {
     put(Order{now, order.from, order.to, order.dwell.run, order.dwell.position, order.dwell.table_g,
-              order.cancel});
+              order.cancel, order.zero_g, order.level_sigma_g, noise});
 }
 void Recorder::dwell_done(Dwell dwell) { put(std::move(dwell)); }
 void Recorder::event(const EventRecord& event) { put(event); }
-void Recorder::campaign_ended(const std::string& state, const std::string& reason,
-                              const std::string& result_json, std::int64_t utc_ns) {
-    put(Ended{state, reason, result_json, utc_ns});
-}
+void Recorder::campaign_ended(Ended ended) { put(std::move(ended)); }
 
 RecorderStatus Recorder::status() const {
     const std::lock_guard lock(mutex_);
     RecorderStatus status = status_;
+    if (const double stuck = stuck_s(); stuck > 0) {
+        status.good = false;
+        status.note = fmt::format("{}: no answer for {:.1f} s", folder_, stuck);
+    }
     status.samples_dropped = samples_.counts().dropped;
     status.frames_dropped = received_.counts().dropped + sent_.counts().dropped;
     return status;
@@ -115,8 +121,17 @@ void Recorder::show() {
     status_.entries_dropped = dropped;
 }
 
+double Recorder::stuck_s() const noexcept {
+    const auto since = alive_wall_ns_.load();
+    const auto age = since == 0 ? 0 : wall_ns() - since;
+    return age > kPatience_ns ? static_cast<double>(age) * 1e-9 : 0;
+}
+
+void Recorder::alive() noexcept { alive_wall_ns_.store(wall_ns()); }
+
 void Recorder::loop() {
     while (!stop_.load()) {
+        alive();
         std::deque<Entry> entries;
         {
             const std::lock_guard lock(mutex_);
@@ -130,8 +145,10 @@ void Recorder::loop() {
         }
         drain();
         look_at_estimate();
-        commit(false);
+        keep_few();
+        commit(std::exchange(commit_now_, false));
         show();
+        alive_wall_ns_.store(0);
         self_.wait_until(clock_.now() + kPeriod);
     }
     drain();
@@ -141,7 +158,7 @@ void Recorder::loop() {
         entries.swap(waiting_);
     }
     for (Entry& entry : entries) std::visit([this](auto& e) { take(e); }, entry);
-    if (head_) take(Ended{"interrupted", "the daemon ended", "", head_->utc_ns});
+    if (head_) take(Ended{"interrupted", "the daemon ended", "", "", head_->utc_ns});
     show();
 }
 
@@ -183,6 +200,7 @@ void Recorder::take(const drivers::Sample& sample) {
     }
     if (writer_) {
         writer_->sample(sample);
+        ++at_risk_;
         if (writer_->samples_waiting() >= kMostRows) commit(true);
         return;
     }
@@ -200,100 +218,205 @@ bool Recorder::room() {
 /// What was not written yet is lost. The file so far stays; another goes on when the disk does.
 void Recorder::refuse(const std::string& why) {
     if (writer_) {
-        lost_.lost += writer_->samples_waiting();
-        shown_.samples_lost += writer_->samples_waiting();
+        lost_.lost += at_risk_;
+        shown_.samples_lost += at_risk_;
+        at_risk_ = 0;
         if (lost_.from == 0) lost_.from = newest_sample_;
         lost_.to = newest_sample_;
         writer_.reset();
     }
     lost_.stream = "samples";
-    lost_.reason = why;
+    if (lost_.reason.empty()) lost_.reason = why;
     shown_.note = why;
     retry_wall_ns_ = wall_ns() + kRetryNs;
-    if (!std::exchange(told_bad_, true)) on_event_(Severity::alarm, why);
+}
+
+/// Both kinds of files are on one disk: what it refuses and that it takes again is told once.
+void Recorder::judge_disk() {
+    const bool raw_good = !raw_ || raw_->good();
+    if (writer_ && raw_good) {
+        shown_.note.clear();
+        if (std::exchange(told_bad_, false))
+            on_event_(Severity::info, fmt::format("writes again, to {}", shown_.file));
+    } else {
+        if (writer_) shown_.note = raw_->note();
+        if (!std::exchange(told_bad_, true)) on_event_(Severity::alarm, shown_.note);
+    }
 }
 
 bool Recorder::open_file() {
-    const std::string name = part_ == 0 ? "campaign.h5" : fmt::format("campaign-{}.h5", part_ + 1);
-    const std::string path = campaign_folder_ + "/" + name;
+    const std::string path = campaign_folder_ + "/" + part_name(part_ + 1);
     try {
         std::filesystem::create_directories(campaign_folder_);
         if (!room()) return false;
-        writer_ = std::make_unique<CampaignWriter>(path, *head_);
+        Head head = *head_;
+        head.part = part_ + 1;
+        writer_ = std::make_unique<CampaignWriter>(path, head);
+        write_kept();
     } catch (const std::exception& error) {
+        writer_.reset();
         std::error_code ignored;
-        if (!writer_) std::filesystem::remove(path, ignored);
+        std::filesystem::remove(path, ignored);
         refuse(error.what());
         return false;
     }
+    close_previous();
+    // Only the first file of this life goes on from another one's dwells.
+    head_->restart = false;
+    head_->dwells_before = 0;
     ++part_;
     shown_.file = path;
+    note(path);
     return true;
 }
 
-void Recorder::take(Head& head) {
-    if (head_) take(Ended{"interrupted", "another campaign began", "", head.utc_ns});
-    head_ = std::move(head);
-    std::string base = folder_ + "/" + head_->name + "-" + stamp(head_->utc_ns);
+/// A new one; or that of the campaign that goes on, with its next part.
+void Recorder::find_folder() {
+    part_ = 0;
+    const std::string base = folder_ + "/" + head_->name + "-" + stamp(head_->utc_ns);
     campaign_folder_ = base;
+    if (head_->restart) {
+        if (const auto found = interrupted_campaign(folder_, *head_)) {
+            campaign_folder_ = found->folder;
+            part_ = found->head.part;
+            head_->campaign = found->head.campaign;
+            if (head_->clock == "rig") {
+                // The rig's time went on, faster or slower than ours.
+                const auto late = head_->utc_ns - head_->utc_offset_ns;
+                head_->utc_offset_ns = found->head.utc_offset_ns;
+                head_->utc_ns = late + head_->utc_offset_ns;
+            }
+            return;
+        }
+        on_event_(
+            Severity::alarm,
+            fmt::format("{}: found no recording of the {} dwells before the restart, expected "
+                        "campaign {}: it will not replay as a whole",
+                        folder_, head_->dwells_before, head_->name));
+    }
     // A folder that cannot be looked at is met again, and told, when the file is opened.
     std::error_code unknown;
     for (int i = 2; std::filesystem::exists(campaign_folder_, unknown); ++i)
         campaign_folder_ = fmt::format("{}-{}", base, i);
-    part_ = 0;
+    head_->campaign = std::filesystem::path(campaign_folder_).filename().string();
+}
+
+/// An index that cannot be written costs nothing but a rebuild.
+void Recorder::note(const std::string& path) {
+    try {
+        if (!index_)
+            index_ = std::make_unique<Index>(
+                folder_, [this](const std::string& words) { on_event_(Severity::warning, words); });
+        index_->note_file(path);
+        told_index_ = false;
+    } catch (const std::exception& error) {
+        index_.reset();
+        if (!std::exchange(told_index_, true))
+            on_event_(Severity::warning,
+                      fmt::format("index: {}; vibrig recover makes it anew", error.what()));
+    }
+}
+
+/// Of another life, or given up when the disk refused: others can read it once it is closed.
+void Recorder::close_previous() {
+    if (part_ == 0) return;
+    const std::string previous = campaign_folder_ + "/" + part_name(part_);
+    try {
+        close_part(previous, part_name(part_ + 1));
+        note(previous);
+    } catch (const std::exception& error) {
+        on_event_(Severity::warning, error.what());
+    }
+}
+
+void Recorder::take(Head& head) {
+    if (head_) take(Ended{"interrupted", "another campaign began", "", "", head.utc_ns});
+    head_ = std::move(head);
+    find_folder();
+    const std::size_t going_on = head_->dwells_before;
     lost_ = {};
+    at_risk_ = 0;
     told_bad_ = false;
     shown_ = {};
     shown_.folder = folder_;
     shown_.recording = true;
     estimate_samples_ = 0;
-    if (open_file()) {
-        for (const EventRecord& event : before_) writer_->event(event);
-    }
-    before_.clear();
+    // What stands there is to be read by others while it is written.
+    if (open_file()) commit(true);
+    if (settings_.raw && going_on > 0) append_dwells(fmt::format("{}{}\n", kRestartLine, going_on));
     if (settings_.raw)
-        raw_ = std::make_unique<RawLog>(campaign_folder_, head_->interface, settings_,
-                                        head_->utc_offset_ns,
-                                        [this](const Segment&) { ++shown_.segments; });
+        raw_ = std::make_unique<RawLog>(
+            campaign_folder_, head_->interface, settings_, head_->utc_offset_ns,
+            [this](const Segment& segment) {
+                ++shown_.segments;
+                note(campaign_folder_ + "/" + segment.file);
+            },
+            [this] { alive(); });
     committed_wall_ns_ = wall_ns();
 }
 
 /// Beside the raw log, in its times: which frames belong to which dwell.
 void Recorder::write_order_line(const Order& order) {
-    const std::string path = campaign_folder_ + "/dwells.csv";
-    std::FILE* file = std::fopen(path.c_str(), "a");
-    if (file == nullptr) return;
-    if (std::ftell(file) == 0)
-        std::fputs("run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us\n", file);
     const auto us = [&](Time time) {
         return (time + head_->utc_offset_ns) / drivers::kMicrosecond;
     };
     const auto seconds = [](std::int64_t t) {
         return fmt::format("{}.{:06d}", t / 1'000'000, t % 1'000'000);
     };
-    const std::string line = fmt::format("{},{},{},{},{},{},{}\n", order.run, order.position,
-                                         order.table_g, order.cancel ? "" : seconds(us(order.from)),
-                                         order.cancel ? "" : seconds(us(order.to)),
-                                         order.cancel ? seconds(us(order.announced)) : "",
-                                         head_->utc_offset_ns / drivers::kMicrosecond);
+    append_dwells(fmt::format(
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", order.run, order.position, order.table_g,
+        order.cancel ? "" : seconds(us(order.from)), order.cancel ? "" : seconds(us(order.to)),
+        order.cancel ? seconds(us(order.announced)) : "",
+        head_->utc_offset_ns / drivers::kMicrosecond, order.zero_g[0], order.zero_g[1],
+        order.zero_g[2], order.level_sigma_g, order.noise.angle_arcsec,
+        order.noise.gyro_random_walk_deg_per_rt_h[0], order.noise.gyro_random_walk_deg_per_rt_h[1],
+        order.noise.gyro_random_walk_deg_per_rt_h[2]));
+}
+
+void Recorder::append_dwells(const std::string& line) {
+    const std::string path = campaign_folder_ + "/dwells.csv";
+    std::FILE* file = std::fopen(path.c_str(), "a");
+    if (file == nullptr) return;
+    if (std::ftell(file) == 0) std::fprintf(file, "%s\n", kDwellsHeader);
     std::fputs(line.c_str(), file);
     std::fclose(file);
 }
 
 void Recorder::take(const Order& order) {
-    if (writer_) writer_->order(order);
-    if (head_ && raw_) write_order_line(order);
+    if (!head_) return;
+    kept_.push_back(order);
+    if (raw_) write_order_line(order);
 }
+
 void Recorder::take(const Dwell& dwell) {
-    if (writer_) writer_->dwell(dwell);
+    if (!head_) return;
+    kept_.push_back(dwell);
+    // The journal goes on from here after a crash: so must the recording.
+    commit_now_ = true;
 }
-void Recorder::take(const EventRecord& event) {
-    if (writer_) {
-        writer_->event(event);
-    } else if (!head_) {
-        before_.push_back(event);
-        if (before_.size() > kEventsBefore) before_.pop_front();
+
+void Recorder::take(const EventRecord& event) { kept_.push_back(event); }
+
+/// Without a campaign the newest; without a disk as many as memory has for them.
+void Recorder::keep_few() {
+    const std::size_t most = head_ ? kMostKept : kEventsBefore;
+    while (kept_.size() > most) {
+        kept_.pop_front();
+        if (!head_) continue;
+        const std::lock_guard lock(mutex_);
+        ++status_.entries_dropped;
     }
+}
+
+/// Throws. What the file did not take is kept for the next one.
+void Recorder::write_kept() {
+    for (const auto& entry : kept_) {
+        if (const auto* order = std::get_if<Order>(&entry)) writer_->order(*order);
+        if (const auto* dwell = std::get_if<Dwell>(&entry)) writer_->dwell(*dwell);
+        if (const auto* event = std::get_if<EventRecord>(&entry)) writer_->event(*event);
+    }
+    writer_->commit();
+    kept_.clear();
 }
 
 void Recorder::write_gap(const Gap& gap) {
@@ -317,28 +440,24 @@ void Recorder::commit(bool all) {
     if (!all && now - committed_wall_ns_ < static_cast<std::int64_t>(settings_.flush_s * 1e9))
         return;
     committed_wall_ns_ = now;
-    if (raw_) {
-        const bool was_good = raw_->good();
-        raw_->flush();
-        Gap gap;
-        while (raw_->take_gap(gap)) write_gap(gap);
-        if (was_good != raw_->good())
-            on_event_(raw_->good() ? Severity::info : Severity::alarm,
-                      raw_->good() ? "the raw log is written again" : raw_->note());
-        if (!raw_->good()) shown_.note = raw_->note();
-    }
+    alive();
+    if (raw_) raw_->flush();
+    alive();
     if (!writer_ && now >= retry_wall_ns_ && open_file()) {
         lost_.stream = "samples";
         if (lost_.lost > 0) write_gap(std::exchange(lost_, {}));
-        shown_.note.clear();
-        if (std::exchange(told_bad_, false))
-            on_event_(Severity::info, fmt::format("writes again, to {}", shown_.file));
     }
+    Gap gap;
+    while (writer_ && raw_ && raw_->take_gap(gap)) write_gap(gap);
+    write_rows();
+    judge_disk();
+}
+
+void Recorder::write_rows() {
     if (!writer_ || !room()) return;
     try {
-        const auto rows = writer_->samples_waiting();
-        writer_->commit();
-        shown_.samples += rows;
+        write_kept();
+        shown_.samples += std::exchange(at_risk_, 0);
     } catch (const hdf5::Error& error) {
         refuse(error.what());
     }
@@ -355,7 +474,8 @@ void Recorder::take(const Ended& ended) {
     if (raw_) raw_->close();
     if (writer_) {
         try {
-            writer_->end(ended.state, ended.reason, ended.result, ended.utc_ns);
+            writer_->end(ended);
+            note(writer_->path());
         } catch (const hdf5::Error& error) {
             refuse(error.what());
         }

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/index.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/record/records.hpp"
 #include "daemon/record/settings.hpp"
@@ -68,27 +69,28 @@ class Recorder {
 
     // Control thread; they queue.
     void campaign_begun(Head head);
-    void ordered(const rt::DwellOrder& order, drivers::Time now);
+    void ordered(const rt::DwellOrder& order, drivers::Time now,
+                 const estimator::NoiseLevels& noise);
     void dwell_done(Dwell dwell);
     void event(const EventRecord& event);
-    void campaign_ended(const std::string& state, const std::string& reason,
-                        const std::string& result_json, std::int64_t utc_ns);
+    void campaign_ended(Ended ended);
 
     [[nodiscard]] RecorderStatus status() const;
+    /// For how long the disk has not answered, s; 0: it does. Any thread.
+    [[nodiscard]] double stuck_s() const noexcept;
 
     static constexpr std::size_t kMostWaiting = 10'000;
 
   private:
-    struct Ended {
-        std::string state, reason, result;
-        std::int64_t utc_ns = 0;
-    };
     using Entry = std::variant<Head, Order, Dwell, EventRecord, Ended>;
 
     void put(Entry entry);
     void loop();
     void drain();
     void take(Head& head);
+    void find_folder();
+    void close_previous();
+    void note(const std::string& path);
     void take(const Order& order);
     void take(const Dwell& dwell);
     void take(const EventRecord& event);
@@ -96,11 +98,17 @@ class Recorder {
     void take(const drivers::Sample& sample);
     void look_at_estimate();
     void commit(bool all);
+    void write_rows();
     [[nodiscard]] bool open_file();
     void refuse(const std::string& why);
     void write_gap(const Gap& gap);
     void write_order_line(const Order& order);
+    void append_dwells(const std::string& line);
+    void write_kept();
+    void keep_few();
     void show();
+    void alive() noexcept;
+    void judge_disk();
     [[nodiscard]] bool room();
 
     const Settings settings_;
@@ -118,17 +126,24 @@ class Recorder {
     std::string campaign_folder_;
     int part_ = 0;  ///< files of this campaign so far
     std::unique_ptr<CampaignWriter> writer_;
+    std::unique_ptr<Index> index_;  ///< null until it could be opened
+    bool told_index_ = false;
     std::unique_ptr<RawLog> raw_;
     std::deque<FrameRecord> late_sent_;
-    std::deque<EventRecord> before_;  ///< the newest events while nothing is recorded
+    /// What goes into the file once it can be written: few and small, unlike the samples.
+    std::deque<std::variant<Order, Dwell, EventRecord>> kept_;
     std::int64_t committed_wall_ns_ = 0, retry_wall_ns_ = 0;
     drivers::Time newest_sample_ = 0, estimate_at_ = 0;
     std::uint64_t estimate_samples_ = 0;
-    Gap lost_;  ///< samples that could not be written
+    Gap lost_;                   ///< samples that could not be written
+    std::uint64_t at_risk_ = 0;  ///< samples given to the file since it last went to the disk
+    bool commit_now_ = false;
     bool told_bad_ = false;
     RecorderStatus shown_;
 
     std::atomic<bool> stop_{false};
+    /// When its thread last went on, in wall time; 0: it waits for something to do.
+    std::atomic<std::int64_t> alive_wall_ns_{0};
     mutable std::mutex mutex_;
     std::deque<Entry> waiting_;
     RecorderStatus status_;

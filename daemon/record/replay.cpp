@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -24,6 +26,15 @@ namespace vibrig::record {
 using drivers::Time;
 
 namespace {
+
+/// Those in force again would move a last bit: the filter keeps their squares.
+void set_noise(estimator::Identification& identification, const estimator::NoiseLevels& levels) {
+    const auto& now = identification.noise();
+    if (levels.angle_arcsec > 0 &&
+        (levels.angle_arcsec != now.angle_arcsec ||
+         levels.gyro_random_walk_deg_per_rt_h != now.gyro_random_walk_deg_per_rt_h))
+        identification.set_noise(levels);
+}
 
 /// The control thread's: it is this one, and it never sleeps there.
 class Awake final : public drivers::Waiter {
@@ -62,22 +73,19 @@ class Player {
         waiter_->notify();
         rest();
     }
-    /// As the daemon does between two dwells.
-    bool take_done(Dwell& dwell) {
+    /// Between two dwells: the levels that the recording says.
+    void take_noise(const estimator::NoiseLevels& levels) { set_noise(identification_, levels); }
+    /// As the daemon does between two dwells. `decide`: what the noise monitor says is done.
+    bool take_done(Dwell& dwell, bool decide) {
         rt::DwellDone done;
         if (!stage_.take_done(done)) return false;
         rt::BlockRecord block;
         while (stage_.take_block(block)) noise_.add(block);
-        estimator::Estimate estimate;
-        identification_.estimate(estimate);
-        if (noise_.end_dwell(done.summary, estimate.value)) {
-            done.summary.flagged = true;
-            done.summary.reason = "noise is not that of the earlier dwells";
-        }
-        if (const auto levels = noise_.take_new_levels()) identification_.set_noise(*levels);
+        if (decide) noise_.conclude(done.summary, identification_);
         dwell.time = clock_.now();
         dwell.summary = done.summary;
         dwell.reason = done.summary.reason;
+        estimator::Estimate estimate;
         identification_.estimate(estimate);
         dwell.value = estimate.value;
         dwell.sigma = estimate.sigma;
@@ -132,6 +140,18 @@ std::string difference(const Dwell& was, const Dwell& is) {
     return {};
 }
 
+/// What the campaign adds to the filter's result: zeros in the amplitudes' uncertainty, its mark.
+void qualify(const Campaign& campaign, ReplayResult& out) {
+    std::vector<std::pair<int, double>> variances;
+    const auto dwells = recorded_dwells(campaign);
+    for (std::size_t i = campaign.restarted_at; i < dwells.size() && i < out.dwells.size(); ++i) {
+        const double sigma = dwells[i].order->level_sigma_g;
+        if (sigma > 0) variances.emplace_back(dwells[i].order->run, sigma * sigma);
+    }
+    estimator::widen_amplitudes(out.result, variances);
+    if (!campaign.mark.empty()) out.result.warnings.push_back("campaign marked: " + campaign.mark);
+}
+
 drivers::AssemblerSettings assembler_settings(const std::string& configuration) {
     std::istringstream lines(configuration);
     std::string kept;
@@ -148,9 +168,10 @@ class FrameReader {
     FrameReader(const std::string& dbc, const std::string& configuration,
                 std::int64_t utc_offset_ns, std::vector<drivers::Sample>& to)
         : dbc_(proto::parse_dbc(dbc.empty() ? proto::rig_dbc_text() : dbc, "DBC of the recording")),
-          assembler_(dbc_, assembler_settings(configuration),
-                     [&to](const drivers::Sample& sample) { to.push_back(sample); }),
+          settings_(assembler_settings(configuration)),
+          to_(to),
           utc_offset_ns_(utc_offset_ns) {
+        begin();
         if (const auto* message = dbc_.find("RigTime")) {
             rig_time_ = message;
             tick_end_ = message->find("TickEnd");
@@ -176,12 +197,18 @@ class FrameReader {
         });
         // A line without an end was cut off with its writer.
     }
-    void finish() { assembler_.advance(std::numeric_limits<Time>::max() / 2); }
+    void finish() { assembler_->advance(std::numeric_limits<Time>::max() / 2); }
     [[nodiscard]] Time until() const { return until_; }
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
 
   private:
+    void begin() {
+        if (assembler_) finish();
+        assembler_.emplace(dbc_, settings_,
+                           [this](const drivers::Sample& sample) { to_.push_back(sample); });
+    }
     void line(std::string_view text, const std::string& path, std::size_t number) {
+        if (text == kStartLine) begin();
         if (text.empty() || text.front() == '#') return;
         proto::LoggedFrame logged;
         try {
@@ -204,15 +231,17 @@ class FrameReader {
         if (rig_time_ != nullptr && frame.frame.can_id == rig_time_->id) {
             rig_ = true;
             const auto end = proto::decode_raw(*tick_end_, {frame.frame.data, frame.frame.len});
-            if (end && *end != 0) assembler_.advance(frame.time);
+            if (end && *end != 0) assembler_->advance(frame.time);
             return;
         }
-        if (!rig_ && assembler_.next_deadline() <= frame.time) assembler_.advance(frame.time);
-        assembler_.feed(frame);
+        if (!rig_ && assembler_->next_deadline() <= frame.time) assembler_->advance(frame.time);
+        assembler_->feed(frame);
     }
 
     proto::Dbc dbc_;
-    drivers::SampleAssembler assembler_;
+    drivers::AssemblerSettings settings_;
+    std::vector<drivers::Sample>& to_;
+    std::optional<drivers::SampleAssembler> assembler_;
     std::int64_t utc_offset_ns_;
     const proto::Message* rig_time_ = nullptr;
     const proto::Signal* tick_end_ = nullptr;
@@ -245,49 +274,103 @@ Time microseconds(const std::string& text, const std::string& place) {
     return (whole * 1'000'000 + part) * drivers::kMicrosecond;
 }
 
+/// The first `count` dwells stay, with their ends: what came after was done again.
+void keep_dwells(Campaign& campaign, std::size_t count) {
+    std::size_t kept = 0, dwells = 0;
+    while (kept < campaign.orders.size()) {
+        if (!campaign.orders[kept].cancel && dwells++ == count) break;
+        ++kept;
+    }
+    campaign.orders.resize(kept);
+    campaign.restarted_at = count;
+}
+
 void read_dwells(const std::string& path, Campaign& to) {
     std::ifstream file(path);
     std::string line;
-    const std::string head = "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us";
-    if (!std::getline(file, line) || line != head)
+    if (!std::getline(file, line) || line != kDwellsHeader)
         throw std::runtime_error(path + ":1: found '" + proto::printable(line.substr(0, 80)) +
-                                 "', expected the header " + head);
+                                 "', expected the header " + kDwellsHeader);
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         if (line.empty()) continue;
         const std::string place = fmt::format("{}:{}", path, number);
+        if (std::size_t count = 0; line.starts_with(kRestartLine)) {
+            if (!proto::read_number(std::string_view(line).substr(std::strlen(kRestartLine)),
+                                    count))
+                throw std::runtime_error(place + ": found '" + proto::printable(line) +
+                                         "', expected a number of dwells");
+            keep_dwells(to, count);
+            continue;
+        }
         const auto fields = fields_of(line);
         Order order;
         std::int64_t offset_us = 0;
-        if (fields.size() != 7 || !proto::read_number(fields[0], order.run) ||
-            !proto::read_number(fields[1], order.position) ||
-            !proto::read_number(fields[2], order.table_g) ||
-            !proto::read_number(fields[6], offset_us))
+        auto& walk = order.noise.gyro_random_walk_deg_per_rt_h;
+        const std::array<std::pair<std::size_t, double*>, 9> numbers{
+            {{2, &order.table_g},
+             {7, &order.zero_g[0]},
+             {8, &order.zero_g[1]},
+             {9, &order.zero_g[2]},
+             {10, &order.level_sigma_g},
+             {11, &order.noise.angle_arcsec},
+             {12, &walk[0]},
+             {13, &walk[1]},
+             {14, &walk[2]}}};
+        bool good = fields.size() == 15 && proto::read_number(fields[0], order.run) &&
+                    proto::read_number(fields[1], order.position) &&
+                    proto::read_number(fields[6], offset_us);
+        for (const auto& [field, value] : numbers)
+            good = good && proto::read_number(fields[field], *value) && std::isfinite(*value);
+        if (!good)
             throw std::runtime_error(place + ": found '" + proto::printable(line.substr(0, 80)) +
-                                     "', expected run, position, table_g, times, offset");
+                                     "', expected 15 fields as the header says");
         to.head.utc_offset_ns = offset_us * drivers::kMicrosecond;
         if (!fields[5].empty()) {
             order.cancel = true;
-            order.announced = microseconds(fields[5], place) - to.head.utc_offset_ns;
+            order.announced = microseconds(fields[5], place);
         } else {
-            order.from = microseconds(fields[3], place) - to.head.utc_offset_ns;
-            order.to = microseconds(fields[4], place) - to.head.utc_offset_ns;
+            order.from = microseconds(fields[3], place);
+            order.to = microseconds(fields[4], place);
             if (order.to <= order.from)
                 throw std::runtime_error(place + ": found an end before the beginning");
         }
         to.orders.push_back(order);
     }
     if (to.orders.empty()) throw std::runtime_error(path + ": found no dwell, expected some");
+    for (Order& order : to.orders) {
+        for (Time* time : {&order.announced, &order.from, &order.to})
+            if (*time != 0) *time -= to.head.utc_offset_ns;
+    }
 }
 
 }  // namespace
 
+bool noise_known(const Campaign& campaign) {
+    return std::ranges::all_of(campaign.orders, [](const Order& order) {
+        return order.cancel || order.noise.angle_arcsec > 0;
+    });
+}
+
+void forget_noise(Campaign& campaign) {
+    for (Order& order : campaign.orders) order.noise = {};
+}
+
+void feed(estimator::Identification& identification, const Campaign& campaign,
+          const RecordedDwell& dwell, const OnStep& on_step) {
+    const Order& order = *dwell.order;
+    set_noise(identification, order.noise);
+    identification.begin_dwell({order.run, order.position, order.table_g});
+    for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
+        const auto step =
+            identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
+        if (on_step) on_step(i, step);
+    }
+    static_cast<void>(identification.end_dwell());
+}
+
 ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,
                     const ReplayOptions& options) {
-    if (campaign.head.dwells_before > 0)
-        throw std::runtime_error(
-            fmt::format("{}: the campaign went on after a restart, {} dwells are in the file "
-                        "before it: found one part, expected a whole campaign",
-                        campaign.path, campaign.head.dwells_before));
+    if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     const auto begin = std::chrono::steady_clock::now();
     ReplayResult out;
     const auto& samples = campaign.samples;
@@ -314,11 +397,17 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
             if (options.progress) options.progress(at, samples.size());
         }
     };
+    const bool decide = !noise_known(campaign);
     const auto take = [&] {
-        for (Dwell dwell; player.take_done(dwell);) {
+        for (Dwell dwell; player.take_done(dwell, decide);) {
             if (out.dwells.size() < campaign.dwells.size()) {
                 ++out.compared;
-                const std::string what = difference(campaign.dwells[out.dwells.size()], dwell);
+                const Dwell& was = campaign.dwells[out.dwells.size()];
+                if (!decide) {
+                    dwell.summary.flagged = was.summary.flagged;
+                    dwell.reason = was.reason;
+                }
+                const std::string what = difference(was, dwell);
                 if (!what.empty()) ++out.different;
                 if (out.first_difference.empty()) out.first_difference = what;
             }
@@ -328,9 +417,11 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     };
     for (const RecordedDwell& dwell : recorded_dwells(campaign)) {
         play_until(std::max(at, dwell.first));
+        player.take_noise(dwell.order->noise);
         rt::DwellOrder order;
         order.from = dwell.order->from;
         order.to = dwell.order->to;
+        order.zero_g = dwell.order->zero_g;
         order.dwell = {dwell.order->run, dwell.order->position, dwell.order->table_g};
         player.order(order);
         const std::size_t end = dwell.first + dwell.count;
@@ -347,6 +438,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     play_until(samples.size());
     take();
     out.result = player.result();
+    qualify(campaign, out);
     out.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;
 }

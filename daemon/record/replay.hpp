@@ -24,6 +24,17 @@ struct ReplayResult {
     std::string first_difference;  ///< empty: none
 };
 
+/// Whether every dwell says which noise levels the filter took; they are then taken again, else
+/// the noise monitor decides again.
+[[nodiscard]] bool noise_known(const Campaign& campaign);
+/// For an identification with other settings.
+void forget_noise(Campaign& campaign);
+
+using OnStep = std::function<void(std::size_t sample, const estimator::StepResult&)>;
+/// One dwell into a filter, with the zeros and the noise levels of the recording.
+void feed(estimator::Identification& identification, const Campaign& campaign,
+          const RecordedDwell& dwell, const OnStep& on_step = {});
+
 /// The recorded samples and orders through the daemon's estimator thread, its noise monitor and
 /// what the control thread does between dwells, on a virtual clock. Throws.
 [[nodiscard]] ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,

@@ -12,8 +12,8 @@ struct Settings {
     bool raw = true;     ///< frames too, as candump logs
     double segment_s = 600;
     int segment_mb = 64;
-    bool zstd = true;  ///< closed segments are compressed
-    double flush_s = 1;
+    bool zstd = true;       ///< closed segments are compressed
+    double flush_s = 0.5;   ///< a second with what the disk and the thread add
     int keep_free_mb = 64;  ///< with less on the disk nothing is written
 };
 

@@ -24,14 +24,6 @@ constexpr std::size_t kLags = 40;
 constexpr std::size_t kThinned = 600;
 constexpr double kBlock_s = 1.0;
 
-estimator::Measurement measurement_of(const drivers::Sample& sample, drivers::Time origin) {
-    return {.time_s = drivers::to_seconds(sample.time - origin),
-            .angle_rad = sample.angle,
-            .force_g = sample.force,
-            .angles_good = sample.angles_good(),
-            .force_good = sample.force_good()};
-}
-
 /// Means of the good angles of a dwell, second by second; raw encoder angles, not wrapped.
 std::vector<estimator::AngleBlock> blocks_of(const Campaign& campaign, const RecordedDwell& dwell) {
     std::vector<estimator::AngleBlock> blocks;
@@ -96,11 +88,7 @@ Coefficients without(const Campaign& campaign, const estimator::Settings& settin
     estimator::Identification identification(settings, dwells.size());
     for (const auto& dwell : dwells) {
         if (left_out.contains(dwell.order->position)) continue;
-        identification.begin_dwell({dwell.order->run, dwell.order->position, dwell.order->table_g});
-        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
-            static_cast<void>(
-                identification.add(measurement_of(campaign.samples[i], dwell.order->from)));
-        static_cast<void>(identification.end_dwell());
+        record::feed(identification, campaign, dwell);
     }
     estimator::Estimate estimate;
     identification.estimate(estimate);
@@ -161,33 +149,26 @@ Innovations innovations_of(const Campaign& campaign, const estimator::Settings& 
     std::size_t total = 0, at = 0;
     for (const auto& dwell : dwells) total += dwell.count;
     const std::size_t every = std::max<std::size_t>(1, total / kThinned);
-    for (const auto& dwell : dwells) {
-        identification.begin_dwell({dwell.order->run, dwell.order->position, dwell.order->table_g});
-        recent.clear();
-        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i, ++at) {
-            const auto step =
-                identification.add(measurement_of(campaign.samples[i], dwell.order->from));
-            if (step.outcome != estimator::StepOutcome::used) {
-                recent.clear();
-                continue;
-            }
-            recent.push_back(step.innovation_arcsec);
-            ++out.count;
-            const std::size_t lags = std::min(kLags, recent.size() - 1);
-            for (std::size_t lag = 0; lag <= lags; ++lag) {
-                const auto& other = recent[recent.size() - 1 - lag];
-                for (std::size_t k = 0; k < 3; ++k) products[k][lag] += recent.back()[k] * other[k];
-                pairs[lag] += 1;
-            }
-            if (recent.size() > 4 * kLags) recent.erase(recent.begin(), recent.end() - kLags);
-            if (at % every == 0) {
-                out.time_s.push_back(
-                    drivers::to_seconds(campaign.samples[i].time - campaign.samples[0].time));
-                for (std::size_t k = 0; k < 3; ++k)
-                    out.arcsec[k].push_back(step.innovation_arcsec[k]);
-            }
+    const auto take = [&](std::size_t i, const estimator::StepResult& step) {
+        const bool shown = at++ % every == 0;
+        if (step.outcome != estimator::StepOutcome::used) return recent.clear();
+        recent.push_back(step.innovation_arcsec);
+        ++out.count;
+        const std::size_t lags = std::min(kLags, recent.size() - 1);
+        for (std::size_t lag = 0; lag <= lags; ++lag) {
+            const auto& other = recent[recent.size() - 1 - lag];
+            for (std::size_t k = 0; k < 3; ++k) products[k][lag] += recent.back()[k] * other[k];
+            pairs[lag] += 1;
         }
-        static_cast<void>(identification.end_dwell());
+        if (recent.size() > 4 * kLags) recent.erase(recent.begin(), recent.end() - kLags);
+        if (!shown) return;
+        out.time_s.push_back(
+            drivers::to_seconds(campaign.samples[i].time - campaign.samples[0].time));
+        for (std::size_t k = 0; k < 3; ++k) out.arcsec[k].push_back(step.innovation_arcsec[k]);
+    };
+    for (const auto& dwell : dwells) {
+        recent.clear();
+        record::feed(identification, campaign, dwell, take);
     }
     for (std::size_t k = 0; k < 3 && pairs[0] > 0; ++k) {
         const double variance = products[k][0] / pairs[0];

@@ -1,6 +1,5 @@
 #include "daemon/report/report.hpp"
 
-#include <openssl/evp.h>
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 
@@ -10,7 +9,9 @@
 #include <numbers>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/record/digest.hpp"
 #include "daemon/report/page.hpp"
+#include "daemon/report/plan_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
 #include "estimator/instruction_set.hpp"
@@ -83,10 +84,13 @@ void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
              ? fmt::format("estimates after each of {} dwells as recorded, to the last bit",
                            a.replayed.compared)
              : "!differs from the recording: " + a.replayed.first_difference},
-        {"Configuration", "SHA-256 " + sha256_of_text(head.configuration)},
-        {"Recording", campaign.path.substr(campaign.path.rfind('/') + 1) + ", SHA-256 " +
-                          sha256_of_file(campaign.path)}};
+        {"Configuration", "SHA-256 " + record::sha256_of_text(head.configuration)}};
+    if (!campaign.mark.empty()) rows.push_back({"Marked", "!" + campaign.mark});
+    if (campaign.parts.size() > 1)
+        rows.push_back(
+            {"Parts", fmt::format("{} files, joined in their order", campaign.parts.size())});
     page.table(rows, "words");
+    add_files(page, campaign);
     if (!unit.instruments.empty()) {
         std::vector<std::vector<std::string>> table{
             {"Instrument", "Serial number", "Certificate", "Due", ""}};
@@ -427,11 +431,12 @@ void add_noise(Page& page, const Campaign& campaign, const Analysis& a) {
             curve.low.push_back(point.lo);
             curve.high.push_back(point.hi);
         }
+        curve.look = Look::dots;
         chart.curves.push_back(std::move(curve));
     }
     page.figure(chart.svg(),
-                "Overlapping, of one-second means, from all dwells together. At short "
-                "times the resolvers, at long times the gyros.");
+                "Measured, overlapping, of one-second means, from all dwells together, with 68 % "
+                "bars. At short times the resolvers, at long times the gyros.");
     std::size_t alarms = 0;
     for (const auto& event : campaign.events) {
         if (event.source != "noise") continue;
@@ -439,6 +444,24 @@ void add_noise(Page& page, const Campaign& campaign, const Analysis& a) {
         if (event.severity != Severity::info) ++alarms;
     }
     page.paragraph(fmt::format("Alarms of the noise monitor: {}.", alarms));
+}
+
+/// Zeros taken in place, where they changed.
+void add_zeros(Page& page, const Campaign& campaign) {
+    std::vector<std::vector<std::string>> rows{
+        {"from run, position", "zero x mg", "y", "z", "vertical uncertain by, ppm"}};
+    const record::Order* before = nullptr;
+    for (const auto& order : campaign.orders) {
+        const bool none = order.zero_g == std::array<double, 3>{};
+        if (order.cancel || (before == nullptr ? none : before->zero_g == order.zero_g)) continue;
+        rows.push_back({fmt::format("{}, {}", order.run, order.position),
+                        num(1e3 * order.zero_g[0], 4), num(1e3 * order.zero_g[1], 4),
+                        num(1e3 * order.zero_g[2], 4), num(1e6 * order.level_sigma_g, 1)});
+        before = &order;
+    }
+    if (rows.size() == 1) return page.paragraph("None were taken in place.");
+    page.paragraph("Taken in place, on top of them, and subtracted from every sample since:");
+    page.table(rows);
 }
 
 void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
@@ -449,6 +472,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
         fmt::format("Accelerometer zeros in force: {:.6f}, {:.6f}, {:.6f} g, from the "
                     "configuration.",
                     zero[0], zero[1], zero[2]));
+    add_zeros(page, campaign);
     std::size_t told = 0;
     for (const auto& event : campaign.events) {
         if (event.text.find("level") == std::string::npos &&
@@ -515,44 +539,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     page.details("Effective configuration", campaign.head.configuration);
 }
 
-std::string hex(const unsigned char* bytes, unsigned size) {
-    std::string text;
-    for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", bytes[i]);
-    return text;
-}
-
-using Digest = std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)>;
-
-std::string finish(Digest& digest) {
-    std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
-    unsigned size = 0;
-    EVP_DigestFinal_ex(digest.get(), bytes.data(), &size);
-    return hex(bytes.data(), size);
-}
-
-Digest begin_digest() {
-    Digest digest(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-    EVP_DigestInit_ex(digest.get(), EVP_sha256(), nullptr);
-    return digest;
-}
-
 }  // namespace
-
-std::string sha256_of_file(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw std::runtime_error(path + ": cannot be read");
-    Digest digest = begin_digest();
-    std::vector<char> piece(1 << 16);
-    while (file.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file.gcount() > 0)
-        EVP_DigestUpdate(digest.get(), piece.data(), static_cast<std::size_t>(file.gcount()));
-    return finish(digest);
-}
-
-std::string sha256_of_text(const std::string& text) {
-    Digest digest = begin_digest();
-    EVP_DigestUpdate(digest.get(), text.data(), text.size());
-    return finish(digest);
-}
 
 std::string utc_text(std::int64_t utc_ns) {
     return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
@@ -564,6 +551,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     Page page;
     add_head(page, campaign, analysis);
     add_coefficients(page, analysis);
+    add_plan(page, campaign, analysis);
     add_held_out(page, analysis);
     add_convergence(page, campaign, analysis);
     add_innovations(page, analysis);

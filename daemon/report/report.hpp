@@ -18,9 +18,6 @@ struct Earlier {
 [[nodiscard]] std::string make_page(const record::Campaign& campaign, const Analysis& analysis,
                                     const std::optional<Earlier>& earlier);
 
-/// SHA-256 of a file, hexadecimal. Throws std::runtime_error.
-[[nodiscard]] std::string sha256_of_file(const std::string& path);
-[[nodiscard]] std::string sha256_of_text(const std::string& text);
 /// "2026-03-01 08:00:00 UTC"
 [[nodiscard]] std::string utc_text(std::int64_t utc_ns);
 

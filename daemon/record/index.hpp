@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace vibrig::journal {
+class Database;
+}
+
+namespace vibrig::record {
+
+/// A file of a campaign as the index has it.
+struct IndexedFile {
+    std::string name;  ///< in the campaign's folder
+    int part = 0;      ///< of an HDF5 file; 0: raw log
+    bool closed = false;
+    std::int64_t from_utc_ns = 0, to_utc_ns = 0;  ///< of its first and last row; 0: none
+    std::int64_t rows = 0;                        ///< samples, or frames
+    std::int64_t bytes = 0;
+    std::string sha256;  ///< empty while it is written
+};
+
+struct IndexedCampaign {
+    std::string key;  ///< its folder's name
+    std::string name, started_by, state;
+    std::int64_t started_utc_ns = 0;
+    std::vector<IndexedFile> files;  ///< by name
+};
+
+/// recordings.sqlite3 beside the campaigns' folders: which there are and which files they have. All
+/// of it can be had again from the files. One thread; everything throws journal::DatabaseError or
+/// std::runtime_error.
+class Index {
+  public:
+    using Tell = std::function<void(const std::string& words)>;
+    /// Opens or makes it; a damaged one is made anew, and told.
+    Index(std::string folder, const Tell& tell);
+    ~Index();
+
+    /// Looks at a campaign's folder, or at one file of it, and notes what there is.
+    void note(const std::string& campaign_folder);
+    void note_file(const std::string& path);
+    /// Forgets all and looks at every folder; the number of campaigns.
+    std::size_t rebuild();
+
+    [[nodiscard]] std::vector<IndexedCampaign> campaigns() const;
+
+    [[nodiscard]] static std::string path_in(const std::string& folder);
+
+  private:
+    void open();
+    void put(const std::string& key, const IndexedFile& file);
+
+    std::string folder_;
+    std::unique_ptr<journal::Database> database_;
+};
+
+/// What CAMPAIGN means: a path, or the name or folder's name of a campaign that the index of one of
+/// `folders` knows. Throws std::runtime_error with what was found and expected.
+[[nodiscard]] std::string find_campaign(const std::string& argument,
+                                        const std::vector<std::string>& folders,
+                                        const Index::Tell& tell);
+/// What the index beside a campaign's folder says of its files: throws if one is not there, tells
+/// if one is not as it was closed. Silent without an index.
+void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell);
+
+}  // namespace vibrig::record
