@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
@@ -21,17 +22,11 @@ namespace {
 constexpr Time kPoll = 200 * drivers::kMillisecond;
 // The order of a dwell goes out this long before its first sample; the last part of settling.
 constexpr Time kOrderLead = kSecond;
-// How much later than the ramp itself the controller may report the level as reached.
-constexpr Time kRampGrace = 10 * kSecond;
 // How much later than the last sample of a dwell the estimator may report it as done.
 constexpr Time kDoneGrace = 2 * kSecond;
 constexpr double kAtRestG = 1e-9;
 // Read back against commanded; a register resolves 1 mHz.
 constexpr double kFrequencyToleranceHz = 0.01;
-// A flagged dwell of an adaptive campaign is repeated so often at most.
-constexpr int kMostRepeats = 2;
-// A status older than this is no status.
-constexpr Time kPlatformDeadline = kSecond;
 
 rt::Guard guard_in(State state) {
     switch (state) {
@@ -39,6 +34,7 @@ rt::Guard guard_in(State state) {
         case State::settling:
         case State::recording:
         case State::resting:
+        case State::checking:
             return rt::Guard::excitation;
         case State::armed:
         case State::waiting:
@@ -58,52 +54,6 @@ Campaign::Campaign(const Settings& settings, Ports ports)
     : settings_(settings), ports_(std::move(ports)) {
     plan_stops();
     make_stages();
-}
-
-void Campaign::add_stop(const Stop& stop) {
-    const auto level = std::ranges::find(levels_, stop.table_g);
-    const auto run = level - levels_.begin();
-    if (level == levels_.end()) levels_.push_back(stop.table_g);
-    stops_.push_back({stop, static_cast<int>(run) + 1, static_cast<int>(stops_.size()) + 1});
-}
-
-void Campaign::plan_stops() {
-    stops_.clear();
-    levels_.clear();
-    at_ = 0;
-    repeats_ = 0;
-    for (const Stop& stop : settings_.stops) add_stop(stop);
-    if (settings_.stops.empty() && !settings_.adaptive) {
-        for (std::size_t run = 0; run < settings_.table_g.size(); ++run) {
-            for (std::size_t k = 0; k < settings_.positions_deg.size(); ++k) {
-                stops_.push_back({{settings_.positions_deg[k], settings_.table_g[run]},
-                                  static_cast<int>(run) + 1,
-                                  static_cast<int>(k) + 1});
-            }
-        }
-    }
-    expected_ = stops_.size();
-}
-
-bool Campaign::choose_next(Time now) {
-    if (!settings_.adaptive) return at_ < stops_.size();
-    const bool begun = at_ > 0;
-    if (begun && dwells_.back().flagged && repeats_ < kMostRepeats) {
-        ++repeats_;
-        const Stop again = stops_[at_ - 1].stop;
-        ports_.event(Severity::warning, "flagged dwell: the position is repeated");
-        add_stop(again);
-        expected_ = std::max(expected_, stops_.size());
-        return true;
-    }
-    repeats_ = 0;
-    const auto here = begun ? stops_[at_ - 1].stop.position_deg : std::array<double, 3>{};
-    const Next next = ports_.next(here, drivers::to_seconds(now - started_));
-    ports_.event(Severity::info, next.words);
-    if (!next.more) return false;
-    add_stop(next.stop);
-    expected_ = at_ + next.left;
-    return true;
 }
 
 bool Campaign::active() const {
@@ -133,7 +83,8 @@ void Campaign::enter(State state, Time now) {
     if (ports_.commanded) {
         ports_.commanded(state == State::settling ? table_g() : 0, excited_deg_);
     }
-    ports_.guard(guard_in(state));
+    // A loop check begins at rest, and has to learn where the gimbals are.
+    ports_.guard(state == State::checking ? rt::Guard::armed : guard_in(state));
     entered_ = now;
     requested_ = false;
     stop_sent_ = false;
@@ -151,21 +102,23 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
     switch (request.kind) {
         case Kind::arm:
             if (active()) return refuse("a campaign is running");
+            if (state_ == State::checking) return refuse("a loop check is running");
             if (state_ == State::tripped)
                 return refuse("tripped (" + reason_ + "): acknowledge it first");
-            if (!settings_.refusal.empty()) return refuse(settings_.refusal);
+            if (const auto why = loop_->refusal(); !why.empty()) return refuse(why);
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             reason_.clear();
             enter(State::armed, now);
             return accept(fmt::format(
                 "armed up to {:g} g at the table",
-                *std::ranges::max_element(levels_.empty() ? settings_.table_g : levels_)));
+                *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_)));
         case Kind::start:
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
             offer_.clear();
+            offered_stops_.clear();
             ports_.begin();
             begin(now);
             return accept("campaign started");
@@ -180,12 +133,23 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             return accept("resumed");
         case Kind::abort:
             ports_.shaker.stop_now();
-            if (active() || state_ == State::armed) abort("aborted by " + request.by, now);
+            if (active() || state_ == State::armed || state_ == State::checking)
+                abort("aborted by " + request.by, now);
             return accept("stop sent");
         case Kind::acknowledge:
+            // The controller latches what its own watchdog did while no daemon was there; a stop at
+            // rest clears it.
+            if (const auto shaker = ports_.shaker.reading();
+                state_ != State::tripped && shaker.fault != 0 && !active()) {
+                if (!shaker.still()) return refuse("the table is not at rest yet");
+                ports_.shaker.stop_now();
+                return accept(fmt::format("acknowledged: shaker fault {:#06x}", shaker.fault));
+            }
             if (state_ != State::tripped) return refuse("nothing to acknowledge");
             enter(State::idle, now);
             return accept("acknowledged: " + std::exchange(reason_, {}));
+        case Kind::selftest:
+            return begin_loop_check(request, now);
     }
     return refuse("unknown command");
 }
@@ -195,44 +159,17 @@ void Campaign::begin(Time now) {
     dwells_ = std::exchange(offer_, {});
     positions_done_ = positions_before_ = dwells_.size();
     plan_stops();
+    offered_stops_.clear();
     at_ = positions_done_;
     temperatures_.clear();
     pause_asked_ = false;
     zeroed_ = false;
+    zeroing_ = Zeroing::none;
     mark_.clear();
     level_variances_.clear();
     if (zero_) zero_->reset();
     started_ = now;
     enter(State::waiting, now);
-}
-
-CommandReply Campaign::resume_interrupted(const CommandRequest& request, Time now) {
-    if (state_ != State::armed) return {false, "not armed: a named person arms it first"};
-    if (const auto why = not_fit_to_excite(); !why.empty()) return {false, why};
-    if (!ports_.estimator_free()) return {false, "the last dwell is still being closed"};
-    if (ports_.resume_gate) {
-        if (const auto why = ports_.resume_gate(); !why.empty())
-            return {false, "not consistent with the campaign so far: " + why};
-    }
-    const std::string what = resume_offer();
-    if (ports_.resume) ports_.resume(request.by);
-    begin(now);
-    const std::string text = "campaign resumed: " + what;
-    ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
-    return {true, text};
-}
-
-std::string Campaign::resume_offer() const {
-    if (offer_.empty()) return {};
-    return fmt::format("{} of {} positions done", offer_.size(), stops_.size());
-}
-
-bool Campaign::offer(std::vector<estimator::DwellSummary> done) {
-    bool fits = !settings_.adaptive && done.size() <= stops_.size();
-    for (std::size_t i = 0; fits && i < done.size(); ++i)
-        fits = done[i].run == stops_[i].run && done[i].position == stops_[i].position;
-    if (fits) offer_ = std::move(done);
-    return fits;
 }
 
 Time Campaign::step(Time now) {
@@ -251,7 +188,8 @@ Time Campaign::step_once(Time now) {
         may_move_ = false;
     }
     // A link that was lost ends the arming: excitation never recovers alone.
-    if ((active() || state_ == State::armed) && !shutting_down_ && !ports_.shaker.reading().valid) {
+    if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
+        !ports_.shaker.reading().valid) {
         abort("no valid read-back from the shaker", now);
     }
     insist_on_zero_torque(now);
@@ -262,6 +200,8 @@ Time Campaign::step_once(Time now) {
             return zeroing(now);
         case State::levelling:
             return levelling(now);
+        case State::checking:
+            return check_loop(now);
         case State::slewing:
             return slew(now);
         case State::ramping:
@@ -286,42 +226,6 @@ Time Campaign::step_once(Time now) {
     return now + kSecond;
 }
 
-Time Campaign::wait_for_platform(Time now) {
-    const auto platform = ports_.platform();
-    if (temperatures_.empty() || platform.time > temperatures_.back().first) {
-        if (platform.time > 0) temperatures_.emplace_back(platform.time, platform.temperature_c);
-    }
-    const Time window = from_seconds(settings_.temperature_window_s);
-    while (temperatures_.size() > 2 && temperatures_[1].first <= now - window)
-        temperatures_.pop_front();
-    bool steady = false;
-    if (!temperatures_.empty() && temperatures_.front().first <= now - window) {
-        const auto [low, high] =
-            std::ranges::minmax(temperatures_, {}, &std::pair<Time, double>::second);
-        steady = high.second - low.second <= settings_.temperature_band_c;
-    }
-    reason_.clear();
-    if (platform.time == 0 || now - platform.time > kPlatformDeadline) {
-        reason_ = "no platform status on the bus";
-        temperatures_.clear();
-    } else if (platform.fault) {
-        reason_ = "platform fault";
-    } else if (!platform.ready || !platform.gyros_at_speed) {
-        reason_ = "platform not ready";
-    } else if (!platform.loop_closed) {
-        reason_ = "stabilisation loop open";
-    } else if (!steady) {
-        reason_ = "temperature not steady";
-    } else {
-        start_position(now);
-        return now;
-    }
-    if (now - entered_ > from_seconds(settings_.ready_timeout_s)) {
-        abort(fmt::format("{} after {:g} s", reason_, settings_.ready_timeout_s), now);
-    }
-    return now + kSecond;
-}
-
 void Campaign::start_position(Time now) {
     reason_.clear();
     if (shutting_down_) return abort("the daemon is shutting down", now);
@@ -333,10 +237,11 @@ void Campaign::start_position(Time now) {
         return;
     }
     if (zero_ && !zeroed_) return begin_zeroing(false, now);
-    if (at_ == stops_.size() && !choose_next(now)) {
-        if (positions_done_ > 0) return conclude(now);
-        armed_by_.clear();
-        return end(State::aborted, "nothing to do", now);
+    if (at_ == stops_.size()) {
+        const Choice choice = choose_next(now);
+        // At rest it is asked again.
+        if (choice == Choice::thinking) return enter(State::resting, now);
+        if (choice == Choice::end) return conclude(now);
     }
     const auto& angle = here().stop.position_deg;
     ports_.event(
@@ -376,10 +281,10 @@ Time Campaign::slew(Time now) {
     }
 }
 
-bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading) const {
+bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading, double table_g) const {
     return reading.valid && reading.running && reading.state == drivers::kShakerRunning &&
            std::abs(reading.frequency_hz - settings_.frequency_hz) <= kFrequencyToleranceHz &&
-           std::abs(reading.measured_g - table_g()) <= settings_.amplitude_tolerance * table_g();
+           std::abs(reading.measured_g - table_g) <= settings_.amplitude_tolerance * table_g;
 }
 
 Time Campaign::ramp(Time now) {
@@ -400,7 +305,7 @@ Time Campaign::ramp(Time now) {
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
     }
-    if (!ports_.shaker.busy() && vibrating_as_commanded(ports_.shaker.reading())) {
+    if (!ports_.shaker.busy() && vibrating_as_commanded(ports_.shaker.reading(), table_g())) {
         enter(State::settling, now);
         return now;
     }
@@ -423,11 +328,14 @@ Time Campaign::record(Time now) {
         order.from = dwell_from_;
         order.to = dwell_to_;
         order.dwell = {here().run, here().position, table_g()};
-        if (zero_) order.zero_g = zero_->raw_zero_g();
+        if (zero_) {
+            order.zero_g = zero_->raw_zero_g();
+            order.level_sigma_g = zero_->level_sigma(here().stop.position_deg);
+        }
         if (!ports_.order_dwell(order)) abort("the estimator takes no order", now);
         return now + kPoll;
     }
-    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.shaker.reading())) {
+    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.shaker.reading(), table_g())) {
         const auto reading = ports_.shaker.reading();
         abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                           reading.state, reading.measured_g, table_g()),
@@ -456,25 +364,39 @@ Time Campaign::record(Time now) {
 
 void Campaign::next_position(Time now) {
     ++positions_done_;
-    if (ports_.position_done)
-        ports_.position_done({here().run, here().position, table_g()}, dwells_.back());
+    if (ports_.position_done) {
+        ports_.position_done({here().run, here().position, table_g()}, dwells_.back(),
+                             {here().stop.position_deg, table_g(), repeats_, used_s(now)});
+    }
     ++at_;
     enter(State::resting, now);
 }
 
 Time Campaign::rest(Time now) {
+    if (!come_to_rest(now)) return now + kPoll;
+    if (shutting_down_) {
+        end(State::aborted, "the daemon is shutting down", now);
+        return now;
+    }
+    if (at_ == stops_.size()) {
+        const Choice choice = choose_next(now);
+        if (choice == Choice::thinking) return now + kPoll;
+        if (choice == Choice::end) {
+            conclude(now);
+            return now;
+        }
+    }
+    start_position(now);
+    return now;
+}
+
+/// Ramps down; true once rest is read back.
+bool Campaign::come_to_rest(Time now) {
     const auto reading = ports_.shaker.reading();
     if (!ports_.shaker.busy() && !ports_.shaker.stop_pending() && reading.at_rest() &&
         reading.time > entered_) {
         may_move_ = false;
-        if (shutting_down_) {
-            end(State::aborted, "the daemon is shutting down", now);
-        } else if (at_ == stops_.size() && at_ > 0 && !choose_next(now)) {
-            conclude(now);
-        } else {
-            start_position(now);
-        }
-        return now;
+        return true;
     }
     if (!requested_ && !ports_.shaker.stop_pending()) {
         requested_ = ports_.shaker.request({settings_.frequency_hz, 0, settings_.ramp_s});
@@ -492,10 +414,14 @@ Time Campaign::rest(Time now) {
             abort("the shaker did not come to rest in time", now);
         }
     }
-    return now + kPoll;
+    return false;
 }
 
 void Campaign::conclude(Time now) {
+    if (positions_done_ == 0) {
+        armed_by_.clear();
+        return end(State::aborted, "nothing to do", now);
+    }
     if (zero_) return begin_zeroing(true, now);
     finish(now);
 }
@@ -524,9 +450,12 @@ void Campaign::abort(const std::string& why, Time now) {
 
 void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
+    const bool checking = state_ == State::checking;
+    if (checking) loop_->not_completed(why);
     const bool slewing = state_ == State::slewing || state_ == State::zeroing;
     leave_dwell();
     leave_stage();
+    zeroing_ = Zeroing::none;
     armed_by_.clear();
     reason_ = why;
     enter(state, now);
@@ -534,7 +463,8 @@ void Campaign::end(State state, const std::string& why, Time now) {
     if (state == State::tripped) {
         ports_.event(Severity::trip, "stop of the shaker ordered: " + why);
     } else {
-        ports_.event(Severity::alarm, "campaign aborted: " + why);
+        ports_.event(Severity::alarm,
+                     (checking ? "loop check aborted: " : "campaign aborted: ") + why);
     }
     if (had_campaign) ports_.end(false);
 }
@@ -561,6 +491,7 @@ void Campaign::on_trip(const std::string& cause, Time now) {
 void Campaign::shut_down(Time now) {
     if (shutting_down_) return;
     shutting_down_ = true;
+    if (state_ == State::checking) return abort("the daemon is shutting down", now);
     if (!active()) return;
     leave_dwell();
     leave_stage();

@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@
 namespace vibrig::campaign {
 
 class LevellingStage;
+class LoopCheck;
 class ZeroingStage;
 
 /// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
@@ -48,13 +50,16 @@ struct Ports {
     std::function<void()> begin;             ///< a new campaign: forget earlier dwells
     std::function<void(bool complete)> end;  ///< write what there is
     std::function<void(Severity, const std::string&)> event;
-    /// Adaptive campaigns: what to do next, at these gimbal angles, so many s after the start.
-    std::function<Next(const std::array<double, 3>& here_deg, double elapsed_s)> next = {};
+    /// Adaptive campaigns: what to do next, at these gimbal angles, after so many s of campaign.
+    /// Nothing while it is thought over: to be asked again.
+    std::function<std::optional<Next>(const std::array<double, 3>& here_deg, double elapsed_s)>
+        next = {};
     /// What the table is to do (0: nothing, or on its way) and where the gimbals are to be, deg.
     std::function<void(double table_g, const std::array<double, 3>& position_deg)> commanded = {};
     /// A position is done, its data with the estimator.
-    std::function<void(const estimator::DwellInfo&, const estimator::DwellSummary&)> position_done =
-        {};
+    std::function<void(const estimator::DwellInfo&, const estimator::DwellSummary&,
+                       const StopDone&)>
+        position_done = {};
     /// Before an interrupted campaign goes on: why not, else empty.
     std::function<std::string()> resume_gate = {};
     /// It goes on, by this person: take the filter as it was.
@@ -62,6 +67,8 @@ struct Ports {
     /// What levelling and zeroing act on and are fed from; null: no such stage.
     drivers::Torquer* torquer = nullptr;
     rt::StageFeed* feed = nullptr;
+    /// A position was levelled, and this is what was torqued out.
+    std::function<void(const LevelDrift&)> levelled = {};
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -73,9 +80,9 @@ class Campaign {
     Campaign(const Settings& settings, Ports ports);
 
     /// Before the first step(): positions that an interrupted campaign has done. Nothing moves
-    /// until a person arms and resumes it. False if they are not the first of the list; what an
-    /// adaptive campaign would have chosen cannot be taken up.
-    bool offer(std::vector<estimator::DwellSummary> done);
+    /// until a person arms and resumes it. False if they are not the first of the list; of an
+    /// adaptive campaign `stops` says what was chosen.
+    bool offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops = {});
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
@@ -94,6 +101,11 @@ class Campaign {
   private:
     /// Within zeroing and levelling.
     enum class Part : std::uint8_t { go, slew, measure, zero };
+    /// The zeroing that is under way, its levelling included.
+    enum class Zeroing : std::uint8_t { none, start, end };
+
+    /// Within a loop check.
+    enum class Check : std::uint8_t { look, ramp, settle, measure, rest };
 
     /// A stop and what the estimator and people call it, from 1.
     struct NumberedStop {
@@ -109,6 +121,14 @@ class Campaign {
     drivers::Time fail_zeroing(const std::string& why, drivers::Time now);
     void leave_zeroing(drivers::Time now);
     drivers::Time levelling(drivers::Time now);
+    drivers::Time fail_levelling(const std::string& why, drivers::Time now);
+    [[nodiscard]] bool for_zeroing() const { return zeroing_ != Zeroing::none; }
+    [[nodiscard]] std::string not_fit_to_check(drivers::Time now) const;
+    CommandReply begin_loop_check(const CommandRequest& request, drivers::Time now);
+    drivers::Time check_loop(drivers::Time now);
+    void go_on_to(Check part, drivers::Time now);
+    void ramp_for_check(drivers::Time now);
+    void conclude_loop_check(drivers::Time now);
     void make_stages();
     void begin_zeroing(bool at_end, drivers::Time now);
     void leave_stage();
@@ -119,6 +139,7 @@ class Campaign {
     drivers::Time ramp(drivers::Time now);
     drivers::Time record(drivers::Time now);
     drivers::Time rest(drivers::Time now);
+    [[nodiscard]] bool come_to_rest(drivers::Time now);
     void enter(CampaignState state, drivers::Time now);
     void next_position(drivers::Time now);
     void start_position(drivers::Time now);
@@ -131,7 +152,9 @@ class Campaign {
     CommandReply resume_interrupted(const CommandRequest& request, drivers::Time now);
     [[nodiscard]] std::string resume_offer() const;
     [[nodiscard]] std::string not_fit_to_excite() const;
-    [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading) const;
+    [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
+    [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
+                                              double table_g) const;
     void plan_stops();
     /// Runs and positions per run of a list; of a plan the levels and all its stops.
     [[nodiscard]] std::size_t runs() const {
@@ -142,11 +165,19 @@ class Campaign {
     }
     [[nodiscard]] bool listed() const { return settings_.stops.empty() && !settings_.adaptive; }
     void add_stop(const Stop& stop);
-    /// At rest: false when the campaign is at its end.
-    [[nodiscard]] bool choose_next(drivers::Time now);
+    enum class Choice : std::uint8_t { more, end, thinking };
+    /// At rest: whether there is one more stop.
+    [[nodiscard]] Choice choose_next(drivers::Time now);
+    /// Of the campaign, s, a life before a restart included.
+    [[nodiscard]] double used_s(drivers::Time now) const {
+        return used_before_s_ + drivers::to_seconds(now - started_);
+    }
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
+
+    /// How much later than the ramp itself the controller may report the level as reached.
+    static constexpr drivers::Time kRampGrace = 10 * drivers::kSecond;
 
     Settings settings_;
     Ports ports_;
@@ -173,15 +204,20 @@ class Campaign {
     std::array<double, 3> excited_deg_{};
     std::size_t positions_done_ = 0;
     std::size_t positions_before_ = 0;  ///< of them before a restart
+    double used_before_s_ = 0;          ///< of the campaign, before a restart
     std::vector<estimator::DwellSummary> offer_;
+    std::vector<StopDone> offered_stops_;  ///< of an adaptive campaign
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made
     std::shared_ptr<LevellingStage> level_;
     std::shared_ptr<ZeroingStage> zero_;
+    std::shared_ptr<LoopCheck> loop_;
     Part part_ = Part::go;
-    bool zeroing_end_ = false;  ///< within zeroing: the one after the last dwell
-    bool zeroed_ = false;       ///< in this campaign, before the first dwell
+    Check check_ = Check::look;
+    Zeroing zeroing_ = Zeroing::none;
+    bool zeroed_ = false;                      ///< in this campaign, before the first dwell
+    std::array<double, 3> level_angle_rad_{};  ///< encoders, while levelling
     drivers::Time last_motion_ = 0, torque_sent_ = 0, zero_since_ = 0;
     std::string mark_;  ///< why the campaign is marked
     /// Of each dwell in which zeros were in force: run, and variance of the relative level.

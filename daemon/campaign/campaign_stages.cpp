@@ -1,15 +1,17 @@
-// The campaign's stages with the table at rest: zeroing and levelling.
+// The campaign's stages with the table at rest: waiting, zeroing and levelling.
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 #include "estimator/levelling/design.hpp"
 
 namespace vibrig::campaign {
 
+using drivers::from_seconds;
 using drivers::kSecond;
 using drivers::Time;
 using State = CampaignState;
@@ -21,6 +23,12 @@ constexpr Time kStagePoll = 200 * drivers::kMillisecond;
 constexpr Time kSilence = kSecond;
 // From the zero command to the platform's word that nothing is torqued.
 constexpr Time kZeroTimeout = 2 * kSecond;
+// A status older than this is no status.
+constexpr Time kPlatformDeadline = kSecond;
+
+bool platform_is_silent(const drivers::PlatformStatus& platform, Time now) {
+    return platform.time == 0 || now - platform.time > kPlatformDeadline;
+}
 
 }  // namespace
 
@@ -53,12 +61,49 @@ rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
 }
 
 void Campaign::make_stages() {
+    loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
     if (settings_.levelling && ports_.torquer != nullptr && ports_.feed != nullptr) {
         level_ = std::make_shared<LevellingStage>(settings_.level, settings_.rig,
                                                   ports_.torquer->limit());
     }
     if (settings_.zeroing && ports_.feed != nullptr)
         zero_ = std::make_shared<ZeroingStage>(settings_.zero, settings_.rig);
+}
+
+std::string Campaign::platform_lacks(Time now) const {
+    const auto platform = ports_.platform();
+    if (platform_is_silent(platform, now)) return "no platform status on the bus";
+    if (platform.fault) return "platform fault";
+    if (!platform.ready || !platform.gyros_at_speed) return "platform not ready";
+    if (!platform.loop_closed) return "stabilisation loop open";
+    return {};
+}
+
+Time Campaign::wait_for_platform(Time now) {
+    const auto platform = ports_.platform();
+    if (temperatures_.empty() || platform.time > temperatures_.back().first) {
+        if (platform.time > 0) temperatures_.emplace_back(platform.time, platform.temperature_c);
+    }
+    const Time window = from_seconds(settings_.temperature_window_s);
+    while (temperatures_.size() > 2 && temperatures_[1].first <= now - window)
+        temperatures_.pop_front();
+    bool steady = false;
+    if (!temperatures_.empty() && temperatures_.front().first <= now - window) {
+        const auto [low, high] =
+            std::ranges::minmax(temperatures_, {}, &std::pair<Time, double>::second);
+        steady = high.second - low.second <= settings_.temperature_band_c;
+    }
+    reason_ = platform_lacks(now);
+    if (platform_is_silent(platform, now)) temperatures_.clear();
+    if (reason_.empty() && !steady) reason_ = "temperature not steady";
+    if (reason_.empty()) {
+        start_position(now);
+        return now;
+    }
+    if (now - entered_ > from_seconds(settings_.ready_timeout_s)) {
+        abort(fmt::format("{} after {:g} s", reason_, settings_.ready_timeout_s), now);
+    }
+    return now + kSecond;
 }
 
 bool Campaign::take_motion(rt::Motion& motion, Time now) {
@@ -86,7 +131,7 @@ void Campaign::insist_on_zero_torque(Time now) {
 }
 
 void Campaign::begin_zeroing(bool at_end, Time now) {
-    zeroing_end_ = at_end;
+    zeroing_ = at_end ? Zeroing::end : Zeroing::start;
     part_ = Part::go;
     zero_->begin();
     ports_.event(Severity::info,
@@ -108,7 +153,11 @@ Time Campaign::zeroing(Time now) {
         return fail_zeroing(fmt::format("gimbals: {}", drivers::name_of(gimbal)), now);
     }
     const bool there = gimbal == drivers::GimbalState::in_position;
-    if (part_ == Part::slew && there) {
+    if (part_ == Part::slew && there && level_ && !zero_->levelled()) {
+        ports_.gimbal.release(now);
+        part_ = Part::go;
+        enter(State::levelling, now);
+    } else if (part_ == Part::slew && there) {
         ports_.feed->order(rt::StageFeed::Mode::increments);
         last_motion_ = now;
         zero_->arrived();
@@ -138,13 +187,14 @@ Time Campaign::end_zeroing(Time now) {
         return now;
     }
     leave_stage();
-    if (const auto failure = zero_->finish(zeroing_end_); !failure.empty())
+    if (const auto failure = zero_->finish(zeroing_ == Zeroing::end); !failure.empty())
         return fail_zeroing(failure, now);
     ports_.event(Severity::info, zero_->words());
-    if (zeroing_end_) {
+    if (zeroing_ == Zeroing::end) {
         mark_ = zero_->status().mark;
         leave_zeroing(now);
     } else {
+        zeroing_ = Zeroing::none;
         zeroed_ = true;
         start_position(now);
     }
@@ -152,7 +202,7 @@ Time Campaign::end_zeroing(Time now) {
 }
 
 Time Campaign::fail_zeroing(const std::string& why, Time now) {
-    if (zeroing_end_) {
+    if (zeroing_ == Zeroing::end) {
         // The dwells are done: the campaign stands, but nobody can say that the zeros stayed.
         mark_ = "zeros not confirmed at the end: " + why;
         leave_zeroing(now);
@@ -163,10 +213,18 @@ Time Campaign::fail_zeroing(const std::string& why, Time now) {
 }
 
 void Campaign::leave_zeroing(Time now) {
+    zeroing_ = Zeroing::none;
     leave_stage();
     ports_.gimbal.release(now);
     if (!mark_.empty()) ports_.event(Severity::alarm, "campaign marked: " + mark_);
     finish(now);
+}
+
+Time Campaign::fail_levelling(const std::string& why, Time now) {
+    leave_stage();
+    if (for_zeroing()) return fail_zeroing("levelling: " + why, now);
+    abort("levelling: " + why, now);
+    return now;
 }
 
 Time Campaign::levelling(Time now) {
@@ -179,10 +237,11 @@ Time Campaign::levelling(Time now) {
         if (gimbal == drivers::GimbalState::commanding)
             return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
         if (gimbal != drivers::GimbalState::idle) {
-            abort(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)), now);
-            return now;
+            return fail_levelling(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)),
+                                  now);
         }
-        level_->begin(here().stop.position_deg, zero_ ? zero_->status() : ZeroStatus{});
+        level_->begin(for_zeroing() ? zero_->target_deg() : here().stop.position_deg,
+                      zero_ ? zero_->status() : ZeroStatus{});
         ports_.feed->order(rt::StageFeed::Mode::force);
         last_motion_ = now;
         part_ = Part::measure;
@@ -193,24 +252,26 @@ Time Campaign::levelling(Time now) {
         bool any = false;
         while (!level_->done() && level_->failure().empty() && take_motion(motion, now)) {
             rate = level_->step(motion);
+            level_angle_rad_ = motion.angle;
             any = true;
         }
-        if (const auto why = level_->failure(); !why.empty()) {
-            leave_stage();
-            abort("levelling: " + why, now);
-            return now;
-        }
+        if (const auto why = level_->failure(); !why.empty()) return fail_levelling(why, now);
         if (level_->done()) {
             leave_stage();
             ports_.event(Severity::info, level_->words());
+            if (ports_.levelled && !for_zeroing()) {
+                auto drift = level_->drift(level_angle_rad_);
+                drift.run = here().run;
+                drift.position = here().position;
+                ports_.levelled(drift);
+            }
             part_ = Part::zero;
             torque_sent_ = zero_since_ = now;
             return now + kStagePoll;
         }
         if (any) static_cast<void>(ports_.torquer->command(rate));
-        if (now - last_motion_ > kSilence) {
-            abort("levelling: no specific force on the bus for 1 s", now);
-        }
+        if (now - last_motion_ > kSilence)
+            return fail_levelling("no specific force on the bus for 1 s", now);
         return now + kStagePoll;
     }
     // A dwell is free drift: it begins only when the platform itself says that nothing is torqued.
@@ -219,13 +280,14 @@ Time Campaign::levelling(Time now) {
         !ports_.feed->knows_torque() ||
         (torque.time > zero_since_ && !torque.torquing && torque.echo == ports_.torquer->counter());
     if (ports_.torquer->zero() && confirmed) {
-        enter(State::ramping, now);
+        if (for_zeroing()) zero_->levelled_at(level_angle_rad_);
+        part_ = Part::go;
+        enter(for_zeroing() ? State::zeroing : State::ramping, now);
         return now;
     }
     if (now - zero_since_ > kZeroTimeout) {
-        abort("levelling: torquing commanded to zero, not confirmed by the platform within 2 s",
-              now);
-        return now;
+        return fail_levelling(
+            "torquing commanded to zero, not confirmed by the platform within 2 s", now);
     }
     if (now - torque_sent_ >= kStagePoll) {
         torque_sent_ = now;

@@ -4,6 +4,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
@@ -48,23 +49,15 @@ void Campaign::fill(StatusData& status, Time now) const {
             state_ == State::ramping || state_ == State::settling || state_ == State::recording;
         status.command_table_g = vibrating ? table_g() : 0;
         status.command_frequency_hz = settings_.frequency_hz;
+    } else if (state_ == State::checking) {
+        status.command_table_g =
+            check_ == Check::look || check_ == Check::rest ? 0 : settings_.loop.table_g;
+        status.command_frequency_hz = settings_.frequency_hz;
     }
 }
 
 void Campaign::qualify(estimator::Result& result) const {
-    for (auto& amplitude : result.amplitudes) {
-        double sum = 0;
-        std::size_t n = 0;
-        for (const auto& [run, variance] : level_variances_) {
-            if (run != amplitude.run) continue;
-            sum += variance;
-            ++n;
-        }
-        if (n == 0) continue;
-        // The same zeros in every dwell: they do not average out.
-        amplitude.sigma_g = std::hypot(
-            amplitude.sigma_g, amplitude.amplitude_g * std::sqrt(sum / static_cast<double>(n)));
-    }
+    estimator::widen_amplitudes(result, level_variances_);
 }
 
 void Campaign::fill_stages(StatusData& status) const {
@@ -72,6 +65,7 @@ void Campaign::fill_stages(StatusData& status) const {
     status.zeros = {};
     if (level_) level_->fill(status.levelling);
     if (zero_) zero_->fill(status.zeros);
+    status.loop_check = loop_->status();
     if (!mark_.empty()) status.zeros.mark = mark_;
 }
 

@@ -141,6 +141,17 @@ std::string LevellingStage::words() const {
     return text;
 }
 
+LevelDrift LevellingStage::drift(const Vector& encoder_rad) const {
+    LevelDrift found;
+    found.encoder_rad = encoder_rad;
+    found.direction = channel_;
+    // The torquers held against it; see to_axes().
+    const auto torqued = leveller_->drift();
+    found.rate_deg_h = {torqued[1] / level::kDegPerHour, -torqued[0] / level::kDegPerHour};
+    found.sigma_deg_h = leveller_->drift_sigma() / level::kDegPerHour;
+    return found;
+}
+
 void LevellingStage::fill(LevellingStatus& status) const {
     const auto& l = *leveller_;
     status.begun = l.time_s() > 0;

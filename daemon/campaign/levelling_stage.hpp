@@ -28,6 +28,8 @@ class LevellingStage {
     [[nodiscard]] std::string failure() const;
     /// What it has found, for the log.
     [[nodiscard]] std::string words() const;
+    /// What the free platform drifted by at these encoder angles; without run and position.
+    [[nodiscard]] LevelDrift drift(const Vector& encoder_rad) const;
     void fill(LevellingStatus& status) const;
     /// s, by design
     [[nodiscard]] double expected_s() const noexcept;

@@ -49,12 +49,8 @@ Vector RigFrame::azimuth_vertical_deg(double azimuth_deg, bool down) const {
     }
     double outer = settings_.up.axis == 1 ? 90 * settings_.up.sign : 90 - 90 * settings_.up.sign;
     if (down) outer += 180;
-    const Vector angle{std::remainder(outer, 360.0), 0, azimuth_deg};
-    Vector encoder{};
-    for (std::size_t i = 0; i < 3; ++i) {
-        encoder[i] = std::remainder(
-            settings_.encoder_sign[i] * angle[i] + settings_.encoder_zero_deg[i], 360.0);
-    }
+    Vector encoder = estimator::encoder_deg(settings_, {outer, 0, azimuth_deg});
+    for (double& angle : encoder) angle = std::remainder(angle, 360.0);
     return encoder;
 }
 

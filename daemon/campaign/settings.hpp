@@ -52,6 +52,20 @@ struct ZeroingSettings {
     std::string accelerometer_message = "AccelerometerIncrements";
 };
 
+/// Before a campaign: a few seconds at a small level, and what the platform makes of it.
+struct LoopCheckSettings {
+    double table_g = 0.5;   ///< peak
+    double measure_s = 5;   ///< at that level
+    bool required = false;  ///< before a campaign is armed
+    // bands
+    double transmission_tolerance = 0.1;  ///< relative, about [vibration] transmission
+    double frequency_tolerance_hz = 0.05;
+    double distortion = 0.05;  ///< rms, of the fundamental
+    double cross_share = 0.1;  ///< across the vertical, of the motion along it
+    double phase_deg = -120;   ///< platform after table, where that has an accelerometer
+    double phase_tolerance_deg = 60;
+};
+
 /// What the campaign does; amplitudes are peak at the table.
 struct Settings {
     std::string name = "campaign";
@@ -60,7 +74,6 @@ struct Settings {
     std::string plan;                       ///< plan file; empty: every position at every level
     std::vector<Stop> stops;                ///< of the plan file, in its order
     bool identify_all = true;  ///< refuse a campaign that cannot determine all 30 coefficients
-    std::string refusal;       ///< why this one is refused; empty: it is not
     // Adaptive: chosen dwell by dwell until the standard errors are down to the targets (0: any).
     bool adaptive = false;
     double target_bias = 0;       ///< deg/h
@@ -71,6 +84,7 @@ struct Settings {
     bool zeroing = false;         ///< at start and end
     LevellingSettings level;
     ZeroingSettings zero;
+    LoopCheckSettings loop;
     estimator::Settings rig;     ///< [site], [platform], [accelerometer], [noise]
     double frequency_hz = 15.0;  ///< [vibration] frequency_hz
     double dwell_s = 100.0;

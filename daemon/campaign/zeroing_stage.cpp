@@ -60,6 +60,7 @@ void ZeroingStage::begin_other_way() {
 void ZeroingStage::start_run(bool down) {
     down_ = down;
     target_ = 0;
+    level_deg_.reset();
     first_time_ = last_time_ = 0;
     failure_.clear();
     calibration_.emplace(plan(down));
@@ -70,7 +71,17 @@ Vector ZeroingStage::target_deg() const {
     const auto& targets = zeros::SlewPlan{}.targets_deg;
     const std::size_t n = targets.size();
     const std::size_t k = target_ < n ? target_ : n - 2 + (target_ - n) % 2;
-    return frame_.azimuth_vertical_deg(targets[k], down_);
+    Vector target = frame_.azimuth_vertical_deg(targets[k], down_);
+    if (level_deg_) {
+        target[0] = (*level_deg_)[0];
+        target[1] = (*level_deg_)[1];
+    }
+    return target;
+}
+
+void ZeroingStage::levelled_at(const Vector& encoder_rad) {
+    level_deg_.emplace();
+    for (std::size_t i = 0; i < 3; ++i) (*level_deg_)[i] = encoder_rad[i] / kRadian;
 }
 
 void ZeroingStage::add(const rt::Motion& motion) {

@@ -24,6 +24,9 @@ class ZeroingStage {
     void begin();
     /// Encoder angles to slew to, deg; after the last one of the plan there and back again.
     [[nodiscard]] Vector target_deg() const;
+    /// The platform was brought level at the first target: outer and inner gimbal stay there.
+    void levelled_at(const Vector& encoder_rad);
+    [[nodiscard]] bool levelled() const { return level_deg_.has_value(); }
     void arrived() { ++target_; }
     void add(const rt::Motion& motion);
     /// The planned time is over, or the filter has given up.
@@ -61,6 +64,7 @@ class ZeroingStage {
     estimator::zeros::CalibrationResult result_;
     bool down_ = false;
     std::size_t target_ = 0;
+    std::optional<Vector> level_deg_;  ///< encoder angles of this run
     drivers::Time first_time_ = 0, last_time_ = 0;
     std::optional<Found> first_;  ///< of the campaign's start
     ZeroStatus present_;

@@ -1,0 +1,126 @@
+// The loop check: a few seconds at a small level, its own arming.
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/loop_check.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::from_seconds;
+using drivers::kSecond;
+using drivers::Time;
+using State = CampaignState;
+
+namespace {
+constexpr Time kCheckPoll = 200 * drivers::kMillisecond;
+constexpr Time kLook = kSecond;  // at rest, before
+// How late samples may be.
+constexpr Time kCheckSilence = kSecond;
+}  // namespace
+
+std::string Campaign::not_fit_to_check(Time now) const {
+    if (active()) return "a campaign is running";
+    if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
+    if (state_ == State::armed) return "armed for a campaign: abort that first";
+    if (ports_.feed == nullptr) return "no samples to look at";
+    if (auto why = not_fit_to_excite(); !why.empty()) return why;
+    if (auto why = platform_lacks(now); !why.empty()) return why;
+    if (torquing()) return "the platform is torqued, expected free drift";
+    return LoopCheck::beyond_limits(settings_);
+}
+
+CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now) {
+    if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
+    armed_by_ = request.by;
+    reason_.clear();
+    loop_->begin(request.by);
+    ports_.feed->order(rt::StageFeed::Mode::samples);
+    last_motion_ = now;
+    check_ = Check::look;
+    enter(State::checking, now);
+    const std::string text = fmt::format("loop check at {:g} g", settings_.loop.table_g);
+    ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+    return {true, text};
+}
+
+/// The next part of the check; the ramps have their time from here on.
+void Campaign::go_on_to(Check part, Time now) {
+    check_ = part;
+    entered_ = now;
+    requested_ = stop_sent_ = false;
+    const bool steady = part == Check::settle || part == Check::measure;
+    if (ports_.commanded) ports_.commanded(steady ? settings_.loop.table_g : 0, excited_deg_);
+    ports_.guard(rt::Guard::excitation);
+}
+
+Time Campaign::check_loop(Time now) {
+    rt::Motion motion;
+    while (take_motion(motion, now)) loop_->add(motion);
+    const Time since = now - entered_;
+    const auto reading = ports_.shaker.reading();
+    if (now - last_motion_ > kCheckSilence) {
+        abort("samples ceased", now);
+    } else if (auto why = platform_lacks(now); !why.empty()) {
+        abort(why, now);
+    } else if ((check_ == Check::settle || check_ == Check::measure) &&
+               !vibrating_as_commanded(reading, settings_.loop.table_g)) {
+        abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
+                          reading.state, reading.measured_g, settings_.loop.table_g),
+              now);
+    } else if (check_ == Check::look && since >= kLook) {
+        if (const auto still = loop_->look(excited_deg_); !still.empty()) {
+            abort(still, now);
+        } else {
+            go_on_to(Check::ramp, now);
+        }
+    } else if (check_ == Check::ramp) {
+        ramp_for_check(now);
+    } else if (check_ == Check::settle && since >= from_seconds(settings_.settle_s)) {
+        loop_->measure();
+        go_on_to(Check::measure, now);
+    } else if (check_ == Check::measure && since >= from_seconds(settings_.loop.measure_s)) {
+        loop_->finish(reading.measured_g);
+        go_on_to(Check::rest, now);
+    } else if (check_ == Check::rest && come_to_rest(now)) {
+        conclude_loop_check(now);
+    }
+    return now + kCheckPoll;
+}
+
+void Campaign::ramp_for_check(Time now) {
+    if (!requested_) {
+        may_move_ = true;
+        requested_ = ports_.shaker.request(
+            {settings_.frequency_hz, settings_.loop.table_g, settings_.ramp_s});
+        if (!requested_) abort("the shaker takes no set-point", now);
+    } else if (!ports_.shaker.busy() &&
+               vibrating_as_commanded(ports_.shaker.reading(), settings_.loop.table_g)) {
+        go_on_to(Check::settle, now);
+    } else if (now - entered_ > from_seconds(settings_.ramp_s) + kRampGrace) {
+        abort(fmt::format("shaker: measured {:.3f} g, expected {:g} g",
+                          ports_.shaker.reading().measured_g, settings_.loop.table_g),
+              now);
+    }
+}
+
+void Campaign::conclude_loop_check(Time now) {
+    leave_stage();
+    loop_->conclude();
+    armed_by_.clear();
+    enter(State::idle, now);
+    const auto& found = loop_->status();
+    for (const auto& row : found.rows) {
+        ports_.event(Severity::info, fmt::format("loop check: {} {:.4g}{}{}, band {:.4g} to {:.4g}",
+                                                 row.name, row.value, *row.unit == '\0' ? "" : " ",
+                                                 row.unit, row.low, row.high));
+    }
+    if (found.message.empty()) {
+        ports_.event(Severity::info, "loop check in band");
+    } else {
+        ports_.event(Severity::alarm,
+                     "loop check out of band, no campaign is armed: " + found.message);
+    }
+}
+
+}  // namespace vibrig::campaign

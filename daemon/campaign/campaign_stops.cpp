@@ -1,0 +1,109 @@
+// Which stops there are, one after the other, and how an interrupted campaign goes on.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+
+#include "daemon/campaign/campaign.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::Time;
+
+namespace {
+
+// A flagged dwell of an adaptive campaign is repeated so often at most.
+constexpr int kMostRepeats = 2;
+
+}  // namespace
+
+void Campaign::add_stop(const Stop& stop) {
+    const auto level = std::ranges::find(levels_, stop.table_g);
+    const auto run = level - levels_.begin();
+    if (level == levels_.end()) levels_.push_back(stop.table_g);
+    stops_.push_back({stop, static_cast<int>(run) + 1, static_cast<int>(stops_.size()) + 1});
+}
+
+void Campaign::plan_stops() {
+    stops_.clear();
+    levels_.clear();
+    at_ = 0;
+    repeats_ = 0;
+    used_before_s_ = 0;
+    for (const Stop& stop : settings_.stops) add_stop(stop);
+    for (const StopDone& done : offered_stops_) {
+        add_stop({done.position_deg, done.table_g});
+        repeats_ = done.repeats;
+        used_before_s_ = done.used_s;
+    }
+    if (settings_.stops.empty() && !settings_.adaptive) {
+        for (std::size_t run = 0; run < settings_.table_g.size(); ++run) {
+            for (std::size_t k = 0; k < settings_.positions_deg.size(); ++k) {
+                stops_.push_back({{settings_.positions_deg[k], settings_.table_g[run]},
+                                  static_cast<int>(run) + 1,
+                                  static_cast<int>(k) + 1});
+            }
+        }
+    }
+    expected_ = stops_.size();
+}
+
+Campaign::Choice Campaign::choose_next(Time now) {
+    if (!settings_.adaptive) return at_ < stops_.size() ? Choice::more : Choice::end;
+    const bool begun = at_ > 0;
+    if (begun && dwells_.back().flagged && repeats_ < kMostRepeats) {
+        ++repeats_;
+        const Stop again = stops_[at_ - 1].stop;
+        ports_.event(Severity::warning, "flagged dwell: the position is repeated");
+        add_stop(again);
+        expected_ = std::max(expected_, stops_.size());
+        return Choice::more;
+    }
+    const auto here = begun ? stops_[at_ - 1].stop.position_deg : std::array<double, 3>{};
+    const auto next = ports_.next(here, used_s(now));
+    if (!next) return Choice::thinking;
+    repeats_ = 0;
+    ports_.event(Severity::info, next->words);
+    if (!next->more) return Choice::end;
+    add_stop(next->stop);
+    expected_ = at_ + next->left;
+    return Choice::more;
+}
+CommandReply Campaign::resume_interrupted(const CommandRequest& request, Time now) {
+    if (state_ != State::armed) return {false, "not armed: a named person arms it first"};
+    if (const auto why = not_fit_to_excite(); !why.empty()) return {false, why};
+    if (!ports_.estimator_free()) return {false, "the last dwell is still being closed"};
+    if (ports_.resume_gate) {
+        if (const auto why = ports_.resume_gate(); !why.empty())
+            return {false, "not consistent with the campaign so far: " + why};
+    }
+    const std::string what = resume_offer();
+    if (ports_.resume) ports_.resume(request.by);
+    begin(now);
+    const std::string text = "campaign resumed: " + what;
+    ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+    return {true, text};
+}
+
+std::string Campaign::resume_offer() const {
+    if (offer_.empty()) return {};
+    if (settings_.adaptive) return fmt::format("{} positions done", offer_.size());
+    return fmt::format("{} of {} positions done", offer_.size(), stops_.size());
+}
+
+bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops) {
+    if (settings_.adaptive) {
+        offered_stops_ = std::move(stops);
+        plan_stops();
+    }
+    bool fits = done.size() <= stops_.size();
+    for (std::size_t i = 0; fits && i < done.size(); ++i)
+        fits = done[i].run == stops_[i].run && done[i].position == stops_[i].position;
+    if (fits) {
+        offer_ = std::move(done);
+    } else {
+        offered_stops_.clear();
+        plan_stops();
+    }
+    return fits;
+}
+}  // namespace vibrig::campaign

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/settings.hpp"
+#include "daemon/rt/stage_feed.hpp"
+#include "daemon/status.hpp"
+#include "estimator/loop_response.hpp"
+
+namespace vibrig::campaign {
+
+/// The newest loop check: collects samples at rest and at the small level, and says what is out of
+/// band. Control thread only.
+class LoopCheck {
+  public:
+    LoopCheck(const LoopCheckSettings& settings, const estimator::Settings& rig);
+
+    void begin(const std::string& by);
+    void add(const rt::Motion& motion);
+    /// What came so far was at rest: where the gimbals are, deg as the encoders count. Why the rig
+    /// cannot be checked, else empty.
+    [[nodiscard]] std::string look(std::array<double, 3>& position_deg) const;
+    /// From now on what counts.
+    void measure() { readings_.clear(); }
+    /// Judges it, `shaker_g` being what the controller says of the table.
+    void finish(double shaker_g);
+    void conclude();  ///< the table is at rest again: it is over
+    void not_completed(const std::string& why);
+
+    /// Why no campaign is armed; empty: as far as this goes it may be.
+    [[nodiscard]] std::string refusal() const;
+    [[nodiscard]] const LoopCheckStatus& status() const { return status_; }
+    /// The shaker's limit that the level exceeds; empty: none.
+    [[nodiscard]] static std::string beyond_limits(const Settings& settings);
+
+  private:
+    void row(const char* name, const char* unit, double value, double low, double high);
+
+    LoopCheckSettings settings_;
+    estimator::Settings rig_;
+    RigFrame frame_;
+    std::vector<estimator::LoopReading> readings_;
+    Vector angle_rad_{};
+    std::size_t bad_ = 0;  ///< samples without good force or angles
+    bool passed_ = false;
+    std::string out_of_band_;  ///< of the newest that was completed
+    LoopCheckStatus status_;
+};
+
+}  // namespace vibrig::campaign
