@@ -83,17 +83,20 @@ PlanData plan_data(const configuration::Configuration& c) {
     return plan;
 }
 
-std::string forecast_campaign(configuration::Configuration& c) {
-    if (c.campaign.adaptive) return "adaptive campaign: " + adaptive_plan(c)->outlook().words;
+CampaignForecast forecast_campaign(const configuration::Configuration& c) {
+    if (c.campaign.adaptive) return {"adaptive campaign: " + adaptive_plan(c)->outlook().words, {}};
     const auto forecast = plan::forecast(c.estimator, runs_of(c.campaign, c.estimator.transmission),
                                          c.campaign.dwell_s, period_s(c));
-    std::string text = plan::forecast_table(forecast);
-    if (!forecast.warning.empty()) text += "warning: " + forecast.warning + '\n';
+    CampaignForecast said{plan::forecast_table(forecast), {}};
+    if (!forecast.warning.empty()) said.words += "warning: " + forecast.warning + '\n';
     if (!forecast.identifies_all) {
-        text += "this campaign does not determine everything: " + forecast.refusal + '\n';
-        if (c.campaign.identify_all) c.campaign.refusal = forecast.refusal;
+        said.words += "this campaign does not determine everything: " + forecast.refusal + '\n';
+        if (c.campaign.identify_all) {
+            said.refusal = "campaign: " + forecast.refusal +
+                           "; campaign.identify = \"what-it-can\" runs it all the same";
+        }
     }
-    return text;
+    return said;
 }
 
 }  // namespace vibrig

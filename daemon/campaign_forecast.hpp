@@ -14,9 +14,12 @@ namespace vibrig {
 [[nodiscard]] std::optional<plan::AdaptivePlan> adaptive_plan(
     const configuration::Configuration& configuration);
 
-/// What the configured campaign will know at its end, in words. Sets the campaign's refusal if it
-/// cannot determine what is asked.
-[[nodiscard]] std::string forecast_campaign(configuration::Configuration& configuration);
+/// What the configured campaign will know at its end.
+struct CampaignForecast {
+    std::string words;
+    std::string refusal;  ///< why it cannot determine what is asked; empty: it can
+};
+[[nodiscard]] CampaignForecast forecast_campaign(const configuration::Configuration& configuration);
 
 /// The configured campaign, stop by stop, with the standard errors to be expected.
 [[nodiscard]] PlanData plan_data(const configuration::Configuration& configuration);

@@ -85,12 +85,14 @@ Daemon::Daemon(configuration::Loaded loaded)
       recorder_(make_recorder()),
       sent_tap_(recorder_ ? std::make_unique<record::SentTap>(*port_, clock_, recorder_->sent())
                           : nullptr),
+      pre_trip_(make_pre_trip()),
       stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign),
                   control_waiter_.get()),
       acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
                    {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_,
                     recorder_ ? &recorder_->received() : nullptr,
-                    recorder_ ? &recorder_->samples() : nullptr}),
+                    recorder_ ? &recorder_->samples() : nullptr,
+                    pre_trip_ ? &pre_trip_->samples() : nullptr}),
       gimbal_(dbc_, configuration_.gimbal, sending_port()),
       torquer_(configuration_.campaign.levelling
                    ? std::make_unique<drivers::Torquer>(dbc_, configuration_.campaign.level.torquer,
@@ -104,7 +106,8 @@ Daemon::Daemon(configuration::Loaded loaded)
            [this](const rt::DwellOrder& order) {
                const bool taken = estimator_stage_.order(order);
                if (taken && !order.cancel) ++dwells_with_estimator_;
-               if (taken && recorder_) recorder_->ordered(order, clock_.now());
+               if (taken && recorder_)
+                   recorder_->ordered(order, clock_.now(), identification_.noise());
                return taken;
            },
            [this](rt::Guard level) {
@@ -113,6 +116,7 @@ Daemon::Daemon(configuration::Loaded loaded)
            },
            [this] { return dwells_with_estimator_ == 0; },
            [this] {
+               planning_ = {};  // of a campaign that was aborted
                identification_ = estimator::Identification(configuration_.estimator);
                noise_monitor_.reset();
                const std::lock_guard lock(mutex_);
@@ -131,24 +135,48 @@ Daemon::Daemon(configuration::Loaded loaded)
            [this](double table_g, const std::array<double, 3>& position_deg) {
                interlock_.command(table_g, position_deg);
            },
-           [this](const estimator::DwellInfo& info, const estimator::DwellSummary& summary) {
-               if (journal_) journal_->dwell_done(info, summary);
+           [this](const estimator::DwellInfo& info, const estimator::DwellSummary& summary,
+                  const StopDone& stop) {
+               if (journal_) journal_->dwell_done(info, summary, stop);
            },
            [this] { return resume_gate(); },
            [this](const std::string& by) {
-               identification_ = std::move(*interrupted_);
+               planning_ = {};
+               identification_ = std::move(interrupted_->identification);
+               noise_monitor_.continue_from(std::move(interrupted_->noise));
+               if (journal_) journal_->campaign_resumed(interrupted_->id, by);
                interrupted_.reset();
-               if (journal_) journal_->campaign_resumed(interrupted_id_, by);
                record_begin(by, identification_.result().dwells.size());
                auto result = identification_.result();
                const std::lock_guard lock(mutex_);
                result_ = std::move(result);
            },
-           torquer_.get(), &stage_feed_}) {}
+           torquer_.get(), &stage_feed_,
+           [this](const LevelDrift& drift) { noise_monitor_.levelled(drift); }}),
+      publisher_(
+          configuration_.mqtt.host.empty()
+              ? nullptr
+              : std::make_unique<fleet::Publisher>(
+                    *this, configuration_.mqtt, [this](Severity severity, const std::string& text) {
+                        log(severity, "mqtt", text);
+                    })) {}
 
-campaign::Next Daemon::next_dwell(const std::array<double, 3>& here_deg, double elapsed_s) {
-    // Between two dwells the identification is this thread's; the shaker is at rest.
-    const auto decision = adaptive_->next(identification_.covariance(), here_deg, elapsed_s);
+std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& here_deg,
+                                                 double elapsed_s) {
+    if (!planning_.valid()) {
+        // Between two dwells the identification is this thread's; the shaker is at rest. It takes
+        // tenths of a second, on a busy machine more than this thread may be away. The rig's clock
+        // waits for this thread, so that there the time is none.
+        planning_ =
+            std::async(rig_clock_ ? std::launch::deferred : std::launch::async,
+                       [this, here_deg, elapsed_s, covariance = identification_.covariance()] {
+                           const auto decision = adaptive_->next(covariance, here_deg, elapsed_s);
+                           control_waiter_->notify();
+                           return decision;
+                       });
+    }
+    if (planning_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return {};
+    const auto decision = planning_.get();
     campaign::Next next;
     next.more = decision.verdict == plan::AdaptivePlan::Verdict::go_on;
     next.stop = {decision.run.position_deg, decision.run.table_g};
@@ -196,6 +224,7 @@ void Daemon::start() {
     }
     open_journal();
     if (recorder_) recorder_->start();
+    if (pre_trip_) pre_trip_->start();
     // A daemon that died may have left it running inside the watchdog's time.
     shaker_->stop_now();
     shaker_->on_reading([this] {
@@ -218,17 +247,21 @@ void Daemon::start() {
     control_thread_ = std::thread([this] { control_loop(); });
     estimator_thread_ = std::thread([this] { estimator_stage_.run(); });
     acquisition_thread_ = std::thread([this] { io_.run(); });
+    // The rig waits for us: a thread that comes first is only woken for every frame instead of
+    // every sample.
+    const bool first = rig_clock_ == nullptr;
     for (const auto& [thread, priority, name] :
          {std::tuple{&acquisition_thread_, configuration_.acquisition_priority, "acquisition"},
           std::tuple{&estimator_thread_, configuration_.estimator_priority, "estimator"},
           std::tuple{&control_thread_, 0, "control"}}) {
         ::pthread_setname_np(thread->native_handle(), name);  // for top and the like
-        if (const auto why = set_fifo(*thread, priority); !why.empty()) {
+        if (const auto why = set_fifo(*thread, first ? priority : 0); !why.empty()) {
             log(Severity::warning, name,
                 fmt::format("SCHED_FIFO {} could not be had ({}): ordinary scheduling", priority,
                             why));
         }
     }
+    if (publisher_) publisher_->start();
 }
 
 void Daemon::shut_down() noexcept {
@@ -248,6 +281,7 @@ double Daemon::longest_end_s() const {
 }
 
 void Daemon::join() {
+    if (publisher_) publisher_->stop();
     give_up_.store(true);
     control_waiter_->notify();
     if (control_thread_.joinable()) control_thread_.join();
@@ -258,6 +292,7 @@ void Daemon::join() {
         acquisition_.stop();
         acquisition_thread_.join();
     }
+    if (pre_trip_) pre_trip_->stop();
     if (recorder_) recorder_->stop();
     if (journal_) journal_->stop();
 }
@@ -331,13 +366,7 @@ void Daemon::take_commands(Time now) {
 void Daemon::take_noise(estimator::DwellSummary& dwell) {
     rt::BlockRecord block;
     while (estimator_stage_.take_block(block)) noise_monitor_.add(block);
-    estimator::Estimate estimate;
-    identification_.estimate(estimate);
-    if (noise_monitor_.end_dwell(dwell, estimate.value)) {
-        dwell.flagged = true;
-        dwell.reason = "noise is not that of the earlier dwells";
-    }
-    if (const auto levels = noise_monitor_.take_new_levels()) identification_.set_noise(*levels);
+    noise_monitor_.conclude(dwell, identification_);
 }
 
 void Daemon::take_done_dwells() {
@@ -371,11 +400,13 @@ void Daemon::control_loop() {
         port_events_.consume(words);
         shaker_events_.consume(words);
         if (const rt::Trip trip = interlock_.tripped(); trip != handled) {
-            if (trip != rt::Trip::none) campaign_.on_trip(interlock_.tripped_text(), now);
+            if (trip != rt::Trip::none) on_trip(now);
             handled = trip;
         }
         tell_alarms();
+        tell_controller();
         if (journal_) tell_journal();
+        if (recorder_) tell_recorder();
         interlock_.filter(excitation_.load() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
@@ -413,7 +444,9 @@ void Daemon::write_result() {
     StatusData ended;
     campaign_.fill(ended, clock_.now());
     write_result_file(text, complete);
-    if (recorder_) recorder_->campaign_ended(name_of(ended.state), ended.reason, text, utc_now());
+    if (recorder_)
+        recorder_->campaign_ended(
+            {name_of(ended.state), ended.reason, campaign_.mark(), text, utc_now()});
     if (journal_) {
         journal_->campaign_ended(name_of(ended.state), ended.reason, text);
     }
@@ -485,6 +518,7 @@ StatusData Daemon::status() const {
     status.assembler = acquired.assembler;
     const auto ring = estimator_stage_.ring();
     status.estimator_ring = {ring.pushed, ring.popped, ring.dropped};
+    status.latency = acquired.latency;
     status.rig_ticks = acquired.rig_ticks;
     status.increment_frames = acquired.increments;
     status.estimator_in_dwell = estimated.in_dwell;
@@ -495,10 +529,14 @@ StatusData Daemon::status() const {
             acquired.last_good[c] == 0 ? -1.0 : drivers::to_seconds(now - acquired.last_good[c]);
     }
     status.platform = acquired.platform;
+    const auto& frame = configuration_.estimator;
+    status.frame = {frame.up, frame.encoder_sign, frame.encoder_zero_deg,
+                    frame.accelerometer_zero_g, frame.accelerometer_matrix};
     status.estimate = estimated.estimate;
     status.interlock = interlock_status();
     if (journal_) status.journal = journal_->status();
     if (recorder_) status.recorder = recorder_->status();
+    if (publisher_) status.mqtt = publisher_->status();
     return status;
 }
 

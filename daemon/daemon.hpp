@@ -13,8 +13,10 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/fleet/publisher.hpp"
 #include "daemon/journal/journal.hpp"
 #include "daemon/noise/noise_monitor.hpp"
+#include "daemon/record/pre_trip.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
@@ -86,18 +88,22 @@ class Daemon final : public StatusSource {
     /// Accepted if it was for an alarm; a trip is the campaign's.
     CommandReply acknowledge_alarm(const CommandRequest& request);
     void tell_alarms();
+    void tell_controller();
     void tell_journal();
+    void tell_recorder();
     [[nodiscard]] InterlockStatus interlock_status() const;
     void take_done_dwells();
     void take_noise(estimator::DwellSummary& dwell);
     void write_result();
     void write_result_file(const std::string& text, bool complete);
-    [[nodiscard]] campaign::Next next_dwell(const std::array<double, 3>& here_deg,
-                                            double elapsed_s);
+    [[nodiscard]] std::optional<campaign::Next> next_dwell(const std::array<double, 3>& here_deg,
+                                                           double elapsed_s);
     void open_journal();
     /// Everything that results depend on; not where things are kept or how one talks to the daemon.
     [[nodiscard]] std::string result_configuration() const;
     [[nodiscard]] std::unique_ptr<record::Recorder> make_recorder();
+    [[nodiscard]] std::unique_ptr<record::PreTrip> make_pre_trip();
+    void on_trip(drivers::Time now);
     /// The bus, by way of the recorder if there is one.
     [[nodiscard]] drivers::CanPort& sending_port() noexcept;
     void record_begin(const std::string& by, std::size_t dwells_before);
@@ -124,28 +130,36 @@ class Daemon final : public StatusSource {
     rt::Ring<RtEvent> port_events_{64};    ///< acquisition to control
     rt::Ring<RtEvent> shaker_events_{64};  ///< shaker to control
     estimator::Identification identification_;
-    /// As it was when the campaign was interrupted; until it is resumed.
-    std::optional<estimator::Identification> interrupted_;
-    std::int64_t interrupted_id_ = 0;
+    /// As they were when the campaign was interrupted; until it is resumed.
+    struct Interrupted {
+        estimator::Identification identification;
+        noise::NoiseMonitor noise;
+        std::int64_t id = 0;
+    };
+    std::optional<Interrupted> interrupted_;
     rt::EstimatorStage estimator_stage_;
     noise::NoiseMonitor noise_monitor_;  ///< control thread
     std::unique_ptr<drivers::Waiter> recorder_waiter_;
     std::unique_ptr<record::Recorder> recorder_;  ///< null: nothing is recorded
     std::unique_ptr<record::SentTap> sent_tap_;
+    std::unique_ptr<record::PreTrip> pre_trip_;  ///< null: results are kept nowhere
     rt::StageFeed stage_feed_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
     std::unique_ptr<drivers::Torquer> torquer_;  ///< null: no levelling
     std::optional<plan::AdaptivePlan> adaptive_;
+    std::future<plan::AdaptivePlan::Decision> planning_;  ///< control thread
     const PlanData plan_;
     campaign::Campaign campaign_;
+    const std::unique_ptr<fleet::Publisher> publisher_;  ///< null: no broker
 
     std::atomic<bool> shut_down_{false};
     std::atomic<bool> give_up_{false};
     std::atomic<bool> excitation_{false};  ///< the campaign is between ramp and rest
     int dwells_with_estimator_ = 0;        ///< ordered, not yet reported done; control thread
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
-    std::string imbalance_;                      ///< as last looked at
+    std::string imbalance_;  ///< as last looked at
+    drivers::ControllerState controller_told_ = drivers::ControllerState::active;
     std::array<bool, rt::kMostRules> raised_{};  ///< alarms already told of
     drivers::Time balance_checked_ = 0;
     std::atomic<drivers::Time> control_beat_{0};
@@ -153,6 +167,7 @@ class Daemon final : public StatusSource {
     serve::EventLog event_log_;
     std::unique_ptr<journal::Journal> journal_;  ///< null: none is kept
     bool journal_was_running_ = true;            ///< control thread
+    bool recorder_was_stuck_ = false;            ///< control thread
     mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
     std::deque<WaitingCommand> commands_;
     StatusData campaign_status_;

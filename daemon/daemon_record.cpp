@@ -66,6 +66,16 @@ std::unique_ptr<record::Recorder> Daemon::make_recorder() {
     return recorder;
 }
 
+void Daemon::tell_recorder() {
+    const double stuck_s = recorder_->stuck_s();
+    const bool stuck = stuck_s > 0;
+    if (std::exchange(recorder_was_stuck_, stuck) == stuck) return;
+    log(stuck ? Severity::alarm : Severity::info, "recorder",
+        stuck ? "the disk does not answer: what comes meanwhile waits, and is lost when there "
+                "is no more room for it"
+              : "the disk answers again");
+}
+
 void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {
     if (!recorder_) return;
     const auto utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -91,6 +101,7 @@ void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {
     head.plan = plan_json(configuration_.campaign);
     head.interface =
         configuration_.can.kind == drivers::CanPortSettings::Kind::socketcan ? configuration_.can.interface : "vcan0";
+    head.restart = dwells_before > 0;
     head.dwells_before = dwells_before;
     recorder_->campaign_begun(std::move(head));
 }

@@ -14,6 +14,7 @@ using drivers::Time;
 namespace {
 // A stage that makes no progress for this long, in wall time, is stuck.
 constexpr Time kPatience = 2 * drivers::kSecond;
+constexpr std::size_t kManyEvents = serve::EventLog::kCapacity;
 }  // namespace
 
 void Daemon::open_journal() {
@@ -26,6 +27,8 @@ void Daemon::open_journal() {
         [this](double free_mb) { interlock_.disk_free(free_mb); });
     for (const auto& refused : journal_->recovery().refused)
         log(Severity::warning, "journal", refused);
+    if (const auto& assumed = journal_->recovery().assumed; !assumed.empty())
+        log(Severity::warning, "journal", assumed);
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
@@ -36,8 +39,9 @@ std::string Daemon::result_configuration() const {
     for (const auto& value : loaded_.effective) {
         const auto section = value.key.substr(0, value.key.find('.'));
         if (section == "server" || section == "log" || section == "threads" ||
-            section == "journal" || section == "clock" || section == "record" ||
-            section == "unit" || section == "instrument" || value.key == "campaign.results")
+            section == "journal" || section == "mqtt" || section == "clock" ||
+            section == "record" || section == "unit" || section == "instrument" ||
+            section == "selftest" || value.key == "campaign.results")
             continue;
         text += value.key + " = " + value.value + "\n";
     }
@@ -45,13 +49,22 @@ std::string Daemon::result_configuration() const {
 }
 
 void Daemon::offer_unfinished(journal::Unfinished& campaign) {
-    estimator::Identification fresh(configuration_.estimator);
+    Interrupted fresh{
+        estimator::Identification(configuration_.estimator),
+        noise::NoiseMonitor(configuration_.estimator, [](Severity, const std::string&) {}),
+        campaign.id};
     std::vector<estimator::DwellSummary> done;
-    std::string why = journal::replay(campaign.dwells, fresh);
-    for (const auto& dwell : campaign.dwells) done.push_back(dwell.summary);
+    std::string why =
+        journal::replay(campaign.dwells, {fresh.identification, fresh.noise,
+                                          drivers::from_seconds(configuration_.campaign.dwell_s)});
+    std::vector<StopDone> stops;
+    for (const auto& dwell : campaign.dwells) {
+        done.push_back(dwell.summary);
+        if (dwell.stop_known) stops.push_back(dwell.stop);
+    }
     const std::size_t count = done.size();
-    if (why.empty() && !campaign_.offer(std::move(done)))
-        why = "its positions are not the first ones of this campaign, or it is adaptive";
+    if (why.empty() && !campaign_.offer(std::move(done), std::move(stops)))
+        why = "its positions are not the first ones of this campaign";
     if (!why.empty()) {
         log(Severity::warning, "journal",
             fmt::format("campaign {} ({}): {}: cold start", campaign.id, campaign.name, why));
@@ -62,8 +75,25 @@ void Daemon::offer_unfinished(journal::Unfinished& campaign) {
                     "and resume it, or start anew",
                     campaign.id, campaign.name, campaign.started_by, count));
     interrupted_ = std::move(fresh);
-    interrupted_id_ = campaign.id;
     campaign.dwells.clear();
+}
+
+std::unique_ptr<record::PreTrip> Daemon::make_pre_trip() {
+    if (configuration_.results.empty()) return nullptr;
+    return std::make_unique<record::PreTrip>(
+        (std::filesystem::path(configuration_.results) / "trips").string(),
+        configuration_.assembler.sample_period, [this] { return event_log_.after(0, kManyEvents); },
+        [this](Severity severity, const std::string& text) { log(severity, "pre-trip", text); });
+}
+
+void Daemon::on_trip(Time now) {
+    campaign_.on_trip(interlock_.tripped_text(), now);
+    if (!pre_trip_) return;
+    const auto utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                            std::chrono::system_clock::now().time_since_epoch())
+                            .count();
+    pre_trip_->tripped({rt::condition_of(interlock_.tripped()).name, interlock_.tripped_name(),
+                        interlock_.tripped_text(), now, utc_ns});
 }
 
 std::string Daemon::resume_gate() const {
@@ -157,6 +187,16 @@ void Daemon::tell_alarms() {
                 fmt::format("{}: {}", row.rule->name, condition.text));
         }
     }
+}
+
+void Daemon::tell_controller() {
+    using drivers::ControllerState;
+    const auto now = port_->counters().controller;
+    if (std::exchange(controller_told_, now) == now) return;
+    log(now == ControllerState::active    ? Severity::info
+        : now == ControllerState::warning ? Severity::warning
+                                          : Severity::alarm,
+        "can", fmt::format("the controller's error state: {}", drivers::name_of(now)));
 }
 
 void Daemon::tell_journal() {

@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "daemon/rt/frame_latency.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
 #include "drivers/sample.hpp"
 #include "drivers/shaker.hpp"
+#include "estimator/allan/dwell_monitor.hpp"
 #include "estimator/allan/fit.hpp"
 #include "estimator/identification.hpp"
 
@@ -29,8 +31,9 @@ enum class CampaignState : std::uint8_t {
     tripped,    ///< stopped by an interlock; latched until acknowledged
     zeroing,    ///< azimuth slews at rest, for the accelerometers' zeros
     levelling,  ///< at rest in position
+    checking,   ///< the loop, at a small level
 };
-inline constexpr CampaignState kLastCampaignState = CampaignState::levelling;
+inline constexpr CampaignState kLastCampaignState = CampaignState::checking;
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
 /// The interlock's table as it stands, and how long stops took.
@@ -69,6 +72,15 @@ struct RecorderStatus {
     std::uint64_t entries_dropped = 0;
 };
 
+/// The broker that watches a fleet of rigs.
+struct MqttStatus {
+    std::string broker;  ///< "broker.lab:8883"; empty: off
+    bool connected = false;
+    std::string note;  ///< why it is not
+    std::uint64_t connections = 0, births = 0, messages = 0;
+    std::uint64_t left_out = 0;  ///< times the broker was too slow to be told
+};
+
 struct RingCounters {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
@@ -79,11 +91,12 @@ struct NoiseStatus {
         std::array<estimator::allan::FittedTerm, estimator::allan::kTerms> terms{};
         double in_force = 0;         ///< N of the filter, deg/sqrt(h)
         double smallest_change = 0;  ///< of N, times, that one dwell shows; 0: not known
+        std::vector<estimator::allan::DwellPoint> points;
     };
     struct Alarm {
         int run = 0, position = 0;
         std::size_t gyro = 0;
-        double tau_s = 0, ratio = 1, limit = 1;
+        double tau_s = 0, ratio = 1, limit = 1;  ///< of a step of the mean in standard deviations
         const char* reading = "";
     };
     std::array<Gyro, 3> gyros;
@@ -92,6 +105,30 @@ struct NoiseStatus {
     std::uint32_t dwells = 0, dwells_left_out = 0;  ///< left out: flagged, too short or alarmed
     std::uint64_t alarms_total = 0;
     std::vector<Alarm> alarms;  ///< the newest
+    /// Drifts found while levelling against what the coefficients say.
+    struct Level {
+        std::uint32_t samples = 0;
+        double mean_square = 0;     ///< of the normalised innovations, 1 when consistent
+        int run = 0, position = 0;  ///< of the newest
+        std::array<double, 2> innovation_deg_h{}, sigma_deg_h{};
+    } level;
+};
+
+/// Of a position that is done, what an adaptive campaign needs to go on after a restart.
+struct StopDone {
+    std::array<double, 3> position_deg{};
+    double table_g = 0;
+    std::int32_t repeats = 0;  ///< of the position so far, because it was flagged
+    double used_s = 0;         ///< of the campaign's time
+};
+
+/// What the platform drifted by at the end of a levelling, which torqued it out.
+struct LevelDrift {
+    int run = 0, position = 0;
+    std::array<double, 3> encoder_rad{};
+    std::array<std::array<double, 3>, 2> direction{};  ///< platform axes, across the vertical
+    std::array<double, 2> rate_deg_h{};                ///< along them, relative to the Earth
+    double sigma_deg_h = 0;                            ///< of either
 };
 
 /// The levelling of the present position, or the last one.
@@ -123,6 +160,29 @@ struct ZeroStatus {
     std::string message;
 };
 
+/// How the platform sits in its gimbals: of the configuration.
+struct FrameStatus {
+    estimator::SignedAxis up{1, 1};
+    std::array<int, 3> encoder_sign{1, 1, 1};
+    std::array<double, 3> encoder_zero_deg{};
+    std::array<double, 3> accelerometer_zero_g{};
+    std::array<std::array<double, 3>, 3> accelerometer_matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+};
+
+/// The newest loop check.
+struct LoopCheckStatus {
+    struct Row {
+        const char* name = "";
+        const char* unit = "";
+        double value = 0, low = 0, high = 0;
+        bool passed = false;
+    };
+    const char* verdict = "";  ///< none, running, in band, out of band, not completed
+    std::string by;
+    std::string message;  ///< what is out of band, or why it was not completed
+    std::vector<Row> rows;
+};
+
 /// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
 /// not in real-time threads.
 struct StatusData {
@@ -150,6 +210,7 @@ struct StatusData {
     InterlockStatus interlock;
     JournalStatus journal;
     RecorderStatus recorder;
+    MqttStatus mqtt;
     bool stop_pending = false;  ///< a stop is ordered and not read back as done
 
     drivers::PortState can = drivers::PortState::absent;
@@ -158,16 +219,19 @@ struct StatusData {
     std::uint64_t rig_ticks = 0;         ///< delivered frames that were the simulated rig's time
     std::uint64_t increment_frames = 0;  ///< delivered frames that were increments
     RingCounters estimator_ring;
+    rt::FrameLatency latency;                                  ///< of the acquisition, real clock
     std::uint64_t estimator_in_dwell = 0, estimator_idle = 0;  ///< popped = in a dwell + idle
     drivers::Sample sample;                                    ///< the newest
     std::array<double, drivers::kChannels> channel_age_s{};
     drivers::PlatformStatus platform;
+    FrameStatus frame;
 
     estimator::Estimate estimate;
     NoiseStatus noise;
     std::vector<estimator::DwellSummary> dwells;
     LevellingStatus levelling;
     ZeroStatus zeros;
+    LoopCheckStatus loop_check;
 };
 
 enum class Severity : std::uint8_t { info, warning, alarm, trip };
@@ -189,7 +253,8 @@ struct CommandRequest {
         pause,
         resume,
         abort,
-        acknowledge
+        acknowledge,
+        selftest
     } kind = Kind::abort;
     std::string by;        ///< named person
     std::string argument;  ///< what is acknowledged

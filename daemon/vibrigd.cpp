@@ -32,8 +32,9 @@ void set_up_log(const vibrig::configuration::Configuration& configuration) {
 
 vibrig::serve::ServerSettings settings_of(const vibrig::configuration::Configuration& c) {
     vibrig::serve::ServerSettings settings{
-        c.socket,        c.server.operator_group, c.server.status_socket, c.server.page,
-        c.server.remote, c.server.certificate,    c.server.key,           c.server.clients_ca};
+        c.socket,      c.server.operator_group, c.server.status_socket,
+        c.server.page, c.server.remote,         c.server.certificate,
+        c.server.key,  c.server.clients_ca,     c.server.revoked};
     settings.limits.connections = 256;
     return settings;
 }
@@ -47,12 +48,19 @@ std::string words_of(const vibrig::StatusData& status) {
     return words;
 }
 
+/// Throws configuration::ConfigurationError where the campaign cannot determine what is asked.
+void insist(const vibrig::CampaignForecast& forecast) {
+    if (!forecast.refusal.empty())
+        throw vibrig::configuration::ConfigurationError(forecast.refusal);
+}
+
 /// The file as it is now; what is in force changes with a restart only, since another
 /// configuration ends an arming.
 void check_again(const std::string& path) {
     try {
         const auto loaded = vibrig::configuration::load(path, true);
         vibrig::Daemon::check_bindings(loaded.configuration);
+        insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
         spdlog::error("configuration checked, the old one stays in force: {}", error.what());
@@ -153,6 +161,8 @@ int main(int argc, char** argv) {
     ::sigemptyset(&signals);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::sigaddset(&signals, signal);
     ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    // A file as large as is allowed is an answer of the disk, not the end.
+    std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGPIPE, SIG_IGN);
 
     try {
@@ -166,21 +176,21 @@ int main(int argc, char** argv) {
             vibrig::Daemon::check_bindings(loaded.configuration);
             std::cout << vibrig::configuration::format_effective(loaded);
             // As comments: what stands above reads back as a configuration.
-            std::istringstream forecast(vibrig::forecast_campaign(loaded.configuration));
-            for (std::string line; std::getline(forecast, line);) {
+            const auto forecast = vibrig::forecast_campaign(loaded.configuration);
+            std::istringstream words(forecast.words);
+            for (std::string line; std::getline(words, line);) {
                 std::cout << "# " << line << '\n';
             }
             for (const std::string& line : vibrig::Daemon::check_plan(loaded.configuration)) {
                 std::cerr << "warning: campaign: " << line << '\n';
             }
-            if (const auto& why = loaded.configuration.campaign.refusal; !why.empty()) {
-                std::cerr << "warning: campaign: will not be armed: " << why << '\n';
-            }
+            insist(forecast);
             return 0;
         }
         set_up_log(loaded.configuration);
-        spdlog::info("campaign \"{}\": {}", loaded.configuration.campaign.name,
-                     vibrig::forecast_campaign(loaded.configuration));
+        const auto forecast = vibrig::forecast_campaign(loaded.configuration);
+        spdlog::info("campaign \"{}\": {}", loaded.configuration.campaign.name, forecast.words);
+        insist(forecast);
         return run(std::move(loaded), signals, path);
     } catch (const std::exception& error) {
         std::cerr << "vibrigd: " << error.what() << '\n';

@@ -205,6 +205,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     resolve(c.server.certificate, folder);
     resolve(c.server.key, folder);
     resolve(c.server.clients_ca, folder);
+    resolve(c.server.revoked, folder);
+    for (auto* const path : {&c.mqtt.ca, &c.mqtt.certificate, &c.mqtt.key, &c.mqtt.password_file})
+        resolve(*path, folder);
     resolve(c.journal, folder);
     resolve(c.log_file, folder);
     return loaded;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/campaign/settings.hpp"
+#include "daemon/fleet/settings.hpp"
 #include "daemon/record/settings.hpp"
 #include "daemon/rt/interlock_table.hpp"
 #include "drivers/assembler.hpp"
@@ -45,8 +46,9 @@ struct Configuration {
     /// [server]: who may command at the socket, and where else is listened; empty: all, nowhere
     struct Server {
         std::string operator_group, status_socket, page, remote;
-        std::string certificate, key, clients_ca;
+        std::string certificate, key, clients_ca, revoked;
     } server;
+    fleet::Settings mqtt;            ///< [mqtt]
     std::string log_level = "info";  ///< [log] level
     std::string log_file;            ///< [log] file; empty: standard error
     /// [journal] file; empty: journal.sqlite3 in results, and none without results

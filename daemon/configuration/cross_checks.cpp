@@ -74,10 +74,27 @@ void CrossCheck::for_daemon() {
                    " with ready_timeout_s " + plain(c_.campaign.ready_timeout_s),
                "a window shorter than the timeout");
     }
+    broker();
     adaptive();
     set_points_fit();
     limits();
     frequency();
+}
+
+void CrossCheck::broker() {
+    const fleet::Settings& mqtt = c_.mqtt;
+    if (!sound({"mqtt.host", "mqtt.tls"}) || mqtt.host.empty()) return;
+    if (!mqtt.tls && !loopback(mqtt.host)) {
+        refuse({"mqtt.tls", "mqtt.host"}, "false with the broker at " + mqtt.host,
+               "true, or a broker on this machine, such as \"127.0.0.1\"");
+    }
+    if (mqtt.certificate.empty() != mqtt.key.empty()) {
+        refuse({"mqtt.certificate", "mqtt.key"}, "one of mqtt.certificate and mqtt.key",
+               "both or none");
+    }
+    if (mqtt.username.empty() && !mqtt.password_file.empty()) {
+        refuse({"mqtt.password_file"}, "a password without mqtt.username", "both or none");
+    }
 }
 
 void CrossCheck::adaptive() {

@@ -26,6 +26,7 @@ class CrossCheck {
     void refuse(std::initializer_list<std::string> keys, const std::string& found,
                 const std::string& expected);
     void bus();
+    void broker();
     void adaptive();
     void rig_clock();
     void registers();

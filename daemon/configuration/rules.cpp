@@ -80,6 +80,18 @@ std::string host_rule(const std::string& text) {
     return good ? "" : "a host name or numeric address";
 }
 
+std::string host_or_empty_rule(const std::string& text) {
+    return text.empty() ? "" : host_rule(text);
+}
+
+std::string line_rule(const std::string& text) {
+    constexpr std::size_t kLine = 256;
+    const bool good = text.size() <= kLine && std::none_of(text.begin(), text.end(), [](char c) {
+                          return (c >= 0 && c < 0x20) || c == 0x7F;
+                      });
+    return good ? "" : "one line, 256 bytes at most";
+}
+
 std::string binding_rule(const std::string& text) {
     const std::size_t dot = text.find('.');
     const bool good =

@@ -73,6 +73,32 @@ void add_zeroing_keys(std::vector<Key>& keys) {
         [](C & c) -> auto& { return c.campaign.zero.accelerometer_message; }));
 }
 
+void add_loop_check_keys(std::vector<Key>& keys) {
+    const auto loop = [&keys](const char* name, const char* unit, Range range, const char* doc,
+                              double campaign::LoopCheckSettings::*member) {
+        keys.push_back(number(std::string("selftest.") + name, unit, range, doc,
+                              [member](C& c) -> double& { return c.campaign.loop.*member; }));
+    };
+    using S = campaign::LoopCheckSettings;
+    loop("table_g", "g", {0.05, 1}, "peak acceleration at the table during the loop check",
+         &S::table_g);
+    loop("measure_s", "s", {2, 20}, "that the loop check measures at its level", &S::measure_s);
+    loop("transmission_tolerance", "", {0.001, 1}, "about vibration.transmission, relative",
+         &S::transmission_tolerance);
+    loop("frequency_tolerance_hz", "Hz", {0.001, 0.5}, "about vibration.frequency_hz",
+         &S::frequency_tolerance_hz);
+    loop("distortion", "", {0.0001, 1}, "rms of all but the fundamental, over the fundamental's",
+         &S::distortion);
+    loop("cross_share", "", {0.0001, 1}, "motion across the vertical over the motion along it",
+         &S::cross_share);
+    loop("phase_deg", "deg", {-180, 180}, "platform after table; needs a table accelerometer",
+         &S::phase_deg);
+    loop("phase_tolerance_deg", "deg", {1, 180}, "about phase_deg", &S::phase_tolerance_deg);
+    keys.push_back(boolean("selftest.required",
+                           "a campaign is armed only after a loop check in band since the start",
+                           [](C& c) -> bool& { return c.campaign.loop.required; }));
+}
+
 }  // namespace
 
 void add_campaign_keys(std::vector<Key>& keys) {
@@ -81,7 +107,7 @@ void add_campaign_keys(std::vector<Key>& keys) {
         [](C & c) -> auto& { return c.campaign.name; }));
     keys.push_back(positions(
         "campaign.positions_deg", kMostPositions,
-        "gimbal positions of every run (default: Tang et al. 2009, table 1)",
+        "gimbal positions of every run as the encoders count (default: Tang et al. 2009, table 1)",
         [](C & c) -> auto& { return c.campaign.positions_deg; }));
     keys.push_back(numbers(
         "campaign.table_g", "g", {0, 1000}, kMostRuns,
@@ -93,7 +119,7 @@ void add_campaign_keys(std::vector<Key>& keys) {
         [](C & c) -> auto& { return c.campaign.plan; }));
     keys.push_back(choice<bool>(
         "campaign.identify", {{"all", true}, {"what-it-can", false}},
-        "all: a campaign that cannot determine all 30 coefficients is not armed",
+        "all: a campaign that cannot determine all 30 coefficients is refused",
         [](C & c) -> auto& { return c.campaign.identify_all; }));
     keys.push_back(boolean(
         "campaign.adaptive",
@@ -147,6 +173,7 @@ void add_campaign_keys(std::vector<Key>& keys) {
         [](C & c) -> auto& { return c.results; }));
     add_levelling_keys(keys);
     add_zeroing_keys(keys);
+    add_loop_check_keys(keys);
 }
 
 }  // namespace vibrig::configuration

@@ -31,6 +31,45 @@ void add_record_keys(std::vector<Key>& keys) {
                            [](C& c) -> int& { return c.record.keep_free_mb; }));
 }
 
+void add_mqtt_keys(std::vector<Key>& keys) {
+    keys.push_back(text(
+        "mqtt.host", "a host name or numeric address, or \"\"",
+        "MQTT broker that is told the status (Sparkplug B); empty: none", host_or_empty_rule,
+        [](C & c) -> auto& { return c.mqtt.host; }));
+    keys.push_back(integer("mqtt.port", "", 1, 65'535, "the broker's; 8883 is usual with TLS",
+                           [](C& c) -> int& { return c.mqtt.port; }));
+    keys.push_back(boolean("mqtt.tls", "false: in clear, to a broker on this machine only",
+                           [](C& c) -> bool& { return c.mqtt.tls; }));
+    keys.push_back(text(
+        "mqtt.ca", "a path", "authority of the broker's certificate, PEM; empty: the system's",
+        path_rule, [](C & c) -> auto& { return c.mqtt.ca; }));
+    keys.push_back(text(
+        "mqtt.certificate", "a path", "this rig's, PEM; empty: none is shown", path_rule,
+        [](C & c) -> auto& { return c.mqtt.certificate; }));
+    keys.push_back(text(
+        "mqtt.key", "a path", "of the certificate, PEM, without a password", path_rule,
+        [](C & c) -> auto& { return c.mqtt.key; }));
+    keys.push_back(text(
+        "mqtt.username", "1 line", "as the broker knows this rig; empty: none", line_rule,
+        [](C & c) -> auto& { return c.mqtt.username; }));
+    keys.push_back(text(
+        "mqtt.password_file", "a path", "its first line is the password", path_rule,
+        [](C & c) -> auto& { return c.mqtt.password_file; }));
+    keys.push_back(text(
+        "mqtt.group", "letters, digits, ' ', '.', '_', '-'",
+        "group id of the topics, spBv1.0/GROUP/NDATA/NODE", campaign_name_rule,
+        [](C & c) -> auto& { return c.mqtt.group; }));
+    keys.push_back(text(
+        "mqtt.node", "letters, digits, ' ', '.', '_', '-'",
+        "edge node id, another one for each rig", campaign_name_rule,
+        [](C & c) -> auto& { return c.mqtt.node; }));
+    keys.push_back(number("mqtt.period_s", "s", {0.1, 3600}, "what has changed is told so often",
+                          [](C& c) -> double& { return c.mqtt.period_s; }));
+    keys.push_back(number("mqtt.backoff_max_s", "s", {0.5, 3600},
+                          "longest wait before a lost broker is sought again",
+                          [](C& c) -> double& { return c.mqtt.backoff_max_s; }));
+}
+
 }  // namespace
 
 void add_daemon_keys(std::vector<Key>& keys) {
@@ -65,6 +104,12 @@ void add_daemon_keys(std::vector<Key>& keys) {
     keys.push_back(text(
         "server.clients_ca", "a path", "authority the clients' certificates come from, PEM",
         path_rule, [](C & c) -> auto& { return c.server.clients_ca; }));
+    keys.push_back(text(
+        "server.revoked", "a path",
+        "clients' certificates that no longer count, PEM; `vibrig pki revoke` writes it; empty: "
+        "none",
+        path_rule, [](C & c) -> auto& { return c.server.revoked; }));
+    add_mqtt_keys(keys);
     // The words are spdlog's own.
     const std::vector<std::string> levels{"trace", "debug",    "info", "warning",
                                           "error", "critical", "off"};

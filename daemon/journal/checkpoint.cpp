@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 namespace vibrig::journal {
@@ -65,6 +66,40 @@ void each_number(Summary& s, Each&& each) {
     each(s.innovation_correlation);
 }
 
+template <typename Levels, typename Each>
+void each_level(Levels& levels, Each&& each) {
+    each(levels.angle_arcsec);
+    for (auto& walk : levels.gyro_random_walk_deg_per_rt_h) each(walk);
+}
+
+template <typename Stop, typename Each>
+void each_part(Stop& stop, Each&& each) {
+    for (auto& angle : stop.position_deg) each(angle);
+    each(stop.table_g);
+    each(stop.repeats);
+    each(stop.used_s);
+}
+
+std::string bytes_of(const estimator::NoiseLevels& levels) {
+    std::string bytes;
+    each_level(levels, [&bytes](double value) { put(bytes, value); });
+    return bytes;
+}
+
+/// No filter ever took others; a walk of 0 can be configured.
+bool possible(const estimator::NoiseLevels& levels) {
+    bool good = levels.angle_arcsec > 0;
+    each_level(levels,
+               [&good](double value) { good = good && std::isfinite(value) && value >= 0; });
+    return good;
+}
+
+std::string words(const estimator::NoiseLevels& levels) {
+    const auto& walk = levels.gyro_random_walk_deg_per_rt_h;
+    return fmt::format("{:g} arcsec, N {:g}, {:g}, {:g} deg/sqrt(h)", levels.angle_arcsec, walk[0],
+                       walk[1], walk[2]);
+}
+
 std::string numbers_of(const estimator::DwellSummary& summary) {
     std::string bytes;
     each_number(summary, [&bytes](const auto& value) { put(bytes, value); });
@@ -92,6 +127,8 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     put(bytes, dwell.info.position);
     put(bytes, dwell.info.table_g);
     bytes += numbers_of(dwell.summary);
+    bytes += bytes_of(dwell.summary.noise);
+    each_part(dwell.stop, [&bytes](auto value) { put(bytes, value); });
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -130,6 +167,19 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     char flagged = 0;
     reader.get(flagged);
     dwell.summary.flagged = flagged != 0;
+    dwell.noise_known = version >= 2;
+    if (dwell.noise_known) {
+        each_level(dwell.summary.noise, [&reader](double& value) { reader.get(value); });
+        if (reader.good() && !possible(dwell.summary.noise))
+            return "corrupt: noise levels " + words(dwell.summary.noise);
+    }
+    dwell.stop_known = version >= 3;
+    if (dwell.stop_known) {
+        each_part(dwell.stop, [&reader](auto& value) { reader.get(value); });
+        bool good = dwell.stop.repeats >= 0 && dwell.stop.used_s >= 0;
+        each_part(dwell.stop, [&good](auto value) { good = good && std::isfinite(value); });
+        if (reader.good() && !good) return "corrupt: position, repeats or time used";
+    }
     std::uint64_t count = 0;
     reader.get(count);
     if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())
@@ -147,20 +197,38 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     return {};
 }
 
-std::string replay(std::vector<DwellCheckpoint>& dwells,
-                   estimator::Identification& identification) {
+std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to) {
+    rt::Ring<rt::BlockRecord> blocks{256};
+    rt::AngleBlocks averager(blocks);
     for (auto& dwell : dwells) {
+        const auto& noise = to.identification.noise();
+        const std::string where =
+            fmt::format("run {} position {}", dwell.info.run, dwell.info.position);
+        if (dwell.noise_known && bytes_of(noise) != bytes_of(dwell.summary.noise)) {
+            return fmt::format("{} was filtered with {}, found {} again", where,
+                               words(dwell.summary.noise), words(noise));
+        }
+        estimator::DwellSummary summary = dwell.summary;
         if (dwell.measurements.empty()) {  // the filter never heard of it
-            dwell.summary.reason = "no samples";
-            continue;
+            summary.reason = "no samples";
+        } else {
+            to.identification.begin_dwell(dwell.info);
+            rt::DwellOrder order;
+            order.to = to.dwell;
+            order.dwell = dwell.info;
+            averager.begin(order);
+            for (const auto& measurement : dwell.measurements) {
+                const auto step = to.identification.add(measurement);
+                if (step.outcome == estimator::StepOutcome::used)
+                    averager.add(measurement.time_s, measurement.angle_rad);
+            }
+            summary = to.identification.end_dwell();
+            averager.end();
+            blocks.consume([&to](const rt::BlockRecord& block) { to.noise.add(block); }, 256);
         }
-        identification.begin_dwell(dwell.info);
-        for (const auto& measurement : dwell.measurements) identification.add(measurement);
-        const auto summary = identification.end_dwell();
-        if (numbers_of(summary) != numbers_of(dwell.summary)) {
-            return fmt::format("run {} position {} does not come out as it did", dwell.info.run,
-                               dwell.info.position);
-        }
+        to.noise.conclude(summary, to.identification);
+        if (numbers_of(summary) != numbers_of(dwell.summary))
+            return where + " does not come out as it did";
         dwell.summary = summary;
     }
     return {};

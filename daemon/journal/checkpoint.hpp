@@ -5,19 +5,24 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/noise/noise_monitor.hpp"
+#include "drivers/clock.hpp"
 #include "estimator/identification.hpp"
 
 namespace vibrig::journal {
 
 /// What the filter was fed in one finished dwell, and what it made of it. Fed again in order, the
-/// filter comes to the same state to the last bit; the summary proves it.
+/// filter and the noise monitor come to the same state to the last bit; the summary proves it.
 struct DwellCheckpoint {
     estimator::DwellInfo info;
     estimator::DwellSummary summary;
     std::vector<estimator::Measurement> measurements;
+    StopDone stop;
+    bool noise_known = true;  ///< false: of version 1, which did not keep the noise levels
+    bool stop_known = true;   ///< false: of version 2 or older
 };
 
-inline constexpr std::uint32_t kCheckpointVersion = 1;
+inline constexpr std::uint32_t kCheckpointVersion = 3;
 
 /// Of everything that the results depend on, "key = value" one per line.
 [[nodiscard]] std::uint64_t configuration_hash(std::string_view text) noexcept;
@@ -28,9 +33,14 @@ inline constexpr std::uint32_t kCheckpointVersion = 1;
 [[nodiscard]] std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
                                  DwellCheckpoint& dwell);
 
-/// Feeds the dwells to a fresh identification. Empty if every summary came out as it was to the
-/// last bit; else which did not. Summaries get their reasons back.
-[[nodiscard]] std::string replay(std::vector<DwellCheckpoint>& dwells,
-                                 estimator::Identification& identification);
+/// A fresh identification and its noise monitor, to be fed again.
+struct Replay {
+    estimator::Identification& identification;
+    noise::NoiseMonitor& noise;
+    drivers::Time dwell = 0;  ///< length of a dwell as it was ordered
+};
+/// Feeds the dwells. Empty if every summary came out as it was to the last bit, filtered with the
+/// noise levels it was; else which did not. Summaries get their reasons back.
+[[nodiscard]] std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to);
 
 }  // namespace vibrig::journal

@@ -55,6 +55,8 @@ const char* word_of(CommandRequest::Kind kind) {
             return "abort";
         case Kind::acknowledge:
             return "acknowledge";
+        case Kind::selftest:
+            return "selftest";
     }
     return "unknown";
 }
@@ -134,8 +136,9 @@ void Journal::recover() {
 
 void Journal::recover_dwells(Unfinished& campaign) {
     const auto rows = database_->ask(
-        "SELECT run, position, checkpoint FROM dwell WHERE campaign = ? ORDER BY run, position",
+        "SELECT run, position, checkpoint FROM dwell WHERE campaign = ? ORDER BY rowid",
         {campaign.id});
+    int without_noise = 0;
     for (const Row& row : rows) {
         DwellCheckpoint dwell;
         std::string why = decode(row.texts.at(2), configuration_hash_, dwell);
@@ -149,7 +152,14 @@ void Journal::recover_dwells(Unfinished& campaign) {
             campaign.dwells.clear();
             return;
         }
+        without_noise += dwell.noise_known ? 0 : 1;
         campaign.dwells.push_back(std::move(dwell));
+    }
+    if (without_noise > 0) {
+        recovery_.assumed = fmt::format(
+            "campaign {} ({}): {} checkpoints of version 1 do not say with which noise levels they "
+            "were filtered: assumed those that the noise monitor comes to again",
+            campaign.id, campaign.name, without_noise);
     }
 }
 
@@ -184,8 +194,9 @@ void Journal::campaign_begun(const std::string& name, const std::string& by) {
 void Journal::campaign_resumed(std::int64_t id, const std::string& by) {
     put(Begun{{}, by, id, utc_now()});
 }
-void Journal::dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary) {
-    put(Done{info, summary});
+void Journal::dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary,
+                         const StopDone& stop) {
+    put(Done{info, summary, stop});
 }
 void Journal::campaign_ended(const std::string& state, const std::string& reason,
                              const std::string& result_json) {
@@ -288,6 +299,7 @@ void Journal::write_one(const Done& done) {
     DwellCheckpoint& dwell = found == collected_.rend() ? empty : *found;
     dwell.info = done.info;
     dwell.summary = done.summary;
+    dwell.stop = done.stop;
     // Measurements that were lost on the way would give another filter.
     const bool whole = dwell.measurements.size() == done.summary.samples;
     const std::string bytes = whole ? encode(dwell, configuration_hash_) : std::string{};

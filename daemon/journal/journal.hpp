@@ -34,6 +34,7 @@ struct Recovery {
     std::optional<Unfinished> campaign;
     /// Why what was there is not used: a cold start, in words. Empty: nothing was refused.
     std::vector<std::string> refused;
+    std::string assumed;  ///< of what an older version did not keep; empty: nothing
 };
 
 /// What happened, on disk: campaigns, positions done with what the filter was fed, results, events
@@ -57,7 +58,8 @@ class Journal {
     // Control thread. They queue; `kMostWaiting` at most, the rest is dropped and counted.
     void campaign_begun(const std::string& name, const std::string& by);
     void campaign_resumed(std::int64_t id, const std::string& by);
-    void dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary);
+    void dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary,
+                    const StopDone& stop);
     void campaign_ended(const std::string& state, const std::string& reason,
                         const std::string& result_json);
     void event(const EventRecord& event);
@@ -77,6 +79,7 @@ class Journal {
     struct Done {
         estimator::DwellInfo info;
         estimator::DwellSummary summary;
+        StopDone stop;
     };
     struct Ended {
         std::string state, reason, result;

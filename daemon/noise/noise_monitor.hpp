@@ -21,18 +21,30 @@ namespace vibrig::noise {
 class NoiseMonitor {
   public:
     using Event = std::function<void(Severity, const std::string&)>;
+    /// Of the coefficients, order of parameter_names(); the covariance 30 x 30, row-major.
+    struct Knowledge {
+        std::array<double, estimator::kParameters> coefficients{};
+        std::vector<double> covariance;
+    };
     NoiseMonitor(const estimator::Settings& settings, Event event);
 
     /// A new campaign: everything is forgotten, the settings' noise is in force.
     void reset();
     void add(const rt::BlockRecord& block);
-    /// The blocks of this dwell are complete. True: its noise is not that of the earlier ones.
-    [[nodiscard]] bool end_dwell(const estimator::DwellSummary& dwell,
-                                 const std::array<double, estimator::kParameters>& coefficients);
+    /// The blocks of this dwell are complete; `now` is known with it. True: its noise, or its mean
+    /// drift, is not that of the earlier ones.
+    [[nodiscard]] bool end_dwell(const estimator::DwellSummary& dwell, Knowledge now);
+    /// One more innovation: the drift that a levelling found against the coefficients'.
+    void levelled(const LevelDrift& drift);
     /// Levels that differ from those in force, once; they are taken as in force from now on. A
     /// level changes only if the data contradict it, by a factor of 2 at most, never by a dwell
     /// with an alarm.
     [[nodiscard]] std::optional<estimator::NoiseLevels> take_new_levels();
+    /// All of that between two dwells: flags a dwell whose noise is not that of the earlier ones,
+    /// and the filter takes what it should use from the next one on.
+    void conclude(estimator::DwellSummary& dwell, estimator::Identification& identification);
+    /// Goes on with what another one has learnt.
+    void continue_from(NoiseMonitor&& other);
     /// One event for each gyro.
     void report() const;
 
@@ -42,6 +54,10 @@ class NoiseMonitor {
     [[nodiscard]] std::vector<estimator::AngleBlock> usable_blocks() const;
     [[nodiscard]] const std::shared_ptr<const estimator::allan::DwellBasis>& basis_of(
         std::vector<std::size_t> present);
+    bool mean_has_stepped(const estimator::DwellSummary& dwell, const Knowledge& before,
+                          const std::vector<estimator::AngleBlock>& blocks,
+                          const std::array<estimator::allan::DwellAngles, 3>& angles);
+    void raise(const NoiseStatus::Alarm& alarm, const std::string& what);
     bool check(const estimator::DwellSummary& dwell,
                const std::array<estimator::allan::DwellAngles, 3>& angles);
     void learn(const std::array<estimator::allan::DwellAngles, 3>& angles);
@@ -54,6 +70,8 @@ class NoiseMonitor {
     std::shared_ptr<const estimator::allan::DwellBasis> basis_;
     estimator::NoiseLevels in_force_;
     bool changed_ = false;
+    Knowledge prior_, known_;
+    double level_squares_ = 0;
     NoiseStatus status_;
 };
 

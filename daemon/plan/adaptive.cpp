@@ -6,6 +6,7 @@
 
 #include "daemon/plan/forecast.hpp"
 #include "estimator/crlb.hpp"
+#include "estimator/kinematics.hpp"
 #include "estimator/parameters.hpp"
 #include "estimator/plan/positions.hpp"
 
@@ -34,14 +35,15 @@ AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSe
     const double dwell_s = adaptive.timing.dwell_s;
     for (const double table_g : adaptive.table_g) {
         for (const auto& direction : planning::cube_directions()) {
-            const auto position = planning::position_for(settings.up, direction, {});
+            const auto position = planning::position_for(settings, direction, {});
             if (!position) continue;
             const PlannedRun run{*position, table_g * settings.transmission, table_g, 1};
             candidates_.push_back(run);
             experiments_.push_back(
                 {estimator::rate_rows(settings,
-                                      {*position, planning::kappa_of(run.level_g), dwell_s}, {},
-                                      adaptive.period_s),
+                                      {estimator::gimbal_deg(settings, *position),
+                                       planning::kappa_of(run.level_g), dwell_s},
+                                      {}, adaptive.period_s),
                  time_of(run, *position)});
         }
     }

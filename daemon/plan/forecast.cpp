@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/kinematics.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/positions.hpp"
 
@@ -35,7 +36,7 @@ std::string remedy(const estimator::Settings& settings, const planning::Problem&
     for (const PlannedRun& run : runs) highest = std::max(highest, run.level_g);
     levels.push_back(highest > 0 ? highest : 6.0);
     const auto offer = [&](const planning::Vec3& position, double level) {
-        const auto up = planning::up_at(settings.up, position);
+        const auto up = planning::up_at(settings, position);
         // Static runs cost no shaker time; vibrating ones ramp as well.
         extra.push_back({planning::vibration_row(up, level), 1, level > 0 ? 1.1 : 1.0});
         names.push_back(describe(position, level));
@@ -43,7 +44,7 @@ std::string remedy(const estimator::Settings& settings, const planning::Problem&
     for (const double level : levels) {
         for (const PlannedRun& run : runs) offer(run.position_deg, level);
         for (const auto& direction : planning::cube_directions()) {
-            if (const auto p = planning::position_for(settings.up, direction, {})) offer(*p, level);
+            if (const auto p = planning::position_for(settings, direction, {})) offer(*p, level);
         }
     }
     const planning::Remedy found = planning::cheapest_remedy(problem, effort, extra);
@@ -133,10 +134,11 @@ Forecast forecast(const estimator::Settings& settings, const std::vector<Planned
     std::vector<estimator::PlannedDwell> dwells;
     for (const PlannedRun& run : runs) {
         problem.points.push_back(
-            {planning::vibration_row(planning::up_at(settings.up, run.position_deg), run.level_g)});
+            {planning::vibration_row(planning::up_at(settings, run.position_deg), run.level_g)});
         effort.push_back(static_cast<double>(run.count));
         dwells.insert(dwells.end(), run.count,
-                      {run.position_deg, planning::kappa_of(run.level_g), dwell_s});
+                      {estimator::gimbal_deg(settings, run.position_deg),
+                       planning::kappa_of(run.level_g), dwell_s});
     }
     const planning::Evaluation evaluation = planning::evaluate(problem, effort);
     Forecast result;

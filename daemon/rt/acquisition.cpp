@@ -75,7 +75,9 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
             feed(stamped);
         }
     }
-    if (!rig_link_) hand_on();
+    if (rig_link_) return;
+    oldest_ = frames.empty() ? 0 : frames.front().time;
+    hand_on();
 }
 
 void Acquisition::record(const drivers::ReceivedFrame& frame, Time time) noexcept {
@@ -115,9 +117,11 @@ void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
 
 void Acquisition::push_batch() noexcept {
     if (batched_ == 0) return;
+    // First the recorder's: when a dwell is reported done its samples are there.
+    if (to_.recorder_samples != nullptr) to_.recorder_samples->push_n({batch_.data(), batched_});
     to_.estimator_ring.push_n({batch_.data(), batched_});
     to_.estimator.notify();
-    if (to_.recorder_samples != nullptr) to_.recorder_samples->push_n({batch_.data(), batched_});
+    if (to_.pre_trip != nullptr) to_.pre_trip->push_n({batch_.data(), batched_});
     shown_.samples_offered += batched_;
     shown_.sample = batch_[batched_ - 1];
     batched_ = 0;
@@ -139,6 +143,8 @@ void Acquisition::hand_on() noexcept {
         shown_.last_good[c] = assembler_.last_good(static_cast<drivers::Channel>(c));
     }
     shown_.beat = clock_.now();
+    if (oldest_ != 0) shown_.latency.add(shown_.beat - oldest_);
+    oldest_ = 0;
     view_.publish(shown_);
     if (changed) to_.control.notify();
 }
@@ -166,9 +172,12 @@ void Acquisition::wait_for_rest() {
 }
 
 void Acquisition::acknowledge_if_at_rest() noexcept {
-    if (unacknowledged_ && rig_->at_rest() && rig_link_->acknowledge(*unacknowledged_)) {
-        unacknowledged_.reset();
-    }
+    if (!unacknowledged_ || !rig_->at_rest()) return;
+    const auto sent = rig_link_->acknowledge(*unacknowledged_);
+    if (!sent) return;
+    if (to_.recorder_frames != nullptr)
+        to_.recorder_frames->try_push({*sent, unacknowledged_->time, false, true, 0});
+    unacknowledged_.reset();
 }
 
 }  // namespace vibrig::rt

@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "daemon/rt/frame_latency.hpp"
 #include "daemon/rt/frame_record.hpp"
 #include "daemon/rt/interlock.hpp"
 #include "daemon/rt/rig_clock.hpp"
@@ -31,6 +32,7 @@ struct AcquisitionView {
     std::uint64_t in_hand = 0;      ///< delivered frames of the batch at work, not looked at yet
     std::uint64_t samples_offered = 0;  ///< to the ring: pushed + dropped
     std::array<drivers::Time, drivers::kChannels> last_good{};
+    FrameLatency latency;    ///< on the real clock
     drivers::Time beat = 0;  ///< when the thread last handled frames
 };
 
@@ -47,6 +49,7 @@ class Acquisition {
         // To the recorder, which looks into them by itself; null: none.
         Ring<FrameRecord>* recorder_frames = nullptr;
         Ring<drivers::Sample>* recorder_samples = nullptr;
+        Ring<drivers::Sample>* pre_trip = nullptr;  ///< what led to a trip; null: nobody keeps it
     };
     using Event = std::function<void(drivers::PortState, const char* text)>;
 
@@ -86,6 +89,7 @@ class Acquisition {
     boost::asio::steady_timer timer_;
     std::array<drivers::Sample, 32> batch_{};
     std::size_t batched_ = 0;
+    drivers::Time oldest_ = 0;  ///< stamp of the batch at work; 0: none, or the rig's time
     Snapshot<AcquisitionView> view_;
     AcquisitionView shown_;
 };

@@ -7,16 +7,6 @@ using drivers::Time;
 namespace {
 // Displays need no more; the filter itself sees every sample.
 constexpr Time kPublishPeriod = 200 * drivers::kMillisecond;
-
-estimator::Measurement measurement_of(const drivers::Sample& sample,
-                                      const DwellOrder& order) noexcept {
-    return {.time_s = drivers::to_seconds(sample.time - order.from),
-            .angle_rad = sample.angle,
-            .force_g = {sample.force[0] - order.zero_g[0], sample.force[1] - order.zero_g[1],
-                        sample.force[2] - order.zero_g[2]},
-            .angles_good = sample.angles_good(),
-            .force_good = sample.force_good()};
-}
 }  // namespace
 
 EstimatorStage::EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& self,
@@ -76,7 +66,7 @@ void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
         averager_.begin(current_);
         begun_ = true;
     }
-    const auto measurement = measurement_of(sample, current_);
+    const auto measurement = measurement_of(sample, current_.from, current_.zero_g);
     if (identification_.add(measurement).outcome == estimator::StepOutcome::used) {
         averager_.add(measurement.time_s, measurement.angle_rad);
     }
@@ -98,6 +88,7 @@ void EstimatorStage::finish() noexcept {
         done.summary.position = current_.dwell.position;
         done.summary.flagged = true;
         done.summary.reason = "no samples";
+        done.summary.noise = identification_.noise();
     }
     ordered_ = false;
     begun_ = false;

@@ -56,13 +56,15 @@ std::optional<RigTimeLink::Tick> RigTimeLink::decode(const canfd_frame& frame) n
     return Tick{(us + offset_us_) * drivers::kMicrosecond, *end != 0, us};
 }
 
-bool RigTimeLink::acknowledge(const Tick& tick) noexcept {
+std::optional<canfd_frame> RigTimeLink::acknowledge(const Tick& tick) noexcept {
     canfd_frame frame{};
     frame.can_id = ack_->id;
     frame.len = ack_->size;
-    return proto::encode_raw(*ack_time_, static_cast<std::uint64_t>(tick.rig_us),
-                             {frame.data, frame.len}) &&
-           port_.send(frame);
+    if (!proto::encode_raw(*ack_time_, static_cast<std::uint64_t>(tick.rig_us),
+                           {frame.data, frame.len}) ||
+        !port_.send(frame))
+        return {};
+    return frame;
 }
 
 }  // namespace vibrig::rt

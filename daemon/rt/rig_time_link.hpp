@@ -24,8 +24,9 @@ class RigTimeLink {
     /// The tick, unless it cannot be one: malformed, or a jump (backwards, or ahead by more than
     /// kLargestStep) that no second tick confirms. A stray frame must not move time for good.
     [[nodiscard]] std::optional<Tick> decode(const canfd_frame& frame) noexcept;
-    /// Tells the rig that everything up to `tick` is done. False: not sent; the rig asks again.
-    bool acknowledge(const Tick& tick) noexcept;
+    /// Tells the rig that everything up to `tick` is done: the frame that was sent. None: not sent;
+    /// the rig asks again.
+    std::optional<canfd_frame> acknowledge(const Tick& tick) noexcept;
 
     static constexpr std::int64_t kLargestStepUs = 10'000'000;
 

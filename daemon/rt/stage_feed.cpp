@@ -84,6 +84,19 @@ void StageFeed::take(const drivers::Sample& sample) noexcept {
     }
     const std::uint32_t order = order_.load();
     if (order != taken_order_) begin(order);
+    if (mode_of(order) == Mode::samples) {
+        Motion one;
+        one.time = sample.time;
+        one.force = sample.force;
+        one.angle = angle_;
+        one.generation = order >> 2;
+        one.good = sample.force_good() && sample.angles_good();
+        one.table = sample.table_accel;
+        one.table_good = sample.of(drivers::Channel::table_accel) == drivers::Quality::good;
+        ring_.try_push(one);
+        if (control_ != nullptr) control_->notify();
+        return;
+    }
     if (mode_of(order) != Mode::force) return;
     if (sample.force_good()) {
         for (std::size_t i = 0; i < 3; ++i) block_.force[i] += sample.force[i];

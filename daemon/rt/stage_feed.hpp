@@ -24,6 +24,8 @@ struct Motion {
     std::uint32_t dropped_before = 0;
     bool good = false;  ///< force and angles
     bool increment = false;
+    double table = 0;  ///< table accelerometer of a single sample, g
+    bool table_good = false;
 };
 
 /// The platform's word on its torquers.
@@ -48,11 +50,11 @@ struct StageFeedSettings {
     std::uint32_t block = 4;  ///< samples per mean
 };
 
-/// Acquisition to control: means of the specific force, or increments, while a stage asks for
-/// them. In the acquisition thread it neither allocates, locks, logs nor formats.
+/// Acquisition to control: means of the specific force, increments, or samples one by one, while a
+/// stage asks for them. In the acquisition thread it neither allocates, locks, logs nor formats.
 class StageFeed {
   public:
-    enum class Mode : std::uint8_t { off, force, increments };
+    enum class Mode : std::uint8_t { off, force, increments, samples };
 
     /// Throws BindingError; the Dbc must outlive this.
     StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings, drivers::Waiter* control);

@@ -87,6 +87,12 @@ std::pair<std::string, std::string> AnyStream::peer_subject() const {
     return {entry(NID_commonName), entry(NID_organizationalUnitName)};
 }
 
+std::string AnyStream::certificate_problem() const {
+    if (!impl_->tls) return {};
+    const long found = SSL_get_verify_result(impl_->tls->native_handle());
+    return found == X509_V_OK ? "" : X509_verify_cert_error_string(found);
+}
+
 void AnyStream::finish() noexcept {
     error_code ignored;
     socket().shutdown(Socket::shutdown_send, ignored);

@@ -62,6 +62,9 @@ class AnyStream {
     /// Subject of the other side's certificate: common name, organisational unit; empty without.
     [[nodiscard]] std::pair<std::string, std::string> peer_subject() const;
 
+    /// Why the other side's certificate was not taken; empty: it was, or none came.
+    [[nodiscard]] std::string certificate_problem() const;
+
     [[nodiscard]] Socket& socket() noexcept;
     /// No more will be sent; the other side reads to the end.
     void finish() noexcept;

@@ -66,7 +66,7 @@ const char* title_of(int status) {
 }
 
 /// Text of a stranger, fit for an error message.
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
     constexpr std::size_t kLongest = 60;
     std::string out = "'";
     for (const char c : text.substr(0, kLongest)) {
@@ -74,17 +74,6 @@ std::string quoted(std::string_view text) {
         out.push_back(plain ? c : '?');
     }
     return out + (text.size() > kLongest ? "...'" : "'");
-}
-
-std::uint64_t count_in(std::string_view name, std::string_view text) {
-    std::uint64_t value = 0;
-    const char* end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data(), end, value);
-    if (text.empty() || error != std::errc{} || stop != end) {
-        throw std::invalid_argument(std::string(name) + ": found " + quoted(text) +
-                                    ", expected a whole number");
-    }
-    return value;
 }
 
 struct EventQuery {
@@ -102,11 +91,11 @@ EventQuery event_query(std::string_view query) {
         const std::string_view name = pair.substr(0, equals);
         const std::string_view value = pair.substr(std::min(equals + 1, pair.size()));
         if (name == "after") {
-            result.after = count_in(name, value);
+            result.after = parse_count(name, value);
         } else if (name == "limit") {
-            result.limit = std::clamp<std::uint64_t>(count_in(name, value), 1, kMostEvents);
+            result.limit = std::clamp<std::uint64_t>(parse_count(name, value), 1, kMostEvents);
         } else {
-            throw std::invalid_argument("query: found " + quoted(name) +
+            throw std::invalid_argument("query: found " + in_quotes(name) +
                                         ", expected after or limit");
         }
     }
@@ -142,8 +131,8 @@ int depth_of(std::string_view json) {
 }
 
 const char* word_of(CommandRequest::Kind kind) {
-    constexpr std::array<const char*, 6> kNames{"arm",    "start", "pause",
-                                                "resume", "abort", "acknowledge"};
+    constexpr std::array<const char*, 7> kNames{"arm",   "start",       "pause",   "resume",
+                                                "abort", "acknowledge", "selftest"};
     return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -167,6 +156,17 @@ bool TokenBucket::take(std::chrono::steady_clock::time_point now) {
     if (left_ < 1) return false;
     left_ -= 1;
     return true;
+}
+
+std::uint64_t parse_count(std::string_view name, std::string_view text) {
+    std::uint64_t value = 0;
+    const char* end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (text.empty() || error != std::errc{} || stop != end) {
+        throw std::invalid_argument(std::string(name) + ": found " + in_quotes(text) +
+                                    ", expected a whole number");
+    }
+    return value;
 }
 
 std::string_view query_value(std::string_view query, std::string_view name) {
@@ -198,14 +198,14 @@ ApiAnswer Api::check_browser(const ApiRequest& request, const Caller& caller) {
         const std::string port = caller.host.substr(caller.host.rfind(':'));
         if (request.host != caller.host && request.host != "localhost" + port &&
             request.host != "127.0.0.1" + port && request.host != "[::1]" + port) {
-            return problem(
-                421, "Host: found " + quoted(request.host) + ", expected " + quoted(caller.host));
+            return problem(421, "Host: found " + in_quotes(request.host) + ", expected " +
+                                    in_quotes(caller.host));
         }
     }
     const std::string own = (caller.encrypted ? "https://" : "http://") + std::string(request.host);
     if (!request.origin.empty() && request.origin != own) {
-        return problem(403, "Origin: found " + quoted(request.origin) + ", expected " +
-                                quoted(own) + ": other pages are not answered");
+        return problem(403, "Origin: found " + in_quotes(request.origin) + ", expected " +
+                                in_quotes(own) + ": other pages are not answered");
     }
     return {};
 }
@@ -220,6 +220,7 @@ ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
         const std::string_view query =
             request.target.substr(std::min(mark + 1, request.target.size()));
         const bool takes_commands = path == kCommands;
+        if (caller.role == Role::none) return turn_away(request, path, caller);
         if (caller.browser && request.method == "GET") {
             if (const auto* file = page_file(path)) {
                 ApiAnswer page;
@@ -231,12 +232,12 @@ ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
         }
         if (!takes_commands &&
             std::find(kReadable.begin(), kReadable.end(), path) == kReadable.end()) {
-            return problem(404, "no such path: " + quoted(path));
+            return problem(404, "no such path: " + in_quotes(path));
         }
         const char* const method = takes_commands ? "POST" : "GET";
         if (request.method != method) {
-            ApiAnswer refusal = problem(
-                405, std::string(path) + " takes " + method + ", found " + quoted(request.method));
+            ApiAnswer refusal = problem(405, std::string(path) + " takes " + method + ", found " +
+                                                 in_quotes(request.method));
             refusal.allow = method;
             return refusal;
         }
@@ -246,6 +247,22 @@ ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
     } catch (const std::exception& error) {
         return problem(500, error.what());
     }
+}
+
+void Api::turned_away(const Caller& caller, const std::string& why) {
+    ++traffic.turned_away;
+    if (strangers_.take(std::chrono::steady_clock::now()))
+        source_.refused("somebody" + caller.identity, "a connection", why);
+}
+
+ApiAnswer Api::turn_away(const ApiRequest& request, std::string_view path, const Caller& caller) {
+    const std::string why =
+        "the certificate names no role: its organisational unit is none of viewer, operator, admin";
+    ++traffic.refused;
+    // What is told of is limited: a flood must not drown the events.
+    if (commands_.take(std::chrono::steady_clock::now()))
+        source_.refused(caller.identity, std::string(request.method) + ' ' + in_quotes(path), why);
+    return problem(403, why);
 }
 
 ApiAnswer Api::get(std::string_view path, std::string_view query) {
@@ -286,16 +303,18 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
 }
 
 ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
+    const bool in_time = commands_.take(std::chrono::steady_clock::now());
     const auto refuse = [&](int status, const std::string& what, const std::string& why) {
         ++traffic.refused;
+        if (!in_time) return problem(429, "more than 10 commands a second");
         source_.refused(caller.identity, what, why);
         return problem(status, why);
     };
     // A page of another origin can send anything but this type without asking first.
     if ((!request.content_type.empty() || caller.browser) && !is_json(request.content_type)) {
-        return refuse(
-            415, "a command",
-            "Content-Type: found " + quoted(request.content_type) + ", expected application/json");
+        return refuse(415, "a command",
+                      "Content-Type: found " + in_quotes(request.content_type) +
+                          ", expected application/json");
     }
     if (depth_of(request.body) > kDeepestBody) {
         return refuse(400, "a command",
@@ -305,22 +324,18 @@ ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
     try {
         parsed = parse_command(request.body);
     } catch (const std::invalid_argument& error) {
-        if (!commands_.take(std::chrono::steady_clock::now()))
-            return problem(429, "more than 10 commands a second");
         return refuse(400, "a command", error.what());
     }
     const std::string what = std::string(word_of(parsed.kind)) + " by " + parsed.by;
-    // A stop is never one too many.
-    if (!commands_.take(std::chrono::steady_clock::now()) &&
-        parsed.kind != CommandRequest::Kind::abort) {
-        ++traffic.refused;
-        return problem(429, "more than 10 commands a second");
-    }
     if (caller.role < Role::operate) {
         return refuse(403, what,
                       std::string("commands take an operator; this connection is a ") +
-                          (caller.role == Role::none ? "stranger" : name_of(caller.role)) +
-                          "'s: " + caller.identity);
+                          name_of(caller.role) + "'s: " + caller.identity);
+    }
+    // A stop is never one too many.
+    if (!in_time && parsed.kind != CommandRequest::Kind::abort) {
+        ++traffic.refused;
+        return problem(429, "more than 10 commands a second");
     }
     // The name is what the person says; the rest is what the kernel or a certificate says. The
     // audit line has both.

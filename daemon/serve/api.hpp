@@ -51,6 +51,9 @@ class Api {
     /// Why a browser's request is refused before it is looked at; status 200: it is not.
     [[nodiscard]] static ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
 
+    /// One who did not get as far as a request.
+    void turned_away(const Caller& caller, const std::string& why);
+
     [[nodiscard]] static ApiAnswer problem(int status, const std::string& detail);
     [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
     [[nodiscard]] StreamFeed& feed() noexcept { return feed_; }
@@ -64,15 +67,21 @@ class Api {
 
   private:
     ApiAnswer get(std::string_view path, std::string_view query);
+    /// One whose certificate names no role.
+    ApiAnswer turn_away(const ApiRequest& request, std::string_view path, const Caller& caller);
     ApiAnswer command(const ApiRequest& request, const Caller& caller);
 
     StatusSource& source_;
     std::string instance_;
     StreamFeed feed_;
     TokenBucket commands_{10, 50};
+    TokenBucket strangers_{1, 20};  ///< that are told of
 };
 
 /// The value of `name` in "a=1&b=2"; empty: it is not there.
 [[nodiscard]] std::string_view query_value(std::string_view query, std::string_view name);
+
+/// Throws std::invalid_argument that names it unless it is a whole number.
+[[nodiscard]] std::uint64_t parse_count(std::string_view name, std::string_view text);
 
 }  // namespace vibrig::serve

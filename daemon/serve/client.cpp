@@ -4,11 +4,13 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket.hpp>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -21,7 +23,9 @@ namespace vibrig::serve {
 namespace {
 
 namespace asio = boost::asio;
+namespace beast = boost::beast;
 namespace http = boost::beast::http;
+namespace websocket = boost::beast::websocket;
 using Protocol = asio::local::stream_protocol;
 using Request = http::request<http::string_body>;
 using boost::system::error_code;
@@ -30,6 +34,7 @@ using boost::system::system_error;
 constexpr unsigned kHttp11 = 11;
 constexpr std::uint64_t kLongestAnswer = 64 * 1024 * 1024;
 constexpr const char* kDefaultPort = "8443";
+constexpr auto kSilence = std::chrono::seconds(40);
 
 }  // namespace
 
@@ -163,6 +168,35 @@ struct Client::Impl {
             (late ? ": no answer within the time" : ": connection lost: " + error.message()));
     }
 
+    void follow(const std::string& target, const std::function<bool(const std::string&)>& take) {
+        connect();
+        websocket::stream<AnyStream> socket(std::move(*stream));
+        stream.reset();
+        // The server pings; who hears nothing for so long asks himself, and then gives up.
+        socket.set_option(websocket::stream_base::timeout{timeout, kSilence, true});
+        socket.read_message_max(kLongestAnswer);
+        beast::flat_buffer message;
+        error_code lost;
+        std::function<void()> read = [&] {
+            socket.async_read(message, [&](error_code error, std::size_t) {
+                lost = error;
+                if (error || !take(beast::buffers_to_string(message.data()))) return io.stop();
+                message.consume(message.size());
+                read();
+            });
+        };
+        socket.async_handshake(tls ? address.host : "localhost", target, [&](error_code error) {
+            lost = error;
+            error ? io.stop() : read();
+        });
+        io.restart();
+        io.run();
+        socket.next_layer().close();
+        io.restart();
+        io.poll();  // what was still waiting ends
+        if (lost) throw ClientError("vibrigd at " + where + ": connection lost: " + lost.message());
+    }
+
     const Address address;
     const std::chrono::milliseconds timeout;
     std::string where, host, port;
@@ -191,6 +225,11 @@ Reply Client::post(const std::string& target, const std::string& json) {
     request.body() = json;
     impl_->stream.reset();
     return impl_->ask(std::move(request), false);
+}
+
+void Client::follow(const std::string& target,
+                    const std::function<bool(const std::string&)>& take) {
+    impl_->follow(target, take);
 }
 
 }  // namespace vibrig::serve

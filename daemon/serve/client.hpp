@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -46,6 +47,9 @@ class Client {
     [[nodiscard]] Reply get(const std::string& target);
     /// On a connection of its own and never sent twice. Throws ClientError.
     [[nodiscard]] Reply post(const std::string& target, const std::string& json);
+    /// Gives each text message of the WebSocket there to `take` until that says false. Throws
+    /// ClientError when the connection ends before, or nothing is heard for long.
+    void follow(const std::string& target, const std::function<bool(const std::string&)>& take);
 
   private:
     struct Impl;

@@ -54,6 +54,23 @@ class Families {
     void gauge(std::string name, std::string help, double value) {
         gauge(std::move(name), std::move(help), {{Labels{}, value}});
     }
+    /// One class more than bounds: it is open.
+    template <typename Bounds, typename Counts>
+    void histogram(std::string name, std::string help, const Bounds& bounds_ms,
+                   const Counts& counts, double sum_ms) {
+        MetricFamily& to = family(std::move(name), std::move(help), MetricType::Histogram);
+        ClientMetric metric;
+        std::uint64_t sum = 0;
+        for (std::size_t i = 0; i < counts.size(); ++i) {
+            sum += counts[i];
+            const double bound =
+                i < bounds_ms.size() ? bounds_ms[i] / 1e3 : std::numeric_limits<double>::infinity();
+            metric.histogram.bucket.push_back({sum, bound});
+        }
+        metric.histogram.sample_count = sum;
+        metric.histogram.sample_sum = sum_ms / 1e3;
+        to.metric.push_back(std::move(metric));
+    }
     [[nodiscard]] std::string text() const {
         std::ostringstream out;
         prometheus::TextSerializer().Serialize(out, families_);
@@ -126,6 +143,13 @@ void add_acquisition(Families& to, const StatusData& s) {
     const auto& a = s.assembler;
     to.gauge("vibrig_can_link_up", "1 while the CAN port runs.",
              yes(s.can == drivers::PortState::running));
+    using Controller = drivers::ControllerState;
+    to.gauge("vibrig_can_controller_state",
+             "1 for the state that the CAN controller says it is in, by error frames.",
+             {{{{"state", "active"}}, yes(can.controller == Controller::active)},
+              {{{"state", "warning"}}, yes(can.controller == Controller::warning)},
+              {{{"state", "passive"}}, yes(can.controller == Controller::passive)},
+              {{{"state", "bus_off"}}, yes(can.controller == Controller::bus_off)}});
     to.counter("vibrig_can_received_frames_total", "Frames read from the CAN port.", can.received);
     to.counter("vibrig_can_sent_frames_total", "Frames sent.", can.sent);
     to.counter("vibrig_can_frames_dropped_total", "Frames that went no further, by reason.",
@@ -146,6 +170,9 @@ void add_acquisition(Families& to, const StatusData& s) {
                {{{{"ring", "estimator"}}, s.estimator_ring.popped}});
     to.counter("vibrig_ring_dropped_samples_total", "Samples dropped because the ring was full.",
                {{{{"ring", "estimator"}}, s.estimator_ring.dropped}});
+    to.histogram("vibrig_acquisition_latency_seconds",
+                 "From the kernel's stamp on a frame until its sample is in the rings; real clock.",
+                 rt::FrameLatency::kBounds_ms, s.latency.count, s.latency.sum_ms);
     std::vector<std::pair<Labels, double>> ages, good;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         if (s.sample.quality[c] == drivers::Quality::unbound) continue;
@@ -219,23 +246,10 @@ void add_interlock(Families& to, const StatusData& s) {
     to.gauge("vibrig_interlock_raised", "1 while the condition of this row is met.", raised);
     to.gauge("vibrig_interlock_tripped", "1: the shaker was stopped; latched until acknowledged.",
              yes(!s.interlock.tripped.empty()));
-    MetricFamily& reaction =
-        to.family("vibrig_interlock_reaction_seconds",
-                  "From the frames that tripped to the stop confirmed by the controller.",
-                  MetricType::Histogram);
-    ClientMetric metric;
-    std::uint64_t sum = 0;
-    const auto& counts = s.interlock.reaction_counts;
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-        sum += counts[i];
-        const bool open = i >= s.interlock.reaction_bounds_ms.size();
-        const double bound = open ? std::numeric_limits<double>::infinity()
-                                  : s.interlock.reaction_bounds_ms[i] / 1e3;
-        metric.histogram.bucket.push_back({sum, bound});
-    }
-    metric.histogram.sample_count = sum;
-    metric.histogram.sample_sum = s.interlock.reaction_sum_ms / 1e3;
-    reaction.metric.push_back(std::move(metric));
+    to.histogram("vibrig_interlock_reaction_seconds",
+                 "From the frames that tripped to the stop confirmed by the controller.",
+                 s.interlock.reaction_bounds_ms, s.interlock.reaction_counts,
+                 s.interlock.reaction_sum_ms);
 }
 
 }  // namespace
@@ -252,6 +266,15 @@ std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) 
     families.counter("vibrig_journal_entries_total", "Entries of the journal.",
                      {{{{"outcome", "written"}}, status.journal.written},
                       {{{"outcome", "dropped"}}, status.journal.dropped}});
+    if (!status.mqtt.broker.empty()) {
+        families.gauge("vibrig_mqtt_up", "1 while the broker is connected.",
+                       yes(status.mqtt.connected));
+        families.counter("vibrig_mqtt_messages_total", "Messages with data for the broker.",
+                         {{{{"outcome", "sent"}}, status.mqtt.messages},
+                          {{{"outcome", "left_out"}}, status.mqtt.left_out}});
+        families.counter("vibrig_mqtt_connections_total", "Connections to the broker.",
+                         status.mqtt.connections);
+    }
     families.counter("vibrig_server_requests_total", "Requests to the status server.",
                      traffic.requests);
     families.counter("vibrig_server_commands_refused_total", "Commands that were not let through.",

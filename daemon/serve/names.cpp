@@ -32,6 +32,8 @@ const char* name_of(CampaignState state) noexcept {
             return "zeroing";
         case CampaignState::levelling:
             return "levelling";
+        case CampaignState::checking:
+            return "checking";
     }
     return "unknown";
 }

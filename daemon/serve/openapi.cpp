@@ -93,6 +93,7 @@ constexpr const char* kEventParameters =
     R"({"name":"limit","in":"query","schema":{"type":"integer","minimum":1,"maximum":10000}})";
 constexpr const char* kStreamParameters =
     R"({"name":"rate_hz","in":"query","description":"of the status; may be changed by sending {\"rate_hz\": NUMBER}","schema":{"type":"number","minimum":0.1,"maximum":20,"default":1}},)"
+    R"({"name":"status","in":"query","description":"false: events alone, looked for at the rate","schema":{"type":"boolean","default":true}},)"
     R"({"name":"after","in":"query","description":"events with a greater id","schema":{"type":"integer","minimum":0}})";
 
 constexpr std::array<Path, 11> kPaths{{
@@ -121,7 +122,9 @@ std::string make() {
     std::string out =
         R"({"openapi":"3.1.0","info":{"title":"vibrigd","version":"1","description":)"
         R"("Status, events and commands of a vibration rig. Roles: a viewer reads, an operator )"
-        R"(commands too, an admin may do what an operator may. Who is what follows from the socket )"
+        R"(commands too. An admin may do what an operator may, nothing more so far; the audit tells )"
+        R"(them apart, and root at the rig's own socket is one. Every command and every refusal is )"
+        R"(audited: who, what, when, outcome. Who is what follows from the socket )"
         R"(and the peer's user, or from the organisational unit of the client's certificate."},)"
         R"("paths":{)";
     for (const Path& path : kPaths) {

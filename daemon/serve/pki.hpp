@@ -30,6 +30,11 @@ struct Identity {
 /// Signed by the issuer; by itself without one. Throws PkiError.
 [[nodiscard]] Identity make_identity(const CertificateSettings& settings,
                                      const Identity* issuer = nullptr);
+/// The authority's list of certificates that no longer count (CRL, PEM), valid as long as the
+/// authority: `before` (empty: none yet) and one certificate more. Throws PkiError, also when the
+/// certificate is another authority's.
+[[nodiscard]] std::string revoke(const std::string& certificate, const Identity& authority,
+                                 const std::string& before);
 /// Key, certificate and authority in one file that browsers import. Throws PkiError.
 [[nodiscard]] std::string pkcs12_of(const Identity& identity, const std::string& authority,
                                     const std::string& name, const std::string& password);

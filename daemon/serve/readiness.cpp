@@ -69,6 +69,11 @@ Readiness readiness(const StatusData& status) {
                            : "not ready");
     add("interlock", status.interlock.tripped.empty(),
         status.interlock.tripped.empty() ? "not tripped" : "tripped: " + status.interlock.tripped);
+    const std::string verdict = status.loop_check.verdict;
+    add("loop check", verdict != "out of band" && verdict != "running",
+        verdict.empty()                     ? "none yet"
+        : status.loop_check.message.empty() ? verdict
+                                            : verdict + ": " + status.loop_check.message);
     const auto& journal = status.journal;
     add("journal", journal.path.empty() || journal.running,
         journal.path.empty() ? "none is kept"

@@ -154,6 +154,15 @@ std::string losses_line(const v1::Status& status) {
                   count(assembler.duplicate()));
 }
 
+/// Empty: nothing was measured.
+std::string latency_line(const v1::Latency& latency) {
+    std::uint64_t batches = 0;
+    for (const std::uint64_t n : latency.counts()) batches += n;
+    if (batches == 0) return {};
+    return format("frame to ring %.3f ms, worst %.2f ms",
+                  latency.sum_ms() / static_cast<double>(batches), latency.largest_ms());
+}
+
 std::string channels_line(const v1::Sample& sample) {
     std::string bad;
     for (const v1::Channel& channel : sample.channels()) {
@@ -256,9 +265,17 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
                           count(status.can().error_frames()))));
     lines.push_back(labelled("rates", rates_line(status, rates)));
     lines.push_back(labelled("dropped", losses_line(status)));
+    if (const std::string latency = latency_line(status.acquisition_latency()); !latency.empty())
+        lines.push_back(labelled("latency", latency));
     lines.push_back(labelled("channels", channels_line(status.sample())));
     lines.push_back(labelled("filter", estimate_line(estimate)));
     lines.push_back(labelled("noise", noise_line(status.noise())));
+    if (const v1::Mqtt& mqtt = status.mqtt(); !mqtt.broker().empty())
+        lines.push_back(labelled(
+            "broker", mqtt.broker() + (mqtt.connected() ? ": " : ": DOWN, ") +
+                          (mqtt.connected() ? format("%llu messages, %llu left out",
+                                                     count(mqtt.messages()), count(mqtt.left_out()))
+                                            : mqtt.note())));
     lines.push_back(labelled("daemon", "vibrigd " + status.version() + ", clock " + status.clock() +
                                            ", up " + render_duration(status.uptime_s())));
     for (std::string& line : lines) line = clipped(line, width);

@@ -1,5 +1,6 @@
 #include "daemon/serve/session.hpp"
 
+#include <boost/asio/ssl/error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
@@ -9,7 +10,6 @@
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket.hpp>
-#include <charconv>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -57,10 +57,12 @@ std::string_view view(beast::string_view text) { return {text.data(), text.size(
 /// One WebSocket client of the stream. Server thread only; lives while a handler of it waits.
 class Stream : public std::enable_shared_from_this<Stream> {
   public:
-    Stream(AnyStream stream, StreamClient client, Shared& shared)
+    /// `admitted`: Shared::certificates when the client's was looked at.
+    Stream(AnyStream stream, StreamClient client, Shared& shared, std::uint64_t admitted)
         : socket_(std::move(stream)),
           client_(std::move(client)),
           shared_(shared),
+          admitted_(admitted),
           timer_(socket_.get_executor()) {
         ++shared_.api.traffic.streams;
         ++shared_.api.traffic.connections;
@@ -103,6 +105,8 @@ class Stream : public std::enable_shared_from_this<Stream> {
     /// Writes what is next, or waits until there is something. One of both is always under way.
     void go_on() {
         if (ended_) return;
+        if (socket_.next_layer().encrypted() && admitted_ != shared_.certificates)
+            return close(websocket::close_code::try_again_later, "certificates have changed");
         try {
             text_ = client_.next(Clock::now());
         } catch (const std::exception& slow) {
@@ -142,6 +146,7 @@ class Stream : public std::enable_shared_from_this<Stream> {
     websocket::stream<AnyStream> socket_;
     StreamClient client_;
     Shared& shared_;
+    const std::uint64_t admitted_;
     asio::steady_timer timer_;
     beast::flat_buffer buffer_;
     std::shared_ptr<const std::string> text_;
@@ -156,6 +161,7 @@ class Session : public std::enable_shared_from_this<Session> {
         : stream_(std::move(stream)),
           caller_(std::move(caller)),
           shared_(shared),
+          admitted_(shared.certificates),
           deadline_(stream_.get_executor()),
           buffer_(shared.limits.header_bytes + shared.limits.body_bytes + 4096),
           requests_(shared.limits.requests_per_s, shared.limits.requests_per_s) {
@@ -169,7 +175,13 @@ class Session : public std::enable_shared_from_this<Session> {
         if (!caller_.encrypted) return read();
         arm(kHandshakeTime);
         stream_.accept_handshake([self = shared_from_this()](error_code error) {
-            if (error) return self->end();
+            if (error) {
+                const std::string why = self->stream_.certificate_problem();
+                if (!why.empty() || error.category() == asio::error::get_ssl_category())
+                    self->shared_.api.turned_away(self->caller_,
+                                                  why.empty() ? error.message() : why);
+                return self->end();
+            }
             const auto [name, unit] = self->stream_.peer_subject();
             Caller& who = self->caller_;
             who.role = role_named(unit);
@@ -230,11 +242,13 @@ class Session : public std::enable_shared_from_this<Session> {
             return refuse(400, "not a request in HTTP/1.1: " + error.message());
         }
         if (error) return end();  // gone, or out of time
+        if (caller_.encrypted && admitted_ != shared_.certificates) return finish();
 
         const Request& request = parser_->get();
         const bool head = request.method() == http::verb::head;
+        const std::string_view target = view(request.target());
         const bool wants_stream = websocket::is_upgrade(request) &&
-                                  view(request.target()).substr(0, 14) == "/api/v1/stream";
+                                  target.substr(0, target.find('?')) == "/api/v1/stream";
         const ApiRequest asked{view(request.method_string()),
                                view(request.target()),
                                view(request[http::field::content_type]),
@@ -244,11 +258,7 @@ class Session : public std::enable_shared_from_this<Session> {
         ApiAnswer answer;
         if (!requests_.take(Clock::now())) {
             answer = Api::problem(429, "too many requests on this connection");
-        } else if (caller_.role == Role::none) {
-            answer = Api::problem(403,
-                                  "the certificate names no role: its organisational unit is "
-                                  "none of viewer, operator, admin");
-        } else if (wants_stream) {
+        } else if (wants_stream && caller_.role != Role::none) {
             answer = upgrade(asked);
             if (answer.status == 200) return;
         } else {
@@ -267,16 +277,23 @@ class Session : public std::enable_shared_from_this<Session> {
         const std::string_view query = asked.target.substr(std::min(mark + 1, asked.target.size()));
         double rate = 0;
         std::uint64_t after = 0;
+        bool with_status = true;
         try {
             rate = parse_rate(query_value(query, "rate_hz"));
+            if (const auto id = query_value(query, "after"); !id.empty())
+                after = parse_count("after", id);
+            if (const auto wanted = query_value(query, "status"); !wanted.empty()) {
+                with_status = wanted != "false";
+                if (with_status && wanted != "true")
+                    throw std::invalid_argument("status: expected true or false");
+            }
         } catch (const std::invalid_argument& error) {
             return Api::problem(400, error.what());
         }
-        const std::string_view id = query_value(query, "after");
-        std::from_chars(id.data(), id.data() + id.size(), after);
         deadline_.cancel();
-        StreamClient client(shared_.api.feed(), shared_.api.instance(), caller_.role, rate, after);
-        std::make_shared<Stream>(std::move(stream_), std::move(client), shared_)
+        StreamClient client(shared_.api.feed(), shared_.api.instance(), caller_.role, rate, after,
+                            with_status);
+        std::make_shared<Stream>(std::move(stream_), std::move(client), shared_, admitted_)
             ->start(parser_->get());
         return {};
     }
@@ -295,6 +312,7 @@ class Session : public std::enable_shared_from_this<Session> {
     AnyStream stream_;
     Caller caller_;
     Shared& shared_;
+    const std::uint64_t admitted_;
     asio::steady_timer deadline_;
     beast::flat_buffer buffer_;
     TokenBucket requests_;

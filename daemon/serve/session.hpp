@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "daemon/serve/any_stream.hpp"
@@ -14,6 +15,9 @@ namespace vibrig::serve {
 struct Shared {
     Api& api;
     const ServerLimits& limits;
+    /// Grows when certificates or the list of revoked ones change: who came in with TLS before has
+    /// to show his certificate again.
+    std::uint64_t certificates = 0;
 };
 
 /// Serves one connection until it ends. With TLS the role comes from the certificate.

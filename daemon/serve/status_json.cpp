@@ -51,11 +51,14 @@ CommandRequest::Kind kind_of(v1::Command::Kind kind) {
             return CommandRequest::Kind::abort;
         case v1::Command::acknowledge:
             return CommandRequest::Kind::acknowledge;
+        case v1::Command::selftest:
+            return CommandRequest::Kind::selftest;
         default:
             break;
     }
     throw std::invalid_argument(
-        "kind: missing or unknown, expected arm, start, pause, resume, abort or acknowledge");
+        "kind: missing or unknown, expected arm, start, pause, resume, abort, acknowledge or "
+        "selftest");
 }
 
 }  // namespace

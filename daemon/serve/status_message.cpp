@@ -1,6 +1,7 @@
 #include "daemon/serve/status_message.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -15,7 +16,7 @@ Wire wire_enum(Enum value) {
     const int number = static_cast<int>(value) + 1;
     return static_cast<Wire>(number);
 }
-static_assert(static_cast<int>(CampaignState::levelling) + 1 == v1::Campaign::levelling);
+static_assert(static_cast<int>(CampaignState::checking) + 1 == v1::Campaign::checking);
 static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::Quality::unbound) + 1 == v1::Channel::unbound);
@@ -42,6 +43,25 @@ void set_time(google::protobuf::Timestamp& out, std::int64_t utc_ns) {
     }
     out.set_seconds(seconds);
     out.set_nanos(static_cast<std::int32_t>(rest));
+}
+
+void fill(v1::Frame& out, const FrameStatus& frame) {
+    out.set_up(std::string(1, frame.up.sign < 0 ? '-' : '+') + "xyz"[frame.up.axis]);
+    for (const int sign : frame.encoder_sign) out.add_encoder_sign(sign);
+    for (const double zero : frame.encoder_zero_deg) out.add_encoder_zero_deg(zero);
+    for (const double zero : frame.accelerometer_zero_g) out.add_accelerometer_zero_g(zero);
+    for (const auto& row : frame.accelerometer_matrix)
+        for (const double cell : row) out.add_accelerometer_matrix(cell);
+}
+
+void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
+    out.set_broker(mend_utf8(mqtt.broker));
+    out.set_connected(mqtt.connected);
+    out.set_note(mend_utf8(mqtt.note));
+    out.set_connections(mqtt.connections);
+    out.set_births(mqtt.births);
+    out.set_messages(mqtt.messages);
+    out.set_left_out(mqtt.left_out);
 }
 
 void fill(v1::Recorder& out, const RecorderStatus& recorder) {
@@ -122,6 +142,9 @@ void fill(v1::Can& out, const StatusData& status) {
     out.set_sent(counters.sent);
     out.set_send_failed(counters.send_failed);
     out.set_transitions(counters.transitions);
+    constexpr std::array<const char*, 4> kControllerWords{"active", "warning", "passive",
+                                                          "bus off"};
+    out.set_controller(kControllerWords[static_cast<std::size_t>(counters.controller)]);
 }
 
 void fill(v1::Assembler& out, const drivers::AssemblerCounters& counters) {
@@ -218,6 +241,12 @@ void fill(v1::Noise& out, const NoiseStatus& noise) {
         set(to, &v1::GyroNoise::set_in_force_deg_per_rt_h, gyro.in_force);
         if (gyro.smallest_change > 0)
             set(to, &v1::GyroNoise::set_smallest_change, gyro.smallest_change);
+        for (const auto& point : gyro.points) {
+            v1::NoisePoint& at = *to.add_points();
+            set(at, &v1::NoisePoint::set_tau_s, point.tau_s);
+            set(at, &v1::NoisePoint::set_deviation_deg_h, point.deviation);
+            set(at, &v1::NoisePoint::set_expected_deg_h, point.expected);
+        }
         if (noise.dwells == 0) continue;
         v1::NoiseFit& fit = *to.mutable_fit();
         const std::array<v1::NoiseTerm*, allan::kTerms> terms{
@@ -247,6 +276,15 @@ void fill(v1::Noise& out, const NoiseStatus& noise) {
         set(to, &v1::NoiseAlarm::set_limit, alarm.limit);
         to.set_reading(alarm.reading);
     }
+    if (noise.level.samples == 0) return;
+    v1::LevelInnovation& level = *out.mutable_level();
+    level.set_samples(noise.level.samples);
+    set(level, &v1::LevelInnovation::set_mean_square, noise.level.mean_square);
+    level.set_run(noise.level.run);
+    level.set_position(noise.level.position);
+    for (const double value : noise.level.innovation_deg_h)
+        level.add_innovation_deg_h(finite(value));
+    for (const double value : noise.level.sigma_deg_h) level.add_sigma_deg_h(finite(value));
 }
 
 void fill(v1::Dwell& out, const estimator::DwellSummary& dwell) {
@@ -301,6 +339,21 @@ void fill(v1::Zeros& out, const ZeroStatus& zeros) {
     out.set_message(mend_utf8(zeros.message));
 }
 
+void fill(v1::LoopCheck& out, const LoopCheckStatus& check) {
+    out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
+    out.set_by(mend_utf8(check.by));
+    out.set_message(mend_utf8(check.message));
+    for (const auto& row : check.rows) {
+        v1::LoopCheck::Row& to = *out.add_rows();
+        to.set_name(row.name);
+        to.set_unit(row.unit);
+        set(to, &v1::LoopCheck::Row::set_value, row.value);
+        set(to, &v1::LoopCheck::Row::set_low, row.low);
+        set(to, &v1::LoopCheck::Row::set_high, row.high);
+        to.set_passed(row.passed);
+    }
+}
+
 void fill(v1::Campaign& out, const StatusData& status) {
     out.set_name(mend_utf8(status.campaign_name));
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
@@ -334,6 +387,7 @@ void fill(v1::Status& out, const StatusData& status) {
     out.set_time_s(drivers::to_seconds(status.time));
     out.set_uptime_s(drivers::to_seconds(status.uptime));
     fill(*out.mutable_campaign(), status);
+    fill(*out.mutable_loop_check(), status.loop_check);
     fill(*out.mutable_shaker(), status);
     fill(*out.mutable_can(), status);
     fill(*out.mutable_assembler(), status.assembler);
@@ -357,6 +411,13 @@ void fill(v1::Status& out, const StatusData& status) {
     journal.set_dropped(status.journal.dropped);
     fill(*out.mutable_recorder(), status.recorder);
     fill(*out.mutable_noise(), status.noise);
+    fill(*out.mutable_mqtt(), status.mqtt);
+    fill(*out.mutable_frame(), status.frame);
+    v1::Latency& latency = *out.mutable_acquisition_latency();
+    for (const double bound : rt::FrameLatency::kBounds_ms) latency.add_bounds_ms(bound);
+    for (const std::uint64_t n : status.latency.count) latency.add_counts(n);
+    latency.set_largest_ms(status.latency.largest_ms);
+    latency.set_sum_ms(status.latency.sum_ms);
 }
 
 void fill(v1::Parameters& out, const estimator::Result& result) {

@@ -33,6 +33,21 @@ using Protocol = asio::generic::stream_protocol;
 using boost::system::error_code;
 
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
+constexpr auto kCertificateLook = std::chrono::seconds(1);
+
+/// Changes whenever one of the files does.
+std::string stamp_of(const ServerSettings& settings) {
+    std::string stamp;
+    for (const auto& path :
+         {settings.certificate, settings.key, settings.clients_ca, settings.revoked}) {
+        struct stat found {};
+        if (::stat(path.c_str(), &found) != 0) found = {};
+        stamp += std::to_string(found.st_ino) + ' ' + std::to_string(found.st_size) + ' ' +
+                 std::to_string(found.st_mtim.tv_sec) + '.' +
+                 std::to_string(found.st_mtim.tv_nsec) + '\n';
+    }
+    return stamp;
+}
 
 std::string random_instance() {
     std::random_device random;
@@ -73,8 +88,8 @@ struct StatusServer::Impl {
         asio::steady_timer pause;
     };
 
-    Impl(StatusSource& source, const ServerSettings& given)
-        : settings(given), api(source, random_instance()) {
+    Impl(StatusSource& from, const ServerSettings& given)
+        : settings(given), source(from), api(from, random_instance()) {
         if (!settings.operator_group.empty()) operators = group_named(settings.operator_group);
         open_unix(Door::control, settings.socket);
         if (operators && ::chown(settings.socket.c_str(), static_cast<uid_t>(-1), *operators) != 0)
@@ -85,7 +100,9 @@ struct StatusServer::Impl {
         if (!settings.page.empty())
             page = open_tcp(Door::page, listen_tcp("server.page", settings.page, true));
         if (!settings.remote.empty()) {
-            tls.emplace(mutual_tls(settings.certificate, settings.key, settings.clients_ca, true));
+            certificates_seen = stamp_of(settings);
+            tls.emplace(read_certificates());
+            look_at_certificates();
             remote = open_tcp(Door::remote, listen_tcp("server.remote", settings.remote, false));
         }
         for (Listener& listener : listeners) accept(listener);
@@ -114,6 +131,29 @@ struct StatusServer::Impl {
         listeners.emplace_back(io, door, Protocol(v6 ? AF_INET6 : AF_INET, IPPROTO_TCP),
                                opened.descriptor);
         return opened.address;
+    }
+
+    [[nodiscard]] asio::ssl::context read_certificates() const {
+        return mutual_tls(settings.certificate, settings.key, settings.clients_ca, true,
+                          settings.revoked);
+    }
+
+    /// Takes over renewed certificates and a longer list of revoked ones while it runs.
+    void look_at_certificates() {
+        certificate_look.expires_after(kCertificateLook);
+        certificate_look.async_wait([this](error_code error) {
+            if (error) return;
+            if (auto stamp = stamp_of(settings); stamp != certificates_seen) {
+                certificates_seen = std::move(stamp);
+                try {
+                    tls.emplace(read_certificates());
+                    ++shared.certificates;
+                } catch (const ServeError& wrong) {
+                    source.refused("server", "changed certificates", wrong.what());
+                }
+            }
+            look_at_certificates();
+        });
     }
 
     void accept(Listener& listener) {
@@ -184,6 +224,7 @@ struct StatusServer::Impl {
     }
 
     const ServerSettings settings;
+    StatusSource& source;
     std::optional<gid_t> operators;
     // Outlive the io_context, whose end destroys the waiting sessions.
     std::deque<SocketFile> files;
@@ -192,6 +233,8 @@ struct StatusServer::Impl {
     std::optional<asio::ssl::context> tls;
     std::string page, remote;
     asio::io_context io{1};
+    asio::steady_timer certificate_look{io};
+    std::string certificates_seen;
     std::deque<Listener> listeners;
     std::thread thread;
 };
@@ -201,7 +244,7 @@ StatusServer::StatusServer(StatusSource& source, const ServerSettings& settings)
 
 StatusServer::StatusServer(StatusSource& source, const std::string& path,
                            const ServerLimits& limits)
-    : StatusServer(source, ServerSettings{path, {}, {}, {}, {}, {}, {}, {}, limits}) {}
+    : StatusServer(source, ServerSettings{path, {}, {}, {}, {}, {}, {}, {}, {}, limits}) {}
 
 StatusServer::~StatusServer() = default;
 

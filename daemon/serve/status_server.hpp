@@ -28,6 +28,7 @@ struct ServerSettings {
     std::string page;            ///< "127.0.0.1:8090": plain HTTP on loopback, read-only
     std::string remote;          ///< "0.0.0.0:8443": TLS with certificates on both sides
     std::string certificate, key, clients_ca;  ///< of `remote`, PEM files
+    std::string revoked;  ///< list of clients' certificates that no longer count; empty: none
     ServerLimits limits = {};
 };
 

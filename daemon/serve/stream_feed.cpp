@@ -83,13 +83,14 @@ std::shared_ptr<const std::string> StreamFeed::change(const std::shared_ptr<cons
 }
 
 StreamClient::StreamClient(StreamFeed& feed, std::string instance, Role role, double rate_hz,
-                           std::uint64_t after_event)
+                           std::uint64_t after_event, bool with_status)
     : feed_(feed),
       instance_(std::move(instance)),
       role_(role),
       period_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1 / rate_hz))),
-      event_(after_event) {}
+      event_(after_event),
+      with_status_(with_status) {}
 
 std::shared_ptr<const std::string> StreamClient::next(Clock::time_point now) {
     if (!std::exchange(greeted_, true)) {
@@ -127,6 +128,7 @@ std::shared_ptr<const std::string> StreamClient::next(Clock::time_point now) {
     // afterwards to make up for what was slow.
     due_ = Clock::time_point((now.time_since_epoch() / period_ + 1) * period_);
     events_looked_at_ = false;
+    if (!with_status_) return {};
     const auto frame = feed_.newest();
     auto text = feed_.change(sent_, frame);
     sent_ = frame;

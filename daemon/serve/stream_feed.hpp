@@ -51,8 +51,9 @@ class StreamClient {
     static constexpr double kSlowest_hz = 0.1, kFastest_hz = 20;
 
     /// Events with an id above `after_event`; the newest ones if that is more than may wait.
+    /// `with_status`: false for one who wants the events alone, looked for at the rate.
     StreamClient(StreamFeed& feed, std::string instance, Role role, double rate_hz,
-                 std::uint64_t after_event);
+                 std::uint64_t after_event, bool with_status = true);
     /// The next text to send; null: nothing yet. Throws std::runtime_error when too many events
     /// wait: the client is too slow and has to go.
     [[nodiscard]] std::shared_ptr<const std::string> next(
@@ -69,6 +70,7 @@ class StreamClient {
     std::chrono::steady_clock::time_point due_{};
     std::shared_ptr<const Frame> sent_;
     std::uint64_t event_ = 0;
+    bool with_status_;
     bool greeted_ = false, caught_up_ = false, events_looked_at_ = false;
 };
 

@@ -1,23 +1,32 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <array>
+#include <cmath>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
+#include "estimator/hann.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
+#include "estimator/kinematics.hpp"
+#include "estimator/plan/positions.hpp"
+#include "estimator/plan_report.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -59,9 +68,58 @@ estimator::Measurement measurement_of(const RecordingRow& row) {
     return measurement;
 }
 
+/// The dwell as a plan would have it: where it begins, and its level by its own accelerometers.
+/// Nothing without a good sample.
+std::optional<estimator::PlannedDwell> planned(const Dwell& dwell,
+                                               const estimator::Settings& settings) {
+    estimator::PlannedDwell plan;
+    std::optional<std::array<double, 3>> up;
+    estimator::GrowingHann force;
+    for (const RecordingRow* row : dwell.rows) {
+        const auto measurement = measurement_of(*row);
+        double all = 0;
+        for (std::size_t i = 0; i < 3; ++i) all += row->angle_deg[i] + row->force_g[i];
+        if (!std::isfinite(all)) continue;
+        if (!up) {
+            plan.angles_deg = estimator::gimbal_deg(settings, row->angle_deg);
+            up = estimator::plan::up_at(settings, row->angle_deg);
+        }
+        double along = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            for (std::size_t j = 0; j < 3; ++j) {
+                along += (*up)[i] * settings.accelerometer_matrix[i][j] *
+                         (measurement.force_g[j] - settings.accelerometer_zero_g[j]);
+            }
+        }
+        force.add(along);
+    }
+    plan.duration_s = dwell.rows.back()->time_s - dwell.rows.front()->time_s;
+    const auto means = force.means();
+    plan.kappa = means.mean_square / (means.mean * means.mean) -
+                 settings.accelerometer_g * settings.accelerometer_g;
+    // At rest.
+    if (plan.kappa - 1 < 1e-4) plan.kappa = 1;
+    if (!up || !(plan.duration_s > 0) || !std::isfinite(plan.kappa)) return std::nullopt;
+    return plan;
+}
+
+/// Says what these dwells cannot determine, before they are gone through.
+void tell_before(const std::vector<Dwell>& dwells, const estimator::Settings& settings) {
+    std::vector<estimator::PlannedDwell> plan;
+    for (const Dwell& dwell : dwells) {
+        if (const auto one = planned(dwell, settings)) plan.push_back(*one);
+    }
+    if (plan.empty()) return;
+    for (const std::string& line :
+         estimator::plan_warnings(estimator::report_plan(settings, plan))) {
+        std::cerr << "before the run: " << line << '\n';
+    }
+}
+
 estimator::Result identify(const std::vector<RecordingRow>& rows,
                            const estimator::Settings& settings) {
     const std::vector<Dwell> dwells = dwells_of(rows);
+    tell_before(dwells, settings);
     estimator::Identification identification(settings, dwells.size());
     Progress progress("identifying");
     std::size_t done = 0;
@@ -86,30 +144,33 @@ estimator::Result identify(const record::Campaign& campaign, const estimator::Se
     Progress progress("identifying");
     std::size_t done = 0;
     for (const auto& dwell : dwells) {
-        identification.begin_dwell({dwell.order->run, dwell.order->position, dwell.order->table_g});
-        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
-            const auto& sample = campaign.samples[i];
-            static_cast<void>(
-                identification.add({.time_s = drivers::to_seconds(sample.time - dwell.order->from),
-                                    .angle_rad = sample.angle,
-                                    .force_g = sample.force,
-                                    .angles_good = sample.angles_good(),
-                                    .force_good = sample.force_good()}));
-            if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
-        }
-        static_cast<void>(identification.end_dwell());
+        record::feed(identification, campaign, dwell,
+                     [&](std::size_t, const estimator::StepResult&) {
+                         if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
+                     });
     }
     return identification.result();
 }
 
 estimator::Result identify_campaign(const std::string& path, const std::string& config) {
-    const record::Campaign campaign = record::read_campaign(path);
+    record::Campaign campaign = read_named_campaign(path);
+    if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
+    if (!config.empty()) record::forget_noise(campaign);
     const auto loaded =
         config.empty()
             ? configuration::parse(record::identification_sections(campaign.head.configuration),
                                    "configuration in " + campaign.path, false)
             : configuration::load(config, false);
     return identify(campaign, loaded.configuration.estimator);
+}
+
+/// A folder, an HDF5 file, or the name of a campaign: then there is no such file.
+bool is_campaign(const std::string& argument) {
+    std::error_code error;
+    return !std::filesystem::is_regular_file(argument, error)
+               ? std::filesystem::is_directory(argument, error) ||
+                     argument.find_first_of("/.") == std::string::npos
+               : record::is_hdf5(argument);
 }
 
 std::vector<RecordingRow> read(const std::string& path) {
@@ -123,7 +184,7 @@ int run(const std::string& recording, const std::string& config, const std::stri
     estimator::Result result;
     try {
         estimator::use_instruction_set(instruction_set);
-        if (record::is_hdf5(recording)) {
+        if (is_campaign(recording)) {
             result = identify_campaign(recording, config);
         } else {
             const estimator::Settings settings =
@@ -158,8 +219,8 @@ void add_identify(CLI::App& app, int& exit_code) {
     command
         ->add_option("FILE", options->recording,
                      "CSV with a header row and the columns time_s, run, position, alpha_deg, "
-                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order; or a campaign's HDF5 "
-                     "file")
+                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order; or a recorded "
+                     "campaign: its folder, HDF5 file or name")
         ->required();
     command->add_option(
         "--config", options->config,

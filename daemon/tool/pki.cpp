@@ -11,6 +11,7 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <sstream>
 
 #include "daemon/tool/commands.hpp"
@@ -30,9 +31,11 @@ struct PkiOptions {
     std::vector<std::string> viewers, operators, admins;
     int days = 825;
     std::string password;
+    std::vector<std::string> revoked;
 };
 
 constexpr const char* kAuthority = "authority";
+constexpr const char* kRevoked = "revoked.crl";
 
 /// Keys are for their owner only, from the moment they exist.
 void write(const fs::path& path, const std::string& text, bool secret) {
@@ -57,15 +60,35 @@ void save(const fs::path& folder, const std::string& name, const Identity& ident
     write(folder / (name + ".key"), identity.key, true);
 }
 
+Identity authority_in(const fs::path& folder) {
+    return {read(folder / (std::string(kAuthority) + ".crt")),
+            read(folder / (std::string(kAuthority) + ".key"))};
+}
+
+/// Before anything is written.
+void check_people(const PkiOptions& options) {
+    std::set<std::string> seen{kAuthority, "server"};
+    for (const auto* const names : {&options.viewers, &options.operators, &options.admins}) {
+        for (const std::string& name : *names) {
+            const bool plain = !name.empty() && name.find_first_of("/\\") == std::string::npos &&
+                               name.front() != '.' && seen.insert(name).second;
+            if (!plain) throw PkiError("found '" + name + "', expected each person's name once");
+            const fs::path key = fs::path(options.folder) / (name + ".key");
+            if (fs::exists(key))
+                throw PkiError(key.string() + " is there already; nothing was changed");
+        }
+    }
+}
+
 int init(const PkiOptions& options) {
+    check_people(options);
     const fs::path folder = options.folder;
     fs::create_directories(folder);
     const auto valid_for = std::chrono::hours(24 * options.days);
     Identity authority;
     // A second call adds people to the same authority.
     if (fs::exists(folder / (std::string(kAuthority) + ".key"))) {
-        authority = {read(folder / (std::string(kAuthority) + ".crt")),
-                     read(folder / (std::string(kAuthority) + ".key"))};
+        authority = authority_in(folder);
         std::cout << "authority: the one in " << folder.string() << '\n';
     } else {
         authority = serve::make_identity({CertificateSettings::Use::authority,
@@ -79,12 +102,6 @@ int init(const PkiOptions& options) {
                   << ".crt; keep its key off the rig\n";
     }
     const auto client = [&](const std::string& name, const std::string& role) {
-        const bool plain = !name.empty() && name.find_first_of("/\\") == std::string::npos &&
-                           name.front() != '.' && name != kAuthority && name != "server";
-        if (!plain)
-            throw PkiError("--" + role + ": found '" + name + "', expected a person's name");
-        if (fs::exists(folder / (name + ".key")))
-            throw PkiError((folder / name).string() + ".key is there already; nothing was changed");
         const Identity made = serve::make_identity(
             {CertificateSettings::Use::client, name, role, {}, std::chrono::hours(-1), valid_for},
             &authority);
@@ -103,6 +120,38 @@ int init(const PkiOptions& options) {
     for (const std::string& name : options.viewers) client(name, "viewer");
     for (const std::string& name : options.operators) client(name, "operator");
     for (const std::string& name : options.admins) client(name, "admin");
+    return 0;
+}
+
+int revoke(const PkiOptions& options) {
+    const fs::path folder = options.folder;
+    const fs::path list = folder / kRevoked;
+    const Identity authority = authority_in(folder);
+    for (const std::string& name : options.revoked) {
+        const fs::path certificate = folder / (name + ".crt");
+        if (name == kAuthority) throw PkiError("the authority cannot revoke itself");
+        std::string text;
+        try {
+            text = serve::revoke(read(certificate), authority,
+                                 fs::exists(list) ? read(list) : std::string{});
+        } catch (const PkiError& error) {
+            throw PkiError("found '" + name + "', expected somebody with a valid certificate in " +
+                           folder.string() + ": " + error.what());
+        }
+        // Never half a list: the daemon looks at it at any time.
+        const fs::path fresh = folder / (std::string(kRevoked) + ".new");
+        write(fresh, text, false);
+        fs::rename(fresh, list);
+        // Out of the way of a new certificate for the same name.
+        const fs::path aside = folder / "revoked";
+        fs::create_directories(aside);
+        for (const char* const kind : {".crt", ".key", ".p12"}) {
+            std::error_code none;
+            fs::rename(folder / (name + kind), aside / (name + kind), none);
+        }
+        std::cout << name << ": revoked; its files are in " << aside.string() << '\n';
+    }
+    std::cout << "the list for the rig: " << list.string() << '\n';
     return 0;
 }
 
@@ -134,6 +183,18 @@ void add_pki(CLI::App& app, int& exit_code) {
         "  clients_ca = \"authority.crt\"");
     making.callback(
         [options, &exit_code] { exit_code = guarded([&] { return init(*options); }, "vibrig: "); });
+    CLI::App& revoking =
+        *pki.add_subcommand("revoke", "Make people's certificates worthless before their time");
+    revoking.add_option("--folder", options->folder, "Where they are")->capture_default_str();
+    revoking.add_option("name", options->revoked, "Whose")->required();
+    revoking.footer(
+        "Example: vibrig pki revoke ada\n"
+        "On the rig, which takes a changed list over by itself and ends connections:\n"
+        "  [server]\n"
+        "  revoked = \"revoked.crl\"");
+    revoking.callback([options, &exit_code] {
+        exit_code = guarded([&] { return revoke(*options); }, "vibrig: ");
+    });
 }
 
 }  // namespace vibrig::tool

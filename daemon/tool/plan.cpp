@@ -78,7 +78,7 @@ int run(Options& options) {
                 std::filesystem::create_directories(path);
                 path /= "sphere.svg";
             }
-            plot::write_file(path.string(), plan_picture(result, up_of(options.request)));
+            plot::write_file(path.string(), plan_picture(result, frame_of(options.request)));
         }
     } catch (const std::exception& error) {
         std::cerr << error.what() << '\n';

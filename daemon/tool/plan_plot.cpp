@@ -61,7 +61,7 @@ std::string globes() {
 
 }  // namespace
 
-std::string plan_picture(const PlanStudy& study, const estimator::SignedAxis& up) {
+std::string plan_picture(const PlanStudy& study, const estimator::Settings& frame) {
     // Runs at one direction and level are one dot; levels at one direction stand side by side.
     std::map<double, std::size_t> colour;
     for (const PlanRun& run : study.runs) colour.emplace(run.visit.level_g, 0);
@@ -69,7 +69,7 @@ std::string plan_picture(const PlanStudy& study, const estimator::SignedAxis& up
     for (auto& [level, c] : colour) c = next++;
     std::map<std::pair<std::array<long, 3>, double>, std::size_t> dots;
     for (const PlanRun& run : study.runs) {
-        const auto u = planning::up_at(up, run.visit.position_deg);
+        const auto u = planning::up_at(frame, run.visit.position_deg);
         dots[{{std::lround(u[0] * 1e6), std::lround(u[1] * 1e6), std::lround(u[2] * 1e6)},
               run.visit.level_g}] += run.count;
     }

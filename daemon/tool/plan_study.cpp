@@ -9,6 +9,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "estimator/crlb.hpp"
+#include "estimator/kinematics.hpp"
 #include "estimator/parameters.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/exact.hpp"
@@ -64,7 +65,7 @@ class Study {
         }
         choose_levels();
         make_candidates();
-        if (!listed_.empty()) out_.vertical_axes = vertical_axes(listed_, levels_);
+        if (!listed_.empty()) out_.vertical_axes = vertical_axes(c_.estimator, listed_, levels_);
         find_runs();
         put_in_order();
         judge();
@@ -128,7 +129,7 @@ class Study {
 
     [[nodiscard]] planning::Point point(const planning::Visit& visit) const {
         planning::Point point;
-        point.f = planning::vibration_row(planning::up_at(c_.estimator.up, visit.position_deg),
+        point.f = planning::vibration_row(planning::up_at(c_.estimator, visit.position_deg),
                                           visit.level_g);
         point.noise = std::hypot(1.0, request_.noise_per_g * visit.level_g);
         if (request_.time_costs) {
@@ -141,10 +142,10 @@ class Study {
     void make_candidates() {
         std::vector<Vec3> positions = listed_;
         if (positions.empty() && request_.grid_deg > 0) {
-            positions = planning::position_grid(c_.estimator.up, request_.grid_deg, limits_);
+            positions = planning::position_grid(c_.estimator, request_.grid_deg, limits_);
         } else if (positions.empty()) {
             for (const Vec3& direction : planning::cube_directions()) {
-                if (const auto p = planning::position_for(c_.estimator.up, direction, limits_)) {
+                if (const auto p = planning::position_for(c_.estimator, direction, limits_)) {
                     positions.push_back(*p);
                 }
             }
@@ -233,10 +234,10 @@ class Study {
         }
         const auto experiment = [&](const planning::Visit& visit) {
             planning::Experiment e;
-            e.rows = estimator::rate_rows(
-                c_.estimator,
-                {visit.position_deg, planning::kappa_of(visit.level_g), timing_.dwell_s}, {},
-                period());
+            e.rows = estimator::rate_rows(c_.estimator,
+                                          {estimator::gimbal_deg(c_.estimator, visit.position_deg),
+                                           planning::kappa_of(visit.level_g), timing_.dwell_s},
+                                          {}, period());
             const double noise = std::hypot(1.0, request_.noise_per_g * visit.level_g);
             for (double& x : e.rows) x /= noise;
             e.cost = point(visit).cost;
@@ -385,11 +386,12 @@ class Study {
 
 PlanStudy study(const PlanRequest& request) { return Study(request).run(); }
 
-estimator::SignedAxis up_of(const PlanRequest& request) {
-    return configuration::load(request.config, false).configuration.estimator.up;
+estimator::Settings frame_of(const PlanRequest& request) {
+    return configuration::load(request.config, false).configuration.estimator;
 }
 
-std::vector<VerticalAxis> vertical_axes(const std::vector<Vec3>& positions,
+std::vector<VerticalAxis> vertical_axes(estimator::Settings frame,
+                                        const std::vector<Vec3>& positions,
                                         const std::vector<double>& levels_g) {
     planning::Problem free;
     const double highest = *std::max_element(levels_g.begin(), levels_g.end());
@@ -402,11 +404,12 @@ std::vector<VerticalAxis> vertical_axes(const std::vector<Vec3>& positions,
     for (int axis = 0; axis < 3; ++axis) {
         VerticalAxis row;
         row.axis = "xyz"[axis];
+        frame.up = {axis, 1};
         std::set<std::array<long, 3>> directions;
         planning::Problem one, all;
         for (const double level : levels_g) {
             for (const Vec3& position : positions) {
-                const Vec3 up = planning::up_at({axis, 1}, position);
+                const Vec3 up = planning::up_at(frame, position);
                 directions.insert({std::lround(up[0] / kSameDirection),
                                    std::lround(up[1] / kSameDirection),
                                    std::lround(up[2] / kSameDirection)});

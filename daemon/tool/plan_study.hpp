@@ -84,11 +84,12 @@ struct PlanStudy {
 [[nodiscard]] std::string plan_json(const PlanStudy& study);
 [[nodiscard]] std::string plan_table(const PlanStudy& study);
 /// The directions of the vertical on both hemispheres, SVG.
-[[nodiscard]] std::string plan_picture(const PlanStudy& study, const estimator::SignedAxis& up);
-/// The axis in a request's configuration.
-[[nodiscard]] estimator::SignedAxis up_of(const PlanRequest& request);
+[[nodiscard]] std::string plan_picture(const PlanStudy& study, const estimator::Settings& frame);
+/// The rig's, of a request's configuration.
+[[nodiscard]] estimator::Settings frame_of(const PlanRequest& request);
 
-[[nodiscard]] std::vector<VerticalAxis> vertical_axes(const std::vector<planning::Vec3>& positions,
+[[nodiscard]] std::vector<VerticalAxis> vertical_axes(estimator::Settings frame,
+                                                      const std::vector<planning::Vec3>& positions,
                                                       const std::vector<double>& levels_g);
 
 }  // namespace vibrig::tool::planner

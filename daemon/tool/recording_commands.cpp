@@ -16,6 +16,8 @@
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
+#include "daemon/report/report.hpp"
+#include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/progress.hpp"
@@ -44,7 +46,7 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
             row.position = dwell.order->position;
             for (std::size_t k = 0; k < 3; ++k) {
                 row.angle_deg[k] = sample.angle[k] * kDegreesPerRadian;
-                row.force_g[k] = sample.force[k];
+                row.force_g[k] = sample.force[k] - dwell.order->zero_g[k];
             }
             rows.push_back(row);
         }
@@ -168,7 +170,29 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
     std::cerr << path << ": " << campaign.samples.size() << " samples\n";
 }
 
-void export_candump(const record::Campaign& campaign, const std::string& path) {
+/// Whole lines of a candump log without what Wireshark does not take: directions, comments.
+class PlainLines {
+  public:
+    std::string_view of(std::string_view piece) {
+        rest_ += piece;
+        plain_.clear();
+        std::size_t begin = 0;
+        for (std::size_t end = rest_.find('\n'); end != std::string::npos;
+             begin = end + 1, end = rest_.find('\n', begin)) {
+            std::string_view line(rest_.data() + begin, end - begin);
+            if (!line.starts_with('(')) continue;
+            if (line.ends_with(" R") || line.ends_with(" T")) line.remove_suffix(2);
+            plain_ += std::string(line) + "\n";
+        }
+        rest_.erase(0, begin);
+        return plain_;
+    }
+
+  private:
+    std::string rest_, plain_;
+};
+
+void export_candump(const record::Campaign& campaign, const std::string& path, bool plain) {
     const auto files = record::raw_files(campaign.folder);
     if (files.empty())
         throw std::runtime_error(campaign.folder +
@@ -178,7 +202,9 @@ void export_candump(const record::Campaign& campaign, const std::string& path) {
     std::size_t bytes = 0;
     bool good = true;
     for (const auto& file : files) {
+        PlainLines lines;
         record::read_raw(file, [&](std::string_view piece) {
+            if (plain) piece = lines.of(piece);
             good = good && std::fwrite(piece.data(), 1, piece.size(), to) == piece.size();
             bytes += piece.size();
             return good;
@@ -195,49 +221,74 @@ int export_campaign(const std::string& argument, const std::string& format, std:
     {
         Progress progress("reading " + argument);
         progress.show(0, 1);
-        campaign = record::read_campaign(argument);
+        campaign = read_named_campaign(argument);
     }
-    if (path.empty()) path = campaign.head.name + (format == "candump" ? ".log" : "." + format);
+    if (path.empty())
+        path = campaign.head.name +
+               (format == "candump" || format == "wireshark" ? ".log" : "." + format);
     if (format == "csv") {
         export_csv(campaign, path);
     } else if (format == "mat") {
         export_mat(campaign, path);
     } else {
-        export_candump(campaign, path);
+        export_candump(campaign, path, format == "wireshark");
     }
     return 0;
 }
 
-int recover(const std::string& argument, bool json) {
-    const record::Recovery found = record::recover(argument);
+nlohmann::ordered_json recovery_json(const record::Recovery& found) {
+    nlohmann::ordered_json root;
+    root["campaign"] = found.path;
+    root["was_closed"] = found.was_closed;
+    root["parts"] = found.parts;
+    root["samples"] = found.samples;
+    root["samples_from_raw"] = found.samples_from_raw;
+    root["samples_missing"] = found.missing;
+    root["recorded_s"] = found.recorded_s;
+    root["ends"] = nullptr;
+    if (found.ends_utc_ns > 0) root["ends"] = report::utc_text(found.ends_utc_ns);
+    root["dwells"] = found.dwells;
+    root["dwell_in_progress"] = nullptr;
+    if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
+    root["raw_beyond_s"] = found.raw_until_s;
+    root["lost"] = found.words;
+    return root;
+}
+
+std::string recovery_text(const record::Recovery& found) {
     std::array<char, 200> line{};
-    if (json) {
-        nlohmann::ordered_json root;
-        root["was_closed"] = found.was_closed;
-        root["samples"] = found.samples;
-        root["samples_from_raw"] = found.samples_from_raw;
-        root["recorded_s"] = found.recorded_s;
-        root["dwells"] = found.dwells;
-        root["dwell_in_progress"] = nullptr;
-        if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
-        root["raw_beyond_s"] = found.raw_until_s;
-        root["lost"] = found.words;
-        std::cout << root.dump() << '\n';
-        return 0;
-    }
-    std::snprintf(line.data(), line.size(), "%zu samples over %.3f s, %zu dwells done\n",
-                  found.samples, found.recorded_s, found.dwells);
-    std::cout << (found.was_closed ? "closed in order: nothing to mend\n" : "mended\n")
-              << line.data();
+    std::string text = found.was_closed ? "closed in order: nothing to mend\n" : "mended\n";
+    std::snprintf(line.data(), line.size(), "%zu samples over %.3f s, %zu dwells done, %zu %s\n",
+                  found.samples, found.recorded_s, found.dwells, found.parts,
+                  found.parts == 1 ? "file" : "files");
+    text += line.data();
     if (!found.was_closed) {
         std::snprintf(line.data(), line.size(),
                       "%zu samples more from the raw log, which goes on %.3f s longer\n",
                       found.samples_from_raw, found.raw_until_s);
-        std::cout << line.data()
-                  << (found.cut_dwell.empty() ? "no dwell was in progress\n"
-                                              : "lost: the end of " + found.cut_dwell + "\n");
+        text += line.data();
+        if (found.ends_utc_ns > 0)
+            text += "lost: everything after " + report::utc_text(found.ends_utc_ns) + "\n";
+        text += found.cut_dwell.empty() ? "no dwell was in progress\n"
+                                        : "lost: the end of " + found.cut_dwell + "\n";
     }
-    for (const auto& words : found.words) std::cout << "lost: " << words << '\n';
+    if (found.missing > 0)
+        text += "lost: " + std::to_string(found.missing) + " sync counts within what is there\n";
+    for (const auto& words : found.words) text += "lost: " + words + "\n";
+    return text;
+}
+
+int recover(const std::string& argument, bool json) {
+    const auto found = record::recover(
+        named_campaign(argument), [](const std::string& words) { std::cerr << words << '\n'; });
+    for (const auto& campaign : found) {
+        if (json) {
+            std::cout << recovery_json(campaign).dump() << '\n';
+        } else {
+            if (found.size() > 1) std::cout << campaign.path << ": ";
+            std::cout << recovery_text(campaign);
+        }
+    }
     return 0;
 }
 
@@ -250,25 +301,34 @@ void add_recordings(CLI::App& app, int& exit_code) {
     };
     auto options = std::make_shared<Options>();
     CLI::App* exporting = app.add_subcommand("export", "A recorded campaign for other programs");
-    exporting->add_option("CAMPAIGN", options->campaign, "its HDF5 file or its folder")->required();
+    exporting->add_option("CAMPAIGN", options->campaign, kCampaignHelp)->required();
     exporting
-        ->add_option("--to", options->format,
-                     "csv (as `vibrig identify` reads it), mat (MATLAB, Octave) or candump "
-                     "(canplayer, Wireshark)")
+        ->add_option(
+            "--to", options->format,
+            "csv (as `vibrig identify` reads it: samples of good quality, zeros that were taken "
+            "in place subtracted), mat (MATLAB, Octave), candump (both directions; "
+            "canplayer, log2asc) or wireshark (the same without directions)")
         ->required()
-        ->check(CLI::IsMember({"csv", "mat", "candump"}));
+        ->check(CLI::IsMember({"csv", "mat", "candump", "wireshark"}));
     exporting->add_option("-o,--output", options->output,
                           "file to write (default: the campaign's name here; candump: - is "
                           "standard output)");
-    exporting->footer("Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv");
+    exporting->footer(
+        "Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv\n"
+        "A sample takes 79 bytes in the recording's HDF5 file (93 with estimates and covariances), "
+        "59 as\n"
+        "frames in its compressed raw log (470 as text).");
     exporting->callback([options, &exit_code] {
         exit_code = guarded(
             [&] { return export_campaign(options->campaign, options->format, options->output); });
     });
 
     CLI::App* recovering = app.add_subcommand(
-        "recover", "Mends a campaign's file after a crash and says what was lost");
-    recovering->add_option("CAMPAIGN", options->campaign, "its HDF5 file or its folder")
+        "recover", "Mends a campaign's files after a crash and says what was lost");
+    recovering
+        ->add_option("CAMPAIGN", options->campaign,
+                     std::string(kCampaignHelp) +
+                         "; or the folder of all recordings: then its index is made anew, too")
         ->required();
     recovering->add_flag("--json", options->json, "print what was found as JSON");
     recovering->footer(

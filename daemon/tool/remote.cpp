@@ -37,6 +37,21 @@ struct CommandOptions {
     bool json = false;
 };
 
+struct TestOptions {
+    serve::Address at;
+    std::string by;
+    bool json = false;
+};
+
+constexpr int kRefused = 409;
+
+std::string json_of(const v1::Command& command) {
+    std::string json;
+    if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
+        throw serve::ClientError("--by: not UTF-8");
+    return json;
+}
+
 std::string login_name() {
     const passwd* const entry = getpwuid(getuid());
     return entry != nullptr ? entry->pw_name : "uid " + std::to_string(getuid());
@@ -82,8 +97,34 @@ int show_status(const StatusOptions& options) {
     return 0;
 }
 
-int self_test(const StatusOptions& options) {
+/// Waits for the end of a loop check; its rows.
+void show_loop_check(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(300);
+    v1::LoopCheck check;
+    do {
+        std::this_thread::sleep_for(kLook);
+        check = ask_status(client).loop_check();
+    } while (check.verdict() == "running");
+    for (const auto& row : check.rows()) {
+        std::cout << (row.passed() ? "  ok    " : "  NOT   ") << row.name() << ": " << row.value()
+                  << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low()
+                  << " to " << row.high() << '\n';
+    }
+}
+
+int self_test(const TestOptions& options) {
     serve::Client client(options.at);
+    if (!options.by.empty()) {
+        v1::Command command;
+        command.set_kind(v1::Command::selftest);
+        command.set_by(options.by);
+        const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
+        if (begun.status != 200) {
+            std::cerr << kWho << problem_of(begun) << '\n';
+            return begun.status == kRefused ? kNo : kBadInput;
+        }
+        show_loop_check(client);
+    }
     const serve::Reply reply = client.get("/api/v1/selftest");
     v1::Readiness found;
     parse_answer(reply, found);
@@ -104,12 +145,8 @@ int send_command(const CommandOptions& options) {
     command.set_kind(options.kind);
     command.set_by(options.by);
     command.set_argument(options.argument);
-    std::string json;
-    if (!google::protobuf::util::MessageToJsonString(command, &json).ok()) {
-        throw serve::ClientError("--by: not UTF-8");
-    }
     serve::Client client(options.at);
-    const serve::Reply reply = client.post("/api/v1/commands", json);
+    const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
     if (options.json) std::cout << reply.body << '\n';
     if (reply.status == 200) {
         v1::CommandReply answer;
@@ -119,7 +156,6 @@ int send_command(const CommandOptions& options) {
         }
         return 0;
     }
-    constexpr int kRefused = 409;
     std::cerr << kWho << problem_of(reply) << '\n';
     return reply.status == kRefused ? kNo : kBadInput;
 }
@@ -205,10 +241,16 @@ void add_remote(CLI::App& app, int& exit_code) {
 
     CLI::App& testing = *app.add_subcommand(
         "selftest", "What is looked at before a campaign; exit code 1 unless all is well");
-    auto test_options = std::make_shared<StatusOptions>();
+    auto test_options = std::make_shared<TestOptions>();
+    testing.add_option("--by", test_options->by,
+                       "Who orders a loop check first: the shaker moves for some seconds at "
+                       "selftest.table_g, then the bands of [selftest] are looked at");
     add_socket(testing, test_options->at);
     testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
-    testing.footer("Example: vibrig selftest && vibrig arm --by 'Ada Lovelace'");
+    testing.footer(
+        "Example: vibrig selftest\n"
+        "With a loop check, which vibrig abort ends at any moment: vibrig selftest --by 'Ada "
+        "Lovelace' && vibrig arm --by 'Ada Lovelace'");
     testing.callback([test_options, &exit_code] {
         exit_code = guarded([&] { return self_test(*test_options); }, kWho);
     });

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <iostream>
 #include <thread>
+#include <utility>
 
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/remote.hpp"
@@ -11,6 +12,7 @@ namespace vibrig::tool {
 namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(500);
+constexpr const char* kStream = "/api/v1/stream?status=false&rate_hz=10&after=";
 
 void print(const v1::Event& event, bool json) {
     if (!json) {
@@ -50,24 +52,42 @@ bool print_new(serve::Client& client, Cursor& cursor, bool json) {
     return answer.events_size() > 0;
 }
 
+/// A message of the stream; false: it is another daemon's, whose events count anew, or nobody
+/// reads.
+bool print_message(const std::string& text, Cursor& cursor, bool json) {
+    v1::Events message;  // "hello" has the instance, "events" the events
+    parse_answer({200, text}, message);
+    if (!message.instance().empty() && message.instance() != cursor.instance) return false;
+    for (const v1::Event& event : message.events()) {
+        print(event, json);
+        cursor.after = event.id();
+    }
+    std::cout.flush();
+    return std::cout.good();
+}
+
 }  // namespace
 
 int show_events(const EventOptions& options) {
     serve::Client client(options.at);
     Cursor cursor;
-    while (print_new(client, cursor, options.json)) {
-    }
+    const auto catch_up = [&] {
+        while (print_new(client, cursor, options.json)) {
+        }
+    };
+    catch_up();
     bool gone = false;
     while (options.follow && std::cout.good()) {
-        std::this_thread::sleep_for(kPause);
         try {
-            while (print_new(client, cursor, options.json)) {
-            }
-            if (gone) std::cerr << "vibrig: vibrigd answers again\n";
-            gone = false;
+            catch_up();
+            if (std::exchange(gone, false)) std::cerr << "vibrig: vibrigd answers again\n";
+            client.follow(kStream + std::to_string(cursor.after), [&](const std::string& text) {
+                return print_message(text, cursor, options.json);
+            });
         } catch (const serve::ClientError& error) {
-            if (!gone) std::cerr << "vibrig: " << error.what() << "; trying again\n";
-            gone = true;
+            if (!std::exchange(gone, true))
+                std::cerr << "vibrig: " << error.what() << "; trying again\n";
+            std::this_thread::sleep_for(kPause);
         }
     }
     return 0;

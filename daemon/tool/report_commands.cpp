@@ -19,6 +19,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/report/report.hpp"
+#include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/plot/chart.hpp"
@@ -79,11 +80,12 @@ void print_pdf(const std::string& html, const std::string& pdf) {
 }
 
 int make_report(const ReportArguments& arguments) {
-    const auto campaign = record::read_campaign(arguments.campaign);
+    auto campaign = read_named_campaign(arguments.campaign);
+    if (!arguments.config.empty()) record::forget_noise(campaign);
     const auto settings = report_settings(campaign, arguments.config);
     std::optional<report::Earlier> earlier;
     if (!arguments.compare.empty()) {
-        const auto other = record::read_campaign(arguments.compare);
+        const auto other = read_named_campaign(arguments.compare);
         earlier = {other.path, other.head.name, report::utc_text(other.head.utc_ns),
                    report::final_coefficients(other.path, other.dwells)};
     }
@@ -215,7 +217,8 @@ int compensate(CompensateArguments arguments) {
             throw std::runtime_error("vibration: found " + filled_in("%g", level) +
                                      " g, expected 0 to 1000 g");
     }
-    const auto campaign = record::read_campaign(arguments.campaign);
+    auto campaign = read_named_campaign(arguments.campaign);
+    if (!arguments.config.empty()) record::forget_noise(campaign);
     report::Coefficients coefficients;
     estimator::Settings settings = report_settings(campaign, arguments.config);
     if (arguments.config.empty()) {
@@ -256,7 +259,7 @@ void add_reports(CLI::App& app, int& exit_code) {
     auto report = std::make_shared<ReportArguments>();
     CLI::App* reporting =
         app.add_subcommand("report", "One page of a recorded campaign, to be signed and filed");
-    reporting->add_option("CAMPAIGN", report->campaign, "its HDF5 file or its folder")->required();
+    reporting->add_option("CAMPAIGN", report->campaign, kCampaignHelp)->required();
     reporting->add_option("-o,--output", report->output,
                           "HTML file to write (default report.html)");
     reporting->add_option("--compare", report->compare,
@@ -272,8 +275,7 @@ void add_reports(CLI::App& app, int& exit_code) {
     auto compensation = std::make_shared<CompensateArguments>();
     CLI::App* compensating = app.add_subcommand(
         "compensate", "Coefficients for a navigation computer, and what drift they leave");
-    compensating->add_option("CAMPAIGN", compensation->campaign, "its HDF5 file or its folder")
-        ->required();
+    compensating->add_option("CAMPAIGN", compensation->campaign, kCampaignHelp)->required();
     compensating
         ->add_option("--to", compensation->format, "text (default), json, csv or c (a header)")
         ->check(CLI::IsMember({"text", "json", "csv", "c"}));

@@ -295,8 +295,8 @@ void add_position_table(Reproduction& table) {
     constexpr std::array<const char*, 3> kPublished{"5 directions, rank 5 / 6, 0.000, 0.000",
                                                     "11 directions, rank 9 / 10, 0.581, 0.648",
                                                     "9 directions, rank 8 / 9, 0.000, 0.000"};
-    const auto strong = planner::vertical_axes(positions, {4.667, 6});
-    const auto weak = planner::vertical_axes(positions, {0, 6});
+    const auto strong = planner::vertical_axes({}, positions, {4.667, 6});
+    const auto weak = planner::vertical_axes({}, positions, {0, 6});
     for (std::size_t k = 0; k < kPublished.size(); ++k) {
         add(table, text("14 positions, %c vertical: D-eff. at 6 + 4.667 and 6 + 0 g", "xyz"[k]),
             kPublished[k],

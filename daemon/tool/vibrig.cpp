@@ -1,6 +1,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <exception>
 #include <iostream>
 
@@ -33,6 +34,14 @@ int main(int argc, char** argv) {
     vibrig::tool::add_reports(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
     vibrig::tool::add_pki(app, exit_code);
+    // Of a word that it does not know CLI11 says only that there should be a command.
+    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+    const auto is_named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
+    if (argc > 1 && *argv[1] != '-' && std::ranges::none_of(commands, is_named)) {
+        std::cerr << "vibrig: found \"" << argv[1]
+                  << "\", expected a command; vibrig --help lists them\n";
+        return kBadUsage;
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -23,10 +23,11 @@ const Draw = (() => {
       case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},
         axes: [minutes, log], series: [{}, line(0), line(1), line(2), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
       default: return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3}},
-        axes: [{...axis, values: (u, v) => decades(v), label: 's', labelSize: 16, size: 34, labelFont: '12px system-ui'}, log],
-        series: [{}, line(0), line(1), line(2)]};
+        axes: [{...axis, values: (u, v) => v.map(x => (x === null ? '' : String(+x.toPrecision(2)))), label: 's', labelSize: 16, size: 34, labelFont: '12px system-ui'}, log],
+        series: [{}, line(0), line(1), line(2), dots(0), dots(1), dots(2)]};
     }
   }
+  const dots = k => ({stroke: css('--c' + k), paths: () => null, points: {show: true, size: 8, fill: css('--c' + k)}});
 
   function chart(name, data) {
     const element = byId('c-' + name);
@@ -62,14 +63,18 @@ const Draw = (() => {
   const back = f => (v, deg) => f(v, -deg);
   const ry0 = turn(2, 0), rx = back(turn(1, 2)), ry = back(ry0), rz = back(turn(0, 1));
 
-  const up = ([a, b, g], v) => rx(ry(rz(v, g), b), a)[1];
+  // The platform axis that points up at zero angles, as "+y"; north is the axis before it, east the one after.
+  const axisOf = name => ['xyz'.indexOf(name[1]), name[0] === '-' ? -1 : 1];
+  const toReference = ([a, b, g], v) => rx(ry(rz(v, g), b), a);
+  const up = (deg, v, name) => { const [k, sign] = axisOf(name); return sign * toReference(deg, v)[k]; };
 
-  function gimbals(deg, force, words) {
-    const [a, b, g] = deg;
-    const toReference = v => rx(ry(rz(v, g), b), a);
-    // Seen from the south-east, a little from above.
+  // `name`: what points up. Returns the cosine between force and vertical.
+  function gimbals(deg, force, words, name) {
+    const [a, b] = deg, [k, sign] = axisOf(name);
+    const placed = v => toReference(deg, v);
+    // North, up, east, seen from the south-east, a little from above.
     const screen = v => {
-      const w = ry0(v, -28), down = 18 * Math.PI / 180;
+      const w = ry0([v[(k + 2) % 3], sign * v[k], sign * v[(k + 1) % 3]], -28), down = 18 * Math.PI / 180;
       return [w[0] * 100, -(w[1] * Math.cos(down) + w[2] * -Math.sin(down)) * 100];
     };
     const path = points => 'M' + points.map(p => screen(p).map(n => n.toFixed(1)).join(' ')).join('L');
@@ -80,23 +85,23 @@ const Draw = (() => {
     const outer = v => rx(v, a), inner = v => rx(ry(v, b), a);
     const line = (v, from = 0) => path([v.map(n => n * from), v]);
     const parts = [
-      `<path d="${line([0, 1, 0], -1)}" stroke="var(--soft)" stroke-dasharray="3 3"/>`,
+      `<path d="${line([0, 1, 2].map(i => (i === k ? sign : 0)), -1)}" stroke="var(--soft)" stroke-dasharray="3 3"/>`,
       `<path d="${ring(.95, outer([1, 0, 0]), outer([0, 1, 0]))}" stroke="var(--c0)" stroke-width="3"/>`,
       `<path d="${ring(.78, inner([0, 1, 0]), inner([0, 0, 1]))}" stroke="var(--c1)" stroke-width="3"/>`,
-      `<path d="${ring(.6, toReference([1, 0, 0]), toReference([0, 1, 0]))}Z" stroke="var(--c2)" stroke-width="3" fill="var(--c2)" fill-opacity=".15"/>`];
-    ['x', 'y', 'z'].forEach((name, i) => {
-      const axis = toReference([0, 1, 2].map(k => (k === i ? .6 : 0)));
+      `<path d="${ring(.6, placed([1, 0, 0]), placed([0, 1, 0]))}Z" stroke="var(--c2)" stroke-width="3" fill="var(--c2)" fill-opacity=".15"/>`];
+    ['x', 'y', 'z'].forEach((letter, i) => {
+      const axis = placed([0, 1, 2].map(n => (n === i ? .6 : 0)));
       const [x, y] = screen(axis.map(n => n * 1.15));
-      parts.push(`<path d="${line(axis)}" stroke="var(--c2)" stroke-width="1.5"/><text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="var(--ink)" font-size="9" text-anchor="middle">${name}</text>`);
+      parts.push(`<path d="${line(axis)}" stroke="var(--c2)" stroke-width="1.5"/><text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="var(--ink)" font-size="9" text-anchor="middle">${letter}</text>`);
     });
     if (force) {
-      const tip = toReference(force), [x, y] = screen(tip);
+      const tip = placed(force), [x, y] = screen(tip);
       parts.push(`<path d="${line(tip)}" stroke="var(--bad)" stroke-width="3"/><circle cx="${x.toFixed(1)}" cy="${y.toFixed(1)}" r="4" fill="var(--bad)"/>`);
     }
     const picture = byId('gimbals');
     picture.innerHTML = `<g fill="none" stroke-linejoin="round">${parts.join('')}</g>`;
     picture.setAttribute('aria-label', words);
-    return force ? toReference(force) : null;
+    return force ? up(deg, force, name) : null;
   }
 
   const digits = (value, sigma) => {

@@ -102,18 +102,23 @@
   }
 
   function channel(s, name) { return (s.sample.channels || []).find(c => c.name === name) || {}; }
+  const turned = deg => deg - 360 * Math.round(deg / 360);
   function gimbals(s) {
     const names = ['outer', 'inner', 'azimuth'];
-    const deg = names.map(n => channel(s, n).value), force = ['accel_x', 'accel_y', 'accel_z'].map(n => channel(s, n).value);
-    const shown = deg.map(d => d || 0), good = force.every(f => f !== undefined);
-    const size = good ? Math.hypot(...force) : NaN;
+    const raw = names.map(n => channel(s, n).value), read = ['accel_x', 'accel_y', 'accel_z'].map(n => channel(s, n).value);
+    // As the configuration has it: gimbal angle = sign (encoder - zero), force in platform axes = matrix (reading - zero).
+    const f = s.frame, deg = raw.map((r, i) => (r === undefined ? r : turned(f.encoder_sign[i] * (r - f.encoder_zero_deg[i]))));
+    const good = read.every(r => r !== undefined);
+    const force = [0, 1, 2].map(i => read.reduce((sum, r, j) => sum + f.accelerometer_matrix[3 * i + j] * (r - f.accelerometer_zero_g[j]), 0));
+    const shown = deg.map(d => d || 0), size = good ? Math.hypot(...force) : NaN;
     const words = `Gimbals: ${names.map((n, i) => `${n} ${fixed(deg[i], 1, 'degrees')}`).join(', ')}; the red line is the measured specific force, the dashed one the vertical`;
     // Under vibration gravity and acceleration lie on one line, whichever is greater at the moment.
-    if (good && size > 0.3) direction = force.map(f => f / size);
-    if (direction && Draw.up(shown, direction) < 0) direction = direction.map(f => -f);
-    const up = Draw.gimbals(shown, good ? direction : null, words);
-    const off = up ? Math.acos(Math.max(-1, Math.min(1, up[1]))) * 180 / Math.PI : NaN;
-    table('angles', [...names.map((n, i) => [n, deg[i] === undefined ? 'not good' : fixed(deg[i], 3, '°'), deg[i] === undefined]),
+    if (good && size > 0.3) direction = force.map(x => x / size);
+    if (direction && Draw.up(shown, direction, f.up) < 0) direction = direction.map(x => -x);
+    const cosine = Draw.gimbals(shown, good ? direction : null, words, f.up);
+    const off = cosine === null ? NaN : Math.acos(Math.max(-1, Math.min(1, cosine))) * 180 / Math.PI;
+    const encoder = i => (Math.abs(deg[i] - raw[i]) > 1e-9 ? ` (encoder ${raw[i].toFixed(3)})` : '');
+    table('angles', [...names.map((n, i) => [n, deg[i] === undefined ? 'not good' : fixed(deg[i], 3, '°') + encoder(i), deg[i] === undefined]),
       ['specific force', fixed(size, 3, 'g'), !good], ['off the vertical', fixed(off, 1, '°'), false],
       ['platform', !s.platform || s.platform.ready === undefined ? 'no status' : (s.platform.ready ? 'ready' : 'not ready') + (s.platform.temperature_c === undefined ? '' : `, ${s.platform.temperature_c.toFixed(2)} °C`),
         !(s.platform && s.platform.ready)]]);
@@ -158,26 +163,32 @@
     byId('c-sigma').setAttribute('aria-label', `Largest sigma over target: bias ${worst[0] || 'unknown'}, linear ${worst[1] || 'unknown'}, quadratic ${worst[2] || 'unknown'}`);
     allan(s);
   }
-  // The identified terms as a deviation (IEEE Std 952, annex C): Q of an angle reading, N, B, K, R.
+  // Points: modified Allan deviation of the dwells' residuals. Lines: what the identified noise lets expect; before the
+  // first dwell the configured random walk N / sqrt(2 tau).
   function allan(s) {
     const noise = s.noise || {}, gyros = noise.gyros || [];
-    const taus = Array.from({length: 31}, (_, i) => 10 ** (-1 + i / 10 * 1.2));
-    const curve = g => taus.map(tau => {
-      const v = k => (g.fit && g.fit[k] && g.fit[k].value) || 0, h = tau / 3600;
-      const q = v('Q') / tau, n = (g.fit ? v('N') : g.in_force_deg_per_rt_h || 0) / Math.sqrt(h), b = v('B') * 0.664, k = v('K') * Math.sqrt(h / 3), r = v('R') * h / Math.SQRT2;
-      const sum = Math.sqrt(3 * q * q + n * n + b * b + k * k + r * r);
-      return sum > 0 ? sum : null;
-    });
     if (gyros.length < 3) return;
-    Draw.chart('allan', [taus, ...gyros.map(curve)]);
+    const points = gyros.map(g => new Map((g.points || []).map(p => [p.tau_s, p])));
+    const measured = [...new Set(points.flatMap(m => [...m.keys()]))].sort((a, b) => a - b);
+    const taus = measured.length ? measured : [2, 4, 8, 16, 32];
+    const at = (m, tau, key) => { const p = m.get(tau); return p && p[key] > 0 ? p[key] : null; };
+    const lines = gyros.map((g, i) => taus.map(tau => (measured.length ? at(points[i], tau, 'expected_deg_h')
+      : g.in_force_deg_per_rt_h ? g.in_force_deg_per_rt_h / Math.sqrt(2 * tau / 3600) : null)));
+    Draw.chart('allan', [taus, ...lines, ...points.map(m => taus.map(tau => at(m, tau, 'deviation_deg_h')))]);
     const words = gyros.map(g => {
       const n = g.fit && g.fit.N;
       return `${g.gyro} ${n && n.value !== undefined ? n.value.toExponential(1) : 'N as configured'}`;
     }).join(', ');
-    set('noise', noise.dwells ? `   N, deg/√h, from ${noise.dwells} dwells: ${words}` : '   as configured; no dwell yet');
-    byId('c-allan').setAttribute('aria-label', `Allan deviation as identified. ${words}`);
+    set('noise', noise.dwells ? `   points measured, lines identified; N, deg/√h, from ${noise.dwells} dwells: ${words}` : '   as configured; no dwell yet');
+    const chart = byId('c-allan');
+    chart.dataset.points = points.reduce((n, m) => n + m.size, 0);
+    chart.setAttribute('aria-label', `Modified Allan deviation of the residuals, ${chart.dataset.points} points measured. ${words}`);
   }
 
+  function latency(l) {
+    const n = l.counts.reduce((sum, c) => sum + Number(c), 0);
+    return n ? `${(l.sum_ms / n).toFixed(3)} ms, worst ${l.largest_ms.toFixed(2)} ms` : 'not on this clock';
+  }
   function health(s) {
     list('channels', (s.sample.channels || []).map(c => {
       const kind = c.quality === 'unbound' ? 'off' : c.quality !== 'good' || c.age_s > 1 ? 'bad' : c.age_s > 0.2 ? 'warn' : '';
@@ -194,8 +205,9 @@
       ['journal', s.journal.path ? (s.journal.running ? 'writes' : 'WAITS: ' + s.journal.note) : 'none', s.journal.path && !s.journal.running],
       ['samples', a.samples], ['dropped', String(dropped), dropped > 0], ['gaps, incomplete', `${a.gaps}, ${a.incomplete}`, number(a.gaps) > 0],
       ['late, duplicate, unknown', `${a.late}, ${a.duplicate}, ${a.unknown}`],
+      ['frame to ring', latency(s.acquisition_latency)], ...(s.mqtt.broker ? [['broker', s.mqtt.connected ? 'connected' : 'DOWN: ' + s.mqtt.note, !s.mqtt.connected]] : []),
       ['Modbus timeouts', s.shaker.timeouts], ['stops', `${stopped}, slowest ${number(i.reaction_largest_ms || 0).toFixed(2)} ms`]]);
-    set('footer', `vibrigd ${s.version}, clock ${s.clock}, up ${duration(s.uptime_s)}; you are a ${role}`);
+    set('footer', `vibrigd ${s.version}, clock ${s.clock}, up ${duration(s.uptime_s)}; you are ${/^[ao]/.test(role) ? "an" : "a"} ${role}`);
   }
 
   function show() {

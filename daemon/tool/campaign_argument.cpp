@@ -1,0 +1,33 @@
+#include "daemon/tool/campaign_argument.hpp"
+
+#include <cstdlib>
+#include <iostream>
+#include <vector>
+
+#include "daemon/record/index.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+void tell_on_error(const std::string& words) { std::cerr << words << '\n'; }
+}  // namespace
+
+std::string named_campaign(const std::string& argument) {
+    std::vector<std::string> folders{"."};
+    if (const char* more = std::getenv("VIBRIG_RECORDINGS"); more != nullptr && *more != '\0')
+        folders.emplace_back(more);
+    folders.emplace_back("/var/lib/vibrig");
+    return record::find_campaign(argument, folders, tell_on_error);
+}
+
+record::Campaign read_named_campaign(const std::string& argument) {
+    const std::string path = record::campaign_path(named_campaign(argument));
+    // A file of another name, put aside by somebody, is none of the index.
+    const auto parts = record::part_files(record::folder_of(path));
+    for (const auto& [number, file] : parts) {
+        if (file == path) record::compare_with_index(record::folder_of(path), tell_on_error);
+    }
+    return record::read_campaign(path);
+}
+
+}  // namespace vibrig::tool
