@@ -37,9 +37,10 @@ struct OwnRing {
     bool push(const Record& record) { return ring.try_push(record); }
     /// How many of the batch went in.
     std::size_t push(const Record* records, std::size_t n) { return ring.push_n({records, n}); }
+    /// All that waits, as the other one's.
     template <class F>
     std::size_t consume(F f) {
-        return ring.consume(f, kBatch);
+        return ring.consume(f, kCapacity);
     }
 };
 

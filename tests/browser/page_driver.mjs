@@ -5,16 +5,21 @@ import {createRequire} from 'node:module';
 const {chromium} = createRequire(process.env.VIBRIG_BROWSER_NPM + '/')('playwright-core');
 const browser = await chromium.launch({executablePath: process.env.VIBRIG_CHROMIUM || '/usr/bin/chromium', headless: true,
   args: ['--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage']});
-const context = await browser.newContext({viewport: {width: 1400, height: 1000}, ignoreHTTPSErrors: true});
-const page = await context.newPage();
 const errors = [];
-let bytes = 0;
-page.on('pageerror', error => errors.push(String(error)));
-page.on('console', message => { if (message.type() === 'error') errors.push(message.text()); });
-page.on('response', async response => { try { bytes += (await response.body()).length; } catch { /* a WebSocket */ } });
+let bytes = 0, page = null;
+async function start(clientCertificates) {
+  const context = await browser.newContext({viewport: {width: 1400, height: 1000}, ignoreHTTPSErrors: true, clientCertificates});
+  page = await context.newPage();
+  page.on('pageerror', error => errors.push(String(error)));
+  page.on('console', message => { if (message.type() === 'error') errors.push(message.text()); });
+  page.on('response', async response => { try { bytes += (await response.body()).length; } catch { /* a WebSocket */ } });
+}
+await start();
 
 const commands = {
   async open({url}) { await page.goto(url, {waitUntil: 'load'}); return bytes; },
+  async as({origin, certPath, keyPath}) { await page.context().close(); await start([{origin, certPath, keyPath}]); },   // another person
+  async click({selector}) { await page.click(selector, {timeout: 10000}); },
   async text({selector}) { return (await page.textContent(selector)) ?? null; },
   async evaluate({script}) { return page.evaluate(script); },
   async until({script, timeout}) {   // waitForFunction() evaluates inside the page, which its policy forbids

@@ -36,6 +36,23 @@ def processes_of(folder):
     return found
 
 
+def begins_on_vcan(checks, folder):
+    """The whole takes minutes where the kernel has no vcan; its beginning shows that it goes."""
+    running = subprocess.Popen([DEMO, "--vcan"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, text=True, cwd=folder, env={**os.environ, "TMPDIR": folder})
+    said = []
+    for line in running.stdout:
+        said.append(line)
+        if re.match(r" +\d+\.\d s +(waiting|slewing|ramping|settling|recording) ", line):
+            break
+    checks.check(any(line.startswith("Campaign:") and "vcan0" in line for line in said) and running.poll() is None,
+                 "--vcan: a campaign begins on a real vcan0", "".join(said[-20:]))
+    running.send_signal(signal.SIGTERM)
+    running.stdout.read()
+    checks.equal(running.wait(60), 143, "--vcan: SIGTERM ends it")
+    checks.equal(processes_of(folder), [], "--vcan: no process is left")
+
+
 def main():
     checks = r.Checks()
     with tempfile.TemporaryDirectory(prefix="vibrig demo ") as folder:   # a blank in the path, too
@@ -71,6 +88,7 @@ def main():
         running.stdout.read()
         checks.equal(running.wait(30), 143, "SIGTERM ends it")
         checks.equal(processes_of(folder), [], "an interrupted demo leaves no process")
+        begins_on_vcan(checks, folder)
         checks.equal(sorted(os.listdir(folder)), ["kept"], "an interrupted demo leaves no temporary folder")
     return checks.end()
 

@@ -74,25 +74,68 @@ def adaptively(checks, programs, folder):
     checks.check(len(run.last["campaign"]["dwells"]) < 28, "in fewer dwells than 2 x 14", run.last["campaign"]["dwells"])
 
 
-def time_limit(checks, programs, folder):
-    run = Run(programs, {"table_g": [9.0, 0.0], "adaptive": True, "time_limit_s": 700.0, "dwell_s": 40.0}, folder,
-              **{"campaign.targets": {"bias": 1e-4, "linear": 1e-4, "quadratic": 1e-5}})
-    checks.check(run.last and run.last["campaign"]["state"] == "finished", "targets out of reach: it ends all the same",
-                 r.state_of(run.last) + run.text[-1500:])
-    checks.check("time limit" in run.text, "and says that the time limit came", run.text[-1500:])
+def restarted(checks, programs, folder):
+    """Killed after three dwells: what was chosen, and the time that it took, survive."""
+    campaign = {"name": "planned", "table_g": [9.0, 0.0], "adaptive": True, "dwell_s": 40.0, "time_limit_s": 1000.0}
+    targets = {"bias": 1e-4, "linear": 1e-4, "quadratic": 1e-5}   # out of reach: the time limit ends it
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    connected = lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running"
+    try:
+        rig.start_plant("--seed", "2", "--speed", "60")
+        rig.configure(campaign, **{"campaign.targets": targets})
+        rig.start_daemon()
+        rig.wait_for(connected, 30)
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "tester")
+        status = rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 3 and s["campaign"]["state"] == "slewing", 120)
+        done = len(status["campaign"]["dwells"]) if status else 0
+        rig.daemon.process.kill()
+        rig.daemon.process.wait()
+        rig.start_daemon()
+        status = rig.wait_for(lambda s: connected(s) and s["campaign"].get("resume_offer"), 60)
+        if not checks.check(status and status["campaign"]["resume_offer"].startswith(f"{done} positions done"),
+                            "a killed adaptive campaign offers to go on after its last dwell", rig.logs()):
+            return
+        rig.wait_for(lambda s: s["shaker"].get("state") == 0 and any(c["quality"] == "good" for c in s["sample"]["channels"]), 30)
+        rig.tool("ack", "trip", "--by", "tester")
+        commands = [rig.tool(command, "--by", "tester") for command in ("arm", "resume")]
+        last = rig.wait_for_state(("finished", "aborted", "tripped"), 150)
+        checks.check(last and last["campaign"]["state"] == "finished" and "time limit has come" in rig.daemon.text(),
+                     "resumed, it ends when its time limit comes", f"{r.state_of(last)} {commands}\n{rig.daemon.text()[-3000:]}")
+        dwells = last["campaign"]["dwells"]
+        # 40 s of dwell, 7 s of ramps and settling, slews: 21 dwells in 1000 s at most, and not the whole limit anew.
+        checks.check(done < len(dwells) <= 1000 / 47, "the time before the restart counts", f"{done} and {len(dwells)}")
+        checks.equal([d["position"] for d in dwells], list(range(1, len(dwells) + 1)), "its dwells go on counting")
+    finally:
+        rig.stop()
 
 
 def refused(checks, programs, folder):
-    run = Run(programs, {"table_g": [9.0]}, folder)
-    checks.check(run.arm.returncode != 0, "one level only: the campaign is not armed")
-    for name in ("D_Fx", "D_IIx", "D_OOx", "D_SSx"):
-        checks.check(name in run.arm.stderr + run.arm.stdout, f"the reason names {name}", run.arm.stderr)
+    path = os.path.join(folder, "one.toml")
+    for what, more in (("one level only", "table_g = [9.0]"), ("a plan file with one level", "plan = \"one.csv\"")):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(f"[campaign]\n{more}\n[server]\nsocket = \"{folder}/s\"\n[can]\nport = \"seqpacket\"\npath = \"{folder}/c\"\n")
+        with open(os.path.join(folder, "one.csv"), "w", encoding="utf-8") as file:
+            file.write("alpha_deg,beta_deg,gamma_deg,table_g\n" + "".join(f"{a},0,{g},9\n" for a in (0, 45, 90, 180)
+                                                                          for g in (0, 45, 90, 180)))
+        run = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path], capture_output=True, text=True,
+                             timeout=30)
+        checks.equal(run.returncode, 2, f"{what}: vibrigd does not start")
+        table, _, reason = run.stderr.rpartition("vibrigd: ")
+        checks.check("expected standard errors" in table, f"{what}: the standard errors are printed before", run.stderr)
+        missing = [name for name in ("D_Fx", "D_IIx", "D_OOx", "D_SSx", "rank 9 of 10", "cheapest remedy", "what-it-can")
+                   if name not in reason]
+        checks.equal(missing, [], f"{what}: the reason names coefficients, remedy and the way round it")
+        check = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True,
+                               text=True, timeout=30)
+        checks.check(check.returncode == 2 and "campaign.table_g" in check.stdout and "rank 9 of 10" in check.stderr,
+                     f"{what}: --check prints the configuration and says the same", check.stdout + check.stderr)
 
 
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (from_a_file, adaptively, time_limit, refused):
+    for part in (from_a_file, adaptively, restarted, refused):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

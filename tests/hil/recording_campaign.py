@@ -4,11 +4,14 @@ last bit, exported, reported. On the seqpacket bus and the rig's clock.
 
 usage: recording_campaign.py PROGRAMS
 """
+import csv
 import glob
+import hashlib
 import json
 import math
 import os
 import re
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -19,6 +22,23 @@ import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "recorded", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [45, 0, 90], [0, 0, 90]],
             "table_g": [9.0, 7.0], "dwell_s": 20.0}
+
+
+PAPERWORK = """
+[unit]
+type = "GP-3"
+serial = "0017"
+
+[[instrument]]
+name = "shaker controller"
+serial = "S-1"
+certificate = "C-77"
+due = 2020-01-31
+
+[[instrument]]
+name = "resolver box"
+due = 2099-12-31
+"""
 
 
 def h5py():
@@ -51,6 +71,9 @@ def killed(checks, rig):
     with h5py().File(path, "r", swmr=True) as file:
         rows = file["samples/time_ns"].shape[0]
         checks.check(rows > 0, "h5py reads the file while it is written", str(rows))
+    living = offline(rig, "recover", folders(rig)[-1])
+    checks.check(living.returncode == 2 and "being written by a running vibrigd" in living.stderr,
+                 "recover leaves a file alone that is being written", living.stdout + living.stderr)
     rig.daemon.process.kill()
     rig.daemon.process.wait()
     refused = subprocess.run(["h5dump", "-H", path], capture_output=True, text=True)
@@ -68,8 +91,98 @@ def killed(checks, rig):
     checks.check("as recorded, to the last bit" in again.stderr, "what was done replays to the last bit", again.stderr)
 
 
+def resumed(checks, rig):
+    """Killed and gone on with: two parts, one campaign."""
+    begin(checks, rig)
+    rig.wait_for(lambda s: len(s["campaign"].get("dwells", [])) >= 2 and s["campaign"]["state"] == "recording", 60)
+    rig.daemon.process.kill()
+    rig.daemon.process.wait()
+    rig.start_daemon()
+    rig.wait_for(lambda s: s["campaign"].get("resume_offer") and s["shaker"].get("running") is False and
+                 s["shaker"].get("state") == 0 and any(c["quality"] == "good" for c in s["sample"]["channels"]), 60)
+    if rig.status()["campaign"]["state"] == "tripped":   # the shaker was left running
+        rig.tool("ack", "trip", "--by", "test")
+    runs = [rig.tool(command, "--by", "test") for command in ("arm", "resume")]
+    status = rig.wait_for_state(("finished", "aborted", "tripped"), 120)
+    checks.equal(r.state_of(status), "finished", "resumed: the campaign finishes")
+    checks.note("".join(run.stderr for run in runs))
+    rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
+    checks.check("the filter takes" in rig.tool("events").stdout, "resumed: the filter takes other noise levels on the way")
+    rig.daemon.end()
+    checks.equal(len(folders(rig)), 1, "resumed: the recording goes on in its folder")
+    folder = folders(rig)[0]
+    names = sorted(os.path.basename(name) for name in glob.glob(folder + "/*.h5"))
+    checks.equal(names, ["campaign-2.h5", "campaign.h5"], "resumed: in a second part")
+    result = rig.result()[1].decode().strip()
+    environment = {**os.environ, "VIBRIG_RECORDINGS": rig.results}
+    for how, arguments in (("replayed by its name", ("replay", "recorded")), ("identified", ("identify", folder)),
+                           ("from frames alone", ("replay", *sorted(glob.glob(folder + "/raw-*"))))):
+        run = subprocess.run([rig.program("vibrig"), *arguments, "--json"], capture_output=True, text=True, env=environment,
+                             cwd=rig.folder)
+        checks.equal(run.stdout.strip(), result, f"resumed: {how}, result.json comes out to the last bit")
+    index = os.path.join(rig.results, "recordings.sqlite3")
+    with sqlite3.connect(f"file:{index}?mode=ro", uri=True) as database:
+        rows = {name: (closed, size, sha) for name, closed, size, sha in
+                database.execute("SELECT name, closed, bytes, sha256 FROM file")}
+    for name in names:
+        with open(os.path.join(folder, name), "rb") as file:
+            data = file.read()
+        checks.equal(rows.get(name), (1, len(data), hashlib.sha256(data).hexdigest()), f"the index has {name} as it is")
+    with open(index, "wb") as file:
+        file.write(b"x" * 8192)
+    for beside in ("-wal", "-shm"):
+        if os.path.exists(index + beside):
+            os.remove(index + beside)
+    run = subprocess.run([rig.program("vibrig"), "compensate", "recorded"], capture_output=True, text=True, env=environment)
+    checks.check(run.stderr.count("made anew from the files of 1 campaigns") == 1 and "D_Fx" in run.stdout,
+                 "a damaged index is made anew, and said so once", run.stderr)
+    os.rename(os.path.join(folder, "campaign.h5"), os.path.join(rig.folder, "aside.h5"))
+    for command in (("replay",), ("identify",), ("report",), ("export", "--to", "csv"), ("compensate",)):
+        run = offline(rig, command[0], folder, *command[1:])
+        checks.check(run.returncode == 2 and "missing campaign.h5 of campaign" in run.stderr,
+                     f"{command[0]}: a missing part is named", run.stderr)
+    os.rename(os.path.join(rig.folder, "aside.h5"), os.path.join(folder, "campaign.h5"))
+    played(checks, rig, folder)
+
+
+def played(checks, rig, folder):
+    """A piece of the log with the restart in it, on a real vcan by canplayer, caught by candump; and read by tshark."""
+    log, piece = os.path.join(rig.folder, "whole.log"), os.path.join(rig.folder, "piece.log")
+    offline(rig, "export", folder, "--to", "candump", "-o", log)
+    with open(log, encoding="ascii") as file:
+        lines = file.read().splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("#"))
+    some = lines[at - 200:at + 200]
+    with open(piece, "w", encoding="ascii") as file:
+        file.write("\n".join(some) + "\n")
+    frames = [line.split()[2] for line in some if line.startswith("(")]
+    script = (f"candump -L -r 4000000 -n {len(frames)} vcan0 & "
+              "until grep -q vcan0 /proc/net/can/rcvlist_all; do sleep 0.1; done; "
+              f"canplayer -t -I {piece} vcan0=vcan0; wait")
+    uml = os.path.join(os.path.dirname(os.path.abspath(__file__)), "run-in-uml")
+    run = subprocess.run([uml, "-t", "60", "--", "sh", "-c", script], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                         timeout=180)
+    caught = [line.split()[2] for line in run.stdout.splitlines() if line.startswith("(")]
+    checks.check(caught == frames and len(frames) == len(some) - 1, "canplayer plays the log, both directions",
+                 f"{len(caught)} of {len(frames)} {run.stderr[-500:]}")
+    plain = os.path.join(rig.folder, "plain.log")
+    offline(rig, "export", folder, "--to", "wireshark", "-o", plain)
+    # Wireshark's own program, for its count, first and last frame.
+    read = subprocess.run(["tshark", "-r", plain, "-T", "fields", "-e", "frame.time_epoch", "-e", "can.id"],
+                          capture_output=True, text=True)
+    rows = [line.split() for line in read.stdout.splitlines()]
+    raw = [line for line in lines if line.startswith("(")]
+    first = [raw[i].split()[0].strip("()") for i in (0, -1)]
+    checks.check(len(rows) == len(raw) and [rows[i][0][:-3] for i in (0, -1)] == first, "Wireshark reads all frames and times",
+                 f"{len(rows)} of {len(raw)} {rows[:1]} {read.stderr[-300:]}")
+    checks.check({"17", "16"} <= {row[1] for row in rows}, "the rig's time and its answers among them")
+
+
 def complete(checks, rig):
     begin(checks, rig)
+    said = rig.tool("events").stdout
+    checks.check("shaker controller S-1: certificate C-77 was due on 2020-01-31" in said and "resolver box" not in said,
+                 "an overdue instrument is told when somebody arms", said)
     status = rig.wait_for_state(("finished",), 120)
     checks.equal(r.state_of(status), "finished", "a campaign finishes")
     status = rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
@@ -105,6 +218,7 @@ def complete(checks, rig):
     anew = offline(rig, "replay", path, "--config", other, "--json")
     checks.check(json.loads(anew.stdout)["nis"] < json.loads(result)["nis"], "other settings give another result")
     exports(checks, rig, folder, path)
+    wrong_input(checks, rig, path)
     report(checks, rig, folder)
 
 
@@ -117,9 +231,23 @@ def exports(checks, rig, folder, path):
                 for a, b in zip(direct["parameters"], from_csv.get("parameters", [{}] * 30)))
     checks.check(close and direct["samples"] == from_csv["samples"], "the CSV identifies as the HDF5 does",
                  exported.stderr)
+    by_row(checks, rig, path)
     offline(rig, "export", folder, "--to", "mat", "-o", "x.mat")
-    with open(os.path.join(rig.folder, "x.mat"), "rb") as file:
-        checks.check(file.read(19) == b"MATLAB 5.0 MAT-file", "a MATLAB file is written")
+    import scipy.io
+    mat = scipy.io.loadmat(os.path.join(rig.folder, "x.mat"))
+    with h5py().File(path, "r") as file:
+        checks.check((mat["force_g"] == file["samples/force_g"][:]).all() and
+                     (mat["sequence"].ravel() == file["samples/sequence"][:]).all() and
+                     (mat["covariance"] == file["dwells/covariance"][-1]).all(), "the MATLAB file holds the same numbers")
+        expected = f"{file['samples/time_ns'][-1]} {file['result'].dtype.itemsize} {file['events/time_ns'].shape[0]}"
+    # Octave stands for MATLAB, which Debian does not have.
+    octave = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval",
+                             "c = load(getenv('RECORDING')); m = load('x.mat'); s = c.samples; "
+                             "assert(s.force_g', m.force_g); assert(double(s.sequence(:)), double(m.sequence(:))); "
+                             "printf('%d %d %d', s.time_ns(end), length(c.result), rows(c.events.text));"],
+                            capture_output=True, text=True, cwd=rig.folder, env={**os.environ, "RECORDING": path})
+    checks.equal(octave.stdout, expected, "Octave opens the HDF5 file and the MATLAB file, with the same numbers")
+    checks.note(octave.stderr[-1000:])
     offline(rig, "export", folder, "--to", "candump", "-o", "x.log")
     log = os.path.join(rig.folder, "x.log")
     with open(log, encoding="ascii") as file:
@@ -132,11 +260,69 @@ def exports(checks, rig, folder, path):
     checks.equal(frames, len(lines), "can-utils read every line of it")
 
 
+def by_row(checks, rig, path):
+    """Every row of the CSV against the sample it comes from, and every good sample of a dwell against a row."""
+    with h5py().File(path, "r") as file:
+        samples = {name: file["samples/" + name][:] for name in ("time_ns", "angle_rad", "force_g", "quality")}
+        orders = {name: file["orders/" + name][:] for name in ("from_ns", "to_ns", "run", "position", "zero_g", "cancel")}
+    with open(os.path.join(rig.folder, "x.csv"), encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    at = worst = 0
+    for i in range(len(orders["run"])):
+        inside = (samples["time_ns"] >= orders["from_ns"][i]) & (samples["time_ns"] < orders["to_ns"][i]) & \
+            (samples["quality"][:, :6] == 0).all(axis=1)
+        for k in inside.nonzero()[0]:
+            row = rows[at] if at < len(rows) else {}
+            at += 1
+            expected = [(samples["time_ns"][k] - orders["from_ns"][i]) * 1e-9, orders["run"][i], orders["position"][i],
+                        *(samples["angle_rad"][k] * 180 / math.pi), *(samples["force_g"][k] - orders["zero_g"][i])]
+            found = [float(row.get(name, "nan")) for name in ("time_s", "run", "position", "alpha_deg", "beta_deg", "gamma_deg",
+                                                              "ax_g", "ay_g", "az_g")]
+            worst = max(worst, *(abs(a - b) / max(1, abs(b)) for a, b in zip(found, expected)))
+    checks.check(at == len(rows) > 0 and worst < 1e-12, "the CSV has every sample, row by row", f"{at} {len(rows)} {worst}")
+
+
+def wrong_input(checks, rig, path):
+    """One clear message and exit 2, whatever the file is."""
+    with open(path, "rb") as file:
+        whole = file.read()
+    broken = {"empty.h5": b"", "foreign.h5": b"time_s,run\n", "truncated.h5": whole[:len(whole) // 2],
+              "head.h5": whole[:4096], "zeros.h5": whole[:8] + bytes(len(whole) - 8)}
+    for name, data in broken.items():
+        with open(os.path.join(rig.folder, name), "wb") as file:
+            file.write(data)
+        for command in (("replay", name), ("export", name, "--to", "csv", "-o", "never.csv"), ("report", name, "-o", "never.html"),
+                        ("compensate", name), ("recover", name), ("identify", name)):
+            run = offline(rig, *command)
+            lines = run.stderr.strip().splitlines()
+            if run.returncode != 2 or len(lines) != 1 or name not in lines[0]:
+                checks.check(False, f"{command[0]} {name}: one clear message", f"status {run.returncode} {run.stderr[-600:]}")
+                return
+    logs = {"empty.log": "", "text.log": "hello\n", "nan.csv": "run,position\n1,nan\n"}
+    for name, text in logs.items():
+        with open(os.path.join(rig.folder, name), "w", encoding="ascii") as file:
+            file.write(text)
+    dwells = os.path.join(os.path.dirname(path), "dwells.csv")
+    for arguments in (("empty.log", "--dwells", dwells), ("text.log", "--dwells", dwells), ("empty.log", "--dwells", "nan.csv"),
+                      ("empty.log",)):
+        run = offline(rig, "replay", *arguments)
+        if run.returncode != 2 or len(run.stderr.strip().splitlines()) != 1:
+            checks.check(False, f"replay {arguments}: one clear message", f"status {run.returncode} {run.stderr[-600:]}")
+            return
+    checks.check(True, "empty, truncated and foreign files: one clear message each")
+
+
 def report(checks, rig, folder):
     made = offline(rig, "report", folder, "-o", "x.html", "--compare", folder)
     checks.equal(made.returncode, 0, "a report is written", )
     with open(os.path.join(rig.folder, "x.html"), encoding="utf-8") as file:
         page = file.read()
+    with open(os.path.join(folder, "campaign.h5"), "rb") as file:
+        digest = hashlib.sha256(file.read()).hexdigest()
+    for what, words in (("unit under test", "GP-3, serial number 0017"), ("overdue instrument", "overdue at the time"),
+                        ("hash of the recording", digest), ("plan", "has rank 6 of 10"), ("replay", "as recorded, to the last bit"),
+                        ("comparison", "Repeatability")):
+        checks.check(words in page, f"the report has its {what}")
     foreign = re.findall(r"(?:src|href)=\"(?!#)[^\"]*\"|https?://(?!www.w3.org/2000/svg)\S+", page)
     checks.equal(foreign, [], "it needs nothing else")
     table = json.loads(offline(rig, "compensate", folder, "--json", "--attitude", "0,0,0").stdout)
@@ -152,12 +338,17 @@ def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
     begun = time.monotonic()
-    for part in (killed, complete):
+    for part in (killed, resumed, complete):
         with tempfile.TemporaryDirectory() as folder:
             rig = r.Rig(programs, "seqpacket", "rig", folder)
             try:
                 rig.start_plant("--seed", "1", "--speed", "max")
-                rig.configure(CAMPAIGN, record={"segment_s": 60.0})
+                # The noise monitor contradicts 10 arcsec after eight dwells: the filter then takes other levels.
+                levels = {"table_g": [9.0, 7.0, 5.0]} if part is resumed else {}
+                rig.configure({**CAMPAIGN, **levels}, record={"segment_s": 60.0},
+                              **({"noise": {"resolver_arcsec": 10.0}} if part is resumed else {}))
+                with open(rig.configuration, "a", encoding="utf-8") as file:
+                    file.write(PAPERWORK)
                 part(checks, rig)
             finally:
                 rig.stop()

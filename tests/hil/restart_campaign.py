@@ -4,8 +4,10 @@ rig's clock. What was done stays done, the shaker never starts by itself, and a 
 
 usage: restart_campaign.py PROGRAMS
 """
+import json
 import os
 import signal
+import socket
 import sqlite3
 import sys
 import tempfile
@@ -81,7 +83,7 @@ def clear(rig):
 def killed_and_resumed(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:
-        rig.start_plant("--seed", "3")
+        rig.start_plant("--seed", "3", "--speed", "20")
         rig.configure(CAMPAIGN)
         rig.start_daemon()
         rig.wait_for(measuring, 60)
@@ -133,11 +135,65 @@ def killed_and_resumed(checks, programs, folder):
         rig.stop()
 
 
+def noise_in_force(status):
+    return [gyro["in_force_deg_per_rt_h"] for gyro in status["noise"]["gyros"]]
+
+
+def estimates(rig):
+    """The result so far: 30 coefficients and their covariance, as many digits as there are."""
+    with socket.socket(socket.AF_UNIX) as link:
+        link.settimeout(10)
+        link.connect(rig.socket)
+        link.sendall(b"GET /api/v1/parameters HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n\r\n")
+        answer = b""
+        while more := link.recv(65536):
+            answer += more
+    return json.loads(answer.partition(b"\r\n\r\n")[2])
+
+
+def noise_goes_on(checks, programs, folder):
+    """Gyros eight times as noisy as the filter was told: its N is changed between positions. Killed after that, it goes
+    on with what filter and noise monitor had learnt, as if nothing had happened."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    try:
+        rig.start_plant("--seed", "4", "--speed", "60", "--fault", "gyro-noise=8@0")
+        rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 15 * k] for k in range(8)], "dwell_s": 30.0})
+        rig.start_daemon()
+        rig.wait_for(measuring, 60)
+        configured = noise_in_force(rig.status())
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "Ada")
+        changed = rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 10 and noise_in_force(s) != configured, 120)
+        rig.tool("pause", "--by", "Ada")
+        before = rig.wait_for_state(("paused",), 60)
+        checks.check(changed is not None and noise_in_force(before) != configured,
+                     "noisy gyros: the monitor changes the filter's N (seed 4)", rig.logs())
+        learnt = estimates(rig)
+        time.sleep(1)
+        kill(rig)
+        done = positions_done(rig)
+        restart(checks, rig, "noisy gyros, killed")
+        clear(rig)
+        rig.tool("arm", "--by", "Grace")
+        resumed = rig.tool("resume", "--by", "Grace")
+        checks.check(resumed.returncode == 0 and f"{done} of 16" in resumed.stdout,
+                     "noisy gyros: it resumes, no cold start", resumed.stderr + events(rig))
+        after = rig.wait_for(lambda s: noise_in_force(s) != configured, 10)
+        checks.equal(noise_in_force(after), noise_in_force(before), "noisy gyros: with the N that it had come to")
+        checks.equal(estimates(rig), learnt, "noisy gyros: with the estimates that it had come to, to the last digit")
+        last = rig.wait_for_state(("finished", "aborted", "tripped"), 120)
+        checks.check(last is not None and last["campaign"]["state"] == "finished", "noisy gyros: the campaign finishes",
+                     r.state_of(last) + rig.logs())
+        checks.equal(len(last["campaign"]["dwells"]), 16, "noisy gyros: with all its positions")
+    finally:
+        rig.stop()
+
+
 def not_used(checks, programs, folder):
     """Damage to the journal: a cold start, and said so."""
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:
-        rig.start_plant("--seed", "3")
+        rig.start_plant("--seed", "3", "--speed", "20")
         rig.configure({**CAMPAIGN, "dwell_s": 10.0})
         rig.start_daemon()
         rig.wait_for(measuring, 60)
@@ -153,7 +209,7 @@ def not_used(checks, programs, folder):
         newer = whole[:8] + b"\x63" + whole[9:]
         for what, change, says in (("corrupt", bytes(blob), "corrupt: the checksum does not match"),
                                    ("truncated", whole[:-1000], "corrupt: the checksum does not match"),
-                                   ("newer", newer, "version 99, newer than 1")):
+                                   ("newer", newer, "version 99, newer than ")):
             with sqlite3.connect(journal(rig)) as database:
                 database.execute("UPDATE dwell SET checkpoint = ?", (change,))
             database.close()
@@ -185,7 +241,7 @@ def not_used(checks, programs, folder):
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (killed_and_resumed, not_used):
+    for part in (killed_and_resumed, noise_goes_on, not_used):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

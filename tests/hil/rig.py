@@ -65,6 +65,9 @@ class Checks:
             except (OSError, xml.etree.ElementTree.ParseError) as error:
                 self.check(False, f"{os.path.basename(program)} runs to its end", f"{error}\n{run.stdout}{run.stderr}")
                 return
+        for line in run.stdout.splitlines():
+            if line.startswith("# "):
+                self.note(line[2:])
         for case in cases:
             name = f"{case.get('classname')}.{case.get('name')}"
             skipped = case.find("skipped")
@@ -152,6 +155,20 @@ class Rig:
             everything.setdefault(table, {}).update(keys)
         with open(self.configuration, "w", encoding="utf-8") as file:
             file.write(toml(everything))
+
+    def truth_file(self, changes):
+        """The rig's own truth with some keys changed."""
+        path = os.path.join(self.folder, "truth.json")
+        subprocess.run([self.program("vibrig-plant"), "run", "--can", "seqpacket:" + os.path.join(self.folder, "t"),
+                        "--modbus", "tcp:127.0.0.1:0", "--clock", "real", "--duration", "0", "--write-truth", path],
+                       check=True, capture_output=True, timeout=30)
+        with open(path, encoding="utf-8") as file:
+            truth = json.load(file)
+        for section, keys in changes.items():
+            truth[section].update(keys)
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(truth, file)
+        return path
 
     def start_plant(self, *more):
         bus = "seqpacket:" + self.path if self.bus == "seqpacket" else self.bus

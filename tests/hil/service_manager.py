@@ -62,10 +62,10 @@ def start_daemon(rig, manager):
                          {"NOTIFY_SOCKET": manager.path, "WATCHDOG_USEC": "2000000"})
 
 
-def shaker_state(rig):
-    """State register, read past the daemon."""
+def shaker_state(rig, address=0):
+    """State register, or another input register, read past the daemon."""
     with socket.create_connection(("127.0.0.1", rig.modbus_port), timeout=5) as link:
-        link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, 0, 1))
+        link.sendall(struct.pack(">HHHBBHH", 1, 0, 6, 1, 4, address, 1))
         reply = b""
         while len(reply) < 11:
             more = link.recv(11 - len(reply))

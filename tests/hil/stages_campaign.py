@@ -6,7 +6,6 @@ usage: stages_campaign.py PROGRAMS
 import json
 import math
 import os
-import subprocess
 import sys
 import tempfile
 
@@ -29,7 +28,7 @@ class Run:
         with tempfile.TemporaryDirectory() as folder:
             rig = r.Rig(programs, "seqpacket", "rig", folder)
             try:
-                rig.start_plant("--seed", "3", "--truth", self.truth_file(programs, folder, truth or {}))
+                rig.start_plant("--seed", "3", "--truth", rig.truth_file(truth or {}))
                 rig.configure(campaign, **tables)
                 rig.start_daemon()
                 rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
@@ -40,21 +39,6 @@ class Run:
                 self.plant = rig.plant.text()
             finally:
                 rig.stop()
-
-    @staticmethod
-    def truth_file(programs, folder, changes):
-        """The rig's own truth with some keys changed."""
-        path = os.path.join(folder, "truth.json")
-        subprocess.run([os.path.join(programs, "vibrig-plant"), "run", "--can", "seqpacket:" + os.path.join(folder, "t"),
-                        "--modbus", "tcp:127.0.0.1:0", "--clock", "real", "--duration", "0", "--write-truth", path],
-                       check=True, capture_output=True, timeout=30)
-        with open(path, encoding="utf-8") as file:
-            truth = json.load(file)
-        for section, keys in changes.items():
-            truth[section].update(keys)
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump(truth, file)
-        return path
 
     def ended(self, checks, state, text):
         return checks.check(self.last is not None and self.last["campaign"]["state"] == state, text,
@@ -87,6 +71,9 @@ def levelling(checks, programs):
         checks.check(level["verdict"] == "settled" and level["done"] == 2, "the status says so", level)
         # Ts + W + 1/sigma + 5 %, sigma = 5.25 / Ts
         checks.check(level["time_s"] <= 1.05 * (100 + 10 + 100 / 5.25), "within Ts + W + 1/sigma + 5 %", level["time_s"])
+        drift = run.last["noise"].get("level", {})
+        checks.check(drift.get("samples") == 2 and drift["mean_square"] < 5,
+                     "the drift that each levelling found has gone to the noise monitor", drift)
         checks.check(max(abs(t) for t in level["tilt_arcmin"]) <= level["tolerance_arcmin"], "within the tolerance", level)
     run = Run(programs, LEVELLING, {"platform": {"slew_error_deg": 0.2, "torquer_scale": [-1, -1, -1]}})
     failed_once(checks, run, ["cannot settle", "sign or axes of the torquers"], "torquers the wrong way round")
@@ -105,6 +92,26 @@ def zero_failures(checks, programs):
     failed_once(checks, run, ["zeroing"], "gyro increments of the wrong sign")
     run = Run(programs, zeroing, {"accelerometer": {"zero_g": [0.02, 0, 0]}})
     failed_once(checks, run, ["outside the small-error range"], "a zero of 20 mg")
+
+
+def both_ways(checks, programs):
+    """Levelled first, then z up and z down: zero and scale of z apart."""
+    zero_g, scale = [0.004, -0.003, 0.002], 2e-4
+    matrix = [[1 / (1 + scale) if i == k else 0 for k in range(3)] for i in range(3)]  # raw to platform axes
+    run = Run(programs, {**LEVELLING, "zeroing": True, "positions_deg": [[0, 0, 0]]},
+              {"platform": {"slew_error_deg": 0.2}, "accelerometer": {"zero_g": zero_g, "matrix": matrix}},
+              zeroing={"both_ways": True, "scale_factor": 1e-3})
+    if not run.ended(checks, "finished", "a campaign with both stages, z up and z down, finishes"):
+        return
+    story = [word for line in run.text.splitlines() for word in ("level", "zeros") if word + " after" in line]
+    checks.equal(story, ["level", "level", "zeros", "level", "level", "level", "zeros"],
+                 "each run of the zeros is levelled first, before and after the position")
+    zeros = run.last["campaign"]["zeros"]
+    off = [abs(z - 1e3 * b) / s for z, b, s in zip(zeros["zero_mg"], zero_g, zeros["sigma_mg"])]
+    checks.check(max(off) <= 5 and max(zeros["sigma_mg"]) <= 0.02, "the zeros come out, z without its scale", zeros)
+    checks.check(abs(zeros["scale_z_ppm"] - 1e6 * scale) <= 5 * zeros["scale_z_sigma_ppm"] <= 100,
+                 "the scale of z comes out beside it", zeros)
+    checks.check(zeros["repeated_at_end"] and not zeros.get("mark"), "nothing has moved at the end", zeros)
 
 
 def vertical(position):
@@ -156,16 +163,22 @@ def predicted_bias(gyro, truth, dwells, zero_g):
     return [x - d for x, d in zip(solve(normal, right), truth)]
 
 
-def effect(checks, programs, truth):
+def effect(checks, programs, coefficients):
     """5 mg zeros: what they do to the coefficients, and what is left of it with zeroing."""
+    # The bias is in proportion to the coefficients: large ones, so that it stands out of the noise of short dwells,
+    # and every sample counts, so that the filter is the least squares of the prediction.
+    truth = [[d * (30 if k >= 4 else 1) for k, d in enumerate(gyro)] for gyro in coefficients]
+    large = {f"D_{name}{'xyz'[gyro]}": truth[gyro][k] for gyro in range(3) for k, name in enumerate(NAMES)}
     campaign = {"name": "effect", "positions_deg": TABLE1, "table_g": [9.0, 7.0], "dwell_s": 20.0}
     zero_g = [0.005, 0.005, 0.005]
-    # Little noise, so that 1 % of it does not hide 1 % of the coefficients.
     noise = {"resolver_arcsec": 0.3, "gyro_random_walk_deg_per_rt_h": 1e-5, "accelerometer_g": 1e-4}
-    zeros = {"noise": noise, "accelerometer": {"zero_g": zero_g}}
-    exact = Run(programs, campaign, {"noise": noise}, noise=noise)
-    wrong = Run(programs, campaign, zeros, noise=noise)
-    right = Run(programs, {**campaign, "zeroing": True}, zeros, noise=noise)
+    ideal = {"noise": noise, "coefficients": large}
+    zeros = {**ideal, "accelerometer": {"zero_g": zero_g}}
+    tables = {"noise": noise, "estimator": {"gate_nis": 1e6},
+              "estimator.prior_sigma": {"bias": 10.0, "linear": 10.0, "quadratic": 100.0}}
+    exact = Run(programs, campaign, ideal, **tables)
+    wrong = Run(programs, campaign, zeros, **tables)
+    right = Run(programs, {**campaign, "zeroing": True}, zeros, **tables)
     if not all([exact.ended(checks, "finished", "a campaign with exact accelerometers finishes"),
                 wrong.ended(checks, "finished", "one with 5 mg zeros and no zeroing finishes"),
                 right.ended(checks, "finished", "one with 5 mg zeros and zeroing finishes")]):
@@ -188,7 +201,7 @@ def effect(checks, programs, truth):
             moved = value[wrong][name] - value[exact][name]
             largest = max(largest, abs(bias[k]))
             worst = max(worst, abs(moved - bias[k]))
-    checks.check(largest > 1e-4 and worst <= 0.1 * largest,
+    checks.check(largest > 1e-2 and worst <= 0.1 * largest,
                  "the quadratic coefficients are biased as predicted, within 10 % of the largest bias",
                  f"largest {largest:.3g}, off by {worst:.3g} deg/h/g^2")
 
@@ -203,7 +216,7 @@ def effect(checks, programs, truth):
 def coefficients(programs):
     """Of the simulated rig, by gyro."""
     with tempfile.TemporaryDirectory() as folder:
-        with open(Run.truth_file(programs, folder, {}), encoding="utf-8") as file:
+        with open(r.Rig(programs, "seqpacket", "rig", folder).truth_file({}), encoding="utf-8") as file:
             truth = json.load(file)["coefficients"]
     return [[truth[f"D_{name}{axis}"] for name in NAMES] for axis in "xyz"]
 
@@ -213,6 +226,7 @@ def main():
     checks = r.Checks()
     levelling(checks, programs)
     zero_failures(checks, programs)
+    both_ways(checks, programs)
     effect(checks, programs, coefficients(programs))
     return checks.end()
 

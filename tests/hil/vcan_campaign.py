@@ -49,6 +49,8 @@ def garbage(rng, rounds):
     for generator in generators:
         generator.terminate()
         generator.wait()
+    # What looked like a command of the torquers was one, and a dwell needs free drift: taken back.
+    send("201#" + "00" * 8)
 
 
 def counts_of(candump_log):

@@ -7,7 +7,7 @@
 namespace vibrig::plant {
 namespace {
 
-enum class Value : std::uint8_t { none, rate, milliseconds, degrees, seconds, word };
+enum class Value : std::uint8_t { none, rate, milliseconds, degrees, seconds, factor, word };
 
 struct Description {
     FaultKind kind;
@@ -17,7 +17,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 15> kDescriptions{{
+constexpr std::array<Description, 16> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -46,6 +46,8 @@ constexpr std::array<Description, 15> kDescriptions{{
      "platform-fault        fault bit of the platform"},
     {FaultKind::spike, "spike", Value::degrees, true,
      "spike[:CHANNEL]=DEG,RATE  angles jump for one sample"},
+    {FaultKind::gyro_noise, "gyro-noise", Value::factor, false,
+     "gyro-noise=FACTOR     the gyros' random walk is FACTOR times as large"},
 }};
 
 constexpr std::array<std::string_view, kChannels> kChannelNames{"outer", "inner", "azimuth",
@@ -108,6 +110,9 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
         case Value::seconds:
             fault.to_s = fault.from_s + number(spec, first, "seconds from 0 to 1e9", 0, 1e9);
             break;
+        case Value::factor:
+            fault.value = number(spec, first, "a factor from 0 to 1000", 0, 1000);
+            break;
         case Value::word:
             if (first != "exception" && first != "value") {
                 fail(spec, "found \"" + std::string(first) + "\", expected exception or value");
@@ -164,7 +169,7 @@ Fault parse_fault(std::string_view spec, double now_s) {
     if (value) {
         read_value(spec, d, *value, fault);
     } else if (d.value == Value::rate || d.value == Value::milliseconds ||
-               d.value == Value::degrees) {
+               d.value == Value::degrees || d.value == Value::factor) {
         fail(spec, "no value, expected " + std::string(d.help));
     }
     return fault;

@@ -30,7 +30,8 @@ enum class FaultKind : std::uint8_t {
     estop,
     loop_open,
     platform_fault,
-    spike
+    spike,
+    gyro_noise
 };
 
 /// Channels of a sample: outer, inner, azimuth, then the accelerometers x, y, z.

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kTick = 1e-6 * kTickUs;
 constexpr double kDegPerRad = 180 / std::numbers::pi;
+constexpr double kNowhereDeg = 0.02;  // two counts of the command
 
 }  // namespace
 
@@ -40,8 +41,16 @@ Vec3 Rig::encoder_deg() const noexcept {
 
 void Rig::slew_to(const Vec3& encoder_deg, GimbalMode mode) {
     // A command said again is the same slew.
-    if (encoder_deg != commanded_deg_ || gimbals_.mode() == GimbalMode::free_drift) {
-        for (double& error : slew_error_deg_) error = truth_.slew_error_deg * slew_noise_.normal();
+    const bool caged = gimbals_.mode() != GimbalMode::free_drift;
+    if (encoder_deg != commanded_deg_ || !caged) {
+        const Vec3 here = this->encoder_deg();
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double error = truth_.slew_error_deg * slew_noise_.normal();
+            const double gap = std::abs(std::remainder(encoder_deg[i] - here[i], 360.0));
+            // An axis that need not move ends where it is.
+            if (caged && encoder_deg[i] == commanded_deg_[i]) continue;
+            slew_error_deg_[i] = gap > kNowhereDeg ? error : 0;
+        }
     }
     commanded_deg_ = encoder_deg;
     gimbals_.slew_to(encoder_deg + slew_error_deg_, mode);
@@ -84,7 +93,8 @@ void Rig::vibrate() {
 void Rig::move() {
     // White rate noise: over a tick its integral is a random walk of N deg per root hour, 60 N
     // arcsec per root second.
-    const double rate_sigma = 60 * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(kTick);
+    const double rate_sigma =
+        60 * gyro_noise_times_ * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(kTick);
     const Vec3 noise{gyro_noise_.normal(), gyro_noise_.normal(), gyro_noise_.normal()};
     if (gimbals_.mode() == GimbalMode::free_drift) {
         Vec3 extra = rate_sigma * noise;

@@ -23,6 +23,8 @@ class Rig {
     void slew_to(const Vec3& encoder_deg, GimbalMode mode = GimbalMode::slew);
     void release() noexcept { gimbals_.release(); }
     void torque(const Vec3& deg_per_h) noexcept { torque_ = deg_per_h; }
+    /// The random walk of the gyros from now on, times that of the truth.
+    void gyro_noise_times(double factor) noexcept { gyro_noise_times_ = factor; }
     [[nodiscard]] ShakerController& shaker() noexcept { return shaker_; }
     [[nodiscard]] const ShakerController& shaker() const noexcept { return shaker_; }
 
@@ -62,6 +64,7 @@ class Rig {
     Sensors sensors_;
     Increments increments_;
     Random gyro_noise_;
+    double gyro_noise_times_ = 1;
     Random slew_noise_;
     Vec3 torque_{};
     Vec3 commanded_deg_{};  ///< of the last slew, and its error

@@ -45,6 +45,8 @@ void Simulation::run() {
             return;
         if (tick > 0) {
             const std::scoped_lock lock(shared_.mutex);
+            const Fault* noise = shared_.faults.active(FaultKind::gyro_noise, shared_.now_s());
+            shared_.rig.gyro_noise_times(noise == nullptr ? 1 : noise->value);
             shared_.rig.advance();
         }
         make_tick();

@@ -69,16 +69,14 @@ struct CampaignTest : testing::Test {
                                 complete = c;
                             },
                             [this](Severity, const std::string& text) { events.push_back(text); },
-                            [this](const std::array<double, 3>& here, double) {
-                                asked_from.push_back(here);
-                                return asked_from.size() <= stops_to_choose.size()
-                                           ? Next{true, stops_to_choose[asked_from.size() - 1], 1,
-                                                  "more"}
-                                           : Next{false, {}, 0, "every target is met"};
+                            [this](const std::array<double, 3>& here, double elapsed_s) {
+                                return think(here, elapsed_s);
                             },
                             {},
-                            [this](const estimator::DwellInfo&, const estimator::DwellSummary&) {
+                            [this](const estimator::DwellInfo&, const estimator::DwellSummary&,
+                                   const StopDone& stop) {
                                 ++positions_done;
+                                stops_done.push_back(stop);
                             },
                             [this] { return gate; },
                             {}});
@@ -93,6 +91,18 @@ struct CampaignTest : testing::Test {
         platform.temperature_c = 40;
         shaker.now.valid = true;
         make();
+    }
+
+    std::optional<Next> think(const std::array<double, 3>& here, double elapsed_s) {
+        if (thinking_steps > 0) {
+            --thinking_steps;
+            return {};
+        }
+        asked_from.push_back(here);
+        elapsed.push_back(elapsed_s);
+        if (asked_from.size() > stops_to_choose.size())
+            return Next{false, {}, 0, "every target is met"};
+        return Next{true, stops_to_choose[asked_from.size() - 1], 1, "more"};
     }
 
     CommandReply command(Kind kind) { return campaign->command({kind, "Ada", ""}, now); }
@@ -136,6 +146,9 @@ struct CampaignTest : testing::Test {
     std::size_t flagged_order = 0;
     std::vector<Stop> stops_to_choose;
     std::vector<std::array<double, 3>> asked_from;
+    std::vector<double> elapsed;
+    std::vector<StopDone> stops_done;
+    int thinking_steps = 0;
 
     void run_for(double seconds) {
         for (int i = 0; i < static_cast<int>(seconds * 10); ++i) run_rig();
@@ -258,6 +271,18 @@ TEST_F(CampaignTest, ATripLatchesUntilAcknowledged) {
     EXPECT_TRUE(command(Kind::arm).accepted);
 }
 
+TEST_F(CampaignTest, AFaultThatTheControllerLatchedMeanwhileIsAcknowledgedByAStop) {
+    EXPECT_FALSE(command(Kind::acknowledge).accepted);
+    shaker.now.fault = 1;
+    shaker.now.measured_g = 2;
+    EXPECT_FALSE(command(Kind::arm).accepted);
+    EXPECT_FALSE(command(Kind::acknowledge).accepted);
+    shaker.now.measured_g = 0;
+    EXPECT_TRUE(command(Kind::acknowledge).accepted);
+    EXPECT_EQ(shaker.stops, 1);
+    EXPECT_EQ(status().state, CampaignState::idle);
+}
+
 TEST_F(CampaignTest, StopsWhenTheMeasuredAmplitudeLeavesTheCommand) {
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);
@@ -344,12 +369,74 @@ TEST_F(CampaignTest, AnAdaptiveCampaignRepeatsFlaggedDwellsAndEndsWhenToldTo) {
     EXPECT_NE(std::ranges::find(events, "flagged dwell: the position is repeated"), events.end());
 }
 
-TEST_F(CampaignTest, WhatCannotIdentifyIsNotArmed) {
-    settings.refusal = "rank 9 of 10";
+TEST_F(CampaignTest, AnAdaptiveCampaignWaitsAtRestWhileItsPlanIsThoughtOver) {
+    settings.adaptive = true;
+    stops_to_choose = {{{0, 0, 45}, 9}};
+    thinking_steps = 50;
     make();
-    const auto reply = command(Kind::arm);
-    EXPECT_FALSE(reply.accepted);
-    EXPECT_EQ(reply.message, "rank 9 of 10");
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    // WHEN it is thought over THEN the control thread goes on, and nothing moves
+    ASSERT_TRUE(run_until(CampaignState::resting, 20));
+    for (int i = 0; i < 20; ++i) {
+        run_rig();
+        EXPECT_EQ(status().state, CampaignState::resting);
+        EXPECT_TRUE(shaker.now.at_rest());
+        EXPECT_TRUE(port.frames.empty());
+    }
+    // WHEN it is known THEN it is done
+    ASSERT_TRUE(run_until(CampaignState::finished, 100));
+    EXPECT_EQ(orders.size(), 1U);
+    EXPECT_EQ(thinking_steps, 0);
+}
+
+TEST_F(CampaignTest, AnAdaptiveCampaignGoesOnAfterARestartWithItsRepeatsAndItsTime) {
+    // GIVEN an adaptive campaign of which three dwells are done, the last two flagged
+    settings.adaptive = true;
+    stops_to_choose = {{{0, 0, 45}, 9}, {{0, 0, 90}, 0}};
+    make();
+    std::vector<estimator::DwellSummary> summaries(3);
+    std::vector<StopDone> stops{
+        {{0, 0, 30}, 9, 0, 100}, {{90, 0, 0}, 0, 0, 210}, {{90, 0, 0}, 0, 1, 320}};
+    const std::array<int, 3> run{1, 2, 2};
+    for (std::size_t i = 0; i < 3; ++i) {
+        summaries[i].run = run[i];
+        summaries[i].position = static_cast<int>(i) + 1;
+        summaries[i].flagged = i > 0;
+    }
+    EXPECT_FALSE(campaign->offer(summaries)) << "what was chosen is not known";
+    ASSERT_TRUE(campaign->offer(summaries, stops));
+    EXPECT_EQ(status().resume_offer, "3 positions done");
+    // WHEN it is resumed
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    flagged_order = 1;
+    ASSERT_TRUE(run_until(CampaignState::finished, 400));
+    // THEN the flagged position is repeated once more, and only once: two repeats are the most
+    ASSERT_EQ(orders.size(), 3U);
+    ASSERT_EQ(stops_done.size(), 3U);
+    EXPECT_EQ(stops_done[0].position_deg, stops[2].position_deg);
+    EXPECT_EQ(stops_done[0].table_g, 0);
+    EXPECT_EQ(stops_done[0].repeats, 2);
+    EXPECT_EQ(orders[0].dwell.run, 2);
+    EXPECT_EQ(orders[0].dwell.position, 4);
+    // AND its time goes on from the 320 s of the life before
+    ASSERT_EQ(elapsed.size(), 3U);
+    EXPECT_GT(elapsed[0], 320);
+    EXPECT_LT(elapsed[0], 400);
+    EXPECT_GT(stops_done[0].used_s, 320);
+    EXPECT_EQ(asked_from[0], stops[2].position_deg);
+    EXPECT_EQ(stops_done[1].repeats, 0);
+    EXPECT_EQ(status().dwells.size(), 6U);
+    // AND a new campaign begins from nothing
+    asked_from.clear();
+    elapsed.clear();
+    stops_to_choose.clear();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::aborted, 60));
+    EXPECT_LT(elapsed.at(0), 30);
+    EXPECT_EQ(status().reason, "nothing to do");
 }
 
 /// Positions done, two of each run.

@@ -55,12 +55,14 @@ struct StagesTest : testing::Test, drivers::CanPort {
     std::unique_ptr<rt::StageFeed> feed;
     std::unique_ptr<Campaign> campaign;
     std::vector<rt::DwellOrder> orders;
+    std::vector<LevelDrift> drifts;
     std::vector<std::string> events;
     std::size_t reported = 0;
     rt::Guard guard = rt::Guard::idle;
     Time now = kSecond;
 
     std::array<double, 3> up{0.005, 1, -0.003}, torque{}, drift{10, 3, -6};  // deg/h
+    std::array<double, 3> encoder_deg{}, target_deg{};                       // last commanded
     double torquer_sign = 1;
     bool silent = false, says_torquing = false, slews = false;
     std::uint8_t torque_echo = 0;
@@ -81,6 +83,9 @@ struct StagesTest : testing::Test, drivers::CanPort {
             torque_echo = static_cast<std::uint8_t>(signal(dbc, "TorqueCommand", "Counter", frame));
         } else {
             platform.gimbal_command_echo = frame.data[7];
+            for (std::size_t i = 0; i < 3; ++i)
+                target_deg[i] =
+                    signal(dbc, "GimbalCommand", std::array{"Outer", "Inner", "Azimuth"}[i], frame);
             slews = (frame.data[6] & 0x0f) != 0;
             slewed_s = 0;
         }
@@ -111,6 +116,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
                     [this](Severity, const std::string& text) { events.push_back(text); }};
         ports.torquer = &torquer;
         ports.feed = feed.get();
+        ports.levelled = [this](const LevelDrift& found) { drifts.push_back(found); };
         campaign = std::make_unique<Campaign>(settings, ports);
         ASSERT_TRUE(campaign->command({Kind::arm, "Ada", ""}, now).accepted);
         ASSERT_TRUE(campaign->command({Kind::start, "Ada", ""}, now).accepted);
@@ -144,6 +150,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
         drivers::Sample sample;
         sample.time = now;
         sample.force = up;
+        for (std::size_t i = 0; i < 3; ++i) sample.angle[i] = kRadPerDeg * encoder_deg[i];
         if (!silent) feed->take(sample);
         shaker.obey(now);
         if (orders.size() > reported && !orders.back().cancel && now > orders.back().to) {
@@ -187,6 +194,14 @@ TEST_F(StagesTest, LevelsBeforeEachPositionAndLetsThePlatformDriftFreelyDuringTh
     // AND the drift was found: first and second channel lie across the vertical
     const auto found = status().levelling.drift_deg_h;
     EXPECT_NEAR(std::hypot(found[0], found[1]), std::hypot(drift[0], drift[2]), 0.2);
+    // AND told as what the platform does along either direction, within what it says of itself
+    ASSERT_EQ(drifts.size(), 2U);
+    EXPECT_EQ(drifts[1].position, 2);
+    EXPECT_LT(drifts[1].sigma_deg_h, 0.5);
+    for (std::size_t a = 0; a < 2; ++a) {
+        EXPECT_NEAR(drifts[1].rate_deg_h[a], dot(drifts[1].direction[a], drift),
+                    4 * drifts[1].sigma_deg_h);
+    }
 }
 
 TEST_F(StagesTest, GoesOverToQuieterGainsOnceSettledAndOnlyThenBeginsTheDwell) {
@@ -250,11 +265,41 @@ TEST_F(StagesTest, AbortsWithOneClearReasonWhenAStageCannotGoOn) {
     EXPECT_THAT(status().reason, HasSubstr("torqued during a dwell"));
     // A zeroing without increments
     says_torquing = false;
+    settings.levelling = false;
     settings.zeroing = true;
     begin();
     ASSERT_TRUE(run_until(CampaignState::zeroing, 60));
     ASSERT_TRUE(run_until(CampaignState::aborted, 60));
     EXPECT_THAT(status().reason, HasSubstr("no increments"));
+}
+
+TEST_F(StagesTest, LevelsBeforeTheZeroingAndThenTurnsTheAzimuthOnly) {
+    // GIVEN platform z nearly up, the outer gimbal 0.3 deg beside its target
+    settings.levelling = settings.zeroing = true;
+    up = {0.004, -0.003, 1};
+    encoder_deg = {90.3, -0.2, 0};
+    begin();
+    // WHEN the campaign begins with the zeros
+    ASSERT_TRUE(run_until(CampaignState::zeroing, 60));
+    EXPECT_EQ(target_deg[0], 90);
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    ASSERT_TRUE(run_until(CampaignState::zeroing, 300)) << testing::PrintToString(events);
+    // THEN the platform is level and let go before the first slew of the azimuth
+    EXPECT_LT(std::hypot(up[0], up[1]), 2 * 0.2 / 60 * kRadPerDeg);
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    EXPECT_EQ(status().levelling.done, 1U);
+    // AND outer and inner gimbal are held where that was
+    for (int i = 0; i < 120; ++i) tick();
+    EXPECT_THAT(target_deg, testing::ElementsAre(testing::DoubleNear(90.3, 0.005),
+                                                 testing::DoubleNear(-0.2, 0.005),
+                                                 testing::DoubleNear(90, 0.005)));
+    // WHEN it cannot be levelled, THEN no zeros are taken
+    torquer_sign = -1;
+    up = {0.004, -0.003, 1};
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::aborted, 400));
+    EXPECT_THAT(status().reason, HasSubstr("levelling: cannot settle"));
+    EXPECT_THAT(status().reason, HasSubstr("zeroing"));
 }
 
 TEST_F(StagesTest, AnAbortWhileLevellingLetsTheTorquersGo) {
@@ -267,18 +312,16 @@ TEST_F(StagesTest, AnAbortWhileLevellingLetsTheTorquersGo) {
     EXPECT_EQ(torque, (std::array<double, 3>{}));
 }
 
-/// Feeds one calibration from the strapdown simulation of a unit.
-void feed_unit(ZeroingStage& stage, const RigFrame& frame, double zero_x_mg, std::uint64_t seed) {
+/// Feeds one run, begun before, from the strapdown simulation of a unit.
+void feed_run(ZeroingStage& stage, const RigFrame& frame,
+              const estimator::zeros::UnitErrors& errors, bool down, std::uint64_t seed) {
     estimator::zeros::CalibrationSettings unit;
     unit.site.latitude_rad = 45.75 * kRadPerDeg;
-    estimator::zeros::UnitErrors errors;
-    errors.zero_mg = {zero_x_mg, -3, 2};
-    errors.azimuth_deg = 0;
-    const Vector start = frame.azimuth_vertical_deg(0, false);
+    unit.inverted = down;
+    const Vector start = frame.azimuth_vertical_deg(0, down);
     Vector encoder{start[0] * kRadPerDeg, start[1] * kRadPerDeg, start[2] * kRadPerDeg};
     const double azimuth = frame.azimuth(encoder);
     estimator::zeros::UnitSimulation simulation(unit, errors, 0.01, seed);
-    stage.begin();
     const double turn0 = encoder[2];
     for (int i = 0; i <= 18000 && !stage.over(); ++i) {
         const auto in = simulation.next();
@@ -297,14 +340,79 @@ void feed_unit(ZeroingStage& stage, const RigFrame& frame, double zero_x_mg, std
     }
 }
 
-TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
-    // GIVEN a rig whose north axis is such that the gimbal's azimuth is the unit's
+void feed_unit(ZeroingStage& stage, const RigFrame& frame, double zero_x_mg, std::uint64_t seed) {
+    estimator::zeros::UnitErrors errors;
+    errors.zero_mg = {zero_x_mg, -3, 2};
+    errors.azimuth_deg = 0;
+    stage.begin();
+    feed_run(stage, frame, errors, false, seed);
+}
+
+/// One whose north axis is such that the gimbal's azimuth is the simulated unit's.
+estimator::Settings rig_of_the_unit() {
     estimator::Settings rig;
-    {
-        const RigFrame frame(rig);
-        const Vector start = frame.azimuth_vertical_deg(0, false);
-        rig.azimuth_deg = frame.azimuth({start[0] * kRadPerDeg, 0, 0}) / kRadPerDeg;
-    }
+    const RigFrame frame(rig);
+    const Vector start = frame.azimuth_vertical_deg(0, false);
+    rig.azimuth_deg = frame.azimuth({start[0] * kRadPerDeg, 0, 0}) / kRadPerDeg;
+    return rig;
+}
+
+TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
+    // GIVEN scale errors of 200 ppm, twice what they are said to be
+    const estimator::Settings rig = rig_of_the_unit();
+    const RigFrame frame(rig);
+    estimator::zeros::UnitErrors errors;
+    errors.zero_mg = {5, -3, 2};
+    errors.scale = {2e-4, 2e-4, 2e-4};
+    errors.azimuth_deg = 0;
+    ZeroingSettings settings;
+    ZeroingStage one_way(settings, rig);
+    one_way.begin();
+    EXPECT_FALSE(one_way.another());
+    feed_run(one_way, frame, errors, false, 11);
+    ASSERT_EQ(one_way.finish(false), "");
+    // THEN one run has 1 g of scale error within z, and its sigma says that it may
+    EXPECT_NEAR(one_way.status().zero_mg[2], 2.2, 0.01);
+    EXPECT_GT(one_way.status().sigma_mg[2], 0.1);
+    EXPECT_EQ(one_way.status().scale_z, 0);
+    EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x scale error"));
+    // WHEN both runs are made
+    settings.both_ways = true;
+    ZeroingStage stage(settings, rig);
+    EXPECT_EQ(stage.expected_s(), 2 * one_way.expected_s());
+    stage.begin();
+    ASSERT_TRUE(stage.another());
+    EXPECT_EQ(stage.target_deg()[0], 90);
+    feed_run(stage, frame, errors, false, 11);
+    stage.begin_other_way();
+    EXPECT_FALSE(stage.another());
+    EXPECT_EQ(stage.target_deg()[0], -90);
+    feed_run(stage, frame, errors, true, 12);
+    ASSERT_EQ(stage.finish(false), "");
+    // THEN they are apart, each within its own sigma
+    const ZeroStatus found = stage.status();
+    EXPECT_LT(found.sigma_mg[2], 0.01);
+    EXPECT_NEAR(found.zero_mg[2], 2, 5 * found.sigma_mg[2]);
+    EXPECT_NEAR(found.scale_z, 2e-4, 5 * found.scale_z_sigma);
+    EXPECT_NEAR(found.zero_mg[0], 5, 5 * found.sigma_mg[0]);
+    EXPECT_NEAR(found.zero_mg[1], -3, 5 * found.sigma_mg[1]);
+    EXPECT_EQ(found.covariance_mg2[2][2], found.sigma_mg[2] * found.sigma_mg[2]);
+    EXPECT_THAT(stage.words(), HasSubstr("z apart: zero "));
+    // AND the level of a dwell is then as sure as that
+    EXPECT_NEAR(stage.level_sigma({90, 0, 0}), 1e-3 * found.sigma_mg[2], 1e-9);
+    EXPECT_GT(one_way.level_sigma({90, 0, 0}), 1e-4);
+    // WHEN the second run fails, THEN nothing is taken over
+    ZeroingStage spoilt(settings, rig);
+    spoilt.begin();
+    feed_run(spoilt, frame, errors, false, 11);
+    spoilt.begin_other_way();
+    EXPECT_THAT(spoilt.finish(false), HasSubstr("no increments"));
+    EXPECT_FALSE(spoilt.status().known);
+}
+
+TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
+    // GIVEN the zeros of a unit at the start
+    estimator::Settings rig = rig_of_the_unit();
     const RigFrame frame(rig);
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, false))[2], 1, 1e-12);
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, true))[2], -1, 1e-12);

@@ -197,11 +197,14 @@ TEST_P(CanPortSuite, HandsErrorFramesToTheErrorHandlerOnly) {
     start();
     // WHEN the controller reports bus-off, then that it has restarted, then data comes
     ASSERT_TRUE(bus_->send(classic_packet(make_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 0))));
+    ASSERT_TRUE(run_until([&] { return errors_.size() == 1; }));
+    EXPECT_EQ(port_->counters().controller, drivers::ControllerState::bus_off);
     ASSERT_TRUE(bus_->send(classic_packet(make_frame(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 0))));
     ASSERT_TRUE(bus_->send(classic_packet(make_frame(0x10, 5))));
     ASSERT_TRUE(run_until([&] { return frames_.size() == 1; }));
     // THEN the error frames are counted apart and shown as states
     ASSERT_EQ(errors_.size(), 2u);
+    EXPECT_EQ(port_->counters().controller, drivers::ControllerState::active);
     EXPECT_NE(errors_[0].frame.can_id & CAN_ERR_BUSOFF, 0u);
     EXPECT_GT(errors_[0].time, 0);
     EXPECT_EQ(port_->counters().error_frames, 2u);

@@ -4,13 +4,16 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <bit>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numbers>
+#include <random>
 #include <thread>
 
 #include "daemon/journal/database.hpp"
@@ -23,6 +26,16 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 constexpr std::uint64_t kHash = 0x1234;
+
+/// A filter and its noise monitor, as between two dwells of the daemon.
+struct Estimating {
+    estimator::Identification filter{estimator::Settings{}};
+    noise::NoiseMonitor noise{estimator::Settings{}, [](Severity, const std::string&) {}};
+
+    [[nodiscard]] Replay again(double dwell_s) {
+        return {filter, noise, drivers::from_seconds(dwell_s)};
+    }
+};
 
 /// A folder of its own, gone afterwards.
 struct JournalTest : testing::Test {
@@ -62,7 +75,7 @@ struct JournalTest : testing::Test {
             ASSERT_TRUE(journal.fed().try_push(
                 {m, dwell.info.run, dwell.info.position, std::exchange(first, false), 0}));
         }
-        journal.dwell_done(dwell.info, dwell.summary);
+        journal.dwell_done(dwell.info, dwell.summary, dwell.stop);
     }
 
     /// A campaign of two positions that nobody ended.
@@ -89,8 +102,9 @@ TEST_F(JournalTest, GivesBackTheFilterToTheLastBit) {
     auto& campaign = *journal.recovery().campaign;
     EXPECT_EQ(campaign.started_by, "Ada");
     ASSERT_THAT(campaign.dwells, SizeIs(2));
-    estimator::Identification again{estimator::Settings{}};
-    EXPECT_EQ(replay(campaign.dwells, again), "");
+    Estimating fresh;
+    EXPECT_EQ(replay(campaign.dwells, fresh.again(20)), "");
+    auto& again = fresh.filter;
     // THEN both say the same to the last bit, now and after one more position
     for (int p = 3; p <= 4; ++p) {
         const auto left = filter.result(), right = again.result();
@@ -105,6 +119,36 @@ TEST_F(JournalTest, GivesBackTheFilterToTheLastBit) {
         EXPECT_EQ(left.samples, right.samples);
         dwell(filter, p);
         dwell(again, p);
+    }
+}
+
+TEST_F(JournalTest, GivesBackWhatAnAdaptiveCampaignHasChosenInItsOrder) {
+    // GIVEN levels in turn, a repeated position, and the time that each end came at
+    estimator::Identification filter{estimator::Settings{}};
+    {
+        Journal journal(path, kHash);
+        journal.start();
+        journal.campaign_begun("night", "Ada");
+        for (int p = 1; p <= 3; ++p) {
+            DwellCheckpoint one = dwell(filter, p);
+            one.info.run = one.summary.run = p % 2 == 0 ? 2 : 1;
+            one.stop = {{1.5 * p, 0, -90}, p % 2 == 0 ? 0.0 : 9.0, p == 3 ? 1 : 0, 100.5 * p};
+            feed(journal, one);
+        }
+        journal.stop();
+    }
+    // WHEN it is opened again THEN all of that is there, in the order in which it was done
+    Journal journal(path, kHash);
+    ASSERT_TRUE(journal.recovery().campaign);
+    const auto& dwells = journal.recovery().campaign->dwells;
+    ASSERT_THAT(dwells, SizeIs(3));
+    for (int p = 1; p <= 3; ++p) {
+        const auto& stop = dwells[static_cast<std::size_t>(p - 1)].stop;
+        EXPECT_EQ(dwells[static_cast<std::size_t>(p - 1)].info.position, p);
+        EXPECT_EQ(stop.position_deg, (std::array<double, 3>{1.5 * p, 0, -90}));
+        EXPECT_EQ(stop.table_g, p % 2 == 0 ? 0 : 9);
+        EXPECT_EQ(stop.repeats, p == 3 ? 1 : 0);
+        EXPECT_EQ(stop.used_s, 100.5 * p);
     }
 }
 
@@ -158,12 +202,12 @@ TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
         const char* says;
     };
     std::string newer = good, foreign = good;
-    newer[8] = 2;
+    newer[8] = 4;
     foreign[0] = 'X';
     std::vector<Case> cases{{"", "truncated: 0 bytes"},
                             {good.substr(0, 11), "truncated"},
                             {foreign, "not a checkpoint"},
-                            {newer, "version 2, newer than 1"}};
+                            {newer, "version 4, newer than 3"}};
     // any cut and any flipped bit
     for (std::size_t at = 12; at < good.size(); at += good.size() / 50) {
         cases.push_back({good.substr(0, at), ""});
@@ -194,8 +238,126 @@ TEST_F(JournalTest, TakesNoCheckpointThatDoesNotComeOutAsItDid) {
     estimator::Identification filter{estimator::Settings{}};
     std::vector<DwellCheckpoint> dwells{dwell(filter, 1)};
     dwells[0].measurements[100].angle_rad[0] += 1e-6;
-    estimator::Identification again{estimator::Settings{}};
-    EXPECT_EQ(replay(dwells, again), "run 1 position 1 does not come out as it did");
+    EXPECT_EQ(replay(dwells, Estimating().again(20)),
+              "run 1 position 1 does not come out as it did");
+}
+
+/// Dwells as the daemon does them, the platform's gyros `walk` deg/sqrt(h) noisy.
+std::vector<DwellCheckpoint> noisy_dwells(Estimating& at, int dwells, double walk, int first = 1) {
+    constexpr double kArcsec = std::numbers::pi / 180 / 3600;
+    std::mt19937_64 generator(911);
+    std::normal_distribution<double> normal;
+    std::vector<DwellCheckpoint> done;
+    for (int p = 1; p < first + dwells; ++p) {
+        DwellCheckpoint checkpoint;
+        checkpoint.info = {1, p, 9};
+        std::array<double, 3> drift{};
+        for (int n = 0; n < 40 * 40; ++n) {
+            estimator::Measurement m;
+            m.time_s = n * 0.025;
+            m.force_g = {0, 1 + 6 * std::sin(2 * std::numbers::pi * 15 * m.time_s), 0};
+            for (std::size_t k = 0; k < 3; ++k) {
+                drift[k] += 60 * walk * std::sqrt(0.025) * normal(generator);
+                m.angle_rad[k] = (drift[k] + 5 * normal(generator)) * kArcsec;
+            }
+            checkpoint.measurements.push_back(m);
+        }
+        if (p < first) continue;  // the same noise, whoever saw its beginning
+        rt::Ring<rt::BlockRecord> blocks{256};
+        rt::AngleBlocks averager(blocks);
+        averager.begin({.to = 40 * drivers::kSecond, .dwell = checkpoint.info});
+        at.filter.begin_dwell(checkpoint.info);
+        for (const auto& m : checkpoint.measurements) {
+            if (at.filter.add(m).outcome == estimator::StepOutcome::used)
+                averager.add(m.time_s, m.angle_rad);
+        }
+        checkpoint.summary = at.filter.end_dwell();
+        averager.end();
+        blocks.consume([&](const rt::BlockRecord& block) { at.noise.add(block); }, 256);
+        at.noise.conclude(checkpoint.summary, at.filter);
+        done.push_back(std::move(checkpoint));
+    }
+    return done;
+}
+
+TEST_F(JournalTest, GoesOnWithTheNoiseLevelsThatTheMonitorHadCameTo) {
+    // GIVEN a campaign whose monitor has changed the filter's N
+    Estimating uninterrupted;
+    std::vector<DwellCheckpoint> dwells = noisy_dwells(uninterrupted, 12, 8e-3);
+    const auto& first = dwells.front().summary.noise;
+    const auto& last = dwells.back().summary.noise;
+    ASSERT_GT(last.gyro_random_walk_deg_per_rt_h[0], 1.5 * first.gyro_random_walk_deg_per_rt_h[0])
+        << "seed 911";
+    // WHEN its checkpoints come back from bytes and are fed again
+    for (auto& dwell : dwells) {
+        DwellCheckpoint read;
+        ASSERT_EQ(decode(encode(dwell, kHash), kHash, read), "");
+        EXPECT_TRUE(read.noise_known);
+        dwell = read;
+    }
+    Estimating resumed;
+    EXPECT_EQ(replay(dwells, resumed.again(40)), "");
+    // THEN filter and monitor go on as the ones that were never interrupted
+    noisy_dwells(uninterrupted, 3, 8e-3, 13);
+    noisy_dwells(resumed, 3, 8e-3, 13);
+    EXPECT_EQ(uninterrupted.filter.noise().gyro_random_walk_deg_per_rt_h,
+              resumed.filter.noise().gyro_random_walk_deg_per_rt_h);
+    estimator::Estimate left, right;
+    uninterrupted.filter.estimate(left);
+    resumed.filter.estimate(right);
+    EXPECT_EQ(left.value, right.value);
+    EXPECT_EQ(uninterrupted.filter.covariance(), resumed.filter.covariance());
+    EXPECT_EQ(uninterrupted.noise.status().dwells, resumed.noise.status().dwells);
+
+    // and levels that are not those it comes to again are refused
+    dwells.back().summary.noise.gyro_random_walk_deg_per_rt_h[2] *= 1.001;
+    EXPECT_THAT(replay(dwells, Estimating().again(40)),
+                HasSubstr("run 1 position 12 was filtered with"));
+    // unless they were not kept
+    dwells.back().noise_known = false;
+    EXPECT_EQ(replay(dwells, Estimating().again(40)), "");
+}
+
+TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
+    estimator::Identification filter{estimator::Settings{}};
+    const DwellCheckpoint good = dwell(filter, 1, 3);
+    for (const double bad : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+        DwellCheckpoint spoilt = good, out;
+        spoilt.summary.noise.angle_arcsec = bad;
+        EXPECT_THAT(decode(encode(spoilt, kHash), kHash, out), HasSubstr("corrupt: noise levels"))
+            << bad;
+        spoilt = good;
+        spoilt.summary.noise.gyro_random_walk_deg_per_rt_h[1] = bad;
+        EXPECT_THAT(decode(encode(spoilt, kHash), kHash, out),
+                    HasSubstr(bad == 0 ? "" : "noise levels"));
+    }
+}
+
+/// As version 1 wrote it: without the four noise levels, position, repeats and time used.
+std::string version_1(const DwellCheckpoint& dwell) {
+    std::string bytes = encode(dwell, kHash);
+    const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
+    bytes.erase(numbers, (4 + 5) * sizeof(double) + sizeof(std::int32_t));
+    bytes[8] = 1;
+    bytes.resize(bytes.size() - 4);
+    const auto sum = static_cast<std::uint32_t>(::crc32_z(
+        ::crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+    bytes.append(reinterpret_cast<const char*>(&sum), sizeof sum);
+    return bytes;
+}
+
+TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {
+    leave_unfinished();
+    estimator::Identification filter{estimator::Settings{}};
+    for (int p = 1; p <= 2; ++p) {
+        Database(path).run("UPDATE dwell SET checkpoint = ? WHERE position = ?",
+                           {Blob{version_1(dwell(filter, p))}, std::int64_t{p}});
+    }
+    Journal journal(path, kHash);
+    ASSERT_TRUE(journal.recovery().campaign);
+    EXPECT_THAT(journal.recovery().assumed, HasSubstr("2 checkpoints of version 1"));
+    EXPECT_FALSE(journal.recovery().campaign->dwells[0].stop_known);
+    EXPECT_EQ(replay(journal.recovery().campaign->dwells, Estimating().again(20)), "");
 }
 
 TEST_F(JournalTest, PutsADamagedOrNewerFileAside) {

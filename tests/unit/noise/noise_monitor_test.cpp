@@ -18,6 +18,7 @@ struct Rig {
     double angle_arcsec = 5.013;  // the default's, quantisation included
     double walk = 1e-3;           // deg/sqrt(h)
     std::size_t blocks = 98;
+    std::array<double, 3> step_deg_h{};  // of the gyros' constant drift
 };
 
 /// Feeds the monitor with the block means of a drifting platform, dwell after dwell.
@@ -38,7 +39,7 @@ class NoiseMonitorTest : public ::testing::Test {
         summary.position = ++position_;
         summary.kappa = 19;
         feed(rig, generator, summary);
-        return monitor_.end_dwell(summary, coefficients_);
+        return monitor_.end_dwell(summary, {coefficients_, covariance_});
     }
 
     void feed(const Rig& rig, std::mt19937_64& generator, const DwellSummary& summary) {
@@ -48,6 +49,8 @@ class NoiseMonitorTest : public ::testing::Test {
         for (std::size_t i = 0; i < estimator::kParameters; ++i) {
             parameters[estimator::internal_of(i)] = coefficients_[i];
         }
+        for (std::size_t j = 0; j < 3; ++j)
+            parameters[estimator::internal_of(10 * j)] += rig.step_deg_h[j];
         std::normal_distribution<double> normal;
         // Through zero of the azimuth.
         Eigen::Vector3d angles(0.7, 0.3 * (position_ % 3 - 1), -1e-4);
@@ -91,6 +94,8 @@ class NoiseMonitorTest : public ::testing::Test {
 
     Settings settings_;
     std::array<double, estimator::kParameters> coefficients_{};
+    std::vector<double> covariance_ =
+        std::vector<double>(estimator::kParameters * estimator::kParameters, 0.0);  // well known
     std::vector<std::pair<Severity, std::string>> events_;
     NoiseMonitor monitor_;
     int position_ = 0;
@@ -163,6 +168,80 @@ TEST_F(NoiseMonitorTest, AnAlarmFlagsTheDwellAndTeachesNothing) {
     EXPECT_NE(events_.back().second.find("position 11"), std::string::npos);
 }
 
+TEST_F(NoiseMonitorTest, AStepOfTheMeanBetweenDwellsRaisesAnAlarm) {
+    std::mt19937_64 generator(7005);
+    // GIVEN dwells of one kind; the very first is compared with the prior, which says nothing
+    for (int d = 0; d < 60; ++d) static_cast<void>(dwell({}, generator));
+    // THEN hardly one has alarmed: 60 x 1e-3 expected, all tests together
+    EXPECT_LE(monitor_.status().alarms_total, 2U) << "seed 7005";
+    const auto before = monitor_.status().alarms_total;
+    // WHEN the constant drift of gyro y steps by seven times the 0.007 deg/h that 100 s show
+    EXPECT_TRUE(dwell({5.013, 1e-3, 98, {0, -0.05, 0}}, generator));
+    // THEN that gyro is named, with the step in standard deviations
+    ASSERT_EQ(monitor_.status().alarms_total, before + 1);
+    const auto& alarm = monitor_.status().alarms.back();
+    EXPECT_EQ(alarm.gyro, 1U);
+    EXPECT_EQ(alarm.position, 61);
+    EXPECT_STREQ(alarm.reading, "step of the mean between adjacent windows");
+    EXPECT_NEAR(alarm.ratio, -0.05 / 0.00699, 4);
+    EXPECT_LT(std::abs(alarm.limit), std::abs(alarm.ratio));
+    EXPECT_NE(events_.back().second.find("gyro y, run 1 position 61: the mean drift has stepped"),
+              std::string::npos)
+        << events_.back().second;
+    // AND where the coefficients leave as much open, it is no step
+    for (std::size_t i = 0; i < estimator::kParameters; i += 10)
+        covariance_[i * (estimator::kParameters + 1)] = 0.05 * 0.05;
+    EXPECT_FALSE(dwell({}, generator));
+    EXPECT_FALSE(dwell({5.013, 1e-3, 98, {0, -0.05, 0}}, generator));
+}
+
+TEST_F(NoiseMonitorTest, ALevellingIsOneMoreInnovation) {
+    // GIVEN coefficients known to 0.02 deg/h of constant drift, and levellings sure to 0.1
+    for (std::size_t i = 0; i < estimator::kParameters; i += 10)
+        covariance_[i * (estimator::kParameters + 1)] = 0.02 * 0.02;
+    std::mt19937_64 generator(7006);
+    static_cast<void>(dwell({}, generator));
+    std::normal_distribution<double> normal;
+    const estimator::Kinematics kinematics(settings_);
+    const estimator::DriftModel model(settings_);
+    estimator::ParameterArray parameters{};
+    for (std::size_t i = 0; i < estimator::kParameters; ++i)
+        parameters[estimator::internal_of(i)] = coefficients_[i];
+    constexpr int kLevellings = 200;
+    const auto level = [&](double more_deg_h) {
+        LevelDrift drift;
+        drift.run = 1;
+        drift.position = 7;
+        drift.encoder_rad = {0.7, 0.2, -0.4};
+        drift.direction = {{{1, 0, 0}, {0, 0.8, 0.6}}};
+        drift.sigma_deg_h = 0.1;
+        const auto pose = kinematics.pose(kinematics.gimbal_angles(drift.encoder_rad));
+        const Eigen::Vector3d rate =
+            model.platform_rate(pose, model.regressors(pose.up, 1), parameters.data());
+        for (std::size_t a = 0; a < 2; ++a) {
+            const auto& d = drift.direction[a];
+            drift.rate_deg_h[a] = d[0] * rate[0] + d[1] * rate[1] + d[2] * rate[2] + more_deg_h +
+                                  std::hypot(0.1, 0.02) * normal(generator);
+        }
+        monitor_.levelled(drift);
+    };
+    events_.clear();
+    for (int i = 0; i < kLevellings; ++i) level(0);
+    // THEN the innovations are as large as said: 400 squares, 99.99 % band
+    const auto& found = monitor_.status().level;
+    EXPECT_EQ(found.samples, 200U);
+    EXPECT_NEAR(found.mean_square, 1, 3.9 * std::sqrt(2.0 / (2 * kLevellings))) << "seed 7006";
+    EXPECT_NEAR(found.sigma_deg_h[1], std::hypot(0.1, 0.02), 1e-9);
+    EXPECT_LE(events_of(Severity::alarm), 2) << "200 x 1e-3 expected";
+    // WHEN the drift is eight standard deviations off, THEN an alarm says where and by how much
+    events_.clear();
+    level(0.8);
+    ASSERT_EQ(events_of(Severity::alarm), 1);
+    EXPECT_NE(events_.back().second.find("run 1 position 7: while it was levelled"),
+              std::string::npos)
+        << events_.back().second;
+}
+
 TEST_F(NoiseMonitorTest, LeavesOutWhatCannotBeJudged) {
     std::mt19937_64 generator(7004);
     // too short
@@ -173,14 +252,14 @@ TEST_F(NoiseMonitorTest, LeavesOutWhatCannotBeJudged) {
     flagged.position = ++position_;
     flagged.flagged = true;
     feed({}, generator, flagged);
-    EXPECT_FALSE(monitor_.end_dwell(flagged, coefficients_));
+    EXPECT_FALSE(monitor_.end_dwell(flagged, {coefficients_, covariance_}));
     // no block at all, and blocks of another dwell
     DwellSummary other;
     other.run = 2;
     other.position = 1;
-    EXPECT_FALSE(monitor_.end_dwell(other, coefficients_));
+    EXPECT_FALSE(monitor_.end_dwell(other, {coefficients_, covariance_}));
     feed({}, generator, flagged);
-    EXPECT_FALSE(monitor_.end_dwell(other, coefficients_));
+    EXPECT_FALSE(monitor_.end_dwell(other, {coefficients_, covariance_}));
     EXPECT_EQ(monitor_.status().dwells, 0U);
     EXPECT_EQ(monitor_.status().dwells_left_out, 4U);
 }

@@ -8,6 +8,7 @@
 #include "daemon/plan/forecast.hpp"
 #include "estimator/crlb.hpp"
 #include "estimator/identification.hpp"
+#include "estimator/kinematics.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/positions.hpp"
 #include "tests/plant/recording.hpp"
@@ -94,7 +95,7 @@ TEST(PlannedCampaign, PredictedStandardErrorsAreThoseOfTheFilter) {
     for (const double table_g : {0.0, 9.0}) {
         for (const auto& u : planning::cube_directions()) {
             const double level = table_g * settings.transmission;
-            candidates.push_back({*planning::position_for(settings.up, u, {}), level, table_g, 1});
+            candidates.push_back({*planning::position_for(settings, u, {}), level, table_g, 1});
             problem.points.push_back({planning::vibration_row(u, level)});
         }
     }
@@ -137,6 +138,28 @@ TEST(PlannedCampaign, OneLevelIsRefusedWithNamesAndRemedy) {
     const Forecast close = forecast(settings, runs, kDwell, 0.025);
     EXPECT_TRUE(close.identifies_all);
     EXPECT_NE(close.warning.find("would halve"), std::string::npos) << close.warning;
+}
+
+TEST(PlannedCampaign, TheForecastIsTheSameHoweverTheEncodersCount) {
+    // GIVEN the 14 positions on a rig whose encoders count the other way, from other zeros
+    estimator::Settings rig;
+    rig.encoder_sign = {-1, 1, -1};
+    rig.encoder_zero_deg = {30, -2, 200};
+    auto runs = fourteen_positions();
+    const Forecast plain = forecast({}, runs, kDwell, 0.025);
+    for (PlannedRun& run : runs) run.position_deg = estimator::encoder_deg(rig, run.position_deg);
+    // THEN what its encoders have to show gives the same standard errors, and what they would have
+    // to show elsewhere does not
+    const Forecast there = forecast(rig, runs, kDwell, 0.025);
+    for (std::size_t i = 0; i < kParameters; ++i)
+        EXPECT_NEAR(there.sigma[i] / plain.sigma[i], 1, 1e-6) << estimator::parameter_names()[i];
+    EXPECT_FALSE(forecast({}, runs, kDwell, 0.025).sigma == plain.sigma);
+    // AND an adaptive campaign expects as many dwells
+    AdaptiveSettings adaptive;
+    adaptive.table_g = {9, 0};
+    adaptive.target = {0.006, 0.005, 0.0005};
+    EXPECT_EQ(AdaptivePlan(rig, adaptive).outlook().left,
+              AdaptivePlan({}, adaptive).outlook().left);
 }
 
 TEST(AdaptivePlan, SaysWhetherTargetsOrTimeEndIt) {

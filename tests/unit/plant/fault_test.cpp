@@ -45,6 +45,7 @@ TEST(FaultSpec, ReadsNameChannelValueAndTimes) {
     EXPECT_EQ(fault.to_s, 10);
     EXPECT_EQ(parse_fault("lose:0.25", 0).value, 0.25);
     EXPECT_EQ(parse_fault("nan:x", 0).kind, FaultKind::out_of_range);
+    EXPECT_EQ(parse_fault("gyro-noise=8", 0).value, 8);
 }
 
 TEST(FaultSpec, SaysWhatIsWrong) {
@@ -58,6 +59,7 @@ TEST(FaultSpec, SaysWhatIsWrong) {
     expect("lose=2", "rate from 0 to 1");
     expect("lose=nan", "rate from 0 to 1");
     expect("lose=", "rate from 0 to 1");
+    expect("gyro-noise=-1", "a factor from 0 to 1000");
     expect("lose=0.1,0.2", "expected one value");
     expect("lose:outer=0.1", "expected none");
     expect("stuck:alpha", "outer, inner, azimuth");

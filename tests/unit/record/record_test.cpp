@@ -103,7 +103,7 @@ TEST_F(Recording, ComesBackToTheLastBitWhileItIsWrittenAndAfterwards) {
     writer.commit();
     for (const bool ended : {false, true}) {
         SCOPED_TRACE(ended ? "closed" : "open");
-        if (ended) writer.end("finished", "", R"({"a":1})", head().utc_ns + 1);
+        if (ended) writer.end({"finished", "", "", R"({"a":1})", head().utc_ns + 1});
         // WHEN it is read, first beside its writer
         const Campaign read = read_campaign(folder_.string());
         // THEN everything is there
@@ -133,14 +133,16 @@ TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
         for (const auto& sample : samples(500, 0)) writer.sample(sample);
         put_order(writer, 3, 2 * drivers::kSecond, 100 * drivers::kSecond);
         writer.commit();
+        EXPECT_THROW(static_cast<void>(recover((folder_ / "living.h5").string(), {})),
+                     std::runtime_error);
         fs::copy_file(folder_ / "living.h5", path);
     }
     // WHEN it is mended
-    const Recovery recovery = recover(path);
+    const Recovery recovery = recover(path, {}).at(0);
     // THEN it says what there is and what is lost
     EXPECT_FALSE(recovery.was_closed);
     EXPECT_EQ(recovery.samples, 500U);
-    EXPECT_EQ(recovery.cut_dwell, "run 1 position 3");
+    EXPECT_EQ(recovery.cut_dwell, "run 1 position 3: 420 samples, 10.475 of 98.000 s, are there");
     const Campaign read = read_campaign(path);
     EXPECT_EQ(read.state, "recovered");
     EXPECT_EQ(read.samples.size(), 500U);
@@ -148,7 +150,7 @@ TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
     EXPECT_EQ(read.gaps[0].stream, "end");
     // AND a second time there is nothing to do
     const std::string bytes = file(path);
-    EXPECT_TRUE(recover(path).was_closed);
+    EXPECT_TRUE(recover(path, {}).at(0).was_closed);
     EXPECT_EQ(file(path), bytes);
 }
 
@@ -267,7 +269,7 @@ TEST_F(Recording, OfTheRecorderHoldsWhatTheRingsGaveAndTellsWhatTheyDropped) {
         sample.time += 1000 * drivers::kSecond;
         running->samples().try_push(sample);
     }
-    recorder.campaign_ended("finished", "", "{}", head().utc_ns);
+    recorder.campaign_ended({"finished", "", "", "{}", head().utc_ns});
     recorder.stop();
     // THEN the file has what came after the beginning, and the gap
     const Campaign read = read_campaign(folder_.string());
@@ -306,12 +308,6 @@ TEST_F(Recording, ReplaysToTheSameBitsAndSeesAChangedOne) {
     double& angle = campaign.samples[900].angle[1];
     angle = std::nextafter(angle, 1.0);
     EXPECT_GT(replay(campaign, settings, {}).different, 0U);
-}
-
-TEST_F(Recording, OfARestartedCampaignIsNotReplayedAsAWhole) {
-    Campaign campaign;
-    campaign.head.dwells_before = 3;
-    EXPECT_THROW(static_cast<void>(replay(campaign, {}, {})), std::runtime_error);
 }
 
 }  // namespace

@@ -66,9 +66,10 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     StageFeed stages(dbc, with_increments, control.get());
     Ring<FrameRecord> recorder_frames(1024);  // nobody takes: what does not fit is dropped
     Ring<drivers::Sample> recorder_samples(1024);
+    Ring<drivers::Sample> pre_trip(1024);
     Acquisition acquisition(io, *port, dbc, settings, clock, nullptr,
                             {ring, *estimator_waiter, *control, interlock, &stages,
-                             &recorder_frames, &recorder_samples});
+                             &recorder_frames, &recorder_samples, &pre_trip});
     acquisition.start([](drivers::PortState, const char*) {});
     DwellOrder order;
     // Long enough for the test, short enough for blocks of a second.
@@ -144,6 +145,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     // and so did the frames and samples for the recorder and the pieces for the stages
     EXPECT_GT(recorder_frames.counts().pushed + recorder_frames.counts().dropped, 6 * kSamples);
     EXPECT_GT(recorder_samples.counts().dropped, 0U);
+    EXPECT_GT(pre_trip.counts().dropped, 0U);
     EXPECT_GT(stages.counters().pairs, kSamples / 5);
     EXPECT_TRUE(stages.torque().torquing);
     Motion motion;

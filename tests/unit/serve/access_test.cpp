@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <optional>
+#include <thread>
 
 #include "daemon/serve/client.hpp"
 #include "daemon/serve/pki.hpp"
 #include "daemon/serve/status_server.hpp"
+#include "proto/vibrig.pb.h"
 #include "tests/unit/serve/fake_source.hpp"
 #include "tests/unit/serve/raw_connection.hpp"
 
@@ -17,7 +20,15 @@ namespace {
 using std::chrono::hours;
 using Use = CertificateSettings::Use;
 
-const std::vector<std::string> kKinds{"arm", "start", "pause", "resume", "abort", "acknowledge"};
+/// All there are: one that is added is tried too.
+std::vector<std::string> all_kinds() {
+    std::vector<std::string> kinds;
+    const auto& all = *v1::Command::Kind_descriptor();
+    for (int i = 0; i < all.value_count(); ++i)
+        if (all.value(i)->number() != v1::Command::unspecified)
+            kinds.push_back(all.value(i)->name());
+    return kinds;
+}
 
 std::string body_for(const std::string& kind) {
     return R"({"kind":")" + kind + R"(","by":"Ada","argument":"trip"})";
@@ -52,6 +63,15 @@ class Access : public testing::Test {
         save(name, identity);
         return {"", without_scheme(server->remote_address()), folder.file(name)};
     }
+    /// Waits until a refusal with these words is audited.
+    [[nodiscard]] bool told(const std::string& words) const {
+        for (int i = 0; i < 500; ++i) {
+            for (const std::string& refusal : source.refusals())
+                if (refusal.find(words) != std::string::npos) return true;
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        return false;
+    }
     [[nodiscard]] Identity person(const std::string& role) const {
         return make_identity({Use::client, "p " + role, role, {}}, &authority);
     }
@@ -75,7 +95,7 @@ TEST_F(Access, EveryCommandByEveryRole) {
         Client client(remote(name, person(row.role)));
         for (const char* path : {"/api/v1/status", "/api/v1/config", "/metrics"})
             EXPECT_EQ(client.get(path).status, row.reads) << row.role << ' ' << path;
-        for (const std::string& kind : kKinds) {
+        for (const std::string& kind : all_kinds()) {
             const std::size_t before = source.requests().size();
             const std::size_t refused = source.refusals().size();
             const Reply reply = client.post("/api/v1/commands", body_for(kind));
@@ -85,11 +105,13 @@ TEST_F(Access, EveryCommandByEveryRole) {
             if (row.commands == 200) {
                 EXPECT_EQ(requests.back().by, "Ada (certificate p " + std::string(row.role) + ", " +
                                                   row.role + ", from 127.0.0.1)");
-            } else if (row.reads == 200) {
+            } else {
                 ASSERT_EQ(source.refusals().size() - refused, 1u) << "refusals are audited";
-                EXPECT_EQ(
-                    source.refusals().back().rfind(kind + " by Ada | certificate p viewer", 0), 0u)
-                    << source.refusals().back();
+                const std::string words =
+                    row.reads == 200 ? kind + " by Ada | certificate p viewer, viewer, from 127"
+                                     : std::string("POST '/api/v1/commands' | certificate p ") +
+                                           row.role + ", none, from 127";
+                EXPECT_EQ(source.refusals().back().rfind(words, 0), 0u) << source.refusals().back();
             }
         }
     }
@@ -98,7 +120,7 @@ TEST_F(Access, EveryCommandByEveryRole) {
 TEST_F(Access, EveryCommandThroughEveryLocalDoor) {
     server.emplace(source, settings);
     const std::string page = without_scheme(server->page_address());
-    for (const std::string& kind : kKinds) {
+    for (const std::string& kind : all_kinds()) {
         EXPECT_EQ(status_of(post(settings.socket, "/api/v1/commands", body_for(kind))), 200)
             << kind;
         EXPECT_EQ(status_of(post(settings.status_socket, "/api/v1/commands", body_for(kind))), 403);
@@ -109,28 +131,39 @@ TEST_F(Access, EveryCommandThroughEveryLocalDoor) {
                      std::to_string(body.size()) + "\r\n\r\n" + body);
         EXPECT_EQ(status_of(browser.answer()), 403) << "the page is read-only";
     }
-    EXPECT_EQ(source.requests().size(), kKinds.size());
-    EXPECT_EQ(source.refusals().size(), 2 * kKinds.size());
+    EXPECT_EQ(source.requests().size(), all_kinds().size());
+    EXPECT_EQ(source.refusals().size(), 2 * all_kinds().size());
     EXPECT_EQ(status_of(get(settings.status_socket, "/api/v1/status")), 200);
 }
 
 TEST_F(Access, BadCertificatesAreRefused) {
     server.emplace(source, settings);
     const Identity stranger = make_identity({Use::authority, "authority", "", {}});
-    const std::vector<std::pair<const char*, Identity>> bad{
+    struct Row {
+        const char* what;
+        Identity identity;
+        const char* told;  ///< in the events
+    };
+    const std::vector<Row> bad{
         {"expired",
-         make_identity({Use::client, "a", "admin", {}, hours(-48), hours(24)}, &authority)},
-        {"not yet valid", make_identity({Use::client, "a", "admin", {}, hours(24)}, &authority)},
+         make_identity({Use::client, "a", "admin", {}, hours(-48), hours(24)}, &authority),
+         "certificate has expired"},
+        {"not yet valid", make_identity({Use::client, "a", "admin", {}, hours(24)}, &authority),
+         "certificate is not yet valid"},
         {"of another authority with the same name",
-         make_identity({Use::client, "a", "admin", {}}, &stranger)},
-        {"signed by itself", make_identity({Use::client, "a", "admin", {}})},
-        {"a server's", make_identity({Use::server, "a", "admin", {"127.0.0.1"}}, &authority)},
-        {"with another's key", {person("admin").certificate, person("admin").key}}};
-    for (const auto& [what, identity] : bad) {
+         make_identity({Use::client, "a", "admin", {}}, &stranger), "issuer"},
+        {"signed by itself", make_identity({Use::client, "a", "admin", {}}), "self-signed"},
+        {"a server's", make_identity({Use::server, "a", "admin", {"127.0.0.1"}}, &authority),
+         "unsuitable certificate purpose"},
+        {"with another's key", {person("admin").certificate, person("admin").key}, nullptr}};
+    for (const Row& row : bad) {
         const int before = source.asked;
-        EXPECT_THROW((void)Client(remote("bad", identity)).get("/api/v1/status"), ClientError)
-            << what;
-        EXPECT_EQ(source.asked, before) << what;
+        EXPECT_THROW((void)Client(remote("bad", row.identity)).get("/api/v1/status"), ClientError)
+            << row.what;
+        EXPECT_EQ(source.asked, before) << row.what;
+        if (row.told == nullptr) continue;  // the client refuses by itself
+        EXPECT_TRUE(told("a connection | somebody, from 127.0.0.1 | ")) << row.what;
+        EXPECT_TRUE(told(row.told)) << row.what;
     }
     // none at all, and no TLS at all
     EXPECT_THROW((void)Client({"", without_scheme(server->remote_address()), ""}), ClientError);
@@ -139,6 +172,56 @@ TEST_F(Access, BadCertificatesAreRefused) {
     EXPECT_EQ(plain.until_closed().find("200 OK"), std::string::npos);
     // and a good one still is
     EXPECT_EQ(Client(remote("good", person("viewer"))).get("/healthz").status, 200);
+}
+
+TEST_F(Access, RevokedCertificatesAreRefusedAtOnce) {
+    const auto list = [&](const std::string& text) {
+        std::ofstream(folder.file("new")) << text;
+        std::filesystem::rename(folder.file("new"), folder.file("revoked.crl"));
+    };
+    const Identity gone = person("admin"), ada = person("operator"), eve = person("operator");
+    const std::string first = revoke(gone.certificate, authority, "");
+    list(first);
+    settings.revoked = folder.file("revoked.crl");
+    server.emplace(source, settings);
+    EXPECT_THROW((void)Client(remote("gone", gone)).get("/healthz"), ClientError);
+    Client of_ada(remote("ada", ada)), of_eve(remote("eve", eve));
+    EXPECT_EQ(of_ada.get("/healthz").status, 200);
+    EXPECT_EQ(of_eve.get("/healthz").status, 200);
+    // WHEN one more is revoked while she is connected THEN she is out, and nobody else
+    list(revoke(eve.certificate, authority, first));
+    bool refused = false;
+    for (int i = 0; i < 300 && !refused; ++i) {
+        try {
+            (void)of_eve.get("/healthz");
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        } catch (const ClientError&) {
+            refused = true;
+        }
+    }
+    EXPECT_TRUE(refused);
+    EXPECT_THROW((void)Client(remote("eve", eve)).post("/api/v1/commands", body_for("start")),
+                 ClientError);
+    EXPECT_THROW((void)Client(remote("gone", gone)).get("/healthz"), ClientError);
+    EXPECT_EQ(of_ada.get("/healthz").status, 200);
+    EXPECT_EQ(of_ada.post("/api/v1/commands", body_for("pause")).status, 200);
+    EXPECT_EQ(source.requests().size(), 1u);
+    // a list that cannot be read changes nothing and is told
+    list("no list");
+    EXPECT_TRUE(told("list of revoked certificates"));
+    EXPECT_TRUE(told("a connection | somebody, from 127.0.0.1 | certificate revoked"));
+    EXPECT_THROW((void)Client(remote("eve", eve)).get("/healthz"), ClientError);
+    EXPECT_EQ(Client(remote("ada", ada)).get("/healthz").status, 200);
+}
+
+TEST_F(Access, OnlyTheAuthoritysOwnCertificatesAreRevokedAndOnce) {
+    const Identity stranger = make_identity({Use::authority, "authority", "", {}});
+    const Identity ada = person("operator");
+    EXPECT_THROW((void)revoke(ada.certificate, stranger, ""), PkiError);
+    const std::string list = revoke(ada.certificate, authority, "");
+    EXPECT_THROW((void)revoke(ada.certificate, authority, list), PkiError);
+    EXPECT_THROW((void)revoke("no certificate", authority, list), PkiError);
+    EXPECT_THROW((void)revoke(person("viewer").certificate, authority, "no list"), PkiError);
 }
 
 TEST_F(Access, BadServersAreNotBelieved) {
@@ -185,6 +268,10 @@ TEST_F(Access, StrangersPagesAreNotAnswered) {
               101);
     EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + "Origin: http://evil.example\r\n")),
               403);
+    EXPECT_EQ(status_of(ask("/api/v1/streams", page, upgrade)), 404);
+    for (const char* wrong : {"rate_hz=x", "rate_hz=21", "after=-1", "after=x", "status=maybe"})
+        EXPECT_EQ(status_of(ask(std::string("/api/v1/stream?") + wrong, page, upgrade)), 400)
+            << wrong;
 }
 
 TEST_F(Access, ManyCommandsAreTooManyButAStopNeverIs) {
@@ -213,6 +300,7 @@ TEST_F(Access, SettingsThatCannotBeAreRefusedByName) {
           Row{&ServerSettings::remote, "no.such.host.invalid:1", "server.remote"},
           Row{&ServerSettings::certificate, "/nowhere.crt", "/nowhere.crt"},
           Row{&ServerSettings::clients_ca, "/nowhere.crt", "authority"},
+          Row{&ServerSettings::revoked, "/nowhere.crl", "list of revoked certificates"},
           Row{&ServerSettings::operator_group, "no-such-group", "server.operator_group"}}) {
         ServerSettings bad = settings;
         bad.*row.field = row.value;

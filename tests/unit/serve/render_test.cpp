@@ -33,6 +33,17 @@ bool has(const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
 }
 
+TEST(Render, SaysThatABrokerIsDownAndNothingOfNone) {
+    StatusData status = full_status();
+    status.mqtt.connected = false;
+    EXPECT_TRUE(has(joined(render_summary(message_of(status), {}, 120)),
+                    "broker.lab:8883: DOWN, no route to host"));
+    status.mqtt = {};
+    status.latency = {};
+    const std::string text = joined(render_summary(message_of(status), {}, 120));
+    EXPECT_FALSE(has(text, "broker") || has(text, "frame to ring")) << text;
+}
+
 TEST(Render, ShowsWhatCountsOnAWideTerminal) {
     const Rates rates{true, 40.0, 240.0, 37.0};
     const std::string text = joined(render_table(message_of(full_status()), rates, 120));
@@ -54,6 +65,8 @@ TEST(Render, ShowsWhatCountsOnAWideTerminal) {
                              "kernel 26",
                              "ring 43",
                              "gaps 39",
+                             "frame to ring 0.150 ms, worst 0.15 ms",
+                             "broker.lab:8883: 103 messages, 104 left out",
                              "all good",
                              "NIS 1.020",
                              "vibrigd 0.1.0",

@@ -79,6 +79,12 @@ StatusData full_status() {
                   98,
                   99,
                   100};
+    s.frame = {
+        {2, -1}, {1, -1, 1}, {1, 2, 3}, {0.1, 0.2, 0.3}, {{{2, 1, 1}, {1, 2, 1}, {1, 1, 2}}}};
+    s.loop_check = {
+        "out of band", "Ada", "transmission", {{"transmission", "1", 0.5, 0.6, 0.7, true}}};
+    s.latency.add(150'000);
+    s.mqtt = {"broker.lab:8883", true, "no route to host", 101, 102, 103, 104};
     s.interlock.tripped = "amplitude_abort";
     s.interlock.rows = {{"amplitude_abort", "amplitude_off_command", "abort", "dB", 1, 0.5, true,
                          true, true, 1.25}};
@@ -98,6 +104,7 @@ StatusData full_status() {
     for (NoiseStatus::Gyro& gyro : s.noise.gyros) {
         gyro.in_force = 0.001;
         gyro.smallest_change = 3.5;
+        gyro.points = {{2, 0.25, 0.3}};
         gyro.terms[0] = {true, 5.1, 0.1, 0.2};
         gyro.terms[1] = {true, 0.0011, 0.0002, 0.0012};
         for (std::size_t t = 2; t < gyro.terms.size(); ++t) gyro.terms[t] = {false, 0, 0, 0.03};
@@ -109,8 +116,22 @@ StatusData full_status() {
     s.noise.dwells_left_out = 82;
     s.noise.alarms_total = 83;
     s.noise.alarms.push_back({1, 2, 1, 4, 2.5, 1.9, "short averaging times"});
-    s.dwells.push_back(
-        {1, 2, 4000, 3990, 10, 1, 18.9, 5.98, 15.0, 1.001, 0.99, 0.05, true, "rejected"});
+    s.noise.level = {7, 1.1, 1, 2, {0.05, -0.06}, {0.1, 0.11}};
+    s.dwells.push_back({1,
+                        2,
+                        4000,
+                        3990,
+                        10,
+                        1,
+                        18.9,
+                        5.98,
+                        15.0,
+                        1.001,
+                        0.99,
+                        0.05,
+                        true,
+                        "rejected",
+                        {5.01, {0.0011, 0.0012, 0.0013}}});
     return s;
 }
 

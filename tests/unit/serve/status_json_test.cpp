@@ -94,6 +94,8 @@ TEST(StatusJson, SaysTheNumbersInTheUnitsOfTheEdge) {
     EXPECT_FALSE(status.noise().gyros(2).fit().k().has_value());
     EXPECT_DOUBLE_EQ(status.noise().gyros(2).fit().k().below(), 0.03);
     EXPECT_EQ(status.noise().alarms(0).gyro(), "y");
+    EXPECT_EQ(status.noise().level().samples(), 7U);
+    EXPECT_DOUBLE_EQ(status.noise().level().innovation_deg_h(1), -0.06);
 }
 
 TEST(StatusJson, PrintsZerosAndOriginalNames) {

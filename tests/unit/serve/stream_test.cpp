@@ -200,6 +200,8 @@ TEST(Metrics, CarryWhatIsValidAndAddUp) {
     EXPECT_TRUE(holds(text, "vibrig_interlock_reaction_seconds_sum 0.0045\n"));
     EXPECT_TRUE(holds(text, "vibrig_interlock_reaction_seconds_bucket{le=\"+Inf\"} 6\n"));
     EXPECT_TRUE(holds(text, "vibrig_campaign_state{state=\"recording\"} 1\n"));
+    EXPECT_TRUE(holds(text, "vibrig_acquisition_latency_seconds_bucket{le=\"0.0002\"} 1\n"));
+    EXPECT_TRUE(holds(text, "vibrig_mqtt_messages_total{outcome=\"left_out\"} 104\n"));
     EXPECT_FALSE(holds(text, "nan") || holds(text, "Nan")) << text;
     status.shaker.valid = false;
     EXPECT_FALSE(holds(metrics_text(status, {}), "vibrig_shaker_measured"));

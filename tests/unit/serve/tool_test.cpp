@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <cstdio>
+#include <fstream>
+#include <sstream>
 #include <string>
 #include <thread>
 
@@ -39,6 +43,11 @@ class Tool : public testing::Test {
         const int before = source.asked;
         for (int i = 0; i < 3000 && source.asked == before; ++i)
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    /// The server shows a status for a moment before it asks for another one.
+    void show(const StatusData& status) {
+        source.set(status);
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
 
     FakeSource source;
@@ -99,18 +108,18 @@ TEST_F(Tool, WatchesUntilTheCampaignEnds) {
     StatusData status = full_status();
     const std::string watch = "watch --until-finished --interval 0.05" + at;
     status.state = CampaignState::finished;
-    source.set(status);
+    show(status);
     EXPECT_EQ(vibrig(watch).code, 0);
     for (const CampaignState bad : {CampaignState::aborted, CampaignState::tripped}) {
         status.state = bad;
-        source.set(status);
+        show(status);
         const Outcome outcome = vibrig(watch);
         EXPECT_EQ(outcome.code, 1);
         EXPECT_NE(outcome.output.find(name_of(bad)), std::string::npos) << outcome.output;
     }
     // GIVEN a campaign under way WHEN it goes on and ends THEN each place is one line
     status.state = CampaignState::recording;
-    source.set(status);
+    show(status);
     Outcome outcome;
     {
         const std::jthread watcher([&] { outcome = vibrig(watch); });
@@ -158,6 +167,46 @@ TEST_F(Tool, ListsEvents) {
     EXPECT_NE(outcome.output.find("event 2500\n"), std::string::npos);
     const Outcome json = vibrig("events --json" + at);
     EXPECT_EQ(json.output.rfind("{\"id\":\"1\"", 0), 0u) << json.output.substr(0, 200);
+}
+
+TEST_F(Tool, FollowsEventsAcrossARestart) {
+    auto server = std::make_unique<StatusServer>(source, path);
+    const auto tell = [this](const std::string& text) {
+        EventRecord event;
+        event.source = "campaign";
+        event.text = text;
+        source.log.append(event);
+    };
+    const std::string file = folder.file("events");
+    const auto printed = [&](const std::string& text) {
+        for (int i = 0; i < 3000; ++i) {
+            std::ifstream input(file);
+            std::ostringstream all;
+            all << input.rdbuf();
+            if (all.str().find(text) != std::string::npos) return true;
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        return false;
+    };
+    tell("first event");
+    const std::string command =
+        "exec " + std::string(VIBRIG_PROGRAM) + " events --follow" + at + " >" + file + " 2>&1";
+    const pid_t follower = fork();
+    if (follower == 0) {
+        execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+        _exit(127);
+    }
+    EXPECT_TRUE(printed("first event"));
+    tell("second event");
+    EXPECT_TRUE(printed("second event"));
+    server.reset();
+    EXPECT_TRUE(printed("trying again"));
+    server = std::make_unique<StatusServer>(source, path);
+    EXPECT_TRUE(printed("the daemon has started anew"));
+    tell("third event");
+    EXPECT_TRUE(printed("third event"));
+    kill(follower, SIGKILL);
+    waitpid(follower, nullptr, 0);
 }
 
 }  // namespace

@@ -88,8 +88,12 @@ TEST_F(Identify, WithOneAmplitudeGivesCombinationsInsteadOfNumbers) {
     record("--dwell 20 --table-g 9");
     // WHEN the recording is identified
     const Outcome outcome = vibrig("identify rec.csv --json");
-    // THEN the four of each gyro that cannot be told apart are null
+    // THEN it is told before what cannot be determined
     EXPECT_EQ(outcome.exit_code, 1) << outcome.error;
+    EXPECT_THAT(outcome.error, AllOf(HasSubstr("before the run: these positions and levels do not "
+                                               "determine one by one: D_Fx D_IIx"),
+                                     HasSubstr("determined is D_Fx + 19 D_OOx")));
+    // AND the four of each gyro that cannot be told apart are null
     const Json result = Json::parse(outcome.out);
     const std::set<std::string> together{"D_F", "D_II", "D_OO", "D_SS"};
     for (const Json& parameter : result["parameters"]) {
@@ -187,6 +191,12 @@ TEST_F(Identify, EveryCommandHasHelpWithAnExample) {
     EXPECT_THAT(help.out, HasSubstr("Example: vibrig identify"));
     EXPECT_EQ(vibrig("--help").exit_code, 0);
     EXPECT_THAT(vibrig("--version").out, HasSubstr("vibrig "));
+}
+
+TEST_F(Identify, AWordThatIsNoCommandIsNamed) {
+    const Outcome outcome = vibrig("frobnicate");
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.error, HasSubstr("found \"frobnicate\", expected a command"));
 }
 
 }  // namespace

@@ -1,0 +1,349 @@
+#!/usr/bin/python3
+"""Each fault of bus and shaker link in turn, while the table shakes, on a real vcan0 and real Modbus in virtual time: what
+happens has to be what is expected, by name; a stop is the next write, no set-point follows it, no frame is unaccounted for.
+With --soak a random fault every few minutes instead; memory, descriptors and log have to stay flat.
+
+usage: fault_matrix.py PROGRAMS [--soak HOURS] [--faults N] [--seed N]
+       fault_matrix.py PROGRAMS --inside WHAT          inside the machine in virtual time
+"""
+import glob
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import modbus_proxy  # noqa: E402
+import rig as r  # noqa: E402
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+BUS = "vcan0"
+CAMPAIGN = {"name": "faulty", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0],
+            "dwell_s": 80000.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
+TIMEOUT_S = 0.5
+STALE = {"stale_channel", "stale_platform"}
+ON = {None}            # it goes on
+LINK = {"link lost"}   # the campaign is aborted for the link's sake, the shaker stops
+
+
+def run(*words):
+    subprocess.run(words, check=True, stdin=subprocess.DEVNULL)
+
+
+def frames(*each):
+    def send(rig):
+        for frame in each:
+            run("cansend", BUS, frame)
+    return send
+
+
+def plant(*faults):
+    return lambda rig: [rig.order("fault " + fault) for fault in faults]
+
+
+def modbus(spoil, times=None):
+    return lambda rig: rig.proxy.break_with(spoil, times)
+
+
+def link(*words):
+    return lambda rig: run("ip", "link", *words)
+
+
+def remade(rig):
+    run("ip", "link", "del", BUS)
+    time.sleep(1)
+    run("ip", "link", "add", BUS, "type", "vcan")
+    run("ip", "link", "set", BUS, "mtu", "72", "up")
+
+
+def stopped_process(rig):
+    rig.plant.process.send_signal(signal.SIGSTOP)
+
+
+def continued_process(rig):
+    rig.plant.process.send_signal(signal.SIGCONT)
+
+
+def clock_step(seconds):
+    return lambda rig: time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
+
+
+def nothing(rig):
+    pass
+
+
+# name, what is done, for how many s, what undoes it, what may come of it
+ROWS = [
+    ("frame loss 1 %", plant("lose=0.01"), 10, nothing, ON),
+    # four of one kind in a row are 100 ms without it: once in some hundred seconds for each of six kinds
+    ("frame loss 10 %", plant("lose=0.1"), 10, nothing, ON | STALE),
+    ("frame loss 33 %", plant("lose=0.33"), 20, nothing, STALE | {"frame_loss_abort"}),
+    ("silence 5 s", plant("bus-silent=5"), 6, nothing, STALE),
+    ("duplicates", plant("duplicate=0.3"), 5, nothing, ON),
+    ("reordering", plant("reorder=0.1"), 5, nothing, ON | STALE),
+    ("wrong DLC", plant("shorten=0.02"), 5, nothing, ON),
+    ("frames a tick late", plant("late=25,0.1"), 5, nothing, ON | STALE),
+    ("emergency stop", plant("estop"), 2, nothing, {"emergency_stop", "shaker_fault"}),
+    ("loop open", plant("loop-open"), 2, nothing, {"loop_open"}),
+    ("platform fault", plant("platform-fault"), 2, nothing, {"platform_fault"}),
+    ("unknown, extended, FD, remote frames",
+     frames("6FF#01", "1FFFFFFF#0102", "101##1010203", "101#R", "7A0##0"), 2, nothing, ON),
+    ("sync count jumps", frames("080#FFFFFFFF00000000"), 3, nothing, ON | STALE),
+    ("error frames", frames("20000002#0000000000000000", "20000080#0000000000000000"), 2, nothing, ON),
+    ("error passive", frames("20000004#0030000000000000"), 2, frames("20000004#0040000000000000"), ON),
+    ("bus off", frames("20000040#0000000000000000"), 2, frames("20000100#0000000000000000"), {"can_lost"}),
+    ("interface down 1 s", link("set", BUS, "down"), 1, link("set", BUS, "up"), {"can_lost"}),
+    ("interface down 60 s", link("set", BUS, "down"), 60, link("set", BUS, "up"), {"can_lost"}),
+    ("wall clock an hour on", clock_step(3600), 3, clock_step(-3600), ON),
+    ("Modbus: wrong transaction", modbus("transaction", 1), 3, nothing, ON | LINK),
+    ("Modbus: wrong unit", modbus("unit", 1), 3, nothing, ON | LINK),
+    ("Modbus: wrong function", modbus("function", 1), 3, nothing, ON | LINK),
+    ("Modbus: length too large", modbus("length", 1), 3, nothing, ON | LINK),
+    ("Modbus: length too small", modbus("short", 1), 3, nothing, ON | LINK),
+    *[(f"Modbus: exception {n}", modbus(("exception", n), 1), 3, nothing, ON | LINK) for n in range(1, 7)],
+    ("Modbus: exceptions without end", modbus(("exception", 4)), 6, modbus(None), LINK),
+    ("Modbus: reset mid-reply", modbus("reset", 1), 3, nothing, ON | LINK),
+    ("Modbus: late by one timeout", modbus(("late", TIMEOUT_S * 1.1), 1), 3, nothing, ON | LINK),
+    ("Modbus: late by three timeouts", modbus(("late", TIMEOUT_S * 3.3), 1), 4, nothing, ON | LINK),
+    ("Modbus: one byte per 100 ms", modbus("trickle"), 6, modbus(None), LINK),
+    ("Modbus: cable out", modbus("refuse"), 10, modbus(None), LINK),
+    ("Modbus: a trip while a request hangs", lambda rig: (modbus("hang")(rig), time.sleep(0.3), plant("bus-silent=2")(rig)),
+     1.5, modbus(None), STALE | LINK),
+    ("rig stopped for 30 s", stopped_process, 30, continued_process, STALE),
+]
+SOAKED = [row for row in ROWS if row[0] != "wall clock an hour on"]
+
+
+class FaultRig(r.Rig):
+    def __init__(self, programs, folder):
+        super().__init__(programs, BUS, "real", folder)
+        self.fifo = os.path.join(folder, "control")
+        os.mkfifo(self.fifo)
+
+    def start(self, seed):
+        self.start_plant("--seed", str(seed), "--warm-up", "1", "--start-temperature", "45", "--control", self.fifo)
+        self.control = open(self.fifo, "w", encoding="ascii")   # the plant has its other end
+        self.proxy = modbus_proxy.Proxy(self.modbus_port)
+        plant_port, self.modbus_port = self.modbus_port, self.proxy.port
+        self.configure(CAMPAIGN, record={"enabled": False},
+                       shaker={"host": "127.0.0.1", "port": self.proxy.port, "response_timeout_ms": TIMEOUT_S * 1e3,
+                               "backoff_max_ms": 500})
+        self.modbus_port = plant_port
+        self.start_daemon()
+
+    def order(self, line):
+        print(line, file=self.control, flush=True)
+
+    def ask(self, path, body=None):
+        """The daemon's own interface; None while it does not answer."""
+        text = b"" if body is None else json.dumps(body).encode()
+        try:
+            with socket.socket(socket.AF_UNIX) as link_:
+                link_.settimeout(10)
+                link_.connect(self.socket)
+                link_.sendall(f"{'GET' if body is None else 'POST'} {path} HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n"
+                              f"Content-Type: application/json\r\nContent-Length: {len(text)}\r\n\r\n".encode() + text)
+                answer = b""
+                while more := link_.recv(65536):
+                    answer += more
+            return json.loads(answer.partition(b"\r\n\r\n")[2])
+        except (OSError, ValueError):
+            return None
+
+    def status(self):
+        return self.ask("/api/v1/status")
+
+    def command(self, kind, argument=""):
+        return self.ask("/api/v1/commands", {"kind": kind, "by": "tester", "argument": argument})
+
+    def rest(self):
+        """Clears what the last fault left, until the rig could be armed."""
+        self.order("clear")
+        self.proxy.break_with(None)
+
+        def clear(status):
+            if status["campaign"]["state"] == "tripped":
+                self.command("acknowledge", "trip")
+            elif status["shaker"].get("fault"):
+                self.command("acknowledge", "shaker")
+            return status["campaign"]["state"] != "tripped" and status["can"]["link"] == "running" and \
+                status["shaker"]["link"] == "running" and status["shaker"].get("state") == 0 and \
+                not status["shaker"].get("fault") and not status["shaker"].get("running") and \
+                all(c["quality"] == "good" for c in status["sample"]["channels"])
+        return self.wait_for(clear, 60)
+
+    def shake(self):
+        """To a table that shakes at its level."""
+        self.rest()
+        said = [self.command(kind) for kind in ("arm", "start")]
+        status = self.wait_for(lambda s: s["campaign"]["state"] in ("recording", "aborted", "tripped"), 60)
+        return status is not None and status["campaign"]["state"] == "recording", f"{r.state_of(status)} {said}"
+
+
+def outcome_of(status):
+    """Name of the row that tripped, or that the link was lost, or None."""
+    state = status["campaign"]["state"]
+    if state == "tripped":
+        return status["interlock"]["tripped"]
+    if state == "aborted":
+        reason = status["campaign"]["reason"]
+        return "link lost" if "read-back" in reason or "shaker" in reason else reason
+    return None
+
+
+def is_set_point(write):
+    _, address, values = write
+    return address < modbus_proxy.RUN or (address == modbus_proxy.RUN and values[0] != 0)
+
+
+def is_stop(write):
+    return write[1] == modbus_proxy.RUN and write[2][0] == 0
+
+
+def fault(checks, rig, row):
+    name, begin, seconds, undo, expected = row
+    shaking, found = rig.shake()
+    if not checks.check(shaking, f"{name}: the table shakes before", found + "\n" + rig.logs()):
+        return
+    trips = len(glob.glob(os.path.join(rig.results, "trips", "*.jsonl")))
+    since = time.monotonic()
+    first = len(rig.proxy.writes)
+    begin(rig)
+    time.sleep(seconds)
+    during = rig.status() or {}
+    undo(rig)
+    time.sleep(2)
+    status = rig.wait_for(lambda s: outcome_of(s) is None or not s["shaker"].get("stop_pending"), 20)
+    outcome = outcome_of(status)
+    checks.check(outcome in expected, f"{name}: {' or '.join(sorted(str(e or 'it goes on') for e in expected))}",
+                 f"found {outcome}\n{rig.logs()}")
+    if name == "bus off" or name == "error passive":
+        checks.equal(during.get("can", {}).get("controller"), name.removeprefix("error "), f"{name}: the status says so")
+    writes = rig.proxy.writes[first:]
+    if outcome is None:
+        checks.check(not any(is_stop(w) or is_set_point(w) for w in writes), f"{name}: nothing is written but feeds", writes)
+    else:
+        stops = [i for i, w in enumerate(writes) if is_stop(w)]
+        checks.check(stops and not any(is_set_point(w) for w in writes), f"{name}: a stop and no set-point is written",
+                     writes)
+        late = [c for c in rig.proxy.connections if c > since]
+        if late and stops:
+            after = [w for w in writes if late[-1] <= w[0] <= late[-1] + 0.1]
+            checks.check(not after or is_stop(after[0]) or writes[stops[0]][0] < late[-1],
+                         f"{name}: after a reconnection the stop is the first write", after)
+        at_rest = rig.wait_for(lambda s: s["shaker"].get("state") in (0, 4) and s["shaker"].get("measured_g", 1) < 0.05, 20)
+        checks.check(at_rest["shaker"].get("measured_g", 1) < 0.05, f"{name}: the table comes to rest", at_rest["shaker"])
+        checks.check(not at_rest["campaign"]["armed_by"], f"{name}: nobody is armed any more")
+    if status["campaign"]["state"] == "tripped":
+        check_trip_file(checks, rig, name, trips, outcome)
+    check_balances(checks, rig, name)
+
+
+def check_trip_file(checks, rig, name, before, outcome):
+    """What led to it is on disk: the cause, events, samples in order up to it."""
+    end = time.monotonic() + 10
+    while len(files := sorted(glob.glob(os.path.join(rig.results, "trips", "*.jsonl")), key=os.path.getmtime)) <= before \
+            and time.monotonic() < end:
+        time.sleep(0.1)
+    if not checks.check(len(files) == before + 1, f"{name}: what led to the trip is saved", f"{before} before, {files}"):
+        return
+    with open(files[-1], encoding="utf-8") as file:
+        lines = [json.loads(line) for line in file]
+    times = [line["time_s"] for line in lines if "sequence" in line]
+    good = lines[0]["trip"] == outcome and any("stop of the shaker" in line.get("event", "") for line in lines) and \
+        len(times) > 50 and times == sorted(times) and lines[0]["time_s"] - 60.001 <= times[0] and lines[0]["samples_lost"] == 0
+    checks.check(good, f"{name}: cause, events and samples in it", f"{lines[0]}, {len(times)} samples")
+
+
+def check_balances(checks, rig, name):
+    rows = []
+    for _ in range(20):
+        status = rig.status()
+        rows = r.balances(status) if status is not None else []
+        if rows and all(left == right for _, left, right in rows):
+            break
+        time.sleep(0.1)
+    checks.check(rows and all(left == right for _, left, right in rows), f"{name}: the loss balance closes", rows)
+
+
+def matrix(checks, rig):
+    for row in ROWS:
+        fault(checks, rig, row)
+
+
+def used(rig):
+    """Resident memory (kB), descriptors (fewest of some looks), bytes of log."""
+    pid = rig.daemon.process.pid
+    counts = []
+    for _ in range(5):
+        counts.append(len(os.listdir(f"/proc/{pid}/fd")))
+        time.sleep(0.3)
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        resident = next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
+    return resident, min(counts), os.path.getsize(rig.daemon.log)
+
+
+def soak(checks, rig, seed, faults):
+    rng = random.Random(seed)
+    checks.note(f"soak: seed {seed}, {faults} faults")
+    looks = []
+    for n in range(faults):
+        row = rng.choice(SOAKED)
+        checks.note(f"{time.monotonic():.0f} s: fault {n + 1}: {row[0]}")
+        fault(checks, rig, row)
+        shaking, found = rig.shake()
+        checks.check(shaking, f"fault {n + 1}: the table shakes again after it", found)
+        time.sleep(rng.uniform(60, 300))
+        looks.append(used(rig))
+        checks.note(f"resident {looks[-1][0]} kB, descriptors {looks[-1][1]}, log {looks[-1][2]} bytes")
+    # Rings, event log and pre-trip record fill in the first third.
+    settled, last = looks[len(looks) // 3], looks[-1]
+    checks.check(last[0] <= settled[0] * 1.1 + 4096, f"memory stays flat (seed {seed})", looks)
+    checks.equal(last[1], settled[1], f"descriptors stay flat (seed {seed})")
+    checks.check(last[2] / len(looks) < 20_000, f"a fault leaves less than 20 kB of log (seed {seed})", last)
+
+
+def inside(programs, what):
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        rig = FaultRig(programs, folder)
+        try:
+            rig.start(1)
+            if what == "matrix":
+                matrix(checks, rig)
+            else:
+                _, seed, faults = what.split(":")
+                soak(checks, rig, int(seed), int(faults))
+            checks.equal(rig.daemon.end(timeout=30), 0, "vibrigd ends cleanly")
+        finally:
+            rig.stop()
+    checks.note(f"{time.monotonic():.0f} s of virtual time")
+    return checks.end()
+
+
+def option(name, default):
+    return sys.argv[sys.argv.index(name) + 1] if name in sys.argv else default
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    if "--inside" in sys.argv:
+        return inside(programs, option("--inside", ""))
+    what = "matrix"
+    if "--soak" in sys.argv or "--faults" in sys.argv:
+        # a fault, its aftermath and the pause take four minutes on average
+        faults = int(option("--faults", int(float(option("--soak", "1")) * 15)))
+        what = f"soak:{option('--seed', random.randrange(1 << 30))}:{faults}"
+    return subprocess.run([os.path.join(HERE, "run-in-uml"), "-T", "-t", "200000", "--wall",
+                           str(600 if "--soak" not in sys.argv else 36000), "--", os.path.abspath(__file__), programs,
+                           "--inside", what], stdin=subprocess.DEVNULL, check=False,
+                          preexec_fn=lambda: r.die_with_parent(signal.SIGTERM)).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,141 @@
+#!/usr/bin/python3
+"""The loop check before a campaign, on the seqpacket bus and the rig's clock: in band it lets a campaign be armed, out of
+band not and says why; it is its own arming, ends disarmed and at rest, can be aborted, and stands in the journal.
+
+usage: loop_check.py PROGRAMS
+"""
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+CAMPAIGN = {"name": "checked", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [9.0],
+            "dwell_s": 10.0}
+ROWS = ["transmission", "frequency", "distortion", "cross-axis share", "phase"]
+
+
+def ready(status):
+    return status["can"]["link"] == "running" and status["shaker"]["link"] == "running" and \
+        status["platform"].get("ready") and status["shaker"].get("state") == 0
+
+
+def running(status):
+    return status["campaign"]["state"] == "checking" and status["shaker"].get("measured_g", 0) > 0.4
+
+
+def over(status):
+    return status["campaign"]["state"] != "checking"
+
+
+def make(checks, programs, folder, speed, change=None, **selftest):
+    """A rig, its truth changed as told, and a daemon that measures."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    truth = os.path.join(folder, "truth.json")
+    subprocess.run([rig.program("vibrig-plant"), "run", "--write-truth", truth, "--duration", "0", "--clock", "real", "--can",
+                    "seqpacket:" + os.path.join(folder, "none.sock"), "--modbus", "tcp:127.0.0.1:0"],
+                   check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, timeout=30)
+    with open(truth, encoding="utf-8") as file:
+        values = json.load(file)
+    for section, keys in (change or {}).items():
+        values.setdefault(section, {}).update(keys)
+    with open(truth, "w", encoding="utf-8") as file:
+        json.dump(values, file)
+    rig.start_plant("--seed", "6", "--truth", truth, "--speed", str(speed))
+    rig.configure(CAMPAIGN, selftest=selftest)
+    rig.start_daemon()
+    status = rig.wait_for(ready, 60)
+    checks.check(status is not None and ready(status), "the rig is ready", rig.logs())
+    return rig
+
+
+def in_band(checks, programs, folder):
+    rig = make(checks, programs, folder, 20, required=True)
+    try:
+        refused = rig.tool("arm", "--by", "Ada")
+        checks.check(refused.returncode == 1 and "no loop check" in refused.stderr,
+                     "required and not made: nothing is armed", refused.stderr)
+        only_looks = rig.tool("selftest")
+        checks.check(rig.status()["loop_check"]["verdict"] == "none", "without a name it only looks", only_looks.stdout)
+        begun = subprocess.Popen([rig.program("vibrig"), "selftest", "--by", "Ada", "--socket", rig.socket],
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        status = rig.wait_for(running, 60)
+        checks.check(status is not None and running(status), "it shakes at the small level", r.state_of(status))
+        checks.check(status["shaker"]["measured_g"] < 0.55, "and no more than that", status["shaker"])
+        for command in ("arm", "start"):
+            refused = rig.tool(command, "--by", "Ada")
+            checks.equal(refused.returncode, 1, f"meanwhile no {command}")
+        said, _ = begun.communicate(timeout=60)
+        checks.equal(begun.returncode, 0, "it ends with exit code 0")
+        checks.check(all(f"ok    {row}" in said for row in ROWS), "it prints what it looked at", said)
+        status = rig.status()
+        rows = {row["name"]: row["value"] for row in status["loop_check"]["rows"]}
+        # 5 s of samples with 1e-4 g of noise, 1e-3 g at the table: a per mille of 0.5 g is ten standard deviations
+        checks.check(abs(rows["transmission"] - 2 / 3) < 1e-3, "transmission as the rig has it", rows)
+        checks.check(abs(rows["frequency"] - 15) < 1e-3, "frequency as the rig has it", rows)
+        checks.check(abs(rows["phase"] + 125.5) < 1, "phase as the rig has it", rows)
+        checks.check(status["campaign"]["state"] == "idle" and not status["campaign"]["armed_by"] and
+                     status["shaker"].get("state") == 0, "it leaves the rig disarmed and at rest", r.state_of(status))
+        checks.equal(rig.tool("start", "--by", "Ada").returncode, 1, "it is no arming for a campaign")
+        checks.equal(rig.tool("arm", "--by", "Ada").returncode, 0, "the campaign can be armed")
+        rig.tool("abort", "--by", "Ada")
+        rig.wait_for(lambda s: s["campaign"]["state"] == "aborted" and not s["shaker"].get("running"), 60)
+        # aborted in the midst of it
+        rig.tool("ack", "trip", "--by", "Ada")
+        begun = subprocess.Popen([rig.program("vibrig"), "selftest", "--by", "Grace", "--socket", rig.socket],
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        status = rig.wait_for(running, 60)
+        checks.check(status is not None and running(status), "it can be made again", r.state_of(status))
+        rig.tool("abort", "--by", "Ada")
+        stopped = rig.wait_for(lambda s: over(s) and s["shaker"].get("state") == 0 and
+                               not s["shaker"].get("running", True), 60)
+        checks.check(stopped is not None and over(stopped) and stopped["shaker"].get("state") == 0,
+                     "an abort ends it at rest", r.state_of(stopped))
+        begun.communicate(timeout=60)
+        checks.equal(stopped["loop_check"]["verdict"], "not completed", "and it counts as not completed")
+        checks.equal(rig.daemon.end(timeout=30), 0, "vibrigd ends with status 0")
+        with sqlite3.connect(f"file:{rig.results}/journal.sqlite3?mode=ro", uri=True) as database:
+            who = [person.split(" (")[0] for person, in database.execute(
+                "SELECT person FROM command WHERE kind = 'selftest' AND accepted ORDER BY id")]
+            told = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE 'loop check%'")]
+        checks.equal(who, ["Ada", "Grace"], "the journal knows who ordered it")
+        checks.check("loop check in band" in told and any("transmission" in text for text in told),
+                     "and what came out", told)
+    finally:
+        rig.stop()
+
+
+def out_of_band(checks, programs, folder, what, change, says):
+    rig = make(checks, programs, folder, 40, change)
+    try:
+        tested = rig.tool("selftest", "--by", "Ada", timeout=90)
+        checks.check(tested.returncode == 1 and f"NOT   {says}" in tested.stdout, f"{what}: out of band",
+                     tested.stdout + tested.stderr)
+        refused = rig.tool("arm", "--by", "Ada")
+        checks.check(refused.returncode == 1 and "out of band" in refused.stderr and says in refused.stderr,
+                     f"{what}: arming is refused with the reason", refused.stderr)
+        status = rig.status()
+        checks.check(status["shaker"].get("state") == 0 and status["campaign"]["state"] == "idle",
+                     f"{what}: it leaves the rig disarmed and at rest", r.state_of(status))
+    finally:
+        rig.stop()
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        in_band(checks, programs, folder)
+    for what, change, says in (("a distorted table", {"shaker": {"second_harmonic": 0.3}}, "distortion"),
+                               ("soft isolators", {"isolator": {"transmission": 0.5}}, "transmission")):
+        with tempfile.TemporaryDirectory() as folder:
+            out_of_band(checks, programs, folder, what, change, says)
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,106 @@
+"""Between vibrigd and the shaker's Modbus server: notes every write with its time, and spoils replies as told."""
+import select
+import socket
+import struct
+import threading
+import time
+
+RUN = 5   # register: 1 run, 0 stop
+WATCHDOG = 6
+
+
+class Proxy:
+    """`spoil` is one of None, "refuse", "hang", "reset", "trickle", "transaction", "unit", "function", "length", "short",
+    ("exception", N), ("late", seconds); `times` replies are spoilt, then it is None again (None: until told)."""
+
+    def __init__(self, target):
+        self.target = target
+        self.writes = []        # (monotonic, address, values)
+        self.connections = []   # monotonic
+        self.spoil, self.times = None, None
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        threading.Thread(target=self.serve, daemon=True).start()
+
+    def break_with(self, spoil, times=None):
+        self.times, self.spoil = times, spoil
+
+    def serve(self):
+        while True:
+            client, _ = self.listener.accept()
+            self.connections.append(time.monotonic())
+            threading.Thread(target=self.relay, args=(client,), daemon=True).start()
+
+    def relay(self, client):
+        server = None
+        try:
+            if self.spoil == "refuse":
+                return
+            server = socket.create_connection(("127.0.0.1", self.target), timeout=5)
+            # Nothing may be sent on in pieces: each side's frames are small and come whole.
+            while True:
+                ready, _, _ = select.select([client, server], [], [])
+                if client in ready:
+                    request = client.recv(512)
+                    if not request:
+                        return
+                    self.note(request)
+                    server.sendall(request)
+                if server in ready:
+                    reply = server.recv(512)
+                    if not reply or not self.answer(client, reply):
+                        return
+        except OSError:
+            pass
+        finally:
+            for end in (client, server):
+                if end is not None:
+                    end.close()
+
+    def note(self, request):
+        if len(request) < 12:
+            return
+        function, address, value = struct.unpack(">BHH", request[7:12])
+        if function == 6:
+            self.writes.append((time.monotonic(), address, (value,)))
+        elif function == 16:
+            self.writes.append((time.monotonic(), address, struct.unpack(f">{value}H", request[13:13 + 2 * value])))
+
+    def answer(self, client, reply):
+        """False: the connection is over."""
+        spoil = self.spoil
+        if spoil is not None and self.times is not None:
+            self.times -= 1
+            if self.times <= 0:
+                self.spoil = self.times = None
+        transaction, protocol, length, unit, function = struct.unpack(">HHHBB", reply[:8])
+        body = reply[8:]
+        kind, value = spoil if isinstance(spoil, tuple) else (spoil, 0)
+        if kind in ("refuse", "reset"):
+            client.sendall(reply[:5])
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            return False
+        if kind == "hang":
+            return True
+        if kind == "late":
+            time.sleep(value)
+        if kind == "transaction":
+            transaction ^= 0x55
+        elif kind == "unit":
+            unit ^= 3
+        elif kind == "function":
+            function ^= 1
+        elif kind == "length":
+            length += 7
+        elif kind == "short":
+            length, body = 3, body[:1]
+        elif kind == "exception":
+            function, body, length = function | 0x80, bytes([value]), 3
+        reply = struct.pack(">HHHBB", transaction, protocol, length, unit, function) + body
+        if kind == "trickle":
+            for byte in reply:
+                client.sendall(bytes([byte]))
+                time.sleep(0.1)
+        else:
+            client.sendall(reply)
+        return True

@@ -1,0 +1,360 @@
+#!/usr/bin/python3
+"""The Debian package on a booted system, with the shipped unit and its sandbox: installed, started, killed, upgraded,
+removed, purged; a campaign over a real vcan0. systemd is PID 1 of a User-Mode Linux.
+
+usage: package_test.py PROGRAMS [--soak]              PROGRAMS: build/PRESET/bin; --soak: the campaign of 2 x 14 dwells
+       package_test.py PROGRAMS --inside OLD NEW [--soak]    on the booted system; OLD, NEW: the packages
+"""
+import glob
+import grp
+import hashlib
+import json
+import os
+import pwd
+import re
+import shutil
+import signal
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+import service_manager as stages  # noqa: E402
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+UNIT = "vibrigd.service"
+EXAMPLES = "/usr/share/doc/vibrig/examples"
+CONFIGURATION, DATA = "/etc/vibrig/vibrigd.toml", "/var/lib/vibrig"
+VERSIONS = ("0.1.0", "0.1.1")
+LARGEST_EXPOSURE = 2.0
+SEED = 11
+SHORT = {"name": "packaged", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [9.0],
+         "dwell_s": 4.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 1.0}
+WHOLE = {"name": "packaged"}   # the default: 14 positions at 9 g and 7 g, 100 s each
+
+
+def output(*command, timeout=60):
+    run = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                         timeout=timeout, check=False, env={**os.environ, "LC_ALL": "C.UTF-8", "SYSTEMD_COLORS": "0",
+                                                            "DEBIAN_FRONTEND": "noninteractive"})
+    return run.returncode, run.stdout.strip()
+
+
+def prop(name, unit=UNIT):
+    return output("systemctl", "show", unit, "-P", name)[1]
+
+
+def wait_until(condition, timeout_s):
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+def journal():
+    return output("journalctl", "-u", UNIT, "-o", "cat", "--no-pager")[1]
+
+
+def succeeds(checks, text, *command):
+    status, said = output(*command, timeout=120)
+    return checks.equal(status, 0, text) or bool(checks.note(said[-3000:]))
+
+
+def owner(path):
+    found = os.stat(path)
+    return f"{pwd.getpwuid(found.st_uid).pw_name}:{grp.getgrgid(found.st_gid).gr_name} {stat.S_IMODE(found.st_mode):o}"
+
+
+def boots(checks):
+    state = output("systemctl", "is-system-running", "--wait", timeout=90)[1]
+    with open("/proc/1/comm", encoding="ascii") as comm:
+        checks.equal(comm.read().strip(), "systemd", "PID 1 is systemd")
+    checks.check(state in ("running", "degraded"), "the system comes up", state)
+
+
+def small_database(package):
+    """dpkg reads the list of files of every package before it does anything: a minute here. Left are those that the
+    package needs."""
+    with open("/var/lib/dpkg/status", encoding="utf-8") as file:
+        known = file.read().split("\n\n")
+    needs = set(re.findall(r"(?:^|, )([a-z0-9.+-]+)", output("dpkg-deb", "-f", package, "Depends")[1]))
+    output("mount", "-t", "tmpfs", "tmpfs", "/var/lib/dpkg")
+    for folder in ("info", "updates", "triggers"):
+        os.mkdir(os.path.join("/var/lib/dpkg", folder))
+    named = re.compile(r"^(?:Package|Provides): (.*)$", re.M)
+    with open("/var/lib/dpkg/status", "w", encoding="utf-8") as file:
+        file.write("".join(one + "\n\n" for one in known
+                           if needs & set(re.findall(r"[a-z0-9.+-]+", " ".join(named.findall(one))))))
+
+
+def installs(checks, package):
+    small_database(package)
+    succeeds(checks, "the package installs", "dpkg", "-i", package)
+    user = pwd.getpwnam("vibrig")
+    checks.check(user.pw_uid < 1000 and user.pw_shell.endswith("nologin"), "sysusers makes the user, without a login",
+                 str(user))
+    checks.check("vibrig" in grp.getgrnam("vibrig-operator").gr_mem and "vibrig" in grp.getgrnam("dialout").gr_mem,
+                 "in the groups of the operators and of the serial lines")
+    checks.equal([owner("/etc/vibrig"), owner(DATA)], ["root:vibrig 750", "vibrig:vibrig 750"],
+                 "tmpfiles makes the folders")
+    checks.equal((prop("LoadState"), prop("ActiveState"), prop("UnitFileState")), ("loaded", "inactive", "disabled"),
+                 "the unit is there; nothing starts by itself")
+    output("systemctl", "start", UNIT)
+    wait_until(lambda: prop("ActiveState") == "failed", 20)
+    checks.equal((prop("ActiveState"), prop("ExecMainStatus"), prop("NRestarts")), ("failed", "2", "0"),
+                 "without a configuration it says so and is not started over and over")
+    checks.check(CONFIGURATION in journal(), "the log names the file", journal()[-500:])
+    output("systemctl", "reset-failed", UNIT)
+
+
+def link(name):
+    status, said = output("ip", "-j", "-details", "link", "show", name)
+    return json.loads(said)[0] if status == 0 else {}
+
+
+def makes_interfaces(checks):
+    for name in ("80-can0.network", "80-vcan0.netdev", "80-vcan0.network"):
+        shutil.copy(os.path.join(EXAMPLES, name), "/etc/systemd/network/")
+    # A kernel without CAN hardware: another vcan plays can0; its bit rate is read and cannot be set.
+    output("ip", "link", "add", "dev", "can0", "type", "vcan")
+    output("networkctl", "reload")
+    checks.check(wait_until(lambda: "UP" in link("vcan0").get("flags", []), 30), "networkd makes vcan0 and raises it",
+                 output("networkctl", "status", "vcan0")[1])
+    for name in ("vcan0", "can0"):
+        said = ""
+
+        def configured():
+            nonlocal said
+            said = output("networkctl", "status", name, "--no-pager")[1]
+            return f"80-{name}.network" in said and "configured" in said
+        checks.check(wait_until(configured, 30), f"{name} is configured by its file", said)
+        checks.check(wait_until(lambda: link(name).get("txqlen") == 1000, 20), f"{name} has room for bursts of commands",
+                     str(link(name).get("txqlen")))
+    said = output("journalctl", "-u", "systemd-networkd", "-o", "cat", "--no-pager")[1]
+    checks.equal([line for line in said.splitlines() if re.search("80-v?can0.*(Unknown|ignoring|Failed)", line)], [],
+                 "networkd understands every line")
+
+
+def starts(checks, rig):
+    with open(os.path.join(EXAMPLES, "vibrigd.toml"), encoding="utf-8") as file:
+        example = file.read()
+    checks.check(f'results = "{DATA}"' in example and "operator_group" in example, "the example is the one installed")
+    rig.configure(rig.campaign, can={"sample_rate_hz": 40.0},
+                  server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
+                          "page": "127.0.0.1:8090"})
+    os.chmod(CONFIGURATION, 0o640)
+    shutil.chown(CONFIGURATION, "root", "vibrig")
+    succeeds(checks, "systemctl enable --now", "systemctl", "enable", "--now", UNIT)
+    checks.equal((prop("Type"), prop("ActiveState"), prop("SubState")), ("notify", "active", "running"),
+                 "started as it has said READY")
+    status = rig.wait_for(stages.measuring, 30)
+    checks.check(status is not None and stages.measuring(status), "status answers; it measures", journal()[-1500:])
+    # "ready, measuring" and the like: what it tells the service manager
+    checks.check(wait_until(lambda: prop("StatusText") != "", 10), f"systemctl status shows: {prop('StatusText')}")
+
+
+def is_confined(checks):
+    pid = int(prop("MainPID"))
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        said = dict(line.split(":", 1) for line in file.read().splitlines())
+    checks.equal(pwd.getpwuid(int(said["Uid"].split()[1])).pw_name, "vibrig", "it runs as its user")
+    checks.equal([said[key].strip() for key in ("CapPrm", "CapEff", "CapBnd", "CapAmb")], ["0" * 16] * 4,
+                 "it has no capability")
+    checks.equal((said["Seccomp"].strip(), said["NoNewPrivs"].strip()), ("2", "1"), "system calls are filtered")
+    thread = stages.thread_named(pid, "acquisition")
+    checks.check(thread is not None and os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO,
+                 "acquisition has a real-time priority")
+    _, said = output("systemd-analyze", "security", UNIT, "--no-pager")
+    exposure = re.search(r"Overall exposure level for \S+: ([0-9.]+)", said)
+    checks.check(exposure is not None and float(exposure[1]) <= LARGEST_EXPOSURE,
+                 f"exposure {exposure and exposure[1]} is at most {LARGEST_EXPOSURE}", said[-600:])
+    stranger = ["setpriv", "--reuid=nobody", "--regid=nogroup", "--clear-groups", rig_tool(), "status", "--socket"]
+    checks.check(output(*stranger, "/run/vibrig/vibrigd.sock")[0] != 0, "a stranger is not let to the command socket")
+    checks.equal(owner("/run/vibrig/vibrigd.sock").split()[0], "vibrig:vibrig-operator", "the operators' group is")
+    stranger[2] = "--regid=vibrig"
+    checks.equal(output(*stranger, "/run/vibrig/status.sock")[0], 0, "the group vibrig may look")
+
+
+def rig_tool():
+    return shutil.which("vibrig", path="/usr/bin")
+
+
+def runs_a_campaign(checks, rig, timeout_s):
+    for command in ("arm", "start"):
+        done = rig.tool(command, "--by", "tester")
+        checks.equal(done.returncode, 0, f"{command} is accepted {done.stderr.strip()}".strip())
+    last = rig.wait_for_state(("finished", "aborted", "tripped"), timeout_s)
+    checks.equal(r.state_of(last), "finished", "a campaign under the sandbox, over vcan0, finishes")
+    status = rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
+    lost = {key: r.number(status["recorder"].get(key, 0)) for key in ("samples_lost", "frames_lost", "gaps")}
+    lost["kernel"] = r.number(status["can"]["kernel_dropped"])
+    checks.equal(lost, dict.fromkeys(lost, 0), "nothing is lost")
+    path, text = rig.result()
+    checks.check(path is not None and len(json.loads(text)["parameters"]) == 30, "result.json is written")
+    checks.check(path is not None and owner(path).startswith("vibrig:vibrig"), "it is the daemon's user's")
+    recorded = glob.glob(os.path.join(DATA, "packaged-*", "campaign.h5"))
+    checks.check(recorded and output("h5dump", "-H", recorded[0])[0] == 0, "the recording opens", str(recorded))
+
+
+def shakes(checks, rig, what):
+    """A campaign until the table is at its level."""
+    status = rig.wait_for(lambda s: stages.measuring(s) and s["shaker"].get("state") == 0 and
+                          not s["shaker"].get("running", True), 30)
+    if status["campaign"]["state"] == "tripped":
+        rig.tool("ack", "trip", "--by", "tester")
+    said = [rig.tool(command, "--by", "tester").stderr for command in ("arm", "start")]
+    status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
+    checks.check(status is not None and status["campaign"]["state"] == "recording", f"{what}: the table shakes",
+                 f"{r.state_of(status)} {said}")
+
+
+def at_rest(rig):
+    return wait_until(lambda: stages.shaker_state(rig) in (0, 4), 30)
+
+
+def comes_back(checks, rig, what, restarts, pid, begun):
+    checks.check(wait_until(lambda: int(prop("MainPID")) not in (0, pid) and prop("ActiveState") == "active", 60) and
+                 prop("NRestarts") == str(restarts), f"{what}: systemd starts it again",
+                 f"{prop('NRestarts')} restarts; {journal()[-800:]}")
+    ready = time.monotonic()
+    status = rig.wait_for(stages.measuring, 30)
+    checks.check(status is not None and stages.measuring(status), f"{what}: it measures again")
+    checks.note(f"{what}: READY after {ready - begun:.1f} s, measures and answers after {time.monotonic() - begun:.1f} s")
+    checks.check(at_rest(rig), f"{what}: the shaker stops", f"state {stages.shaker_state(rig)}")
+    checks.check(status is not None and status["campaign"]["state"] in ("idle", "tripped"), f"{what}: disarmed",
+                 r.state_of(status))
+
+
+def is_killed(checks, rig):
+    shakes(checks, rig, "kill -9")
+    pid, begun = int(prop("MainPID")), time.monotonic()
+    os.kill(pid, signal.SIGKILL)
+    comes_back(checks, rig, "kill -9", 1, pid, begun)
+
+
+def hangs(checks, rig):
+    shakes(checks, rig, "a stage hangs")
+    pid = int(prop("MainPID"))
+    thread = stages.thread_named(pid, "estimator")
+    begun = time.monotonic()
+    stages.block(thread)
+    checks.check(at_rest(rig), "a stage hangs: the shaker's watchdog stops it")
+    checks.note(f"the shaker is at rest {time.monotonic() - begun:.1f} s after")
+    os.waitpid(thread, stages.WALL)   # systemd's watchdog, after WatchdogSec; the tracer has to let go
+    begun = time.monotonic()
+    comes_back(checks, rig, "a stage hangs", 2, pid, begun)
+    checks.check("Watchdog timeout" in journal(), "a stage hangs: systemd's watchdog ended it", journal()[-800:])
+
+
+def digest(*patterns):
+    found = {}
+    for path in sorted(p for pattern in patterns for p in glob.glob(pattern, recursive=True) if os.path.isfile(p)):
+        with open(path, "rb") as file:
+            found[path] = hashlib.sha256(file.read()).hexdigest()
+    return found
+
+
+def upgrades(checks, rig, package):
+    kept = (CONFIGURATION, os.path.join(DATA, "**", "result.json"), os.path.join(DATA, "**", "raw-*"),
+            os.path.join(DATA, "**", "campaign.h5"))
+    before, pid = digest(*kept), int(prop("MainPID"))
+    succeeds(checks, "the package upgrades while the daemon runs", "dpkg", "-i", package)
+    checks.equal(output("dpkg-query", "-W", "-f", "${Version}", "vibrig")[1], VERSIONS[1], "to the new version")
+    checks.check(wait_until(lambda: int(prop("MainPID")) not in (0, pid) and prop("ActiveState") == "active", 60),
+                 "the new program takes over", prop("ActiveState"))
+    checks.equal(prop("UnitFileState"), "enabled", "it stays enabled")
+    after = digest(*kept)
+    checks.check(len(before) > 3 and before == after, "configuration and recordings are kept",
+                 f"{before.keys() ^ after.keys()}")
+    status = rig.wait_for(stages.measuring, 30)
+    checks.check(status is not None and stages.measuring(status), "it measures")
+
+
+def is_removed(checks, rig):
+    succeeds(checks, "the package is removed", "dpkg", "-r", "vibrig")
+    checks.equal((prop("ActiveState"), prop("LoadState")), ("inactive", "not-found"), "daemon and unit are gone")
+    checks.check(rig_tool() is None and not glob.glob("/etc/systemd/system/*/vibrigd.service"), "programs too")
+    checks.check(os.path.exists(CONFIGURATION) and glob.glob(DATA + "/*/campaign.h5"),
+                 "configuration and recordings stay")
+    succeeds(checks, "the package is purged", "dpkg", "-P", "vibrig")
+    checks.equal([path for path in ("/etc/vibrig", DATA, "/run/vibrig", "/usr/share/doc/vibrig") if
+                  os.path.exists(path)], [], "nothing of it is left")
+
+
+def inside(programs, old, new, soak):
+    checks = r.Checks()
+
+    def timed(function, *arguments):
+        begun = time.monotonic()
+        function(checks, *arguments)
+        checks.note(f"{function.__name__}: {time.monotonic() - begun:.1f} s")
+
+    with tempfile.TemporaryDirectory() as folder:
+        timed(boots)
+        timed(installs, old)
+        timed(makes_interfaces)
+        rig = r.Rig("/usr/bin", "vcan0", "real", folder)
+        rig.configuration, rig.results, rig.socket = CONFIGURATION, DATA, "/run/vibrig/vibrigd.sock"
+        rig.campaign = WHOLE if soak else SHORT
+        rig.programs = programs   # the rig is there when the package is not
+        rig.start_plant("--seed", str(SEED), *(() if soak else ("--warm-up", "1", "--start-temperature", "45")))
+        rig.programs = "/usr/bin"
+        try:
+            timed(starts, rig)
+            timed(is_confined)
+            timed(runs_a_campaign, rig, 12000 if soak else 120)
+            timed(is_killed, rig)
+            timed(hangs, rig)
+            timed(upgrades, rig, new)
+            timed(is_removed, rig)
+        finally:
+            rig.stop()
+    return checks.end()
+
+
+def installs_below_a_prefix(checks, build, folder):
+    """cmake --install below a prefix of its own: the unit names the program there."""
+    prefix = os.path.join(folder, "prefix")
+    succeeds(checks, "cmake --install", "cmake", "--install", build, "--prefix", prefix)
+    with open(os.path.join(prefix, "lib/systemd/system/vibrigd.service"), encoding="utf-8") as file:
+        program = re.search(r"^ExecStart=(\S+)", file.read(), re.M)[1]
+    checks.equal(program, os.path.join(prefix, "bin/vibrigd"), "its unit starts the program installed")
+    checks.equal(output(program, "--check", "--config", os.path.join(prefix, "share/doc/vibrig/examples/vibrigd.toml"))[0], 0,
+                 "which accepts the example configuration")
+
+
+def package(checks, build, folder, version):
+    status, said = output("cpack", "--config", os.path.join(build, "CPackConfig.cmake"), "-R", version, "-B", folder,
+                          timeout=120)
+    path = os.path.join(folder, f"vibrig_{version}_amd64.deb")
+    checks.check(status == 0 and os.path.exists(path), f"cpack makes the package {version}", said[-1500:])
+    return path
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    soak = "--soak" in sys.argv
+    if "--inside" in sys.argv:
+        at = sys.argv.index("--inside")
+        return inside(programs, sys.argv[at + 1], sys.argv[at + 2], soak)
+    checks = r.Checks()
+    build = os.path.dirname(programs)
+    with tempfile.TemporaryDirectory(dir=build) as folder:   # a booting system empties /tmp
+        installs_below_a_prefix(checks, build, folder)
+        packages = [package(checks, build, folder, version) for version in VERSIONS]
+        limit = 14000 if soak else 240
+        run = subprocess.run([os.path.join(HERE, "run-in-uml"), "--systemd", "-t", str(limit), "--", os.path.abspath(__file__),
+                              programs, "--inside", *packages, *(["--soak"] if soak else [])], stdin=subprocess.DEVNULL,
+                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False,
+                             preexec_fn=lambda: r.die_with_parent(signal.SIGTERM))
+        checks.adopt(run.stdout)
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,207 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/digest.hpp"
+#include "daemon/record/index.hpp"
+#include "daemon/record/replay.hpp"
+
+namespace vibrig::record {
+namespace {
+
+namespace fs = std::filesystem;
+using drivers::kSecond;
+using drivers::Time;
+
+constexpr Time kStep = 25 * drivers::kMillisecond;
+
+/// Campaigns in recordings/test-1: files with samples, and dwells of 100 samples.
+class Parts : public ::testing::Test {
+  protected:
+    Parts() {
+        std::string name = (fs::temp_directory_path() / "vibrig-parts.XXXXXX").string();
+        recordings_ = ::mkdtemp(name.data());
+        folder_ = recordings_ / "test-1";
+        fs::create_directory(folder_);
+    }
+    ~Parts() override {
+        std::error_code ignored;
+        fs::remove_all(recordings_, ignored);
+    }
+
+    static Head head(int part, bool restart = false, std::size_t before = 0) {
+        Head head;
+        head.name = "test";
+        head.started_by = "A. Person";
+        head.utc_ns = (1'700'000'000 + 1000 * part) * kSecond;
+        head.utc_offset_ns = 1'700'000'000 * kSecond;
+        head.clock = "real";
+        head.campaign = "test-1";
+        head.part = part;
+        head.restart = restart;
+        head.dwells_before = before;
+        return head;
+    }
+    /// `orders`: positions, each 100 samples from the next hundred on; the first `done` are done.
+    void write(const Head& head, Time from, const std::vector<int>& orders, std::size_t done,
+               const char* state = "finished") {
+        CampaignWriter writer((folder_ / part_name(head.part)).string(), head);
+        for (int i = 0; i < 400; ++i) {
+            drivers::Sample sample;
+            sample.time = from + i * kStep;
+            sample.sequence = static_cast<std::uint32_t>(i);
+            sample.force = {0, 1, 0};
+            writer.sample(sample);
+        }
+        for (std::size_t i = 0; i < orders.size(); ++i) {
+            const Time at = from + static_cast<Time>(i) * 100 * kStep;
+            writer.order({at,
+                          at,
+                          at + 100 * kStep,
+                          1,
+                          orders[i],
+                          9.0,
+                          false,
+                          {},
+                          0,
+                          {5.0, {1e-3, 1e-3, 1e-3}}});
+            if (i >= done) continue;
+            Dwell dwell;
+            dwell.time = at + 100 * kStep;
+            dwell.summary.run = 1;
+            dwell.summary.position = orders[i];
+            dwell.summary.samples = 100;
+            writer.dwell(dwell);
+        }
+        writer.end({state, "", "", "{}", head.utc_ns + kSecond});
+    }
+    std::string refusal() const {
+        try {
+            static_cast<void>(read_campaign(folder_.string()));
+        } catch (const std::runtime_error& error) {
+            return error.what();
+        }
+        return {};
+    }
+
+    fs::path recordings_, folder_;
+};
+
+TEST_F(Parts, OfARestartTakeThePlaceOfWhatWasNotFinished) {
+    // GIVEN a campaign that died in its third dwell, the second of them not in the journal either
+    write(head(1), 10 * kSecond, {1, 2, 3}, 2, "running");
+    // WHEN it went on after the first one, in the time of another boot
+    Head after = head(2, true, 1);
+    after.utc_offset_ns += 2000 * kSecond;
+    write(after, 1 * kSecond, {2, 3}, 2);
+    // THEN it reads as one campaign, each position once and in its times
+    const Campaign campaign = read_campaign(folder_.string());
+    EXPECT_EQ(campaign.samples.size(), 800U);
+    EXPECT_TRUE(std::ranges::is_sorted(campaign.samples, {}, &drivers::Sample::time));
+    ASSERT_EQ(campaign.dwells.size(), 3U);
+    const auto dwells = recorded_dwells(campaign);
+    ASSERT_EQ(dwells.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(dwells[i].order->position, static_cast<int>(i) + 1);
+        EXPECT_EQ(dwells[i].count, 100U);
+    }
+    EXPECT_EQ(dwells[1].first, 400U) << "the second of the new part";
+    EXPECT_EQ(campaign.samples[400].time, 2001 * kSecond);
+    EXPECT_EQ(campaign.restarted_at, 1U);
+    EXPECT_EQ(campaign.state, "finished");
+    EXPECT_TRUE(campaign.incomplete.empty()) << campaign.incomplete;
+    ASSERT_EQ(campaign.gaps.size(), 1U);
+    EXPECT_EQ(campaign.gaps[0].stream, "restart");
+}
+
+TEST_F(Parts, ThatLackWhatTheFilterHadAreNotReplayed) {
+    write(head(1), 10 * kSecond, {1, 2}, 1, "running");
+    write(head(2, true, 2), 100 * kSecond, {3}, 1);
+    const Campaign campaign = read_campaign(folder_.string());
+    EXPECT_NE(campaign.incomplete.find("found 1 dwells before the restart, expected 2"),
+              std::string::npos)
+        << campaign.incomplete;
+    EXPECT_THROW(static_cast<void>(replay(campaign, {}, {})), std::runtime_error);
+}
+
+TEST_F(Parts, AfterADiskThatRefusedHoldWhatWasKeptOnce) {
+    // GIVEN a file that was given up, and its next one with orders and samples of both
+    write(head(1), 10 * kSecond, {1, 2}, 1, "continued");
+    write(head(2), 10 * kSecond + 100 * kStep, {2, 3}, 2);
+    // WHEN the order of the second dwell is in both
+    const Campaign campaign = read_campaign(folder_.string());
+    // THEN nothing is there twice
+    EXPECT_EQ(campaign.samples.size(), 500U);
+    EXPECT_TRUE(
+        std::ranges::is_sorted(campaign.samples, std::less_equal{}, &drivers::Sample::time));
+    EXPECT_EQ(recorded_dwells(campaign).size(), 3U);
+}
+
+TEST_F(Parts, AreRefusedByNameWhenOneIsMissing) {
+    for (const int part : {1, 2, 3})
+        write(head(part), part * 100 * kSecond, {part}, 1, part == 3 ? "finished" : "continued");
+    fs::remove(folder_ / "campaign-2.h5");
+    EXPECT_NE(refusal().find("missing campaign-2.h5 of campaign test-1"), std::string::npos)
+        << refusal();
+    fs::rename(folder_ / "campaign-3.h5", folder_ / "campaign-2.h5");
+    EXPECT_NE(refusal().find("found part 3 of campaign test-1, expected part 2"), std::string::npos)
+        << refusal();
+    fs::remove(folder_ / "campaign.h5");
+    fs::rename(folder_ / "campaign-2.h5", folder_ / "other.h5");
+    EXPECT_THROW(static_cast<void>(read_campaign((folder_ / "other.h5").string())),
+                 std::runtime_error);
+}
+
+TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
+    write(head(1), 10 * kSecond, {1}, 1, "continued");
+    write(head(2), 100 * kSecond, {2}, 1);
+    std::vector<std::string> told;
+    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    {
+        Index index(recordings_.string(), tell);
+        EXPECT_TRUE(index.campaigns().empty());
+        index.note(folder_.string());
+    }
+    const auto campaigns = Index(recordings_.string(), tell).campaigns();
+    ASSERT_EQ(campaigns.size(), 1U);
+    EXPECT_EQ(campaigns[0].key, "test-1");
+    EXPECT_EQ(campaigns[0].state, "finished");
+    ASSERT_EQ(campaigns[0].files.size(), 2U);
+    const auto& file = campaigns[0].files[0];
+    EXPECT_EQ(file.name, "campaign-2.h5");
+    EXPECT_TRUE(file.closed);
+    EXPECT_EQ(file.rows, 400);
+    EXPECT_EQ(file.from_utc_ns, 1'700'000'100 * kSecond);
+    EXPECT_EQ(file.to_utc_ns, 1'700'000'100 * kSecond + 399 * kStep);
+    EXPECT_EQ(file.bytes, static_cast<std::int64_t>(fs::file_size(folder_ / file.name)));
+    EXPECT_EQ(file.sha256, sha256_of_file((folder_ / file.name).string()));
+    // WHEN a campaign is asked for by its name, THEN it is found
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    EXPECT_EQ(find_campaign("test-1", {recordings_.string()}, tell), folder_.string());
+    EXPECT_THROW(static_cast<void>(find_campaign("tset", {recordings_.string()}, tell)),
+                 std::runtime_error);
+    EXPECT_TRUE(told.empty());
+    // WHEN the last part is gone, THEN the index knows it
+    fs::remove(folder_ / "campaign-2.h5");
+    EXPECT_THROW(compare_with_index(folder_.string(), tell), std::runtime_error);
+}
+
+TEST_F(Parts, AreFoundAgainWhenTheIndexIsDamaged) {
+    write(head(1), 10 * kSecond, {1}, 1);
+    std::ofstream(Index::path_in(recordings_.string())) << std::string(5000, 'x');
+    std::vector<std::string> told;
+    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
+        << told[0];
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    EXPECT_EQ(told.size(), 1U);
+}
+
+}  // namespace
+}  // namespace vibrig::record
