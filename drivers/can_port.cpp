@@ -4,6 +4,20 @@
 
 namespace vibrig::drivers {
 
+const char* name_of(ControllerState state) noexcept {
+    switch (state) {
+        case ControllerState::active:
+            return "active";
+        case ControllerState::warning:
+            return "warning";
+        case ControllerState::passive:
+            return "passive";
+        case ControllerState::bus_off:
+            return "bus off";
+    }
+    return "unknown";
+}
+
 const char* name_of(PortState state) noexcept {
     switch (state) {
         case PortState::absent:

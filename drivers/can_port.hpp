@@ -31,6 +31,10 @@ struct ReceivedFrame {
     bool own = false;  ///< this process sent it (loop-back of an own frame)
 };
 
+/// What the CAN controller says of itself in error frames; a virtual one never does.
+enum class ControllerState : std::uint8_t { active, warning, passive, bus_off };
+[[nodiscard]] const char* name_of(ControllerState state) noexcept;
+
 /// Counters of one port; received = delivered + own + error_frames + malformed. Read from any
 /// thread.
 struct CanPortCounters {
@@ -43,6 +47,7 @@ struct CanPortCounters {
     std::uint64_t sent = 0;
     std::uint64_t send_failed = 0;
     std::uint64_t transitions = 0;  ///< changes of PortState
+    ControllerState controller = ControllerState::active;
 };
 
 enum class PortState : std::uint8_t { absent, connecting, running, degraded, fault };

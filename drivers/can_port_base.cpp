@@ -225,7 +225,7 @@ std::size_t CanPortBase::take(std::size_t count) {
         const ReceiveBatch::Packet packet = batch_.packet(i);
         if (packet.overflows) count_overflows(*packet.overflows);
         ++counted_.received;
-        ReceivedFrame received;
+        ReceivedFrame& received = frames_[frames];
         if (!to_frame(packet, settings_.fd, received)) {
             ++counted_.malformed;
             continue;
@@ -240,7 +240,7 @@ std::size_t CanPortBase::take(std::size_t count) {
             errors_[errors++] = received;
         } else {
             ++counted_.delivered;
-            frames_[frames++] = received;
+            ++frames;
         }
     }
     publish();
@@ -276,6 +276,20 @@ void CanPortBase::count_last_overflows() noexcept {
 
 void CanPortBase::watch_controller(const canfd_frame& error_frame) {
     if ((error_frame.can_id & CAN_ERR_BUSOFF) != 0) {
+        controller_.store(ControllerState::bus_off);
+    } else if ((error_frame.can_id & CAN_ERR_RESTARTED) != 0) {
+        controller_.store(ControllerState::active);
+    } else if ((error_frame.can_id & CAN_ERR_CRTL) != 0) {
+        const unsigned says = error_frame.data[1];
+        constexpr unsigned kPassive = CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE;
+        constexpr unsigned kWarning = CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING;
+        if ((says & (kPassive | kWarning | CAN_ERR_CRTL_ACTIVE)) != 0) {
+            controller_.store((says & kPassive) != 0   ? ControllerState::passive
+                              : (says & kWarning) != 0 ? ControllerState::warning
+                                                       : ControllerState::active);
+        }
+    }
+    if ((error_frame.can_id & CAN_ERR_BUSOFF) != 0) {
         enter(PortState::degraded, 0, "bus off");
     } else if ((error_frame.can_id & CAN_ERR_RESTARTED) != 0 && state() == PortState::degraded) {
         enter(PortState::running, 0, "controller restarted");
@@ -283,6 +297,7 @@ void CanPortBase::watch_controller(const canfd_frame& error_frame) {
 }
 
 void CanPortBase::lost(int error) {
+    controller_.store(ControllerState::active);  // it is set up anew
     ++pending_->generation;  // neither the socket's nor the watch's completion counts any more
     close();
     if (error == ENODEV) {
@@ -361,6 +376,7 @@ CanPortCounters CanPortBase::counters() const noexcept {
     c.transitions = values[6];
     c.sent = sent_.load(std::memory_order_relaxed);
     c.send_failed = send_failed_.load(std::memory_order_relaxed);
+    c.controller = controller_.load(std::memory_order_relaxed);
     return c;
 }
 

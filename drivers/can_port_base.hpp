@@ -106,6 +106,7 @@ class CanPortBase : public CanPort {
     std::array<std::atomic<std::uint64_t>, 7> published_{};
     std::atomic<std::uint64_t> sent_{0};
     std::atomic<std::uint64_t> send_failed_{0};
+    std::atomic<ControllerState> controller_{ControllerState::active};
     std::atomic<PortState> state_{PortState::absent};
 };
 

@@ -56,9 +56,8 @@ struct ShakerReading {
     std::uint16_t fault = 0;
     bool running = false;  ///< the run register read back
     bool emergency_stop_open = false;
-    [[nodiscard]] bool at_rest() const {
-        return valid && !running && state == 0 && measured_g < 0.05;
-    }
+    [[nodiscard]] bool still() const { return valid && measured_g < 0.05; }
+    [[nodiscard]] bool at_rest() const { return still() && !running && state == 0; }
 };
 
 enum class LinkState : std::uint8_t { absent, connecting, running, degraded, fault };
