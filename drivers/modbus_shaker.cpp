@@ -46,7 +46,7 @@ void ModbusShaker::start(std::function<bool()> may_feed, StateHandler on_state) 
     ::pthread_setname_np(thread_.native_handle(), "shaker");
 }
 
-bool ModbusShaker::request(const ShakerSetPoint& set_point) noexcept {
+bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops) noexcept {
     const proto::ShakerRegisters& map = settings_.registers;
     if (!encodable(map.frequency, set_point.frequency_hz) ||
         !encodable(map.amplitude, set_point.amplitude_g) ||
@@ -54,7 +54,8 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point) noexcept {
         return false;
     }
     const auto ticket = orders_.ticket();
-    if (ticket.stop_pending() || state() != LinkState::running) return false;
+    if (ticket.stop_pending() || ticket.stops() != stops || state() != LinkState::running)
+        return false;
     if (orders_.put(set_point, ticket)) ++counts_.set_points_discarded;
     wake();
     return true;

@@ -24,8 +24,10 @@ class ModbusShaker final : public Shaker {
     ~ModbusShaker() override;
 
     void start(std::function<bool()> may_feed, StateHandler on_state) override;
-    [[nodiscard]] bool request(const ShakerSetPoint& set_point) noexcept override;
+    [[nodiscard]] bool request(const ShakerSetPoint& set_point,
+                               std::uint64_t stops) noexcept override;
     void stop_now() noexcept override;
+    [[nodiscard]] std::uint64_t stops() const noexcept override { return orders_.ticket().stops(); }
     [[nodiscard]] bool stop_pending() const noexcept override { return orders_.stop_pending(); }
     [[nodiscard]] bool busy() const noexcept override { return orders_.busy(); }
     [[nodiscard]] ShakerReading reading() const noexcept override;

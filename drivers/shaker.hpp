@@ -85,11 +85,16 @@ class Shaker {
     virtual ~Shaker() = default;
     /// Starts the thread. `may_feed` is asked in that thread before each watchdog feed.
     virtual void start(std::function<bool()> may_feed, StateHandler on_state) = 0;
-    /// Replaces a waiting set-point; false if a stop is pending, the link is not running, or a
-    /// value does not fit its register (nothing is kept then).
-    [[nodiscard]] virtual bool request(const ShakerSetPoint& set_point) noexcept = 0;
+    /// Replaces a waiting set-point; false if a stop is pending or was asked for since `stops` was
+    /// read, the link is not running, or a value does not fit its register (nothing is kept then).
+    /// Who arms the shaker reads stops() then and asks under that number: a stop that came in
+    /// between is not undone, however long the caller slept before it asked.
+    [[nodiscard]] virtual bool request(const ShakerSetPoint& set_point,
+                                       std::uint64_t stops) noexcept = 0;
     /// Any thread; never blocks. Cuts off a request in flight.
     virtual void stop_now() noexcept = 0;
+    /// How often stop_now() was called.
+    [[nodiscard]] virtual std::uint64_t stops() const noexcept = 0;
     [[nodiscard]] virtual bool stop_pending() const noexcept = 0;
     /// True while a request() waits or is being written.
     [[nodiscard]] virtual bool busy() const noexcept = 0;

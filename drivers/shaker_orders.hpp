@@ -31,6 +31,7 @@ class ShakerOrders {
         std::uint64_t stop = 0;
         std::uint64_t link = 0;
         [[nodiscard]] bool stop_pending() const noexcept { return (stop & kPending) != 0; }
+        [[nodiscard]] std::uint64_t stops() const noexcept { return stop / kOneStop; }
     };
     [[nodiscard]] Ticket ticket() const noexcept { return {stop_.load(), link_.load()}; }
     /// Any thread. True if a waiting set-point was replaced.

@@ -108,6 +108,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (const auto why = loop_->refusal(); !why.empty()) return refuse(why);
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
             armed_by_ = request.by;
+            armed_under_ = ports_.shaker.stops();
             reason_.clear();
             enter(State::armed, now);
             return accept(fmt::format(
@@ -142,7 +143,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (const auto shaker = ports_.shaker.reading();
                 state_ != State::tripped && shaker.fault != 0 && !active()) {
                 if (!shaker.still()) return refuse("the table is not at rest yet");
-                ports_.shaker.stop_now();
+                stop_shaker();
                 return accept(fmt::format("acknowledged: shaker fault {:#06x}", shaker.fault));
             }
             if (state_ != State::tripped) return refuse("nothing to acknowledge");
@@ -301,7 +302,8 @@ Time Campaign::ramp(Time now) {
     }
     if (!requested_) {
         may_move_ = true;
-        requested_ = ports_.shaker.request({settings_.frequency_hz, table_g(), settings_.ramp_s});
+        requested_ = ports_.shaker.request({settings_.frequency_hz, table_g(), settings_.ramp_s},
+                                           armed_under_);
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
     }
@@ -390,6 +392,12 @@ Time Campaign::rest(Time now) {
     return now;
 }
 
+/// A stop of this thread's own does not end the arming.
+void Campaign::stop_shaker() {
+    ports_.shaker.stop_now();
+    ++armed_under_;
+}
+
 /// Ramps down; true once rest is read back.
 bool Campaign::come_to_rest(Time now) {
     const auto reading = ports_.shaker.reading();
@@ -399,10 +407,11 @@ bool Campaign::come_to_rest(Time now) {
         return true;
     }
     if (!requested_ && !ports_.shaker.stop_pending()) {
-        requested_ = ports_.shaker.request({settings_.frequency_hz, 0, settings_.ramp_s});
+        requested_ =
+            ports_.shaker.request({settings_.frequency_hz, 0, settings_.ramp_s}, armed_under_);
         if (!requested_) {  // no ramp to be had: the hard way
             stop_sent_ = true;
-            ports_.shaker.stop_now();
+            stop_shaker();
         }
     }
     if (!stop_sent_ && now - entered_ > from_seconds(settings_.ramp_s + settings_.stop_timeout_s)) {
@@ -483,7 +492,7 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
 }
 
 void Campaign::on_trip(const std::string& cause, Time now) {
-    // Once more: a set-point of this thread may have slipped in behind the interlock's stop.
+    // Once more: whoever tripped has stopped it already, and a second stop costs one write.
     ports_.shaker.stop_now();
     end(State::tripped, cause, now);
 }

@@ -146,6 +146,7 @@ class Campaign {
     void abort(const std::string& why, drivers::Time now);
     void end(CampaignState state, const std::string& why, drivers::Time now);
     void leave_dwell();
+    void stop_shaker();
     void begin(drivers::Time now);
     void conclude(drivers::Time now);
     void finish(drivers::Time now);
@@ -190,6 +191,8 @@ class Campaign {
     std::vector<double> levels_;  ///< one run each, in order of appearance
     int repeats_ = 0;             ///< of the present stop, after flagged dwells
     std::string armed_by_;
+    std::uint64_t armed_under_ =
+        0;  ///< of the shaker when it was armed, and this thread's own since
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;

@@ -33,6 +33,7 @@ std::string Campaign::not_fit_to_check(Time now) const {
 CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now) {
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
     armed_by_ = request.by;
+    armed_under_ = ports_.shaker.stops();
     reason_.clear();
     loop_->begin(request.by);
     ports_.feed->order(rt::StageFeed::Mode::samples);
@@ -92,7 +93,7 @@ void Campaign::ramp_for_check(Time now) {
     if (!requested_) {
         may_move_ = true;
         requested_ = ports_.shaker.request(
-            {settings_.frequency_hz, settings_.loop.table_g, settings_.ramp_s});
+            {settings_.frequency_hz, settings_.loop.table_g, settings_.ramp_s}, armed_under_);
         if (!requested_) abort("the shaker takes no set-point", now);
     } else if (!ports_.shaker.busy() &&
                vibrating_as_commanded(ports_.shaker.reading(), settings_.loop.table_g)) {

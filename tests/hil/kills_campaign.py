@@ -117,11 +117,13 @@ class Kill:
                     self.going_on = asked
                 before_this = (status["campaign"]["run"] - 1) * len(CAMPAIGN["positions_deg"]) + status["campaign"]["position"] - 1
                 self.done.append((time.monotonic(), before_this))
-        moved = stages.shaker_state(self.rig) in (1, 2)
         self.killed = time.monotonic()
         self.rig.daemon.process.kill()
         self.rig.daemon.process.wait()
         self.text = f"killed {self.killed - self.begun:.2f} s after {self.how}, {self.state}"
+        # Asked after the kill: before it, the daemon itself may be about to end the level.
+        time.sleep(0.1)   # what it sent last arrives
+        moved = stages.shaker_state(self.rig) in (1, 2)   # the watchdog takes longer than this
         self.shaker(moved)
         self.journal()
         self.recording(before)

@@ -245,7 +245,7 @@ TEST_F(CampaignTest, AnAbortStopsTheShakerAndEndsTheArming) {
     ASSERT_TRUE(run_until(CampaignState::recording, 60));
     EXPECT_EQ(guard, rt::Guard::excitation);
     EXPECT_TRUE(command(Kind::abort).accepted);
-    EXPECT_GE(shaker.stops, 1);
+    EXPECT_GE(shaker.stops_asked, 1U);
     EXPECT_TRUE(orders.back().cancel);
     EXPECT_EQ(status().state, CampaignState::aborted);
     const auto requests = shaker.requests.size();
@@ -271,6 +271,23 @@ TEST_F(CampaignTest, ATripLatchesUntilAcknowledged) {
     EXPECT_TRUE(command(Kind::arm).accepted);
 }
 
+TEST_F(CampaignTest, AStopOfSomebodyElsesIsNotUndoneByTheNextLevel) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    ASSERT_TRUE(run_until(CampaignState::slewing, 200));
+    // GIVEN the interlock's stop, confirmed before this thread hears of it
+    shaker.stop_now();
+    shaker.obey(now);
+    const auto requests = shaker.requests.size();
+    // THEN the next level is not asked for
+    ASSERT_TRUE(run_until(CampaignState::aborted, 200));
+    EXPECT_EQ(status().reason, "the shaker takes no set-point");
+    run_for(30);
+    for (auto i = requests; i < shaker.requests.size(); ++i)
+        EXPECT_EQ(shaker.requests[i].amplitude_g, 0);
+}
+
 TEST_F(CampaignTest, AFaultThatTheControllerLatchedMeanwhileIsAcknowledgedByAStop) {
     EXPECT_FALSE(command(Kind::acknowledge).accepted);
     shaker.now.fault = 1;
@@ -279,7 +296,7 @@ TEST_F(CampaignTest, AFaultThatTheControllerLatchedMeanwhileIsAcknowledgedByASto
     EXPECT_FALSE(command(Kind::acknowledge).accepted);
     shaker.now.measured_g = 0;
     EXPECT_TRUE(command(Kind::acknowledge).accepted);
-    EXPECT_EQ(shaker.stops, 1);
+    EXPECT_EQ(shaker.stops_asked, 1U);
     EXPECT_EQ(status().state, CampaignState::idle);
 }
 
@@ -290,7 +307,7 @@ TEST_F(CampaignTest, StopsWhenTheMeasuredAmplitudeLeavesTheCommand) {
     shaker.now.measured_g = 9 * 1.06;
     campaign->step(now);
     EXPECT_EQ(status().state, CampaignState::aborted);
-    EXPECT_GE(shaker.stops, 1);
+    EXPECT_GE(shaker.stops_asked, 1U);
 }
 
 TEST_F(CampaignTest, StopsWhenTheShakerNoLongerAnswers) {
@@ -300,7 +317,7 @@ TEST_F(CampaignTest, StopsWhenTheShakerNoLongerAnswers) {
     shaker.now.valid = false;
     campaign->step(now);
     EXPECT_EQ(status().state, CampaignState::aborted);
-    EXPECT_GE(shaker.stops, 1);
+    EXPECT_GE(shaker.stops_asked, 1U);
 }
 
 TEST_F(CampaignTest, PausesAtRestBeforeTheNextPositionAndResumes) {
@@ -326,7 +343,7 @@ TEST_F(CampaignTest, ShutsDownByRampingToRestFirst) {
     ASSERT_TRUE(run_until(CampaignState::aborted, 20));
     EXPECT_TRUE(campaign->done());
     EXPECT_TRUE(shaker.now.at_rest());
-    EXPECT_EQ(shaker.stops, 0) << "ramped down, not cut";
+    EXPECT_EQ(shaker.stops_asked, 0U) << "ramped down, not cut";
     EXPECT_FALSE(command(Kind::arm).accepted);
 }
 

@@ -12,15 +12,17 @@ namespace vibrig {
 class FakeShaker final : public drivers::Shaker {
   public:
     void start(std::function<bool()>, StateHandler) override {}
-    [[nodiscard]] bool request(const drivers::ShakerSetPoint& set_point) noexcept override {
-        if (refuse || stop_pending()) return false;
+    [[nodiscard]] bool request(const drivers::ShakerSetPoint& set_point,
+                               std::uint64_t under) noexcept override {
+        if (refuse || stop_pending() || under != stops()) return false;
         requests.push_back(set_point);
         return true;
     }
     void stop_now() noexcept override {
-        ++stops;
+        ++stops_asked;
         stop_waits = true;
     }
+    [[nodiscard]] std::uint64_t stops() const noexcept override { return stops_asked; }
     [[nodiscard]] bool stop_pending() const noexcept override { return stop_waits; }
     [[nodiscard]] bool busy() const noexcept override { return false; }
     [[nodiscard]] drivers::ShakerReading reading() const noexcept override { return now; }
@@ -45,7 +47,7 @@ class FakeShaker final : public drivers::Shaker {
 
     drivers::ShakerReading now;
     std::vector<drivers::ShakerSetPoint> requests;
-    std::atomic<int> stops{0};
+    std::atomic<std::uint64_t> stops_asked{0};
     std::atomic<bool> stop_waits{false};
     bool refuse = false;
 };

@@ -33,7 +33,7 @@ TEST_F(InterlockTest, StopsAndWakesTheControlThreadOnAnOpenLoop) {
     platform.loop_closed = false;
     interlock.check(sample, platform);
     EXPECT_EQ(interlock.tripped(), Trip::loop_open);
-    EXPECT_EQ(shaker.stops, 1);
+    EXPECT_EQ(shaker.stops_asked, 1U);
     EXPECT_TRUE(control->wait_until(clock.now() + drivers::kSecond));
 }
 
@@ -45,7 +45,7 @@ TEST_F(InterlockTest, StaysLatchedWithTheFirstCauseUntilAcknowledged) {
     sample.table_accel = 13;
     interlock.check(sample, platform);
     EXPECT_EQ(interlock.tripped(), Trip::loop_open);
-    EXPECT_EQ(shaker.stops, 1);
+    EXPECT_EQ(shaker.stops_asked, 1U);
     interlock.acknowledge(Trip::over_amplitude);
     EXPECT_EQ(interlock.tripped(), Trip::loop_open) << "another cause than the handled one stays";
     interlock.acknowledge(Trip::loop_open);
@@ -78,7 +78,7 @@ TEST_F(InterlockTest, TakesPlatformAndTableForNothingWhileNothingMayMove) {
     interlock.check(sample, platform);
     interlock.lost_bus();
     EXPECT_EQ(interlock.tripped(), Trip::none);
-    EXPECT_EQ(shaker.stops, 0);
+    EXPECT_EQ(shaker.stops_asked, 0U);
 }
 
 TEST_F(InterlockTest, WatchesEmergencyStopFaultsAndBusFromTheArmingOn) {
@@ -102,7 +102,7 @@ TEST_F(InterlockTest, StopsAShakerThatNobodyCommanded) {
     reading.running = true;
     interlock.check(reading);
     EXPECT_EQ(interlock.tripped(), Trip::uncommanded);
-    EXPECT_EQ(shaker.stops, 1);
+    EXPECT_EQ(shaker.stops_asked, 1U);
     // WHEN the stop is on its way, THEN the same reading is no new trip
     interlock.acknowledge(Trip::uncommanded);
     interlock.check(reading);
@@ -174,7 +174,7 @@ TEST_F(TableTest, AlarmsInTheInnerBandAndAbortsInTheOuterOneAfterItsDwell) {
     }
     EXPECT_EQ(interlock->tripped_name(), "stop");
     EXPECT_EQ(interlock->tripped_text(), "amplitude off command: 3.1, limit 3 dB");
-    EXPECT_EQ(shaker.stops, 1);
+    EXPECT_EQ(shaker.stops_asked, 1U);
 }
 
 TEST_F(TableTest, TakesNoAmplitudeForOneThatIsOff) {
@@ -205,7 +205,7 @@ TEST_F(TableTest, ALatchedAlarmStaysUntilItsNameIsAcknowledged) {
     EXPECT_FALSE(interlock->acknowledge_alarm("hotter"));
     EXPECT_TRUE(interlock->acknowledge_alarm("hot"));
     EXPECT_FALSE(interlock->row(0).raised);
-    EXPECT_EQ(shaker.stops, 0) << "alarm is not abort";
+    EXPECT_EQ(shaker.stops_asked, 0U) << "alarm is not abort";
 }
 
 TEST_F(TableTest, MeasuresCrossAxisMotionAndTiltWhateverTheGimbalAngles) {
@@ -295,7 +295,8 @@ TEST(Reaction, TheStopIsTheNextWriteAndNoSetPointFollows) {
         return done();
     };
     ASSERT_TRUE(eventually([&] { return shaker->state() == drivers::LinkState::running; }));
-    ASSERT_TRUE(shaker->request({15.0, 1.0, 1.0}));
+    const std::uint64_t armed = shaker->stops();
+    ASSERT_TRUE(shaker->request({15.0, 1.0, 1.0}, armed));
     ASSERT_TRUE(eventually([&] { return !shaker->busy(); }));
     std::atomic<bool> hung = false;
     server.script([&](const drivers::test::Request& request) {
@@ -314,9 +315,11 @@ TEST(Reaction, TheStopIsTheNextWriteAndNoSetPointFollows) {
     platform.loop_closed = true;
     interlock.arrived(clock.now());
     interlock.check(sample, platform);
-    EXPECT_FALSE(shaker->request({15.0, 2.0, 1.0}));
-    // THEN the stop is the first write, nothing but the watchdog follows, and its time is known
+    EXPECT_FALSE(shaker->request({15.0, 2.0, 1.0}, armed));
+    // THEN the stop is the first write, nothing but the watchdog follows, even once the stop is
+    // confirmed, and its time is known
     ASSERT_TRUE(eventually([&] { return !shaker->stop_pending(); }));
+    EXPECT_FALSE(shaker->request({15.0, 2.0, 1.0}, armed));
     const std::uint64_t polls = shaker->counters().requests;
     ASSERT_TRUE(eventually([&] { return shaker->counters().requests > polls + 5; }));
     const auto writes = server.writes();

@@ -63,14 +63,14 @@ TEST(ShakerStop, LeavesNoSetPointBehind) {
     server.script([&](const Request& request) {
         return request.writes(kRampTime) ? Answer{Kind::hang, 0, {}} : Answer{};
     });
-    ASSERT_TRUE(bench.shaker->request(kRunning));
+    ASSERT_TRUE(bench.request(kRunning));
     ASSERT_TRUE(server.saw([](const Request& r) { return r.writes(kRampTime); }));
     EXPECT_TRUE(bench.shaker->busy());
-    ASSERT_TRUE(bench.shaker->request({15.0, 2.0, 1.0}));
+    ASSERT_TRUE(bench.request({15.0, 2.0, 1.0}));
     server.forget();
     // WHEN it is stopped
     bench.shaker->stop_now();
-    EXPECT_FALSE(bench.shaker->request({15.0, 3.0, 1.0}));
+    EXPECT_FALSE(bench.request({15.0, 3.0, 1.0}));
     // THEN both are gone, and counted
     ASSERT_TRUE(
         bench.eventually([&] { return !bench.shaker->stop_pending() && !bench.shaker->busy(); }));
@@ -109,7 +109,7 @@ TEST(ShakerStop, DiscardsASetPointWhenTheLinkIsLost) {
         return request.connection == 1 && request.writes(kRampTime) ? Answer{Kind::close, 0, {}}
                                                                     : Answer{};
     });
-    ASSERT_TRUE(bench.shaker->request(kRunning));
+    ASSERT_TRUE(bench.request(kRunning));
     ASSERT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects >= 1; }));
     ASSERT_TRUE(bench.reaches(LinkState::running));
     // THEN excitation does not recover by itself
@@ -137,7 +137,7 @@ TEST(ShakerStop, IsRepeatedUntilItIsReadBackAndTheWatchdogStarves) {
     EXPECT_TRUE(bench.shaker->stop_pending());
     EXPECT_LE(bench.shaker->counters().feeds, before.feeds + 1);
     EXPECT_EQ(bench.shaker->state(), LinkState::degraded);
-    EXPECT_FALSE(bench.shaker->request(kRunning));
+    EXPECT_FALSE(bench.request(kRunning));
     // WHEN the device obeys at last THEN all is well
     server.script({});
     EXPECT_TRUE(bench.reaches(LinkState::running));
@@ -181,7 +181,7 @@ TEST(ShakerStop, MayComeFromManyThreadsAtOnce) {
         threads.emplace_back([&] {
             for (int n = 0; n < 100; ++n) {
                 bench.shaker->stop_now();
-                static_cast<void>(bench.shaker->request(kRunning));
+                static_cast<void>(bench.request(kRunning));
                 static_cast<void>(bench.shaker->reading());
             }
         });
@@ -191,6 +191,22 @@ TEST(ShakerStop, MayComeFromManyThreadsAtOnce) {
     ASSERT_TRUE(
         bench.eventually([&] { return !bench.shaker->stop_pending() && !bench.shaker->busy(); }));
     EXPECT_EQ(server.holding(kRun), 0);
+}
+
+TEST(ShakerStop, IsNotUndoneByWhoWasArmedBeforeIt) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply(kRunning));
+    // GIVEN a stop that is over and confirmed before a slow thread asks for more
+    const std::uint64_t armed = bench.shaker->stops();
+    bench.shaker->stop_now();
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    server.forget();
+    // THEN it is refused, and nothing is written; whoever arms anew may ask
+    EXPECT_FALSE(bench.shaker->request(kRunning, armed));
+    EXPECT_EQ(bench.shaker->stops(), armed + 1);
+    EXPECT_FALSE(bench.shaker->busy());
+    EXPECT_TRUE(bench.shaker->request(kRunning, bench.shaker->stops()));
 }
 
 TEST(ShakerStop, EndsAThreadThatHangs) {

@@ -155,7 +155,7 @@ TEST(Shaker, StaysDegradedAfterAMismatchUntilAStopIsReadBack) {
     EXPECT_NE(bench.said().back().second.find("amplitude reads back as 0.000000, expected 3.5"),
               std::string::npos)
         << bench.said().back().second;
-    EXPECT_FALSE(bench.shaker->request({15.0, 1.0, 1.0}));
+    EXPECT_FALSE(bench.request({15.0, 1.0, 1.0}));
     // WHEN it is stopped THEN it is usable again
     bench.shaker->stop_now();
     EXPECT_TRUE(bench.reaches(LinkState::running));
@@ -203,9 +203,9 @@ TEST(Shaker, RefusesValuesThatFitNoRegister) {
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     for (const double bad : {kNan, kInfinity, -1.0, 1e12}) {
-        EXPECT_FALSE(bench.shaker->request({bad, 1.0, 1.0})) << bad;
-        EXPECT_FALSE(bench.shaker->request({15.0, bad, 1.0})) << bad;
-        EXPECT_FALSE(bench.shaker->request({15.0, 1.0, bad})) << bad;
+        EXPECT_FALSE(bench.request({bad, 1.0, 1.0})) << bad;
+        EXPECT_FALSE(bench.request({15.0, bad, 1.0})) << bad;
+        EXPECT_FALSE(bench.request({15.0, 1.0, bad})) << bad;
     }
     EXPECT_FALSE(bench.shaker->busy());
     EXPECT_TRUE(addresses_written(server).empty());

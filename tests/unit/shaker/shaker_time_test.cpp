@@ -97,7 +97,7 @@ TEST(ShakerTime, LeavesTheWatchdogAloneUntilAStopIsDone) {
     const auto shaker = make_shaker(clock, periods(settings_for(server)));
     shaker->start([] { return true; }, {});
     static_cast<void>(clock.rest());
-    ASSERT_TRUE(shaker->request({15.0, 1.0, 1.0}));
+    ASSERT_TRUE(shaker->request({15.0, 1.0, 1.0}, 0));
     static_cast<void>(clock.rest());
     ASSERT_EQ(server.holding(kRun), 1);
     server.script([](const Request& request) {

@@ -121,7 +121,7 @@ TEST(ShakerWire, WaitsForAServerThatIsNotThereYet) {
     Bench bench(settings);
     ASSERT_TRUE(bench.reaches(LinkState::connecting));
     EXPECT_NE(bench.said().front().second.find("Connection refused"), std::string::npos);
-    EXPECT_FALSE(bench.shaker->request({15.0, 1.0, 1.0}));
+    EXPECT_FALSE(bench.request({15.0, 1.0, 1.0}));
     // WHEN it comes THEN it is used, and there was one line per change
     TestServer server(TestServer::Line::tcp, port);
     ASSERT_TRUE(bench.reaches(LinkState::running));

@@ -63,9 +63,13 @@ class Bench {
     [[nodiscard]] bool reaches(LinkState state) {
         return eventually([&] { return shaker->state() == state; });
     }
+    /// Asks for a set-point under whatever stops there were.
+    [[nodiscard]] bool request(const ShakerSetPoint& set_point) {
+        return shaker->request(set_point, shaker->stops());
+    }
     /// Asks for a set-point and waits until it has been dealt with.
     [[nodiscard]] bool apply(const ShakerSetPoint& set_point) {
-        return reaches(LinkState::running) && shaker->request(set_point) &&
+        return reaches(LinkState::running) && request(set_point) &&
                eventually([&] { return !shaker->busy(); });
     }
     [[nodiscard]] std::vector<std::pair<LinkState, std::string>> said() const {
