@@ -104,8 +104,9 @@ int run(vibrig::configuration::Loaded loaded, const sigset_t& signals, const std
     const auto server_settings = settings_of(loaded.configuration);
     vibrig::Daemon daemon(std::move(loaded));
     // Before anything moves: it refuses to run beside another vibrigd.
-    const vibrig::serve::StatusServer server(daemon, server_settings);
+    vibrig::serve::StatusServer server(daemon, server_settings);
     daemon.start();
+    server.answer();
     spdlog::info("vibrigd {} answers at {}; measuring, shaker disarmed", vibrig::kVersion, socket);
     if (const auto page = server.page_address(); !page.empty()) spdlog::info("live page: {}", page);
     if (const auto remote = server.remote_address(); !remote.empty())

@@ -105,6 +105,9 @@ struct StatusServer::Impl {
             look_at_certificates();
             remote = open_tcp(Door::remote, listen_tcp("server.remote", settings.remote, false));
         }
+    }
+
+    void answer() {
         for (Listener& listener : listeners) accept(listener);
         // Signals are for the main thread.
         sigset_t all, before;
@@ -119,7 +122,7 @@ struct StatusServer::Impl {
 
     ~Impl() {
         io.stop();
-        thread.join();
+        if (thread.joinable()) thread.join();
     }
 
     void open_unix(Door door, const std::string& path) {
@@ -244,7 +247,11 @@ StatusServer::StatusServer(StatusSource& source, const ServerSettings& settings)
 
 StatusServer::StatusServer(StatusSource& source, const std::string& path,
                            const ServerLimits& limits)
-    : StatusServer(source, ServerSettings{path, {}, {}, {}, {}, {}, {}, {}, {}, limits}) {}
+    : StatusServer(source, ServerSettings{path, {}, {}, {}, {}, {}, {}, {}, {}, limits}) {
+    answer();
+}
+
+void StatusServer::answer() { impl_->answer(); }
 
 StatusServer::~StatusServer() = default;
 

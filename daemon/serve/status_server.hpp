@@ -36,16 +36,19 @@ struct ServerSettings {
 /// it.
 class StatusServer {
   public:
-    /// Listens when it returns. Throws ServeError ("another vibrigd answers at PATH", no such
-    /// folder, a certificate that cannot be read, ...).
+    /// Listens when it returns, so that nobody else does; clients wait for answer(). Throws
+    /// ServeError ("another vibrigd answers at PATH", no such folder, a certificate that cannot be
+    /// read, ...).
     StatusServer(StatusSource& source, const ServerSettings& settings);
-    /// The control socket alone.
+    /// The control socket alone, answered at once.
     StatusServer(StatusSource& source, const std::string& path, const ServerLimits& limits = {});
     /// Closes all connections and removes the sockets' files.
     ~StatusServer();
     StatusServer(const StatusServer&) = delete;
     StatusServer& operator=(const StatusServer&) = delete;
 
+    /// Once, when `source` may be asked.
+    void answer();
     /// With the port that was found for port 0; empty: not listening there.
     [[nodiscard]] std::string page_address() const;
     [[nodiscard]] std::string remote_address() const;

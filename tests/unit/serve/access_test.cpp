@@ -85,6 +85,7 @@ class Access : public testing::Test {
 
 TEST_F(Access, EveryCommandByEveryRole) {
     server.emplace(source, settings);
+    server->answer();
     struct Row {
         const char* role;
         int reads, commands;
@@ -119,6 +120,7 @@ TEST_F(Access, EveryCommandByEveryRole) {
 
 TEST_F(Access, EveryCommandThroughEveryLocalDoor) {
     server.emplace(source, settings);
+    server->answer();
     const std::string page = without_scheme(server->page_address());
     for (const std::string& kind : all_kinds()) {
         EXPECT_EQ(status_of(post(settings.socket, "/api/v1/commands", body_for(kind))), 200)
@@ -138,6 +140,7 @@ TEST_F(Access, EveryCommandThroughEveryLocalDoor) {
 
 TEST_F(Access, BadCertificatesAreRefused) {
     server.emplace(source, settings);
+    server->answer();
     const Identity stranger = make_identity({Use::authority, "authority", "", {}});
     struct Row {
         const char* what;
@@ -184,6 +187,7 @@ TEST_F(Access, RevokedCertificatesAreRefusedAtOnce) {
     list(first);
     settings.revoked = folder.file("revoked.crl");
     server.emplace(source, settings);
+    server->answer();
     EXPECT_THROW((void)Client(remote("gone", gone)).get("/healthz"), ClientError);
     Client of_ada(remote("ada", ada)), of_eve(remote("eve", eve));
     EXPECT_EQ(of_ada.get("/healthz").status, 200);
@@ -235,6 +239,7 @@ TEST_F(Access, BadServersAreNotBelieved) {
           Row{"a person's", {Use::client, "rig", "", {"127.0.0.1"}}}}) {
         save("server", make_identity(row.settings, &authority));
         server.emplace(source, settings);
+        server->answer();
         EXPECT_THROW((void)Client(remote("ada", person("admin"))).get("/healthz"), ClientError)
             << row.what;
         server.reset();
@@ -243,6 +248,7 @@ TEST_F(Access, BadServersAreNotBelieved) {
 
 TEST_F(Access, StrangersPagesAreNotAnswered) {
     server.emplace(source, settings);
+    server->answer();
     const std::string page = without_scheme(server->page_address());
     const std::string port = page.substr(page.find(':'));
     const auto ask = [&](const std::string& path, const std::string& host,
@@ -276,6 +282,7 @@ TEST_F(Access, StrangersPagesAreNotAnswered) {
 
 TEST_F(Access, ManyCommandsAreTooManyButAStopNeverIs) {
     server.emplace(source, settings);
+    server->answer();
     Client client(settings.socket);
     int taken = 0, refused = 0;
     for (int i = 0; i < 200; ++i) {
