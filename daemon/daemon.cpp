@@ -11,7 +11,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <tuple>
 
 #include "daemon/tool/result_json.hpp"
 #include "daemon/version.hpp"
@@ -51,19 +50,12 @@ drivers::ShakerSettings shaker_settings(const configuration::Configuration& conf
     return settings;
 }
 
-/// Ordinary scheduling when it cannot be had; the reason is returned for the log.
-std::string set_fifo(std::thread& thread, int priority) {
-    if (priority <= 0) return {};
-    const sched_param parameters{.sched_priority = priority};
-    const int error = ::pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &parameters);
-    return error == 0 ? std::string{} : std::strerror(error);
-}
-
 }  // namespace
 
 Daemon::Daemon(configuration::Loaded loaded)
     : loaded_(std::move(loaded)),
       configuration_(loaded_.configuration),
+      memory_lock_(lock_memory()),
       rig_clock_(configuration_.clock == configuration::Configuration::ClockKind::rig
                      ? std::make_unique<rt::RigClock>()
                      : nullptr),
@@ -88,11 +80,14 @@ Daemon::Daemon(configuration::Loaded loaded)
       pre_trip_(make_pre_trip()),
       stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign),
                   control_waiter_.get()),
-      acquisition_(io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
-                   {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_,
-                    recorder_ ? &recorder_->received() : nullptr,
-                    recorder_ ? &recorder_->samples() : nullptr,
-                    pre_trip_ ? &pre_trip_->samples() : nullptr}),
+      acquisition_(
+          io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
+          {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_,
+           recorder_ ? &recorder_->received() : nullptr,
+           recorder_ ? &recorder_->samples() : nullptr, pre_trip_ ? &pre_trip_->samples() : nullptr,
+           in_real_time()
+               ? &estimator_stage_.time_by(clock_, configuration_.assembler.sample_period)
+               : nullptr}),
       gimbal_(dbc_, configuration_.gimbal, sending_port()),
       torquer_(configuration_.campaign.levelling
                    ? std::make_unique<drivers::Torquer>(dbc_, configuration_.campaign.level.torquer,
@@ -244,23 +239,7 @@ void Daemon::start() {
                        shaker_events_.try_push(event);
                        control_waiter_->notify();
                    });
-    control_thread_ = std::thread([this] { control_loop(); });
-    estimator_thread_ = std::thread([this] { estimator_stage_.run(); });
-    acquisition_thread_ = std::thread([this] { io_.run(); });
-    // The rig waits for us: a thread that comes first is only woken for every frame instead of
-    // every sample.
-    const bool first = rig_clock_ == nullptr;
-    for (const auto& [thread, priority, name] :
-         {std::tuple{&acquisition_thread_, configuration_.acquisition_priority, "acquisition"},
-          std::tuple{&estimator_thread_, configuration_.estimator_priority, "estimator"},
-          std::tuple{&control_thread_, 0, "control"}}) {
-        ::pthread_setname_np(thread->native_handle(), name);  // for top and the like
-        if (const auto why = set_fifo(*thread, first ? priority : 0); !why.empty()) {
-            log(Severity::warning, name,
-                fmt::format("SCHED_FIFO {} could not be had ({}): ordinary scheduling", priority,
-                            why));
-        }
-    }
+    start_threads();
     if (publisher_) publisher_->start();
 }
 
@@ -519,6 +498,7 @@ StatusData Daemon::status() const {
     const auto ring = estimator_stage_.ring();
     status.estimator_ring = {ring.pushed, ring.popped, ring.dropped};
     status.latency = acquired.latency;
+    status.real_time = real_time_status(acquired, estimated);
     status.rig_ticks = acquired.rig_ticks;
     status.increment_frames = acquired.increments;
     status.estimator_in_dwell = estimated.in_dwell;

@@ -22,6 +22,7 @@
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/interlock.hpp"
 #include "daemon/rt/real_clock.hpp"
+#include "daemon/rt/real_time.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
@@ -81,6 +82,10 @@ class Daemon final : public StatusSource {
         std::shared_ptr<std::atomic<bool>> abandoned;
     };
 
+    /// False where the simulated rig owns the time: it waits, and nothing is late.
+    [[nodiscard]] bool in_real_time() const noexcept;
+    [[nodiscard]] rt::MemoryLock lock_memory() const;
+    void start_threads();
     void control_loop();
     void take_commands(drivers::Time now);
     void on_port_state(drivers::PortState state, const char* text) noexcept;
@@ -92,6 +97,8 @@ class Daemon final : public StatusSource {
     void tell_journal();
     void tell_recorder();
     [[nodiscard]] InterlockStatus interlock_status() const;
+    [[nodiscard]] RealTimeStatus real_time_status(const rt::AcquisitionView& acquired,
+                                                  const rt::EstimatorView& estimated) const;
     void take_done_dwells();
     void take_noise(estimator::DwellSummary& dwell);
     void write_result();
@@ -116,6 +123,7 @@ class Daemon final : public StatusSource {
 
     configuration::Loaded loaded_;
     const configuration::Configuration& configuration_;
+    const rt::MemoryLock memory_lock_;  ///< before any thread
     std::unique_ptr<rt::RigClock> rig_clock_;
     std::unique_ptr<rt::RealClock> real_clock_;
     drivers::Clock& clock_;
@@ -173,6 +181,7 @@ class Daemon final : public StatusSource {
     StatusData campaign_status_;
     estimator::Result result_;
     bool ended_ = false;
+    rt::ThreadSetup acquisition_setup_, estimator_setup_;
     std::condition_variable ended_changed_;
 
     /// How far each stage was when it last went on, for stuck_stage().

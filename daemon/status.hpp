@@ -81,6 +81,22 @@ struct MqttStatus {
     std::uint64_t left_out = 0;  ///< times the broker was too slow to be told
 };
 
+/// What the threads that a sample passes have of real time.
+struct RealTimeStatus {
+    struct Thread {
+        std::string name;
+        int fifo_priority = 0;                             ///< SCHED_FIFO; 0: ordinary scheduling
+        std::string cpus;                                  ///< it may run on
+        std::uint64_t major_faults = 0, minor_faults = 0;  ///< since it was set up
+        std::uint64_t deadline_misses = 0;
+        double longest_ms = 0;  ///< of what the deadline is for
+    };
+    std::vector<Thread> threads;
+    bool memory_locked = false;
+    double deadline_ms = 0;            ///< a sample period; 0: the rig owns the time, no deadline
+    std::vector<std::string> missing;  ///< what could not be had, each with its cause
+};
+
 struct RingCounters {
     std::uint64_t pushed = 0, popped = 0, dropped = 0;
 };
@@ -210,6 +226,7 @@ struct StatusData {
     InterlockStatus interlock;
     JournalStatus journal;
     RecorderStatus recorder;
+    RealTimeStatus real_time;
     MqttStatus mqtt;
     bool stop_pending = false;  ///< a stop is ordered and not read back as done
 

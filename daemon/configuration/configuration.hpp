@@ -59,6 +59,9 @@ struct Configuration {
     record::Paperwork paperwork;                                ///< [unit], [[instrument]]
     int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
+    int acquisition_cpu = -1;  ///< [threads] keeps to this one; -1: any
+    int estimator_cpu = -1;
+    bool lock_memory = true;  ///< [threads]
 };
 
 /// One effective value as --check prints it.

@@ -131,12 +131,22 @@ void add_daemon_keys(std::vector<Key>& keys) {
         "SQLite: campaigns, results, events, commands; empty: journal.sqlite3 in campaign.results",
         path_rule, [](C & c) -> auto& { return c.journal; }));
     add_record_keys(keys);
+    constexpr int kLastCpu = 1023;
     keys.push_back(integer("threads.acquisition_priority", "", 0, 99,
                            "SCHED_FIFO; 0: ordinary scheduling",
                            [](C& c) -> int& { return c.acquisition_priority; }));
     keys.push_back(integer("threads.estimator_priority", "", 0, 99,
                            "SCHED_FIFO; 0: ordinary scheduling",
                            [](C& c) -> int& { return c.estimator_priority; }));
+    keys.push_back(integer("threads.acquisition_cpu", "", -1, kLastCpu,
+                           "the thread keeps to this CPU, counted from 0; -1: to none",
+                           [](C& c) -> int& { return c.acquisition_cpu; }));
+    keys.push_back(integer("threads.estimator_cpu", "", -1, kLastCpu,
+                           "the thread keeps to this CPU, counted from 0; -1: to none",
+                           [](C& c) -> int& { return c.estimator_cpu; }));
+    keys.push_back(boolean("threads.lock_memory",
+                           "the daemon's memory stays in memory; not where the rig owns the time",
+                           [](C& c) -> bool& { return c.lock_memory; }));
 }
 
 }  // namespace vibrig::configuration

@@ -15,6 +15,7 @@ using drivers::Time;
 namespace {
 // Silence is looked for this often on the real clock; stale deadlines are longer.
 constexpr Time kTimerPeriod = 50 * drivers::kMillisecond;
+constexpr Time kFaultPeriod = 200 * drivers::kMillisecond;  // a system call each time
 }  // namespace
 
 Acquisition::Acquisition(boost::asio::io_context& io, drivers::CanPort& port, const proto::Dbc& dbc,
@@ -28,6 +29,8 @@ Acquisition::Acquisition(boost::asio::io_context& io, drivers::CanPort& port, co
       assembler_(dbc, settings, [this](const drivers::Sample& s) { on_sample(s); }),
       rest_(io),
       timer_(io) {
+    // Where the rig owns the time it waits, and nothing is late.
+    if (rig_ == nullptr) shown_.lateness.bound = settings.sample_period;
     if (rig_ != nullptr) {
         rig_link_.emplace(port_);
         const int rest = ::dup(rig_->rest().fd());
@@ -120,6 +123,7 @@ void Acquisition::push_batch() noexcept {
     // First the recorder's: when a dwell is reported done its samples are there.
     if (to_.recorder_samples != nullptr) to_.recorder_samples->push_n({batch_.data(), batched_});
     to_.estimator_ring.push_n({batch_.data(), batched_});
+    if (to_.to_estimator != nullptr) to_.to_estimator->given(clock_.now());
     to_.estimator.notify();
     if (to_.pre_trip != nullptr) to_.pre_trip->push_n({batch_.data(), batched_});
     shown_.samples_offered += batched_;
@@ -143,20 +147,32 @@ void Acquisition::hand_on() noexcept {
         shown_.last_good[c] = assembler_.last_good(static_cast<drivers::Channel>(c));
     }
     shown_.beat = clock_.now();
-    if (oldest_ != 0) shown_.latency.add(shown_.beat - oldest_);
+    if (oldest_ != 0) {
+        shown_.latency.add(shown_.beat - oldest_);
+        shown_.lateness.add(shown_.beat - oldest_);
+    }
     oldest_ = 0;
+    count_faults(shown_.beat);
     view_.publish(shown_);
     if (changed) to_.control.notify();
+}
+
+void Acquisition::count_faults(Time now) noexcept {
+    if (now - faults_at_ < kFaultPeriod) return;
+    faults_at_ = now;
+    shown_.faults = page_faults_of_this_thread();
 }
 
 void Acquisition::arm_timer() {
     const Time now = clock_.now();
     const Time deadline = std::clamp(assembler_.next_deadline(), now, now + kTimerPeriod);
     timer_.expires_at(std::chrono::steady_clock::time_point(std::chrono::nanoseconds(deadline)));
-    timer_.async_wait([this](const boost::system::error_code& error) {
+    timer_.async_wait([this, deadline](const boost::system::error_code& error) {
         if (error) return;
         to_.interlock.arrived(wall_clock());
-        on_time(clock_.now());
+        const Time woken = clock_.now();
+        shown_.lateness.add(woken - deadline);
+        on_time(woken);
         arm_timer();
     });
 }

@@ -11,6 +11,7 @@
 #include "daemon/rt/frame_latency.hpp"
 #include "daemon/rt/frame_record.hpp"
 #include "daemon/rt/interlock.hpp"
+#include "daemon/rt/real_time.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/rt/rig_time_link.hpp"
 #include "daemon/rt/ring.hpp"
@@ -32,7 +33,10 @@ struct AcquisitionView {
     std::uint64_t in_hand = 0;      ///< delivered frames of the batch at work, not looked at yet
     std::uint64_t samples_offered = 0;  ///< to the ring: pushed + dropped
     std::array<drivers::Time, drivers::kChannels> last_good{};
-    FrameLatency latency;    ///< on the real clock
+    FrameLatency latency;  ///< on the real clock
+    /// On the real clock: of frames, as latency; of wake-ups for silence, after their moment.
+    Lateness lateness;
+    PageFaults faults;
     drivers::Time beat = 0;  ///< when the thread last handled frames
 };
 
@@ -50,6 +54,7 @@ class Acquisition {
         Ring<FrameRecord>* recorder_frames = nullptr;
         Ring<drivers::Sample>* recorder_samples = nullptr;
         Ring<drivers::Sample>* pre_trip = nullptr;  ///< what led to a trip; null: nobody keeps it
+        HandOver* to_estimator = nullptr;           ///< null: its lateness does not count
     };
     using Event = std::function<void(drivers::PortState, const char* text)>;
 
@@ -72,6 +77,7 @@ class Acquisition {
     void feed(const drivers::ReceivedFrame& frame) noexcept;
     void push_batch() noexcept;
     void hand_on() noexcept;
+    void count_faults(drivers::Time now) noexcept;
     void on_time(drivers::Time now) noexcept;
     void arm_timer();
     void wait_for_rest();
@@ -89,7 +95,8 @@ class Acquisition {
     boost::asio::steady_timer timer_;
     std::array<drivers::Sample, 32> batch_{};
     std::size_t batched_ = 0;
-    drivers::Time oldest_ = 0;  ///< stamp of the batch at work; 0: none, or the rig's time
+    drivers::Time oldest_ = 0;     ///< stamp of the batch at work; 0: none, or the rig's time
+    drivers::Time faults_at_ = 0;  ///< when they were last looked at
     Snapshot<AcquisitionView> view_;
     AcquisitionView shown_;
 };

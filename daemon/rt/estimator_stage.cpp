@@ -15,9 +15,11 @@ EstimatorStage::EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& 
 
 void EstimatorStage::run() noexcept {
     while (!stop_.load()) {
+        const Time since = handed_over_.taken();
         orders_.consume([this](const DwellOrder& order) { take_order(order); });
         while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
         }
+        if (since != 0 && clock_ != nullptr) shown_.lateness.add(clock_->now() - since);
         if (shown_.sample_time - published_at_ >= kPublishPeriod) publish();
         self_.wait_until(drivers::kNever);
     }
@@ -27,6 +29,12 @@ void EstimatorStage::run() noexcept {
 void EstimatorStage::stop() noexcept {
     stop_.store(true);
     self_.notify();
+}
+
+HandOver& EstimatorStage::time_by(const drivers::Clock& clock, Time bound) noexcept {
+    clock_ = &clock;
+    shown_.lateness.bound = bound;
+    return handed_over_;
 }
 
 bool EstimatorStage::order(const DwellOrder& order) noexcept {
@@ -101,6 +109,7 @@ void EstimatorStage::publish() noexcept {
     // Outside a dwell the Identification may be in the control thread's hands.
     if (begun_) identification_.estimate(shown_.estimate);
     published_at_ = shown_.sample_time;
+    shown_.faults = page_faults_of_this_thread();
     view_.publish(shown_);
 }
 

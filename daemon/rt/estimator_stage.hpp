@@ -6,6 +6,7 @@
 #include "daemon/rt/angle_blocks.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/fed.hpp"
+#include "daemon/rt/real_time.hpp"
 #include "daemon/rt/ring.hpp"
 #include "daemon/rt/snapshot.hpp"
 #include "drivers/clock.hpp"
@@ -20,6 +21,8 @@ struct EstimatorView {
     std::uint64_t taken = 0, in_dwell = 0, idle = 0;
     drivers::Time sample_time = 0;  ///< of the newest sample taken
     double dwell_fraction = 0;      ///< 0 to 1 in a dwell, else 0
+    Lateness lateness;              ///< from samples in the ring until done with
+    PageFaults faults;
 };
 
 /// Second stage, on its own thread: feeds the samples of ordered dwells to the identification.
@@ -36,6 +39,10 @@ class EstimatorStage {
 
     /// Before run(): what goes into the filter goes there too.
     void feed_to(Ring<Fed>& journal) noexcept { journal_ = &journal; }
+
+    /// Before run(): samples that it is done with later than this count. Who fills the ring tells
+    /// the hand-over.
+    HandOver& time_by(const drivers::Clock& clock, drivers::Time bound) noexcept;
 
     /// Control thread only.
     bool order(const DwellOrder& order) noexcept;
@@ -57,6 +64,8 @@ class EstimatorStage {
     drivers::Waiter& control_;
     estimator::Identification& identification_;
     Ring<Fed>* journal_ = nullptr;
+    const drivers::Clock* clock_ = nullptr;  ///< null: lateness does not count
+    HandOver handed_over_;
     Ring<DwellOrder> orders_{8};
     Ring<DwellDone> done_{8};
     Ring<BlockRecord> blocks_{256};

@@ -138,6 +138,24 @@ void add_shaker(Families& to, const StatusData& s) {
                n.read_back_mismatches);
 }
 
+void add_real_time(Families& to, const RealTimeStatus& s) {
+    std::vector<std::pair<Labels, double>> priorities;
+    std::vector<std::pair<Labels, std::uint64_t>> misses, faults;
+    for (const auto& thread : s.threads) {
+        const Labels name{{"thread", thread.name}};
+        priorities.emplace_back(name, thread.fifo_priority);
+        misses.emplace_back(name, thread.deadline_misses);
+        faults.push_back({{{"kind", "major"}, {"thread", thread.name}}, thread.major_faults});
+        faults.push_back({{{"kind", "minor"}, {"thread", thread.name}}, thread.minor_faults});
+    }
+    to.gauge("vibrig_memory_locked", "1 while the daemon's memory is locked.",
+             yes(s.memory_locked));
+    to.gauge("vibrig_thread_fifo_priority", "SCHED_FIFO; 0: ordinary scheduling.", priorities);
+    to.counter("vibrig_thread_deadline_misses_total",
+               "What a thread did later than a sample period; real clock.", misses);
+    to.counter("vibrig_thread_page_faults_total", "Since the thread was set up.", faults);
+}
+
 void add_acquisition(Families& to, const StatusData& s) {
     const auto& can = s.can_counters;
     const auto& a = s.assembler;
@@ -173,6 +191,7 @@ void add_acquisition(Families& to, const StatusData& s) {
     to.histogram("vibrig_acquisition_latency_seconds",
                  "From the kernel's stamp on a frame until its sample is in the rings; real clock.",
                  rt::FrameLatency::kBounds_ms, s.latency.count, s.latency.sum_ms);
+    add_real_time(to, s.real_time);
     std::vector<std::pair<Labels, double>> ages, good;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         if (s.sample.quality[c] == drivers::Quality::unbound) continue;

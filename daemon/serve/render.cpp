@@ -163,6 +163,25 @@ std::string latency_line(const v1::Latency& latency) {
                   latency.sum_ms() / static_cast<double>(batches), latency.largest_ms());
 }
 
+/// Empty: nothing is known of it.
+std::string real_time_line(const v1::RealTime& real_time) {
+    std::string text;
+    std::uint64_t misses = 0, major = 0, minor = 0;
+    for (const auto& thread : real_time.threads()) {
+        if (!text.empty()) text += " and ";
+        text += thread.fifo_priority() > 0 ? format("FIFO %d", thread.fifo_priority())
+                                           : std::string("ordinary");
+        misses += thread.deadline_misses();
+        major += thread.major_page_faults();
+        minor += thread.minor_page_faults();
+    }
+    if (text.empty()) return {};
+    text += real_time.memory_locked() ? ", memory locked" : ", memory not locked";
+    text += real_time.deadline_ms() > 0 ? format(", %llu deadlines missed", count(misses))
+                                        : std::string(", no deadlines");
+    return text + format(", page faults %llu major %llu minor", count(major), count(minor));
+}
+
 std::string channels_line(const v1::Sample& sample) {
     std::string bad;
     for (const v1::Channel& channel : sample.channels()) {
@@ -267,6 +286,8 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     lines.push_back(labelled("dropped", losses_line(status)));
     if (const std::string latency = latency_line(status.acquisition_latency()); !latency.empty())
         lines.push_back(labelled("latency", latency));
+    if (const std::string line = real_time_line(status.real_time()); !line.empty())
+        lines.push_back(labelled("real time", line));
     lines.push_back(labelled("channels", channels_line(status.sample())));
     lines.push_back(labelled("filter", estimate_line(estimate)));
     lines.push_back(labelled("noise", noise_line(status.noise())));

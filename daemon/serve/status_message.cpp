@@ -54,6 +54,22 @@ void fill(v1::Frame& out, const FrameStatus& frame) {
         for (const double cell : row) out.add_accelerometer_matrix(cell);
 }
 
+void fill(v1::RealTime& out, const RealTimeStatus& real_time) {
+    for (const RealTimeStatus::Thread& thread : real_time.threads) {
+        v1::RealTime::Thread& to = *out.add_threads();
+        to.set_name(thread.name);
+        to.set_fifo_priority(thread.fifo_priority);
+        to.set_cpus(thread.cpus);
+        to.set_major_page_faults(thread.major_faults);
+        to.set_minor_page_faults(thread.minor_faults);
+        to.set_deadline_misses(thread.deadline_misses);
+        to.set_longest_ms(thread.longest_ms);
+    }
+    out.set_memory_locked(real_time.memory_locked);
+    out.set_deadline_ms(real_time.deadline_ms);
+    for (const std::string& what : real_time.missing) out.add_missing(mend_utf8(what));
+}
+
 void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
     out.set_broker(mend_utf8(mqtt.broker));
     out.set_connected(mqtt.connected);
@@ -413,6 +429,7 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_noise(), status.noise);
     fill(*out.mutable_mqtt(), status.mqtt);
     fill(*out.mutable_frame(), status.frame);
+    fill(*out.mutable_real_time(), status.real_time);
     v1::Latency& latency = *out.mutable_acquisition_latency();
     for (const double bound : rt::FrameLatency::kBounds_ms) latency.add_bounds_ms(bound);
     for (const std::uint64_t n : status.latency.count) latency.add_counts(n);

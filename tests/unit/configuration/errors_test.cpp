@@ -46,6 +46,12 @@ TEST(Errors, ComeAllInOneGoInTheOrderOfTheFile) {
                                "integer from 8 to 32 bit")));
 }
 
+TEST(Errors, RefuseACpuThatNoMachineHas) {
+    EXPECT_EQ(complaint("threads.acquisition_cpu = -2"),
+              "rig.toml:1:27: threads.acquisition_cpu: found -2, expected an integer from -1 to "
+              "1023");
+}
+
 TEST(Errors, AnUnknownKeySuggestsTheNearestKnownOne) {
     EXPECT_THAT(complaint("[site]\nlattitude_deg = 45"), EndsWith("perhaps site.latitude_deg"));
     EXPECT_THAT(complaint("[campaign]\nfrequency_hz = 15"),

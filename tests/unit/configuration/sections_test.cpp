@@ -236,13 +236,18 @@ TEST(Sections, DaemonKeysReachTheDaemon) {
         file = "/var/log/vibrig.log"
         [threads]
         acquisition_priority = 0
-        estimator_priority = 99)");
+        estimator_priority = 99
+        acquisition_cpu = 3
+        lock_memory = false)");
     EXPECT_EQ(c.clock, Configuration::ClockKind::rig);
     EXPECT_EQ(c.socket, "/tmp/s");
     EXPECT_EQ(c.log_level, "debug");
     EXPECT_EQ(c.log_file, "/var/log/vibrig.log");
     EXPECT_EQ(c.acquisition_priority, 0);
     EXPECT_EQ(c.estimator_priority, 99);
+    EXPECT_EQ(c.acquisition_cpu, 3);
+    EXPECT_EQ(c.estimator_cpu, -1);
+    EXPECT_FALSE(c.lock_memory);
 }
 
 TEST(Sections, RelativePathsAreRelativeToTheFileThatNamesThem) {

@@ -33,14 +33,17 @@ bool has(const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
 }
 
-TEST(Render, SaysThatABrokerIsDownAndNothingOfNone) {
+TEST(Render, SaysWhatIsNotThereAndNothingOfNoBroker) {
     StatusData status = full_status();
     status.mqtt.connected = false;
     EXPECT_TRUE(has(joined(render_summary(message_of(status), {}, 120)),
                     "broker.lab:8883: DOWN, no route to host"));
     status.mqtt = {};
     status.latency = {};
+    status.real_time.memory_locked = false;
+    status.real_time.deadline_ms = 0;
     const std::string text = joined(render_summary(message_of(status), {}, 120));
+    EXPECT_TRUE(has(text, "ordinary, memory not locked, no deadlines, ")) << text;
     EXPECT_FALSE(has(text, "broker") || has(text, "frame to ring")) << text;
 }
 
@@ -66,6 +69,8 @@ TEST(Render, ShowsWhatCountsOnAWideTerminal) {
                              "ring 43",
                              "gaps 39",
                              "frame to ring 0.150 ms, worst 0.15 ms",
+                             "FIFO 60 and ordinary, memory locked, 229 deadlines missed, page "
+                             "faults 225 major 227 minor",
                              "broker.lab:8883: 103 messages, 104 left out",
                              "all good",
                              "NIS 1.020",

@@ -202,6 +202,11 @@ TEST(Metrics, CarryWhatIsValidAndAddUp) {
     EXPECT_TRUE(holds(text, "vibrig_campaign_state{state=\"recording\"} 1\n"));
     EXPECT_TRUE(holds(text, "vibrig_acquisition_latency_seconds_bucket{le=\"0.0002\"} 1\n"));
     EXPECT_TRUE(holds(text, "vibrig_mqtt_messages_total{outcome=\"left_out\"} 104\n"));
+    EXPECT_TRUE(holds(text, "vibrig_thread_deadline_misses_total{thread=\"estimator\"} 116\n"));
+    EXPECT_TRUE(holds(
+        text, "vibrig_thread_page_faults_total{kind=\"major\",thread=\"acquisition\"} 111\n"));
+    EXPECT_TRUE(holds(text, "vibrig_thread_fifo_priority{thread=\"acquisition\"} 60\n"));
+    EXPECT_TRUE(holds(text, "vibrig_memory_locked 1\n"));
     EXPECT_FALSE(holds(text, "nan") || holds(text, "Nan")) << text;
     status.shaker.valid = false;
     EXPECT_FALSE(holds(metrics_text(status, {}), "vibrig_shaker_measured"));

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/clock.hpp"
+
+namespace vibrig::rt {
+
+/// Page faults of one thread; major ones waited for a disk.
+struct PageFaults {
+    std::uint64_t major = 0, minor = 0;
+};
+/// Of the calling thread since it began; one system call.
+[[nodiscard]] PageFaults page_faults_of_this_thread() noexcept;
+
+/// Counts what was done later than a bound. One thread.
+struct Lateness {
+    drivers::Time bound = drivers::kNever;
+    std::uint64_t misses = 0;
+    drivers::Time longest = 0;  ///< of all, late or not
+
+    void add(drivers::Time taken) noexcept {
+        longest = std::max(longest, taken);
+        if (taken > bound) ++misses;
+    }
+};
+
+/// Since when the next stage has had something that it is not done with. One giver, one taker.
+class HandOver {
+  public:
+    /// After the records are in the ring, before the notice.
+    void given(drivers::Time now) noexcept {
+        drivers::Time none = 0;
+        since_.compare_exchange_strong(none, now);
+    }
+    /// Before the ring is emptied; 0: nothing new.
+    [[nodiscard]] drivers::Time taken() noexcept { return since_.exchange(0); }
+
+  private:
+    std::atomic<drivers::Time> since_{0};
+};
+
+/// What a thread is to have.
+struct ThreadWishes {
+    const char* name = "";
+    int fifo_priority = 0;  ///< SCHED_FIFO; 0: ordinary scheduling
+    int cpu = -1;           ///< it keeps to this one; -1: any
+};
+
+/// What it has.
+struct ThreadSetup {
+    int fifo_priority = 0;             ///< 0: ordinary scheduling
+    std::string cpus;                  ///< it may run on, "0-1,3"; empty: not known
+    std::vector<std::string> missing;  ///< what could not be had, each with its cause
+    PageFaults faults;                 ///< it took so far
+};
+
+/// Sets up the calling thread and brings its stack into memory. What cannot be had is left as it
+/// is and told.
+[[nodiscard]] ThreadSetup set_up_this_thread(const ThreadWishes& wishes);
+
+struct MemoryLock {
+    bool locked = false;
+    std::string cause;  ///< why it is not
+};
+
+/// Locks the memory of the process: all that is there now, and whatever comes once it has been
+/// touched. Before other threads begin.
+[[nodiscard]] MemoryLock lock_memory();
+
+}  // namespace vibrig::rt
