@@ -322,7 +322,10 @@ Time Campaign::ramp(Time now) {
 
 Time Campaign::record(Time now) {
     if (!dwell_ordered_) {
-        dwell_from_ = entered_ + std::max(from_seconds(settings_.settle_s), kOrderLead);
+        // On a whole millisecond: how often clocks were read on the way here does not show.
+        const Time settled = entered_ + std::max(from_seconds(settings_.settle_s), kOrderLead);
+        dwell_from_ =
+            (settled + drivers::kMillisecond - 1) / drivers::kMillisecond * drivers::kMillisecond;
         dwell_to_ = dwell_from_ + from_seconds(settings_.dwell_s);
         dwell_done_ = false;
         dwell_ordered_ = true;

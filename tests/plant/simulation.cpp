@@ -1,10 +1,14 @@
 #include "tests/plant/simulation.hpp"
 
 #include <poll.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 
 namespace vibrig::plant {
@@ -27,7 +31,12 @@ Simulation::Simulation(SharedRig& shared, Bus& bus, const proto::Dbc& dbc,
       settings_(settings),
       stop_(stop_descriptor),
       command_(command_descriptor),
-      on_commands_(std::move(on_commands)) {}
+      on_commands_(std::move(on_commands)),
+      timer_(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
+    if (timer_ < 0) throw PlantError(std::string("timerfd_create: ") + std::strerror(errno));
+}
+
+Simulation::~Simulation() { close(timer_); }
 
 void Simulation::run() {
     const std::int64_t start = monotonic_ns();
@@ -105,17 +114,22 @@ bool Simulation::wait_until(std::int64_t deadline_ns) {
 }
 
 Simulation::Wake Simulation::wait(std::optional<std::int64_t> deadline_ns) {
-    std::array<pollfd, 3> descriptors{
-        {{bus_.descriptor(), POLLIN, 0}, {stop_, POLLIN, 0}, {command_, POLLIN, 0}}};
-    timespec left{};
+    // An absolute time: a timeout from now would come later by what it takes from here to the
+    // kernel, and by its slack for timeouts.
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    itimerspec timer{};  // off
     if (deadline_ns) {
-        const std::int64_t ns = std::max<std::int64_t>(*deadline_ns - monotonic_ns(), 0);
-        left = {static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
+        timer.it_value = {static_cast<time_t>(*deadline_ns / kSecond),
+                          static_cast<long>(*deadline_ns % kSecond)};
     }
-    const int ready =
-        ppoll(descriptors.data(), descriptors.size(), deadline_ns ? &left : nullptr, nullptr);
-    if (ready == 0) return Wake::deadline;
+    timerfd_settime(timer_, TFD_TIMER_ABSTIME, &timer, nullptr);
+    std::array<pollfd, 4> descriptors{{{bus_.descriptor(), POLLIN, 0},
+                                       {stop_, POLLIN, 0},
+                                       {command_, POLLIN, 0},
+                                       {timer_, POLLIN, 0}}};
+    const int ready = poll(descriptors.data(), descriptors.size(), -1);
     if (ready < 0) return Wake::event;
+    if (ready == 1 && descriptors[3].revents != 0) return Wake::deadline;
     if (descriptors[1].revents != 0) return Wake::stop;
     if (descriptors[0].revents != 0) {
         bus_.receive([this](const canfd_frame& frame) { handle(frame); });

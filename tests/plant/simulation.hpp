@@ -23,10 +23,13 @@ struct SimulationSettings {
 class Simulation {
   public:
     /// `stop_descriptor` ends run() when it becomes readable (it is not read). `command_descriptor`
-    /// (or -1) carries lines that `on_commands` is to read.
+    /// (or -1) carries lines that `on_commands` is to read. Throws PlantError.
     Simulation(SharedRig& shared, Bus& bus, const proto::Dbc& dbc,
                const SimulationSettings& settings, int stop_descriptor, int command_descriptor = -1,
                std::function<bool()> on_commands = {});
+    ~Simulation();
+    Simulation(const Simulation&) = delete;
+    Simulation& operator=(const Simulation&) = delete;
 
     void run();
 
@@ -52,6 +55,7 @@ class Simulation {
     int stop_;
     int command_;
     std::function<bool()> on_commands_;
+    int timer_;
     std::vector<can_frame> tick_frames_;
     std::int64_t time_us_ = 0;
     std::optional<std::int64_t> acknowledged_us_;
