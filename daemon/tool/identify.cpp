@@ -16,6 +16,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/rt/dwell_order.hpp"
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/progress.hpp"
@@ -68,46 +69,66 @@ estimator::Measurement measurement_of(const RecordingRow& row) {
     return measurement;
 }
 
-/// The dwell as a plan would have it: where it begins, and its level by its own accelerometers.
-/// Nothing without a good sample.
-std::optional<estimator::PlannedDwell> planned(const Dwell& dwell,
-                                               const estimator::Settings& settings) {
-    estimator::PlannedDwell plan;
-    std::optional<std::array<double, 3>> up;
-    estimator::GrowingHann force;
-    for (const RecordingRow* row : dwell.rows) {
-        const auto measurement = measurement_of(*row);
+/// A dwell as a plan would have it: where it begins, and its level by its own accelerometers.
+class SeenDwell {
+  public:
+    explicit SeenDwell(const estimator::Settings& settings) : settings_(settings) {}
+
+    void add(const estimator::Measurement& measurement) {
+        if (!begin_s_) begin_s_ = measurement.time_s;
+        end_s_ = measurement.time_s;
+        std::array<double, 3> angle_deg{};
         double all = 0;
-        for (std::size_t i = 0; i < 3; ++i) all += row->angle_deg[i] + row->force_g[i];
-        if (!std::isfinite(all)) continue;
-        if (!up) {
-            plan.angles_deg = estimator::gimbal_deg(settings, row->angle_deg);
-            up = estimator::plan::up_at(settings, row->angle_deg);
+        for (std::size_t i = 0; i < 3; ++i) {
+            angle_deg[i] = measurement.angle_rad[i] * (180 / std::numbers::pi);
+            all += angle_deg[i] + measurement.force_g[i];
+        }
+        const bool good = measurement.angles_good && measurement.force_good;
+        if (!good || !std::isfinite(all)) return;
+        if (!up_) {
+            angles_deg_ = estimator::gimbal_deg(settings_, angle_deg);
+            up_ = estimator::plan::up_at(settings_, angle_deg);
         }
         double along = 0;
         for (std::size_t i = 0; i < 3; ++i) {
             for (std::size_t j = 0; j < 3; ++j) {
-                along += (*up)[i] * settings.accelerometer_matrix[i][j] *
-                         (measurement.force_g[j] - settings.accelerometer_zero_g[j]);
+                along += (*up_)[i] * settings_.accelerometer_matrix[i][j] *
+                         (measurement.force_g[j] - settings_.accelerometer_zero_g[j]);
             }
         }
-        force.add(along);
+        force_.add(along);
     }
-    plan.duration_s = dwell.rows.back()->time_s - dwell.rows.front()->time_s;
-    const auto means = force.means();
-    plan.kappa = means.mean_square / (means.mean * means.mean) -
-                 settings.accelerometer_g * settings.accelerometer_g;
-    // At rest.
-    if (plan.kappa - 1 < 1e-4) plan.kappa = 1;
-    if (!up || !(plan.duration_s > 0) || !std::isfinite(plan.kappa)) return std::nullopt;
-    return plan;
-}
 
-/// Says what these dwells cannot determine, before they are gone through.
-void tell_before(const std::vector<Dwell>& dwells, const estimator::Settings& settings) {
+    /// Nothing without a good sample.
+    [[nodiscard]] std::optional<estimator::PlannedDwell> planned() const {
+        if (!up_) return std::nullopt;
+        const auto means = force_.means();
+        double kappa = means.mean_square / (means.mean * means.mean) -
+                       settings_.accelerometer_g * settings_.accelerometer_g;
+        if (kappa - 1 < 1e-4) kappa = 1;  // at rest
+        const double duration_s = end_s_ - *begin_s_;
+        if (!(duration_s > 0) || !std::isfinite(kappa)) return std::nullopt;
+        return estimator::PlannedDwell{angles_deg_, kappa, duration_s};
+    }
+
+  private:
+    const estimator::Settings& settings_;
+    std::optional<double> begin_s_;
+    double end_s_ = 0;
+    std::array<double, 3> angles_deg_{};
+    std::optional<std::array<double, 3>> up_;
+    estimator::GrowingHann force_;
+};
+
+/// Says what these dwells cannot determine, before they are gone through. `show(dwell, seen)` adds
+/// all measurements of a dwell to `seen`.
+template <typename Dwells, typename Show>
+void tell_before(const Dwells& dwells, const estimator::Settings& settings, const Show& show) {
     std::vector<estimator::PlannedDwell> plan;
-    for (const Dwell& dwell : dwells) {
-        if (const auto one = planned(dwell, settings)) plan.push_back(*one);
+    for (const auto& dwell : dwells) {
+        SeenDwell seen(settings);
+        show(dwell, seen);
+        if (const auto one = seen.planned()) plan.push_back(*one);
     }
     if (plan.empty()) return;
     for (const std::string& line :
@@ -119,7 +140,9 @@ void tell_before(const std::vector<Dwell>& dwells, const estimator::Settings& se
 estimator::Result identify(const std::vector<RecordingRow>& rows,
                            const estimator::Settings& settings) {
     const std::vector<Dwell> dwells = dwells_of(rows);
-    tell_before(dwells, settings);
+    tell_before(dwells, settings, [](const Dwell& dwell, SeenDwell& seen) {
+        for (const RecordingRow* row : dwell.rows) seen.add(measurement_of(*row));
+    });
     estimator::Identification identification(settings, dwells.size());
     Progress progress("identifying");
     std::size_t done = 0;
@@ -140,6 +163,11 @@ estimator::Result identify(const std::vector<RecordingRow>& rows,
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
 estimator::Result identify(const record::Campaign& campaign, const estimator::Settings& settings) {
     const auto dwells = record::recorded_dwells(campaign);
+    tell_before(dwells, settings, [&](const record::RecordedDwell& dwell, SeenDwell& seen) {
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
+            seen.add(
+                rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
+    });
     estimator::Identification identification(settings, dwells.size());
     Progress progress("identifying");
     std::size_t done = 0;
