@@ -174,8 +174,8 @@ class Kill:
 
     def recording(self, before):
         new = self.files() - before
-        last = self.killed if self.state not in ("tripped", "aborted", "finished") else self.going_on + KEPT_S
-        wanted = self.witness.between(self.begun, min(last, self.killed) - KEPT_S)
+        # It may have ended after the last look, and recording with it.
+        wanted = self.witness.between(self.begun, min(self.going_on, self.killed - KEPT_S))
         if not new and not wanted:
             return
         if not self.check(len(new) == 1, f"the {self.how} has a recording", str(new)):
@@ -199,7 +199,8 @@ def one_rig(programs, folder, name, kills, rng, report):
     rig = r.Rig(programs, "seqpacket", "real", folder, poll_s=0.1)
     try:
         rig.start_plant("--seed", str(rng.randrange(1000)), "--warm-up", "1", "--start-temperature", "45")
-        rig.configure(CAMPAIGN, record=RECORD)
+        rig.be_punctual()
+        rig.configure(CAMPAIGN, record=RECORD, **r.PATIENT)
         witness = Witness(rig.path)
         for number in range(kills):
             kill = Kill(rig, witness, rng)

@@ -144,7 +144,7 @@ def starts(checks, rig):
     with open(os.path.join(EXAMPLES, "vibrigd.toml"), encoding="utf-8") as file:
         example = file.read()
     checks.check(f'results = "{DATA}"' in example and "operator_group" in example, "the example is the one installed")
-    rig.configure(rig.campaign, can={"sample_rate_hz": 40.0},
+    rig.configure(rig.campaign, can={"sample_rate_hz": 40.0, **r.PATIENT["can"]}, gimbal=r.PATIENT["gimbal"],
                   server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
                           "page": "127.0.0.1:8090"})
     os.chmod(CONFIGURATION, 0o640)

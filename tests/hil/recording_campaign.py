@@ -11,6 +11,7 @@ import json
 import math
 import os
 import re
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -161,7 +162,7 @@ def played(checks, rig, folder):
               f"canplayer -t -I {piece} vcan0=vcan0; wait")
     uml = os.path.join(os.path.dirname(os.path.abspath(__file__)), "run-in-uml")
     run = subprocess.run([uml, "-t", "60", "--", "sh", "-c", script], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                         timeout=180)
+                         timeout=180, preexec_fn=lambda: r.die_with_parent(signal.SIGTERM))
     caught = [line.split()[2] for line in run.stdout.splitlines() if line.startswith("(")]
     checks.check(caught == frames and len(frames) == len(some) - 1, "canplayer plays the log, both directions",
                  f"{len(caught)} of {len(frames)} {run.stderr[-500:]}")
@@ -223,9 +224,14 @@ def complete(checks, rig):
 
 
 def exports(checks, rig, folder, path):
-    direct = json.loads(offline(rig, "identify", path, "--json").stdout)
+    both = [offline(rig, "identify", path, "--json")]
     exported = offline(rig, "export", folder, "--to", "csv", "-o", "x.csv")
-    from_csv = json.loads(offline(rig, "identify", "x.csv", "--json").stdout or "{}")
+    both.append(offline(rig, "identify", "x.csv", "--json"))
+    direct, from_csv = (json.loads(run.stdout or "{}") for run in both)
+    told = [run.stderr.splitlines() for run in both]
+    checks.check(told[0] == told[1] and told[0][:1] and
+                 told[0][0].startswith("before the run: these positions and levels do not determine one by one: D_"),
+                 "of both it is told before what three positions cannot determine", str(told))
     # Degrees and back move an angle by 1e-16 of itself: nothing beside sigma.
     close = all(a["value"] is None and b["value"] is None or math.isclose(a["value"], b["value"], abs_tol=1e-6 * a["sigma"])
                 for a, b in zip(direct["parameters"], from_csv.get("parameters", [{}] * 30)))
@@ -344,7 +350,8 @@ def main():
             try:
                 rig.start_plant("--seed", "1", "--speed", "max")
                 # The noise monitor contradicts 10 arcsec after eight dwells: the filter then takes other levels.
-                levels = {"table_g": [9.0, 7.0, 5.0]} if part is resumed else {}
+                # One that is killed has to last until then.
+                levels = {resumed: {"table_g": [9.0, 7.0, 5.0]}, killed: {"positions_deg": [[0, 0, 15 * k] for k in range(14)]}}.get(part, {})
                 rig.configure({**CAMPAIGN, **levels}, record={"segment_s": 60.0},
                               **({"noise": {"resolver_arcsec": 10.0}} if part is resumed else {}))
                 with open(rig.configuration, "a", encoding="utf-8") as file:

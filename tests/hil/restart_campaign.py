@@ -27,12 +27,6 @@ def measuring(status):
         any(c["quality"] == "good" for c in status["sample"]["channels"])
 
 
-def positions_done(rig):
-    """As the file says, read by another program."""
-    with sqlite3.connect(f"file:{journal(rig)}?mode=ro", uri=True, timeout=5) as database:
-        return database.execute("SELECT count(*) FROM dwell").fetchone()[0]
-
-
 def journal(rig):
     return os.path.join(rig.results, "journal.sqlite3")
 
@@ -96,7 +90,7 @@ def killed_and_resumed(checks, programs, folder):
                          f"recording after {kills} positions", r.state_of(status))
             time.sleep(1)   # what is older than a second has to be on disk
             kill(rig)
-            done = positions_done(rig)
+            done = rig.positions_done()
             checks.check(done >= kills, f"killed: {kills} finished positions are on disk", f"{done}")
             status = restart(checks, rig, f"killed after {kills}")
             checks.check(f"{done} of {POSITIONS} positions done" in status["campaign"]["resume_offer"],
@@ -171,7 +165,7 @@ def noise_goes_on(checks, programs, folder):
         learnt = estimates(rig)
         time.sleep(1)
         kill(rig)
-        done = positions_done(rig)
+        done = rig.positions_done()
         restart(checks, rig, "noisy gyros, killed")
         clear(rig)
         rig.tool("arm", "--by", "Grace")

@@ -1,9 +1,11 @@
 """The simulated rig and the daemon as processes, for campaigns driven from a test; and the checks, as TAP."""
+import contextlib
 import ctypes
 import json
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -11,6 +13,9 @@ import time
 import xml.etree.ElementTree
 
 PR_SET_PDEATHSIG = 1
+# On a busy machine real time is late: for tests on the real clock that are not about deadlines.
+PATIENT = {"can": {"stale_deadline_ms": 10000}, "gimbal": {"status_deadline_ms": 10000},
+           "shaker": {"response_timeout_ms": 5000}}
 
 
 class Checks:
@@ -182,6 +187,12 @@ class Rig:
         with open(ready, encoding="utf-8") as file:
             self.modbus_port = json.load(file)["modbus_port"]
 
+    def be_punctual(self):
+        """In real time a rig comes first, whatever else the machine does: a late frame would be taken for a fault of the
+        rig. Whether this user may do that."""
+        return subprocess.run(["chrt", "-a", "-f", "-p", "20", str(self.plant.process.pid)], stdin=subprocess.DEVNULL,
+                              capture_output=True, check=False).returncode == 0
+
     def start_daemon(self):
         self.daemon = Child("vibrigd", [self.program("vibrigd"), "--config", self.configuration], self.folder)
 
@@ -218,6 +229,12 @@ class Rig:
                 with open(os.path.join(folder, "result.json"), "rb") as file:
                     return os.path.join(folder, "result.json"), file.read()
         return None, b""
+
+    def positions_done(self):
+        """As the journal says, read by another program."""
+        path = os.path.join(self.results, "journal.sqlite3")
+        with contextlib.closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5)) as database:
+            return database.execute("SELECT count(*) FROM dwell").fetchone()[0]
 
     def stop(self):
         for child in (self.daemon, self.plant):

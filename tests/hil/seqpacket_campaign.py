@@ -20,7 +20,7 @@ def campaign(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
         commands = start(rig)
-        last = rig.wait_for_state(("finished", "aborted", "tripped"), 90)
+        last = rig.wait_for_state(("finished", "aborted", "tripped"), 300)
         checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
                      f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}")
         r.check_balances(checks, rig)

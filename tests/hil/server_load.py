@@ -124,9 +124,8 @@ def main():
         rig = r.Rig(programs, "seqpacket", "real", folder)
         try:
             rig.start_plant()
-            # The rig's frames have to come in time however busy the machine is.
-            punctual = subprocess.run(["chrt", "-a", "-f", "-p", "20", str(rig.plant.process.pid)], capture_output=True).returncode == 0
-            rig.configure({"name": "load", "identify": "what-it-can"}, server={"page": f"127.0.0.1:{live_page.free_port()}"})
+            punctual = rig.be_punctual()
+            rig.configure({"name": "load", "identify": "what-it-can"}, server={"page": "127.0.0.1:0"})
             rig.start_daemon()
             where = urllib.parse.urlparse(live_page.page_address(rig))
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)

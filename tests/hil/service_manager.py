@@ -19,7 +19,7 @@ import rig as r  # noqa: E402
 PTRACE_SEIZE, PTRACE_INTERRUPT, WALL = 0x4206, 0x4207, 0x40000000
 CAMPAIGN = {"name": "blocked", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0], "dwell_s": 600.0, "settle_s": 2.0,
             "ramp_s": 0.5, "temperature_window_s": 0.0}
-LINK = {"backoff_max_ms": 500, "response_timeout_ms": 200}
+LINK = {"backoff_max_ms": 500, "response_timeout_ms": 1000}
 STAGES = ("acquisition", "estimator", "control", "shaker")
 libc = ctypes.CDLL(None, use_errno=True)
 libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
@@ -155,7 +155,8 @@ def main():
         manager = Manager(folder)
         try:
             rig.start_plant("--seed", "5")
-            rig.configure(CAMPAIGN, shaker=LINK)
+            rig.be_punctual()
+            rig.configure(CAMPAIGN, **{**r.PATIENT, "shaker": LINK})
             talks(checks, rig, manager)
             for stage in STAGES:
                 blocked(checks, rig, manager, stage)

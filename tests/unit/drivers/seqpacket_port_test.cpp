@@ -27,7 +27,7 @@ class HubBus final : public TestBus {
     }
     void join() override {
         pollfd p{listener_, POLLIN, 0};
-        ASSERT_GT(::poll(&p, 1, 2000), 0) << "the port did not connect to " << path_;
+        ASSERT_GT(::poll(&p, 1, 10'000), 0) << "the port did not connect to " << path_;
         client_ = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
         ASSERT_GE(client_, 0);
     }
@@ -38,7 +38,7 @@ class HubBus final : public TestBus {
     std::vector<std::byte> receive() override {
         std::vector<std::byte> packet(256);
         pollfd p{client_, POLLIN, 0};
-        if (::poll(&p, 1, 2000) <= 0) return {};
+        if (::poll(&p, 1, 10'000) <= 0) return {};
         const ssize_t size = ::recv(client_, packet.data(), packet.size(), 0);
         packet.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
         return packet;

@@ -89,9 +89,18 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
 
     // WHEN samples stream, complete and with losses, garbage and platform status between them
     constexpr std::uint32_t kSamples = 4000;
-    std::uint64_t before = 0;  // taken after start-up
+    const auto filtered = [&](std::uint64_t samples) {  // true as soon as there are as many
+        const auto deadline = clock.now() + 10 * kSecond;
+        while (stage.ring().popped < samples && clock.now() < deadline)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return stage.ring().popped >= samples;
+    };
+    std::uint64_t before = 0;
     for (std::uint32_t n = 0; n < kSamples; ++n) {
-        if (n == kSamples / 4) before = test::watched_allocations();
+        if (n == kSamples / 4) {
+            ASSERT_TRUE(filtered(kSamples / 8)) << "start-up is over";
+            before = test::watched_allocations();
+        }
         // Each stage of the campaign in turn; their pieces wait for nobody.
         if (n == kSamples / 2) stages.order(StageFeed::Mode::force);
         if (n == kSamples * 3 / 4) stages.order(StageFeed::Mode::increments);
@@ -128,9 +137,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
         // One by one: of samples in bursts the clock would learn the rate of the burst.
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    const auto deadline = clock.now() + 10 * kSecond;
-    while (stage.ring().popped + 16 < kSamples && clock.now() < deadline)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(filtered(kSamples - 16));
     const std::uint64_t after = test::watched_allocations();
     acquisition.stop();
     acquisition_thread.join();

@@ -93,7 +93,8 @@ TEST(Ring, LosesTearsAndReordersNothingBetweenTwoThreads) {
         std::array<Record, 32> batch{};
         std::uint64_t number = 0;
         std::uint64_t round = 0;
-        while (number < kRecords) {
+        // Longer where the consumer hardly gets a processor: else there was nothing to see.
+        while (number < kRecords || ring.counts().popped < kRecords / 100) {
             const std::size_t n = 1 + static_cast<std::size_t>(round++ % batch.size());
             for (std::size_t i = 0; i < n; ++i) batch[i] = record(number++);
             if (ring.push_n({batch.data(), n}) < n) std::this_thread::yield();
@@ -123,7 +124,6 @@ TEST(Ring, LosesTearsAndReordersNothingBetweenTwoThreads) {
     EXPECT_EQ(counts.pushed, taken);
     EXPECT_EQ(counts.popped, taken);
     EXPECT_EQ(counts.pushed + counts.dropped, offered.load());
-    EXPECT_GE(taken, kRecords / 100);
 }
 
 }  // namespace

@@ -49,8 +49,8 @@ TEST(Shaker, GivesTheReadingInEngineeringUnits) {
     TestServer server;
     Bench bench(settings_for(server));
     ASSERT_TRUE(bench.apply({15.0, 3.5, 4.0}));
+    server.set_input(2, 0xfff1);  // before the one that is waited for: it may be read in between
     server.set_input(1, 5);
-    server.set_input(2, 0xfff1);
     ASSERT_TRUE(bench.eventually([&] { return bench.shaker->reading().fault == 5; }));
     const ShakerReading reading = bench.shaker->reading();
     EXPECT_DOUBLE_EQ(reading.frequency_hz, 15.0);
