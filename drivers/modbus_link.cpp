@@ -125,6 +125,13 @@ void ModbusLink::abort() noexcept {
 
 void ModbusLink::close() noexcept {
     arm_cutter(inert_);
+    if (connected_ && settings_.transport == ShakerSettings::Transport::tcp) {
+        // What has not been taken yet is forgotten: else the kernel would go on sending it by
+        // itself and, when a cable is in again, deliver an old request after a new stop.
+        const linger forget{1, 0};
+        ::setsockopt(modbus_get_socket(context_.get()), SOL_SOCKET, SO_LINGER, &forget,
+                     sizeof forget);
+    }
     if (connected_) modbus_close(context_.get());
     connected_ = false;
 }

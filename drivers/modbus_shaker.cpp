@@ -9,6 +9,11 @@
 namespace vibrig::drivers {
 namespace {
 
+// The first time on a new link that is the stop's alone. A device that was cut off for long has
+// tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
+// left shaking is to see it told one thing. 100 ms, and as much again for the way there.
+constexpr Time kStopAlone = 200 * kMillisecond;
+
 /// A period after `due` if this round was in time; one that came early, or so late that a period
 /// was missed, starts anew.
 [[nodiscard]] Time following(Time due, Time period, Time now) noexcept {
@@ -131,7 +136,7 @@ void ModbusShaker::work(Time now) {
     if (stop && (!stop_tried_ || now >= next_stop_)) return write_stop(now);
     if (watchdog_due(now)) return serve_watchdog(now);
     // Before the poll, which a slow line may have due all the time; it ends with one of its own.
-    if (!stop && orders_.waiting()) return write_set_point();
+    if (!stop && orders_.waiting() && now >= stop_alone_until_) return write_set_point();
     if (now >= next_poll_) return poll(now);
     sleep_until(std::min(next_poll_, stop ? next_stop_ : next_feed_));
 }
@@ -150,11 +155,16 @@ void ModbusShaker::try_connect(Time now) {
             why + "; trying again");
         return;
     }
-    if (std::exchange(was_connected_, true)) ++counts_.reconnects;
+    const bool again = std::exchange(was_connected_, true);
+    if (again) ++counts_.reconnects;
     polled_ = poll_refused_ = feed_refused_ = false;
     stop_tried_ = false;
     timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
-    next_stop_ = next_poll_ = next_feed_ = now;
+    // A lost reply must not cost the device a feed that it still waits for.
+    const bool starved = again && now - last_feed_ > watchdog_timeout();
+    stop_alone_until_ = stop_pending() || starved ? now + kStopAlone : now;
+    next_stop_ = next_poll_ = now;
+    next_feed_ = stop_alone_until_;
 }
 
 void ModbusShaker::lose_link(const std::string& why) {
@@ -271,7 +281,8 @@ void ModbusShaker::write_stop(Time now) {
     orders_.stop_done();
     drop_void_set_point();
     write_failed_ = false;
-    next_poll_ = next_feed_ = clock_.now();
+    next_poll_ = clock_.now();
+    next_feed_ = std::max(next_poll_, stop_alone_until_);
     settle("stopped");
 }
 
@@ -345,7 +356,7 @@ void ModbusShaker::serve_watchdog(Time now) {
     if (timeout_due_) {
         const proto::Register& reg = map.watchdog_timeout;
         const auto raw = std::span(words).first(reg.words());
-        static_cast<void>(proto::encode(reg, 3 * to_seconds(settings_.watchdog_period), raw));
+        static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), raw));
         const Reply reply = write(reg, raw);
         feed_refused_ = reply.kind == ReplyKind::exception;
         if (feed_refused_) settle("watchdog timeout refused: " + reply.text());
@@ -358,7 +369,10 @@ void ModbusShaker::serve_watchdog(Time now) {
     if (!proto::encode(*map.watchdog, feed_ * map.watchdog->scale, raw)) return;
     const Reply reply = write(*map.watchdog, raw);
     feed_refused_ = reply.kind == ReplyKind::exception;
-    if (reply.ok()) ++counts_.feeds;
+    if (reply.ok()) {
+        ++counts_.feeds;
+        last_feed_ = now;
+    }
     if (link_.connected()) settle("watchdog feed " + reply.text());
 }
 

@@ -79,6 +79,8 @@ class ModbusShaker final : public Shaker {
     void drop_void_set_point() noexcept;
     [[nodiscard]] bool watchdog_due(Time now) const noexcept;
     void serve_watchdog(Time now);
+    /// After so long without a feed the device stops.
+    [[nodiscard]] Time watchdog_timeout() const noexcept { return 3 * settings_.watchdog_period; }
     void poll(Time now);
 
     void settle(const std::string& why);
@@ -115,6 +117,7 @@ class ModbusShaker final : public Shaker {
     std::uint16_t feed_ = 0;
     Time backoff_ = 0;
     Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0;
+    Time last_feed_ = 0, stop_alone_until_ = 0;
 };
 
 }  // namespace vibrig::drivers

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "manual_clock.hpp"
 #include "test_bench.hpp"
@@ -113,6 +114,63 @@ TEST(ShakerTime, LeavesTheWatchdogAloneUntilAStopIsDone) {
     EXPECT_EQ(polls(server) - polled, 25);
     EXPECT_EQ(shaker->counters().feeds, feeds);
     EXPECT_TRUE(shaker->stop_pending());
+    shaker->shut_down();
+}
+
+TEST(ShakerTime, LeavesTheFirstTenthOfASecondAfterAnOutageToTheStop) {
+    // GIVEN a shaker that shook when its cable was cut, ten minutes ago
+    std::optional<TestServer> server(std::in_place);
+    const int port = server->port();
+    ManualClock clock;
+    const auto shaker = make_shaker(clock, periods(settings_for(*server)));
+    shaker->start([] { return true; }, {});
+    static_cast<void>(clock.rest());
+    ASSERT_TRUE(shaker->request({15.0, 1.0, 1.0}, 0));
+    static_cast<void>(clock.rest());
+    ASSERT_EQ(server->holding(kRun), 1);
+    server.reset();
+    for (Time now = clock.rest(); shaker->state() != LinkState::connecting; now = clock.rest())
+        clock.set(now);
+    shaker->stop_now();
+    for (Time now = clock.rest(); now <= 600 * kSecond; now = clock.rest()) clock.set(now);
+    // WHEN it is in again
+    server.emplace(TestServer::Line::tcp, port);
+    server->set_holding(kRun, 1);
+    for (Time now = clock.rest(); shaker->counters().reconnects == 0; now = clock.rest())
+        clock.set(now);
+    const Time connected = clock.now();
+    for (Time now = clock.rest(); now <= connected + 100 * kMillisecond; now = clock.rest())
+        clock.set(now);
+    // THEN the stop was written and read back, and nothing else within 100 ms
+    EXPECT_FALSE(shaker->stop_pending());
+    ASSERT_EQ(server->writes().size(), 1U);
+    EXPECT_TRUE(server->writes().front().writes(kRun, 0));
+    EXPECT_GE(shaker->reading().time, connected);
+    // and then the watchdog has its own again, and nothing starts by itself
+    for (Time now = clock.rest(); now <= connected + 3 * kSecond; now = clock.rest())
+        clock.set(now);
+    EXPECT_TRUE(server->saw([](const Request& r) { return r.writes(kWatchdog); }));
+    EXPECT_EQ(addresses_written(*server), std::vector{kRun});
+    EXPECT_EQ(server->holding(kRun), 0);
+    shaker->shut_down();
+}
+
+TEST(ShakerTime, FeedsAtOnceAfterALostReply) {
+    // GIVEN a shaker whose watchdog waits for the next feed when a reply is lost
+    TestServer server;
+    ManualClock clock;
+    const auto shaker = make_shaker(clock, periods(settings_for(server)));
+    shaker->start([] { return true; }, {});
+    for (Time now = clock.rest(); now <= kSecond; now = clock.rest()) clock.set(now);
+    server.script([](const Request& request) {
+        return request.connection == 1 ? Answer{Answer::Kind::close, 0, {}} : Answer{};
+    });
+    server.forget();
+    for (Time now = clock.rest(); shaker->counters().reconnects == 0; now = clock.rest())
+        clock.set(now);
+    // THEN it is fed on the new connection before the clock goes on
+    EXPECT_TRUE(
+        server.saw([](const Request& r) { return r.connection == 2 && r.writes(kWatchdog); }));
     shaker->shut_down();
 }
 
