@@ -19,7 +19,12 @@ DEMO = os.path.realpath(os.path.join(os.path.dirname(os.path.abspath(__file__)),
 
 def demo(*arguments, temporary, timeout=400):
     return subprocess.run([DEMO, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                          timeout=timeout, cwd=temporary, env={**os.environ, "TMPDIR": temporary})
+                          timeout=timeout, cwd=temporary, env={**os.environ, "TMPDIR": temporary}, preexec_fn=with_us)
+
+
+def with_us():
+    """A demo ends when this test is ended."""
+    r.die_with_parent(signal.SIGTERM)
 
 
 def processes_of(folder):
@@ -39,7 +44,8 @@ def processes_of(folder):
 def begins_on_vcan(checks, folder):
     """The whole takes minutes where the kernel has no vcan; its beginning shows that it goes."""
     running = subprocess.Popen([DEMO, "--vcan"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.STDOUT, text=True, cwd=folder, env={**os.environ, "TMPDIR": folder})
+                               stderr=subprocess.STDOUT, text=True, cwd=folder, env={**os.environ, "TMPDIR": folder},
+                               preexec_fn=with_us)
     said = []
     for line in running.stdout:
         said.append(line)
@@ -79,7 +85,7 @@ def main():
         checks.check(wrong.returncode == 2 and "many" in wrong.stderr, "a bad seed is refused by name", wrong.stderr)
         # WHEN it is interrupted in the middle of a campaign
         running = subprocess.Popen([DEMO], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                   text=True, cwd=folder, env={**os.environ, "TMPDIR": folder})
+                                   text=True, cwd=folder, env={**os.environ, "TMPDIR": folder}, preexec_fn=with_us)
         for line in running.stdout:
             if line.startswith("Campaign:"):
                 break
