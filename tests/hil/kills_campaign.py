@@ -52,13 +52,13 @@ class Witness(threading.Thread):
 
 
 def lines_of(folder):
-    """Of all raw logs, read by other programs. A segment that is being compressed is there twice, or as a .part."""
-    for path in sorted(glob.glob(os.path.join(folder, "raw-*.log"))):
-        with open(path, encoding="ascii") as file:
-            yield from file.read().splitlines()
-    for path in sorted(glob.glob(os.path.join(folder, "raw-*.zst"))):
-        if not os.path.exists(path.removesuffix(".zst")):
+    """Of all raw logs, read by other programs."""
+    for path in r.raw_logs(folder):
+        if path.endswith(".zst"):
             yield from subprocess.run(["zstd", "-dcq", path], capture_output=True, check=True, text=True).stdout.splitlines()
+        else:
+            with open(path, encoding="ascii") as file:
+                yield from file.read().splitlines()
 
 
 def logged(folder):

@@ -117,10 +117,11 @@ def resumed(checks, rig):
     result = rig.result()[1].decode().strip()
     environment = {**os.environ, "VIBRIG_RECORDINGS": rig.results}
     for how, arguments in (("replayed by its name", ("replay", "recorded")), ("identified", ("identify", folder)),
-                           ("from frames alone", ("replay", *sorted(glob.glob(folder + "/raw-*"))))):
+                           ("from frames alone", ("replay", *r.raw_logs(folder)))):
         run = subprocess.run([rig.program("vibrig"), *arguments, "--json"], capture_output=True, text=True, env=environment,
                              cwd=rig.folder)
-        checks.equal(run.stdout.strip(), result, f"resumed: {how}, result.json comes out to the last bit")
+        checks.check(run.stdout.strip() == result, f"resumed: {how}, result.json comes out to the last bit",
+                     f"{arguments}\n{run.stderr}\n{run.stdout}\nexpected\n{result}")
     index = os.path.join(rig.results, "recordings.sqlite3")
     with sqlite3.connect(f"file:{index}?mode=ro", uri=True) as database:
         rows = {name: (closed, size, sha) for name, closed, size, sha in
@@ -211,7 +212,7 @@ def complete(checks, rig):
         checks.check(True, "estimates after the last dwell are the result's")
     replayed = offline(rig, "replay", path, "--json")
     checks.equal(replayed.stdout.strip(), result.decode().strip(), "a replay gives result.json to the last bit")
-    from_frames = offline(rig, "replay", *sorted(glob.glob(os.path.join(folder, "raw-*"))), "--json")
+    from_frames = offline(rig, "replay", *r.raw_logs(folder), "--json")
     checks.equal(from_frames.stdout.strip(), result.decode().strip(), "and so do the frames alone")
     other = os.path.join(rig.folder, "other.toml")
     with open(other, "w", encoding="utf-8") as file:

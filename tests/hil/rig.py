@@ -1,6 +1,7 @@
 """The simulated rig and the daemon as processes, for campaigns driven from a test; and the checks, as TAP."""
 import contextlib
 import ctypes
+import glob
 import json
 import os
 import re
@@ -249,6 +250,13 @@ class Rig:
                 found.append(f"-- end of {child.name}.log{ended}")
                 found += child.text().splitlines()[-lines:]
         return "\n".join(found)
+
+
+def raw_logs(folder):
+    """The raw logs in order, each once: one that was being compressed may be there twice, and as a .part."""
+    plain = set(glob.glob(os.path.join(folder, "raw-*.log")))
+    packed = {path for path in glob.glob(os.path.join(folder, "raw-*.log.zst")) if path.removesuffix(".zst") not in plain}
+    return sorted(plain | packed)
 
 
 def state_of(status):
