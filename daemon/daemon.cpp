@@ -147,7 +147,10 @@ Daemon::Daemon(configuration::Loaded loaded)
                result_ = std::move(result);
            },
            torquer_.get(), &stage_feed_,
-           [this](const LevelDrift& drift) { noise_monitor_.levelled(drift); }}),
+           [this](const LevelDrift& drift) { noise_monitor_.levelled(drift); },
+           [this](const std::string& by, const std::string& out_of_band) {
+               if (journal_) journal_->loop_checked(by, out_of_band);
+           }}),
       publisher_(
           configuration_.mqtt.host.empty()
               ? nullptr
@@ -326,7 +329,9 @@ void Daemon::take_commands(Time now) {
             continue;
         }
         if (waiting.request.kind == CommandRequest::Kind::arm) tell_overdue();
-        const auto reply = campaign_.command(waiting.request, now);
+        const auto unknown = unknown_to_acknowledge(waiting.request);
+        const auto reply = unknown.empty() ? campaign_.command(waiting.request, now)
+                                           : CommandReply{false, unknown};
         if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
             interlock_.acknowledge(handled);
         }
@@ -386,6 +391,7 @@ void Daemon::control_loop() {
         tell_controller();
         if (journal_) tell_journal();
         if (recorder_) tell_recorder();
+        watch_onlookers();
         interlock_.filter(excitation_.load() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);

@@ -73,6 +73,7 @@ class Daemon final : public StatusSource {
     CommandReply command(const CommandRequest& request) override;
     [[nodiscard]] PlanData plan() const override { return plan_; }
     void refused(const std::string& who, const std::string& what, const std::string& why) override;
+    void serving() override;
 
   private:
     struct WaitingCommand {
@@ -92,10 +93,13 @@ class Daemon final : public StatusSource {
     void log(Severity severity, const std::string& source, const std::string& text);
     /// Accepted if it was for an alarm; a trip is the campaign's.
     CommandReply acknowledge_alarm(const CommandRequest& request);
+    /// Why there is nothing of the name it gives; empty: there is, or it gives none.
+    [[nodiscard]] std::string unknown_to_acknowledge(const CommandRequest& request) const;
     void tell_alarms();
     void tell_controller();
     void tell_journal();
     void tell_recorder();
+    void watch_onlookers();
     [[nodiscard]] InterlockStatus interlock_status() const;
     [[nodiscard]] RealTimeStatus real_time_status(const rt::AcquisitionView& acquired,
                                                   const rt::EstimatorView& estimated) const;
@@ -171,6 +175,7 @@ class Daemon final : public StatusSource {
     std::array<bool, rt::kMostRules> raised_{};  ///< alarms already told of
     drivers::Time balance_checked_ = 0;
     std::atomic<drivers::Time> control_beat_{0};
+    std::atomic<std::int64_t> serving_wall_ns_{0};  ///< 0: there is no server
     drivers::Time started_ = 0;
     serve::EventLog event_log_;
     std::unique_ptr<journal::Journal> journal_;  ///< null: none is kept

@@ -71,9 +71,9 @@ void Daemon::tell_recorder() {
     const bool stuck = stuck_s > 0;
     if (std::exchange(recorder_was_stuck_, stuck) == stuck) return;
     log(stuck ? Severity::alarm : Severity::info, "recorder",
-        stuck ? "the disk does not answer: what comes meanwhile waits, and is lost when there "
-                "is no more room for it"
-              : "the disk answers again");
+        stuck ? "does not go on, as with a disk that does not answer: what comes meanwhile waits, "
+                "and is lost when there is no more room for it"
+              : "goes on again");
 }
 
 void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {

@@ -14,6 +14,8 @@ using drivers::Time;
 namespace {
 // A stage that makes no progress for this long, in wall time, is stuck.
 constexpr Time kPatience = 2 * drivers::kSecond;
+// The server waits for the control thread's answer to a command for 5 s.
+constexpr Time kServerPatience = 7 * drivers::kSecond;
 constexpr std::size_t kManyEvents = serve::EventLog::kCapacity;
 }  // namespace
 
@@ -29,6 +31,10 @@ void Daemon::open_journal() {
         log(Severity::warning, "journal", refused);
     if (const auto& assumed = journal_->recovery().assumed; !assumed.empty())
         log(Severity::warning, "journal", assumed);
+    if (const auto& found = journal_->recovery().out_of_band; !found.empty()) {
+        campaign_.take_over_loop_check(found);
+        log(Severity::warning, "journal", "the newest loop check was out of band: " + found);
+    }
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
@@ -166,6 +172,18 @@ CommandReply Daemon::acknowledge_alarm(const CommandRequest& request) {
     return {true, "acknowledged: " + request.argument};
 }
 
+std::string Daemon::unknown_to_acknowledge(const CommandRequest& request) const {
+    const std::string& what = request.argument;
+    if (request.kind != CommandRequest::Kind::acknowledge || what.empty() || what == "trip" ||
+        what == "shaker")
+        return {};
+    const std::string tripped = interlock_.tripped_name();
+    if (what == tripped) return {};
+    return fmt::format("found \"{}\", expected {}", what,
+                       tripped.empty() ? "the name of an alarm that is raised, trip or shaker"
+                                       : tripped + " or trip");
+}
+
 void Daemon::refused(const std::string& who, const std::string& what, const std::string& why) {
     log(Severity::warning, "server", fmt::format("refused {} ({}): {}", what, who, why));
 }
@@ -197,6 +215,14 @@ void Daemon::tell_controller() {
         : now == ControllerState::warning ? Severity::warning
                                           : Severity::alarm,
         "can", fmt::format("the controller's error state: {}", drivers::name_of(now)));
+}
+
+void Daemon::serving() { serving_wall_ns_.store(rt::wall_clock()); }
+
+void Daemon::watch_onlookers() {
+    const auto served = serving_wall_ns_.load();
+    interlock_.onlookers(recorder_ && recorder_->degraded(),
+                         served != 0 && rt::wall_clock() - served > kServerPatience);
 }
 
 void Daemon::tell_journal() {

@@ -308,6 +308,8 @@ class StatusSource {
     [[nodiscard]] virtual std::string effective_configuration() const = 0;
     virtual CommandReply command(const CommandRequest& request) = 0;
     [[nodiscard]] virtual PlanData plan() const { return {}; }
+    /// The server's thread goes on; told twice a second.
+    virtual void serving() {}
     /// A command that was not let through: who wanted what, and why not.
     virtual void refused(const std::string& /*who*/, const std::string& /*what*/,
                          const std::string& /*why*/) {}

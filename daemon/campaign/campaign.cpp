@@ -137,18 +137,27 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (active() || state_ == State::armed || state_ == State::checking)
                 abort("aborted by " + request.by, now);
             return accept("stop sent");
-        case Kind::acknowledge:
-            // The controller latches what its own watchdog did while no daemon was there; a stop at
-            // rest clears it.
-            if (const auto shaker = ports_.shaker.reading();
-                state_ != State::tripped && shaker.fault != 0 && !active()) {
+        case Kind::acknowledge: {
+            // One acknowledgement is for both: the controller latches its faults, too, and forgets
+            // them when it is told to stop at rest.
+            const auto shaker = ports_.shaker.reading();
+            const bool latched = shaker.valid && shaker.fault != 0 && !active();
+            std::string what;
+            if (latched) {
+                if (shaker.emergency_stop_open)
+                    return refuse("the emergency-stop chain is open: close it first");
                 if (!shaker.still()) return refuse("the table is not at rest yet");
-                stop_shaker();
-                return accept(fmt::format("acknowledged: shaker fault {:#06x}", shaker.fault));
+                what = fmt::format("shaker fault {:#06x}", shaker.fault);
             }
-            if (state_ != State::tripped) return refuse("nothing to acknowledge");
-            enter(State::idle, now);
-            return accept("acknowledged: " + std::exchange(reason_, {}));
+            if (state_ == State::tripped) {
+                what = std::exchange(reason_, {}) + (latched ? "; " + what : "");
+                enter(State::idle, now);
+            } else if (!latched) {
+                return refuse("nothing to acknowledge");
+            }
+            if (latched) stop_shaker();
+            return accept("acknowledged: " + what);
+        }
         case Kind::selftest:
             return begin_loop_check(request, now);
     }

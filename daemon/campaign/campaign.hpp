@@ -69,6 +69,8 @@ struct Ports {
     rt::StageFeed* feed = nullptr;
     /// A position was levelled, and this is what was torqued out.
     std::function<void(const LevelDrift&)> levelled = {};
+    /// A loop check has its verdict; empty: all in band.
+    std::function<void(const std::string& by, const std::string& out_of_band)> loop_checked = {};
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -83,6 +85,9 @@ class Campaign {
     /// until a person arms and resumes it. False if they are not the first of the list; of an
     /// adaptive campaign `stops` says what was chosen.
     bool offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops = {});
+    /// Before the first step(): what the newest loop check of an earlier life found out of band.
+    /// No campaign is armed until another one is in band.
+    void take_over_loop_check(const std::string& out_of_band);
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);

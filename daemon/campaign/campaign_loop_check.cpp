@@ -18,6 +18,10 @@ constexpr Time kLook = kSecond;  // at rest, before
 constexpr Time kCheckSilence = kSecond;
 }  // namespace
 
+void Campaign::take_over_loop_check(const std::string& out_of_band) {
+    loop_->take_over(out_of_band);
+}
+
 std::string Campaign::not_fit_to_check(Time now) const {
     if (active()) return "a campaign is running";
     if (state_ == State::checking) return "a loop check is running";
@@ -82,6 +86,7 @@ Time Campaign::check_loop(Time now) {
         go_on_to(Check::measure, now);
     } else if (check_ == Check::measure && since >= from_seconds(settings_.loop.measure_s)) {
         loop_->finish(reading.measured_g);
+        if (ports_.loop_checked) ports_.loop_checked(armed_by_, loop_->out_of_band());
         go_on_to(Check::rest, now);
     } else if (check_ == Check::rest && come_to_rest(now)) {
         conclude_loop_check(now);

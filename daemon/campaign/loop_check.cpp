@@ -113,6 +113,13 @@ void LoopCheck::not_completed(const std::string& why) {
     status_.message = why;
 }
 
+void LoopCheck::take_over(const std::string& out_of_band) {
+    out_of_band_ = out_of_band;
+    if (out_of_band.empty()) return;
+    status_.verdict = "out of band";
+    status_.message = out_of_band;
+}
+
 std::string LoopCheck::refusal() const {
     if (!out_of_band_.empty()) return "the loop check was out of band: " + out_of_band_;
     if (settings_.required && !passed_)

@@ -30,6 +30,10 @@ class LoopCheck {
     void conclude();  ///< the table is at rest again: it is over
     void not_completed(const std::string& why);
 
+    /// What the newest one that was completed found out of its band; empty: nothing. One of an
+    /// earlier life is taken over before anything else.
+    [[nodiscard]] const std::string& out_of_band() const { return out_of_band_; }
+    void take_over(const std::string& out_of_band);
     /// Why no campaign is armed; empty: as far as this goes it may be.
     [[nodiscard]] std::string refusal() const;
     [[nodiscard]] const LoopCheckStatus& status() const { return status_; }

@@ -34,6 +34,12 @@ CREATE TABLE command (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL, kind TEXT
     answer TEXT NOT NULL);
 )";
 
+// Later than version 1, whose readers leave it alone; made with the first check.
+constexpr const char* kLoopCheckTable = R"(
+CREATE TABLE IF NOT EXISTS loop_check (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
+    person TEXT NOT NULL, out_of_band TEXT NOT NULL);
+)";
+
 std::int64_t utc_now() {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
                std::chrono::system_clock::now().time_since_epoch())
@@ -118,6 +124,7 @@ void Journal::open() {
 }
 
 void Journal::recover() {
+    recover_loop_check();
     const auto found = database_->ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
         "ORDER BY id DESC LIMIT 1");
@@ -132,6 +139,13 @@ void Journal::recover() {
     }
     recover_dwells(campaign);
     if (!campaign.dwells.empty()) recovery_.campaign = std::move(campaign);
+}
+
+void Journal::recover_loop_check() {
+    if (database_->ask("SELECT name FROM sqlite_master WHERE name = 'loop_check'").empty()) return;
+    const auto newest =
+        database_->ask("SELECT out_of_band FROM loop_check ORDER BY id DESC LIMIT 1");
+    if (!newest.empty()) recovery_.out_of_band = newest.front().texts.at(0);
 }
 
 void Journal::recover_dwells(Unfinished& campaign) {
@@ -201,6 +215,9 @@ void Journal::dwell_done(const estimator::DwellInfo& info, const estimator::Dwel
 void Journal::campaign_ended(const std::string& state, const std::string& reason,
                              const std::string& result_json) {
     put(Ended{state, reason, result_json, utc_now()});
+}
+void Journal::loop_checked(const std::string& by, const std::string& out_of_band) {
+    put(LoopChecked{by, out_of_band, utc_now()});
 }
 void Journal::event(const EventRecord& event) { put(event); }
 void Journal::command(const CommandRequest& request, const CommandReply& reply,
@@ -335,6 +352,13 @@ void Journal::write_one(const Commanded& commanded) {
         {commanded.utc_ns, std::string_view(word_of(commanded.request.kind)),
          std::string_view(commanded.request.by), std::string_view(commanded.request.argument),
          std::int64_t{commanded.reply.accepted}, std::string_view(commanded.reply.message)});
+}
+
+void Journal::write_one(const LoopChecked& checked) {
+    database_->execute(kLoopCheckTable);
+    database_->run(
+        "INSERT INTO loop_check (utc_ns, person, out_of_band) VALUES (?, ?, ?)",
+        {checked.utc_ns, std::string_view(checked.by), std::string_view(checked.out_of_band)});
 }
 
 }  // namespace vibrig::journal

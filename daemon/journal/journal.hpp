@@ -34,7 +34,8 @@ struct Recovery {
     std::optional<Unfinished> campaign;
     /// Why what was there is not used: a cold start, in words. Empty: nothing was refused.
     std::vector<std::string> refused;
-    std::string assumed;  ///< of what an older version did not keep; empty: nothing
+    std::string assumed;      ///< of what an older version did not keep; empty: nothing
+    std::string out_of_band;  ///< what the newest loop check found so; empty: nothing
 };
 
 /// What happened, on disk: campaigns, positions done with what the filter was fed, results, events
@@ -62,6 +63,8 @@ class Journal {
                     const StopDone& stop);
     void campaign_ended(const std::string& state, const std::string& reason,
                         const std::string& result_json);
+    /// A loop check was completed; `out_of_band` is empty if all was in its band.
+    void loop_checked(const std::string& by, const std::string& out_of_band);
     void event(const EventRecord& event);
     void command(const CommandRequest& request, const CommandReply& reply, std::int64_t utc_ns);
 
@@ -90,10 +93,15 @@ class Journal {
         CommandReply reply;
         std::int64_t utc_ns = 0;
     };
-    using Entry = std::variant<Begun, Done, Ended, EventRecord, Commanded>;
+    struct LoopChecked {
+        std::string by, out_of_band;
+        std::int64_t utc_ns = 0;
+    };
+    using Entry = std::variant<Begun, Done, Ended, EventRecord, Commanded, LoopChecked>;
 
     void open();
     void recover();
+    void recover_loop_check();
     void recover_dwells(Unfinished& campaign);
     void put(Entry entry);
     void loop();
@@ -104,6 +112,7 @@ class Journal {
     void write_one(const Ended& ended);
     void write_one(const EventRecord& event);
     void write_one(const Commanded& commanded);
+    void write_one(const LoopChecked& checked);
 
     const std::string path_;
     const std::uint64_t configuration_hash_;

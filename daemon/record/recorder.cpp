@@ -29,6 +29,8 @@ constexpr std::size_t kEventsBefore = 32;
 constexpr std::size_t kMostKept = 4096;
 // A disk that takes longer for one thing does not answer.
 constexpr std::int64_t kPatience_ns = 400'000'000;
+// A thread that wakes later than this does not get to run.
+constexpr Time kLate = 2 * drivers::kSecond;
 
 std::string stamp(std::int64_t utc_ns) {
     return fmt::format("{:%Y%m%dT%H%M%SZ}",
@@ -122,9 +124,13 @@ void Recorder::show() {
 }
 
 double Recorder::stuck_s() const noexcept {
-    const auto since = alive_wall_ns_.load();
-    const auto age = since == 0 ? 0 : wall_ns() - since;
-    return age > kPatience_ns ? static_cast<double>(age) * 1e-9 : 0;
+    if (const auto since = alive_wall_ns_.load(); since != 0) {
+        const auto age = wall_ns() - since;
+        return age > kPatience_ns ? static_cast<double>(age) * 1e-9 : 0;
+    }
+    const Time due = due_.load();
+    const Time late = due == 0 ? 0 : clock_.now() - due;
+    return late > kLate ? drivers::to_seconds(late) : 0;
 }
 
 void Recorder::alive() noexcept { alive_wall_ns_.store(wall_ns()); }
@@ -148,9 +154,12 @@ void Recorder::loop() {
         keep_few();
         commit(std::exchange(commit_now_, false));
         show();
+        const Time next = clock_.now() + kPeriod;
+        due_.store(next);
         alive_wall_ns_.store(0);
-        self_.wait_until(clock_.now() + kPeriod);
+        self_.wait_until(next);
     }
+    due_.store(0);
     drain();
     std::deque<Entry> entries;
     {
@@ -236,11 +245,11 @@ void Recorder::judge_disk() {
     const bool raw_good = !raw_ || raw_->good();
     if (writer_ && raw_good) {
         shown_.note.clear();
-        if (std::exchange(told_bad_, false))
+        if (told_bad_.exchange(false))
             on_event_(Severity::info, fmt::format("writes again, to {}", shown_.file));
     } else {
         if (writer_) shown_.note = raw_->note();
-        if (!std::exchange(told_bad_, true)) on_event_(Severity::alarm, shown_.note);
+        if (!told_bad_.exchange(true)) on_event_(Severity::alarm, shown_.note);
     }
 }
 

@@ -76,8 +76,11 @@ class Recorder {
     void campaign_ended(Ended ended);
 
     [[nodiscard]] RecorderStatus status() const;
-    /// For how long the disk has not answered, s; 0: it does. Any thread.
+    /// For how long it has not gone on, s, because the disk does not answer or the thread does not
+    /// run; 0: it does. Any thread.
     [[nodiscard]] double stuck_s() const noexcept;
+    /// The disk refuses, or it does not go on. Any thread.
+    [[nodiscard]] bool degraded() const noexcept { return told_bad_.load() || stuck_s() > 0; }
 
     static constexpr std::size_t kMostWaiting = 10'000;
 
@@ -138,12 +141,13 @@ class Recorder {
     Gap lost_;                   ///< samples that could not be written
     std::uint64_t at_risk_ = 0;  ///< samples given to the file since it last went to the disk
     bool commit_now_ = false;
-    bool told_bad_ = false;
     RecorderStatus shown_;
 
+    std::atomic<bool> told_bad_{false};  ///< set by its thread
     std::atomic<bool> stop_{false};
     /// When its thread last went on, in wall time; 0: it waits for something to do.
     std::atomic<std::int64_t> alive_wall_ns_{0};
+    std::atomic<drivers::Time> due_{0};  ///< when it will look again, in the daemon's time
     mutable std::mutex mutex_;
     std::deque<Entry> waiting_;
     RecorderStatus status_;

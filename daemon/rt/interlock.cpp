@@ -83,16 +83,17 @@ void Interlock::judge(By by, Trip trip, double value, Time now) noexcept {
 
 void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time now) noexcept {
     State& state = states_[row];
-    Time& since = state.since[static_cast<std::size_t>(by)];
+    std::atomic<Time>& since = state.since[static_cast<std::size_t>(by)];
     const Rule& rule = rules_[row];
     if (!wrong) {
         since = 0;
-        if (!rule.latched && state.raised.exchange(false)) control_.notify();
+        // The other thread may see it otherwise.
+        if (!rule.latched && state.met() && state.raised.exchange(false)) control_.notify();
         return;
     }
     now = std::max<Time>(now, 1);  // 0 says that the condition is met
-    if (since == 0) since = now;
-    if (now - since < drivers::from_seconds(rule.dwell_s)) return;
+    if (since.load() == 0) since = now;
+    if (now - since.load() < drivers::from_seconds(rule.dwell_s)) return;
     if (rule.reaction == Reaction::abort && tripped_.load() == Trip::none) {
         if (by == By::sample && arrived_ != 0) stop_asked_.store(arrived_);
         trip(rule.condition, row, value);
@@ -110,7 +111,8 @@ void Interlock::forget(By by, Guard above) noexcept {
         const Guard from = condition_of(rules_[i].condition).from;
         if (from <= above) continue;
         states_[i].since[static_cast<std::size_t>(by)] = 0;
-        if (!rules_[i].latched && states_[i].raised.exchange(false)) control_.notify();
+        if (!rules_[i].latched && states_[i].met() && states_[i].raised.exchange(false))
+            control_.notify();
     }
 }
 
@@ -132,6 +134,8 @@ void Interlock::check(const drivers::Sample& sample,
     if (platform.time > 0) judge(By::sample, Trip::temperature, platform.temperature_c, now);
     if (const double free_mb = disk_free_mb_.load(); free_mb >= 0)
         judge(By::sample, Trip::disk, free_mb, now);
+    judge(By::sample, Trip::recording, recording_degraded_.load(), now);
+    judge(By::sample, Trip::server, server_stuck_.load(), now);
 }
 
 void Interlock::check_motion(const drivers::Sample& sample) noexcept {

@@ -62,6 +62,11 @@ class Interlock {
     /// Control thread, slowly: innovations of the filter (0: none yet), free space.
     void filter(double nis_per_dof) noexcept { nis_.store(nis_per_dof); }
     void disk_free(double megabytes) noexcept { disk_free_mb_.store(megabytes); }
+    /// Control thread: whether those that only look on keep up.
+    void onlookers(bool recording_degraded, bool server_stuck) noexcept {
+        recording_degraded_.store(recording_degraded);
+        server_stuck_.store(server_stuck);
+    }
 
     /// Acquisition thread: a batch of frames came in at this moment (CLOCK_MONOTONIC).
     void arrived(drivers::Time wall) noexcept { arrived_ = wall; }
@@ -98,7 +103,10 @@ class Interlock {
     /// Who judges: each keeps its own time since when a condition has not been met.
     enum class By : std::uint8_t { sample, read_back };
     struct State {
-        std::array<drivers::Time, 2> since{};  ///< by By; 0: met
+        std::array<std::atomic<drivers::Time>, 2> since{};  ///< by By; 0: met
+        [[nodiscard]] bool met() const noexcept {
+            return since[0].load() == 0 && since[1].load() == 0;
+        }
         std::atomic<bool> raised{false};
         std::atomic<double> value{0};
     };
@@ -123,6 +131,7 @@ class Interlock {
     std::atomic<std::size_t> tripped_row_{0};
     std::atomic<double> tripped_value_{0};
     std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
+    std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
     std::array<std::atomic<double>, 3> position_rad_{};
     std::atomic<bool> position_known_{false};
     std::atomic<drivers::Time> stop_asked_{0};  ///< arrival of the frames that tripped; 0: none

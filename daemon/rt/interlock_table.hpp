@@ -29,9 +29,11 @@ enum class Trip : std::uint8_t {
     filter_divergence,
     read_back,
     shaker_lost,
-    disk
+    disk,
+    recording,
+    server
 };
-inline constexpr std::size_t kTrips = 20;
+inline constexpr std::size_t kTrips = 22;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -88,6 +90,8 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::shaker_lost, "shaker_link_lost", "no valid read-back from the shaker", Guard::armed,
      false},
     {Trip::disk, "disk", "free space for results", Guard::idle, false, "MB", 1, 1e7, true},
+    {Trip::recording, "recording_degraded", "the disk refuses, or the recorder does not go on"},
+    {Trip::server, "server_stuck", "the status server makes no progress"},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];
@@ -132,6 +136,8 @@ inline constexpr std::size_t kMostRules = 64;
     add("read_back_mismatch", Trip::read_back, Reaction::abort, 0, 0, true);
     add("shaker_link_lost", Trip::shaker_lost, Reaction::alarm, 0, 0, false);
     add("disk", Trip::disk, Reaction::alarm, 200, 0, false);
+    add("recording_degraded", Trip::recording, Reaction::alarm, 0, 0, false);
+    add("server_stuck", Trip::server, Reaction::alarm, 0, 0, false);
     return rules;
 }
 

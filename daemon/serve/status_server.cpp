@@ -34,6 +34,7 @@ using boost::system::error_code;
 
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 constexpr auto kCertificateLook = std::chrono::seconds(1);
+constexpr auto kLife = std::chrono::milliseconds(500);
 
 /// Changes whenever one of the files does.
 std::string stamp_of(const ServerSettings& settings) {
@@ -109,6 +110,7 @@ struct StatusServer::Impl {
 
     void answer() {
         for (Listener& listener : listeners) accept(listener);
+        show_life();
         // Signals are for the main thread.
         sigset_t all, before;
         sigfillset(&all);
@@ -139,6 +141,14 @@ struct StatusServer::Impl {
     [[nodiscard]] asio::ssl::context read_certificates() const {
         return mutual_tls(settings.certificate, settings.key, settings.clients_ca, true,
                           settings.revoked);
+    }
+
+    void show_life() {
+        source.serving();
+        life.expires_after(kLife);
+        life.async_wait([this](error_code error) {
+            if (!error) show_life();
+        });
     }
 
     /// Takes over renewed certificates and a longer list of revoked ones while it runs.
@@ -236,6 +246,7 @@ struct StatusServer::Impl {
     std::optional<asio::ssl::context> tls;
     std::string page, remote;
     asio::io_context io{1};
+    asio::steady_timer life{io};
     asio::steady_timer certificate_look{io};
     std::string certificates_seen;
     std::deque<Listener> listeners;

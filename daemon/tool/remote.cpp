@@ -140,6 +140,19 @@ int self_test(const TestOptions& options) {
     return found.ready() ? 0 : kNo;
 }
 
+/// After an acknowledgement, until the controller has forgotten its fault: who arms next is not
+/// refused because of what is only on its way.
+void wait_for_shaker(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30; ++looks) {
+        const v1::Status status = ask_status(client);
+        const auto& shaker = status.shaker();
+        if (!shaker.stop_pending() && shaker.fault() == 0) return;
+        std::this_thread::sleep_for(kLook);
+    }
+    std::cerr << kWho << "the shaker has not confirmed it yet: vibrig status\n";
+}
+
 int send_command(const CommandOptions& options) {
     v1::Command command;
     command.set_kind(options.kind);
@@ -154,6 +167,7 @@ int send_command(const CommandOptions& options) {
         if (!options.json) {
             std::cout << (answer.message().empty() ? "accepted" : answer.message()) << '\n';
         }
+        if (options.kind == v1::Command::acknowledge) wait_for_shaker(client);
         return 0;
     }
     std::cerr << kWho << problem_of(reply) << '\n';

@@ -122,6 +122,12 @@ def out_of_band(checks, programs, folder, what, change, says):
         status = rig.status()
         checks.check(status["shaker"].get("state") == 0 and status["campaign"]["state"] == "idle",
                      f"{what}: it leaves the rig disarmed and at rest", r.state_of(status))
+        checks.equal(rig.daemon.end(timeout=30), 0, f"{what}: vibrigd ends with status 0")
+        rig.start_daemon()
+        rig.wait_for(ready, 60)
+        refused = rig.tool("arm", "--by", "Ada")
+        checks.check(refused.returncode == 1 and "out of band" in refused.stderr and says in refused.stderr,
+                     f"{what}: a restart changes nothing", refused.stderr + rig.logs())
     finally:
         rig.stop()
 

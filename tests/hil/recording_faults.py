@@ -109,7 +109,7 @@ def slow_fsync(checks, rig, disk):
                  status["recorder"]["file"] == before["file"], "fsync of 10 s: then it goes on, nothing is lost",
                  str(status["recorder"]))
     def counts():
-        return len(told(rig, "the disk does not answer")), len(told(rig, "the disk answers again"))
+        return len(told(rig, "does not go on")), len(told(rig, "goes on again"))
 
     rig.wait_for(lambda s: counts()[0] == counts()[1], 30)
     # A segment takes two of them, and the second may be slow, too.

@@ -300,6 +300,52 @@ TEST_F(CampaignTest, AFaultThatTheControllerLatchedMeanwhileIsAcknowledgedByASto
     EXPECT_EQ(status().state, CampaignState::idle);
 }
 
+TEST_F(CampaignTest, OneAcknowledgementIsForTheTripAndForWhatTheControllerLatched) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    // GIVEN an emergency stop, which the controller latches as a fault of its own
+    shaker.stop_now();
+    campaign->on_trip("emergency-stop chain open", now);
+    shaker.obey(now);
+    shaker.now.fault = 2;
+    shaker.now.emergency_stop_open = true;
+    const auto refused = command(Kind::acknowledge);
+    EXPECT_FALSE(refused.accepted);
+    EXPECT_EQ(refused.message, "the emergency-stop chain is open: close it first");
+    shaker.now.emergency_stop_open = false;
+    shaker.now.measured_g = 2;
+    EXPECT_EQ(command(Kind::acknowledge).message, "the table is not at rest yet");
+    EXPECT_EQ(status().state, CampaignState::tripped) << "what was refused has changed nothing";
+    // WHEN the chain is closed and the table at rest THEN once is enough
+    shaker.now.measured_g = 0;
+    const auto stops = shaker.stops_asked.load();
+    EXPECT_EQ(command(Kind::acknowledge).message,
+              "acknowledged: emergency-stop chain open; shaker fault 0x0002");
+    EXPECT_EQ(shaker.stops_asked, stops + 1);
+    EXPECT_EQ(command(Kind::arm).message, "a stop of the shaker is pending");
+    shaker.obey(now);
+    shaker.now.fault = 0;
+    EXPECT_TRUE(command(Kind::arm).accepted);
+}
+
+TEST_F(CampaignTest, AnAcknowledgementOfATripNeedsNoShaker) {
+    shaker.now.fault = 2;
+    shaker.now.valid = false;
+    EXPECT_FALSE(command(Kind::acknowledge).accepted) << "an old reading says nothing";
+    campaign->on_trip("CAN bus lost", now);
+    EXPECT_TRUE(command(Kind::acknowledge).accepted);
+    EXPECT_EQ(status().state, CampaignState::idle);
+}
+
+TEST_F(CampaignTest, ALoopCheckOutOfBandInAnEarlierLifeKeepsTheShakerDisarmed) {
+    campaign->take_over_loop_check("distortion 0.3, expected 0 to 0.05");
+    const auto refused = command(Kind::arm);
+    EXPECT_FALSE(refused.accepted);
+    EXPECT_EQ(refused.message,
+              "the loop check was out of band: distortion 0.3, expected 0 to 0.05");
+}
+
 TEST_F(CampaignTest, StopsWhenTheMeasuredAmplitudeLeavesTheCommand) {
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);

@@ -191,6 +191,22 @@ TEST_F(JournalTest, KeepsEventsAndWhoCommandedWhat) {
     EXPECT_EQ(command.numbers[2], 0);
 }
 
+TEST_F(JournalTest, KeepsTheVerdictOfTheNewestLoopCheck) {
+    const auto after = [this](const std::vector<std::string>& verdicts) {
+        Journal journal(path, kHash);
+        const std::string before = journal.recovery().out_of_band;
+        journal.start();
+        for (const auto& verdict : verdicts) journal.loop_checked("Ada", verdict);
+        journal.stop();
+        return before;
+    };
+    EXPECT_EQ(after({}), "") << "none was made";
+    EXPECT_EQ(after({"", "distortion 0.3, expected 0 to 0.05"}), "");
+    EXPECT_EQ(after({}), "distortion 0.3, expected 0 to 0.05");
+    EXPECT_EQ(after({""}), "distortion 0.3, expected 0 to 0.05") << "whatever did not check it";
+    EXPECT_EQ(after({}), "") << "another one was in band";
+}
+
 TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
     // GIVEN good bytes of a checkpoint
     estimator::Identification filter{estimator::Settings{}};

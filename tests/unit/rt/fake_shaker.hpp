@@ -26,7 +26,7 @@ class FakeShaker final : public drivers::Shaker {
     [[nodiscard]] bool stop_pending() const noexcept override { return stop_waits; }
     [[nodiscard]] bool busy() const noexcept override { return false; }
     [[nodiscard]] drivers::ShakerReading reading() const noexcept override { return now; }
-    [[nodiscard]] drivers::ShakerCounters counters() const noexcept override { return {}; }
+    [[nodiscard]] drivers::ShakerCounters counters() const noexcept override { return counts; }
     [[nodiscard]] drivers::LinkState state() const noexcept override {
         return drivers::LinkState::running;
     }
@@ -46,6 +46,7 @@ class FakeShaker final : public drivers::Shaker {
     }
 
     drivers::ShakerReading now;
+    drivers::ShakerCounters counts;
     std::vector<drivers::ShakerSetPoint> requests;
     std::atomic<std::uint64_t> stops_asked{0};
     std::atomic<bool> stop_waits{false};
