@@ -1,15 +1,18 @@
 #!/usr/bin/python3
 """Each fault of bus and shaker link in turn, while the table shakes, on a real vcan0 and real Modbus in virtual time: what
 happens has to be what is expected, by name; a stop is the next write, no set-point follows it, no frame is unaccounted for.
-With --soak a random fault every few minutes instead; memory, descriptors and log have to stay flat.
+Then all processors kept busy, in real time. With --soak or --faults a random fault every few minutes instead; memory,
+descriptors and log have to stay flat.
 
-usage: fault_matrix.py PROGRAMS [--soak HOURS] [--faults N] [--seed N]
+usage: fault_matrix.py PROGRAMS [--rows PATTERN]       of the matrix, by name; else all and what follows
+       fault_matrix.py PROGRAMS --soak HOURS | --faults N [--seed N]
        fault_matrix.py PROGRAMS --inside WHAT          inside the machine in virtual time
 """
 import glob
 import json
 import os
 import random
+import re
 import signal
 import socket
 import subprocess
@@ -70,7 +73,20 @@ def continued_process(rig):
 
 
 def clock_step(seconds):
+    """Kernel receive stamps follow the wall clock."""
     return lambda rig: time.clock_settime(time.CLOCK_REALTIME, time.time() + seconds)
+
+
+def clock_shaken(rig):
+    for seconds in (-0.5, 0.7, -0.3, 0.05, -0.05, 0.1) * 5:
+        clock_step(seconds)(rig)
+        time.sleep(0.037)
+
+
+def cable(out):
+    """What is sent is lost without a word, in both directions."""
+    words = ("add", "dev", "lo", "root", "netem", "loss", "100%") if out else ("del", "dev", "lo", "root")
+    return lambda rig: run("tc", "qdisc", *words)
 
 
 def nothing(rig):
@@ -94,12 +110,16 @@ ROWS = [
     ("unknown, extended, FD, remote frames",
      frames("6FF#01", "1FFFFFFF#0102", "101##1010203", "101#R", "7A0##0"), 2, nothing, ON),
     ("sync count jumps", frames("080#FFFFFFFF00000000"), 3, nothing, ON | STALE),
+    ("sync count goes backwards", frames("080#0100000000000000", "080#0000000000000000"), 3, nothing, ON | STALE),
     ("error frames", frames("20000002#0000000000000000", "20000080#0000000000000000"), 2, nothing, ON),
     ("error passive", frames("20000004#0030000000000000"), 2, frames("20000004#0040000000000000"), ON),
     ("bus off", frames("20000040#0000000000000000"), 2, frames("20000100#0000000000000000"), {"can_lost"}),
     ("interface down 1 s", link("set", BUS, "down"), 1, link("set", BUS, "up"), {"can_lost"}),
     ("interface down 60 s", link("set", BUS, "down"), 60, link("set", BUS, "up"), {"can_lost"}),
+    ("interface deleted and remade", remade, 2, nothing, {"can_lost"}),
     ("wall clock an hour on", clock_step(3600), 3, clock_step(-3600), ON),
+    ("wall clock an hour back", clock_step(-3600), 3, clock_step(3600), ON),
+    ("time stamps back and forth", clock_shaken, 2, nothing, ON),
     ("Modbus: wrong transaction", modbus("transaction", 1), 3, nothing, ON | LINK),
     ("Modbus: wrong unit", modbus("unit", 1), 3, nothing, ON | LINK),
     ("Modbus: wrong function", modbus("function", 1), 3, nothing, ON | LINK),
@@ -111,12 +131,42 @@ ROWS = [
     ("Modbus: late by one timeout", modbus(("late", TIMEOUT_S * 1.1), 1), 3, nothing, ON | LINK),
     ("Modbus: late by three timeouts", modbus(("late", TIMEOUT_S * 3.3), 1), 4, nothing, ON | LINK),
     ("Modbus: one byte per 100 ms", modbus("trickle"), 6, modbus(None), LINK),
-    ("Modbus: cable out", modbus("refuse"), 10, modbus(None), LINK),
+    ("Modbus: each connection is closed at once", modbus("refuse"), 10, modbus(None), LINK),
+    ("Modbus: server killed", lambda rig: rig.proxy.kill(), 10, lambda rig: rig.proxy.revive(), LINK),
+    ("Modbus: server stopped for 30 s", modbus("freeze"), 30, modbus(None), LINK),
+    ("Modbus: cable out 5 s", cable(True), 5, cable(False), LINK),
+    ("Modbus: cable out 10 minutes", cable(True), 600, cable(False), LINK),
     ("Modbus: a trip while a request hangs", lambda rig: (modbus("hang")(rig), time.sleep(0.3), plant("bus-silent=2")(rig)),
      1.5, modbus(None), STALE | LINK),
     ("rig stopped for 30 s", stopped_process, 30, continued_process, STALE),
 ]
-SOAKED = [row for row in ROWS if row[0] != "wall clock an hour on"]
+SOAKED = [row for row in ROWS if not row[0].startswith("wall clock")]
+HOGS = []
+
+
+def lost(status):
+    """On the way from the bus to the filter."""
+    return [r.number(status["can"].get("kernel_dropped", 0)), r.number(status["assembler"].get("gaps", 0)),
+            r.number(status["assembler"].get("incomplete", 0)), r.number(status["estimator_ring"].get("dropped", 0))]
+
+
+def hog(rig):
+    rig.lost_before = lost(rig.status())
+    HOGS.extend(subprocess.Popen(["sh", "-c", "while :; do :; done"], stdin=subprocess.DEVNULL, preexec_fn=r.die_with_parent)
+                for _ in range(2 * os.cpu_count()))
+
+
+def no_hog(rig):
+    while HOGS:
+        process = HOGS.pop()
+        process.kill()
+        process.wait()
+
+
+BUSY = ("all processors busy", hog, 10, no_hog, ON)
+# In real time the whole machine may be late; that is not what is looked at there.
+PATIENT = {"can": {"stale_deadline_ms": 5000}, "gimbal": {"status_deadline_ms": 5000},
+           "shaker": {"response_timeout_ms": 5000, "watchdog_period_ms": 4000}}
 
 
 class FaultRig(r.Rig):
@@ -125,14 +175,17 @@ class FaultRig(r.Rig):
         self.fifo = os.path.join(folder, "control")
         os.mkfifo(self.fifo)
 
-    def start(self, seed):
+    def start(self, seed, interlock="", **tables):
+        """`interlock`: rows of its table, as they stand in the configuration."""
         self.start_plant("--seed", str(seed), "--warm-up", "1", "--start-temperature", "45", "--control", self.fifo)
         self.control = open(self.fifo, "w", encoding="ascii")   # the plant has its other end
         self.proxy = modbus_proxy.Proxy(self.modbus_port)
         plant_port, self.modbus_port = self.modbus_port, self.proxy.port
-        self.configure(CAMPAIGN, record={"enabled": False},
-                       shaker={"host": "127.0.0.1", "port": self.proxy.port, "response_timeout_ms": TIMEOUT_S * 1e3,
-                               "backoff_max_ms": 500})
+        shaker = {"host": "127.0.0.1", "port": self.proxy.port, "response_timeout_ms": TIMEOUT_S * 1e3,
+                  "backoff_max_ms": 500, **tables.pop("shaker", {})}
+        self.configure(CAMPAIGN, shaker=shaker, **{"record": {"enabled": False}, **tables})
+        with open(self.configuration, "a", encoding="utf-8") as file:
+            file.write(interlock)
         self.modbus_port = plant_port
         self.start_daemon()
 
@@ -174,6 +227,7 @@ class FaultRig(r.Rig):
             return status["campaign"]["state"] != "tripped" and status["can"]["link"] == "running" and \
                 status["shaker"]["link"] == "running" and status["shaker"].get("state") == 0 and \
                 not status["shaker"].get("fault") and not status["shaker"].get("running") and \
+                not status["shaker"].get("stop_pending") and \
                 all(c["quality"] == "good" for c in status["sample"]["channels"])
         return self.wait_for(clear, 60)
 
@@ -216,6 +270,7 @@ def fault(checks, rig, row):
     begin(rig)
     time.sleep(seconds)
     during = rig.status() or {}
+    back = time.monotonic()
     undo(rig)
     time.sleep(2)
     status = rig.wait_for(lambda s: outcome_of(s) is None or not s["shaker"].get("stop_pending"), 20)
@@ -236,12 +291,30 @@ def fault(checks, rig, row):
             after = [w for w in writes if late[-1] <= w[0] <= late[-1] + 0.1]
             checks.check(not after or is_stop(after[0]) or writes[stops[0]][0] < late[-1],
                          f"{name}: after a reconnection the stop is the first write", after)
+        if during.get("shaker", {}).get("stop_pending"):
+            check_return(checks, rig, name, back)
         at_rest = rig.wait_for(lambda s: s["shaker"].get("state") in (0, 4) and s["shaker"].get("measured_g", 1) < 0.05, 20)
         checks.check(at_rest["shaker"].get("measured_g", 1) < 0.05, f"{name}: the table comes to rest", at_rest["shaker"])
         checks.check(not at_rest["campaign"]["armed_by"], f"{name}: nobody is armed any more")
     if status["campaign"]["state"] == "tripped":
         check_trip_file(checks, rig, name, trips, outcome)
     check_balances(checks, rig, name)
+
+
+def check_return(checks, rig, name, back):
+    """The shaker can be reached again, and is to be stopped: within 100 ms that is the one write."""
+    numbers = [n for n, when in enumerate(rig.proxy.connections) if when >= back]
+    if not numbers:
+        return
+    first = rig.proxy.connections[numbers[0]]
+    after = [w for w in rig.proxy.writes if first <= w[0] <= first + 0.1]
+    if "stopped for" in name:   # it finds waiting whatever was asked in vain, the stops among it
+        checks.check(any(map(is_stop, after)), f"{name}: within 100 ms after it there is a stop", after)
+        return
+    checks.check(len(after) == 1 and is_stop(after[0]), f"{name}: within 100 ms after it the stop is the only write", after)
+    time.sleep(5)   # what a kernel has kept it would have sent again by now
+    late = [n for n in range(numbers[0]) if rig.proxy.heard[n] > first]
+    checks.check(not late, f"{name}: nothing is delivered late on an older connection", late)
 
 
 def check_trip_file(checks, rig, name, before, outcome):
@@ -271,9 +344,43 @@ def check_balances(checks, rig, name):
     checks.check(rows and all(left == right for _, left, right in rows), f"{name}: the loss balance closes", rows)
 
 
-def matrix(checks, rig):
+def matrix(checks, rig, pattern=""):
     for row in ROWS:
-        fault(checks, rig, row)
+        if re.search(pattern, row[0]):
+            fault(checks, rig, row)
+    if pattern:
+        return
+    one_acknowledgement(checks, rig, "emergency stop", plant("estop"), 2, plant_is_well)
+    one_acknowledgement(checks, rig, "vibrigd stopped for 5 s", daemon_signal(signal.SIGSTOP), 5, daemon_signal(signal.SIGCONT))
+
+
+def plant_is_well(rig):
+    rig.order("clear")
+
+
+def daemon_signal(number):
+    return lambda rig: rig.daemon.process.send_signal(number)
+
+
+def one_acknowledgement(checks, rig, name, begin, seconds, undo):
+    """The controller latches a fault of its own, too: acknowledged once, it can be armed at once. (A controller that was
+    left alone is told to stop by the daemon's own trip, and so forgets by itself.)"""
+    shaking, found = rig.shake()
+    checks.check(shaking, f"{name}: the table shakes before", found)
+    begin(rig)
+    time.sleep(seconds)
+    undo(rig)
+    status = rig.wait_for(lambda s: outcome_of(s) is not None and s["shaker"].get("measured_g", 1) < 0.05 and
+                          not s["shaker"].get("stop_pending") and not s["shaker"].get("emergency_stop_open"), 20)
+    checks.check(status["campaign"]["state"] == "tripped" and (name != "emergency stop" or status["shaker"].get("fault")),
+                 f"{name}: it has tripped", f"{r.state_of(status)} {status['shaker']}")
+    wrong = rig.tool("ack", "nothing-of-this-name", "--by", "tester")
+    checks.check(wrong.returncode == 1 and status["interlock"]["tripped"] in wrong.stderr,
+                 f"{name}: another name acknowledges nothing", wrong.stderr)
+    for words in (("ack", status["interlock"]["tripped"]), ("arm",)):
+        done = rig.tool(*words, "--by", "tester")
+        checks.equal(done.returncode, 0, f"{name}: then vibrig {words[0]} is accepted at once")
+    rig.command("abort")
 
 
 def used(rig):
@@ -288,7 +395,22 @@ def used(rig):
     return resident, min(counts), os.path.getsize(rig.daemon.log)
 
 
-def soak(checks, rig, seed, faults):
+def busy(programs):
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        rig = FaultRig(programs, folder)
+        try:
+            rig.start(1, **PATIENT)
+            fault(checks, rig, BUSY)
+            checks.equal(lost(rig.status()), rig.lost_before, "all processors busy: no frame and no sample is lost")
+            checks.equal(rig.daemon.end(timeout=60), 0, "vibrigd ends cleanly")
+        finally:
+            no_hog(rig)
+            rig.stop()
+    return checks.end()
+
+
+def soak(checks, rig, seed, faults, longest_pause_s):
     rng = random.Random(seed)
     checks.note(f"soak: seed {seed}, {faults} faults")
     looks = []
@@ -298,7 +420,7 @@ def soak(checks, rig, seed, faults):
         fault(checks, rig, row)
         shaking, found = rig.shake()
         checks.check(shaking, f"fault {n + 1}: the table shakes again after it", found)
-        time.sleep(rng.uniform(60, 300))
+        time.sleep(rng.uniform(longest_pause_s / 5, longest_pause_s))
         looks.append(used(rig))
         checks.note(f"resident {looks[-1][0]} kB, descriptors {looks[-1][1]}, log {looks[-1][2]} bytes")
     # Rings, event log and pre-trip record fill in the first third.
@@ -314,11 +436,11 @@ def inside(programs, what):
         rig = FaultRig(programs, folder)
         try:
             rig.start(1)
-            if what == "matrix":
-                matrix(checks, rig)
+            if what.startswith("matrix"):
+                matrix(checks, rig, what.removeprefix("matrix"))
             else:
-                _, seed, faults = what.split(":")
-                soak(checks, rig, int(seed), int(faults))
+                _, *numbers = what.split(":")
+                soak(checks, rig, *map(int, numbers))
             checks.equal(rig.daemon.end(timeout=30), 0, "vibrigd ends cleanly")
         finally:
             rig.stop()
@@ -333,15 +455,23 @@ def option(name, default):
 def main():
     programs = r.programs_from_command_line(__doc__)
     if "--inside" in sys.argv:
-        return inside(programs, option("--inside", ""))
-    what = "matrix"
+        what = option("--inside", "")
+        return busy(programs) if what == "busy" else inside(programs, what)
+    what = "matrix" + option("--rows", "")
     if "--soak" in sys.argv or "--faults" in sys.argv:
-        # a fault, its aftermath and the pause take four minutes on average
-        faults = int(option("--faults", int(float(option("--soak", "1")) * 15)))
-        what = f"soak:{option('--seed', random.randrange(1 << 30))}:{faults}"
-    return subprocess.run([os.path.join(HERE, "run-in-uml"), "-T", "-t", "200000", "--wall",
-                           str(600 if "--soak" not in sys.argv else 36000), "--", os.path.abspath(__file__), programs,
-                           "--inside", what], stdin=subprocess.DEVNULL, check=False,
+        # a fault, its aftermath and the pause take four minutes on average; a few faults need no long pauses
+        faults, pause_s = option("--faults", None), 100
+        if faults is None:
+            faults, pause_s = int(float(option("--soak", "1")) * 15), 300
+        what = f"soak:{option('--seed', random.randrange(1 << 30))}:{faults}:{pause_s}"
+    virtual = in_machine(programs, what, "-T", "-t", "200000", "--wall", str(600 if "--soak" not in sys.argv else 36000))
+    real = in_machine(programs, "busy", "-t", "120") if what == "matrix" else 0
+    return virtual or real
+
+
+def in_machine(programs, what, *options):
+    return subprocess.run([os.path.join(HERE, "run-in-uml"), *options, "--", os.path.abspath(__file__), programs, "--inside",
+                           what], stdin=subprocess.DEVNULL, check=False,
                           preexec_fn=lambda: r.die_with_parent(signal.SIGTERM)).returncode
 
 

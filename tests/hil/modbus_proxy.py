@@ -10,29 +10,56 @@ WATCHDOG = 6
 
 
 class Proxy:
-    """`spoil` is one of None, "refuse", "hang", "reset", "trickle", "transaction", "unit", "function", "length", "short",
-    ("exception", N), ("late", seconds); `times` replies are spoilt, then it is None again (None: until told)."""
+    """`spoil` is one of None, "refuse", "hang", "freeze" (as a server that is stopped), "reset", "trickle", "transaction",
+    "unit", "function", "length", "short", ("exception", N), ("late", seconds); `times` replies are spoilt, then it is None
+    again (None: until told)."""
 
     def __init__(self, target):
         self.target = target
         self.writes = []        # (monotonic, address, values)
         self.connections = []   # monotonic
+        self.heard = []         # monotonic, by connection: when it last asked for anything
+        self.ends = set()       # sockets in use
         self.spoil, self.times = None, None
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.port = self.listener.getsockname()[1]
-        threading.Thread(target=self.serve, daemon=True).start()
+        self.port = 0
+        self.revive()
 
     def break_with(self, spoil, times=None):
         self.times, self.spoil = times, spoil
 
-    def serve(self):
-        while True:
-            client, _ = self.listener.accept()
-            self.connections.append(time.monotonic())
-            threading.Thread(target=self.relay, args=(client,), daemon=True).start()
+    def revive(self):
+        self.listener = socket.create_server(("127.0.0.1", self.port))
+        self.port = self.listener.getsockname()[1]
+        threading.Thread(target=self.serve, args=(self.listener,), daemon=True).start()
 
-    def relay(self, client):
+    def kill(self):
+        """As the kernel does for a killed server: nobody listens, connections are reset."""
+        for end in [self.listener, *self.ends]:
+            try:
+                end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                end.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass   # it has just ended by itself
+        self.listener.close()
+
+    def serve(self, listener):
+        while True:
+            try:
+                client, _ = listener.accept()
+            except OSError:
+                return   # killed
+            self.thaw()
+            self.connections.append(time.monotonic())
+            self.heard.append(0.0)
+            threading.Thread(target=self.relay, args=(client, len(self.heard) - 1), daemon=True).start()
+
+    def thaw(self):
+        while self.spoil == "freeze":
+            time.sleep(0.01)
+
+    def relay(self, client, number):
         server = None
+        self.ends.add(client)
         try:
             if self.spoil == "refuse":
                 return
@@ -40,10 +67,12 @@ class Proxy:
             # Nothing may be sent on in pieces: each side's frames are small and come whole.
             while True:
                 ready, _, _ = select.select([client, server], [], [])
+                self.thaw()
                 if client in ready:
                     request = client.recv(512)
                     if not request:
                         return
+                    self.heard[number] = time.monotonic()
                     self.note(request)
                     server.sendall(request)
                 if server in ready:
@@ -53,6 +82,7 @@ class Proxy:
         except OSError:
             pass
         finally:
+            self.ends.discard(client)
             for end in (client, server):
                 if end is not None:
                     end.close()

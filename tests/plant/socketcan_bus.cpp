@@ -21,24 +21,19 @@ namespace {
 /// A socket of the rig's own on a CAN interface of the kernel.
 class SocketCanBus final : public Bus {
   public:
-    explicit SocketCanBus(const std::string& interface) {
-        const unsigned index = if_nametoindex(interface.c_str());
-        if (index == 0) {
+    explicit SocketCanBus(const std::string& interface) : interface_(interface) {
+        if (if_nametoindex(interface.c_str()) == 0) {
             throw PlantError("--can " + interface + ": " + std::strerror(errno) +
                              ", expected a CAN interface or seqpacket:PATH");
         }
         fd_ = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
-        sockaddr_can address{};
-        address.can_family = AF_CAN;
-        address.can_ifindex = static_cast<int>(index);
         const int on = 1;
         const int size = 1 << 20;
         if (fd_ >= 0) {
             setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on));
             setsockopt(fd_, SOL_SOCKET, SO_SNDBUF, &size, sizeof(size));
         }
-        if (fd_ < 0 ||
-            bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+        if (fd_ < 0 || !bind_to_interface()) {
             const std::string reason = std::strerror(errno);
             if (fd_ >= 0) close(fd_);
             throw PlantError("--can " + interface + ": cannot open: " + reason);
@@ -87,11 +82,24 @@ class SocketCanBus final : public Bus {
                 continue;
             }
             dropped_ += frames.size();  // ENETDOWN and the like: the interface may come back
+            // One that was deleted comes back as another.
+            if (errno == ENXIO || errno == ENODEV) static_cast<void>(bind_to_interface());
             return;
         }
     }
 
   private:
+    [[nodiscard]] bool bind_to_interface() const noexcept {
+        sockaddr_can address{};
+        address.can_family = AF_CAN;
+        address.can_ifindex = static_cast<int>(if_nametoindex(interface_.c_str()));
+        const can_filter all{0, 0};  // the kernel forgets filters with the interface
+        setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FILTER, &all, sizeof(all));
+        return address.can_ifindex != 0 &&
+               bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+    }
+
+    std::string interface_;
     int fd_ = -1;
     std::uint64_t dropped_ = 0;
 };
