@@ -93,7 +93,8 @@ TEST(RealTime, TellsWhyAPriorityCouldNotBeHad) {
     }));
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they answer for mlockall
+// Sanitizers answer for mlockall, and touch memory of their own.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 std::uint64_t locked_kb() {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;)
@@ -131,8 +132,6 @@ TEST(RealTime, LocksNothingWhereTheLimitWouldBeMetNowOrLater) {
         })) << bytes;
     }
 }
-#endif
-
 TEST(RealTime, CountsPageFaultsOfTheThreadAlone) {
     constexpr std::size_t kPages = 64;
     const auto touch = [] {
@@ -171,6 +170,8 @@ TEST(RealTime, TheStackIsThereOnceAThreadIsSetUp) {
     });
     EXPECT_LT(after.minor - setup.faults.minor, 20U);
 }
+
+#endif
 
 TEST(Lateness, CountsWhatIsLaterThanItsBoundAndKeepsTheLongest) {
     Lateness lateness;
