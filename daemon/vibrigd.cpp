@@ -135,6 +135,7 @@ int run(vibrig::configuration::Loaded loaded, const sigset_t& signals, const std
 
 }  // namespace
 
+// NOLINTNEXTLINE(bugprone-exception-escape): before anything runs only memory can be short
 int main(int argc, char** argv) {
     CLI::App app{"Acquisition and identification daemon for vibration rigs", "vibrigd"};
     app.footer("Example: vibrigd --config /etc/vibrig/vibrigd.toml --check");

@@ -22,7 +22,7 @@ using drivers::Time;
 
 namespace {
 
-constexpr std::size_t kBuffer = 64 * 1024;
+constexpr std::size_t kBuffer = 65'536;
 constexpr int kLevel = 3;  // of zstd: fast, and logs shrink to a fifth
 
 struct CloseFile {

@@ -3,9 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -117,7 +118,7 @@ class Player {
 
 bool same(double a, double b) {
     // To the last bit; and what is not a number is so on both sides.
-    return std::memcmp(&a, &b, sizeof a) == 0;
+    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
 std::string difference(const Dwell& was, const Dwell& is) {

@@ -32,7 +32,7 @@ using boost::system::error_code;
 using boost::system::system_error;
 
 constexpr unsigned kHttp11 = 11;
-constexpr std::uint64_t kLongestAnswer = 64 * 1024 * 1024;
+constexpr std::uint64_t kLongestAnswer = 64ULL * 1024 * 1024;
 constexpr const char* kDefaultPort = "8443";
 constexpr auto kSilence = std::chrono::seconds(40);
 

@@ -16,7 +16,7 @@ struct ServerLimits {
     std::chrono::milliseconds idle_timeout{
         30'000};  ///< for a whole request to come, and for an answer to be taken
     std::uint32_t header_bytes = 8 * 1024;
-    std::uint64_t body_bytes = 16 * 1024;
+    std::uint64_t body_bytes = 16'384;
     double requests_per_s = 2000;  ///< of one connection; more are answered 429
 };
 
