@@ -90,7 +90,7 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::shaker_lost, "shaker_link_lost", "no valid read-back from the shaker", Guard::armed,
      false},
     {Trip::disk, "disk", "free space for results", Guard::idle, false, "MB", 1, 1e7, true},
-    {Trip::recording, "recording_degraded", "the disk refuses, or the recorder does not go on"},
+    {Trip::recording, "recording_degraded", "the disk refuses, or what is to be recorded waits"},
     {Trip::server, "server_stuck", "the status server makes no progress"},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
