@@ -29,6 +29,7 @@ BUS = "vcan0"
 CAMPAIGN = {"name": "faulty", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0],
             "dwell_s": 80000.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
 TIMEOUT_S = 0.5
+LONGEST_DWELL_S = 900
 STALE = {"stale_channel", "stale_platform"}
 ON = {None}            # it goes on
 LINK = {"link lost"}   # the campaign is aborted for the link's sake, the shaker stops
@@ -415,11 +416,15 @@ def busy(programs):
 def soak(checks, rig, seed, faults, longest_pause_s):
     rng = random.Random(seed)
     checks.note(f"soak: seed {seed}, {faults} faults")
-    looks = []
+    looks, began = [], time.monotonic()
     for n in range(faults):
         row = rng.choice(SOAKED)
         checks.note(f"{time.monotonic():.0f} s: fault {n + 1}: {row[0]}")
         fault(checks, rig, row)
+        # What a dwell was fed is kept until it is done (64 bytes a sample), and no real one lasts for hours.
+        if time.monotonic() - began > LONGEST_DWELL_S:
+            rig.command("abort")
+            began = time.monotonic()
         shaking, found = rig.shake()
         checks.check(shaking, f"fault {n + 1}: the table shakes again after it", found)
         time.sleep(rng.uniform(longest_pause_s / 5, longest_pause_s))
