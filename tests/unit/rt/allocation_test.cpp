@@ -60,7 +60,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     can.path = path;
     const auto port = drivers::make_can_port(io, can);
     drivers::AssemblerSettings settings;
-    settings.sample_period = kMillisecond;  // faster than life, to be done soon
+    settings.sample_period = 2 * kMillisecond;  // faster than life, to be done soon
     StageFeedSettings with_increments;
     with_increments.increments = true;
     StageFeed stages(dbc, with_increments, control.get());
@@ -135,7 +135,7 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
         for (const auto& frame : frames)
             ASSERT_EQ(::send(bus, &frame, CAN_MTU, 0), static_cast<ssize_t>(CAN_MTU));
         // One by one: of samples in bursts the clock would learn the rate of the burst.
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     EXPECT_TRUE(filtered(kSamples - 16));
     const std::uint64_t after = test::watched_allocations();
