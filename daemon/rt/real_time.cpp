@@ -16,8 +16,8 @@ namespace {
 // Address space that has to be left below the limit of locked memory: stacks of 8 MB and arenas of
 // 64 MB count in full, although little of them is ever touched.
 constexpr std::size_t kRoom = std::size_t{1} << 30;
-constexpr std::size_t kStack = 256 * 1024;  // deeper than any real-time thread goes
-constexpr std::size_t kPage = 4096;         // the smallest there is
+constexpr std::size_t kStack = std::size_t{256} * 1024;  // deeper than any real-time thread goes
+constexpr std::size_t kPage = 4096;                      // the smallest there is
 
 std::string words_of(const cpu_set_t& cpus) {
     std::string words;
