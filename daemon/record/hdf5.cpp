@@ -24,7 +24,13 @@ int close_group(std::int64_t id) { return H5Gclose(id); }
 int close_attribute(std::int64_t id) { return H5Aclose(id); }
 
 /// The library prints to standard error unless told not to, each thread for itself.
-void quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void quiet() {
+    // A file whose closing a sick disk refused is not closed a second time at exit: the library
+    // crashes there. Whoever ends has closed the others.
+    static const bool first = H5dont_atexit() >= 0;
+    static_cast<void>(first);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 std::string what_it_says() {
     std::string text;
@@ -150,10 +156,13 @@ File File::open(const std::string& path, Mode mode) {
         return file.file_.get() >= 0;
     };
     if (mode == Mode::mend) {
-        // What h5clear does: the flags of a writer that is gone are cleared at opening.
-        const hbool_t clear = 1;
-        H5Pset(list.get(), "clear_status_flags", &clear);
-        if (!attempt(H5F_ACC_RDWR)) file.fail("");
+        // What h5clear does: the flags of a writer that is gone are cleared at opening, and where
+        // its last allocations end is taken from the file's size. It is written down last, behind
+        // what points there.
+        const hbool_t yes = 1;
+        H5Pset(list.get(), "clear_status_flags", &yes);
+        H5Pset(list.get(), "skip_eof_check", &yes);
+        if (!attempt(H5F_ACC_RDWR) || H5Fincrement_filesize(file.file_.get(), 0) < 0) file.fail("");
     } else if (mode == Mode::write) {
         if (!attempt(H5F_ACC_RDWR)) file.fail("");
     } else if (!attempt(H5F_ACC_RDONLY) && !attempt(H5F_ACC_RDONLY | H5F_ACC_SWMR_READ)) {
