@@ -161,15 +161,16 @@ def played(checks, rig, folder):
     with open(piece, "w", encoding="ascii") as file:
         file.write("\n".join(some) + "\n")
     frames = [line.split()[2] for line in some if line.startswith("(")]
+    # An interface nobody reads is listed, too: "(vcan0: no entry)".
     script = (f"candump -L -r 4000000 -n {len(frames)} vcan0 & "
-              "until grep -q vcan0 /proc/net/can/rcvlist_all; do sleep 0.1; done; "
+              "until grep -q '^ *vcan0 ' /proc/net/can/rcvlist_all; do sleep 0.1; done; "
               f"canplayer -t -I {piece} vcan0=vcan0; wait")
     uml = os.path.join(os.path.dirname(os.path.abspath(__file__)), "run-in-uml")
     run = subprocess.run([uml, "-t", "60", "--", "sh", "-c", script], stdin=subprocess.DEVNULL, capture_output=True, text=True,
                          timeout=180, preexec_fn=lambda: r.die_with_parent(signal.SIGTERM))
     caught = [line.split()[2] for line in run.stdout.splitlines() if line.startswith("(")]
     checks.check(caught == frames and len(frames) == len(some) - 1, "canplayer plays the log, both directions",
-                 f"{len(caught)} of {len(frames)} {run.stderr[-500:]}")
+                 f"{len(caught)} of {len(frames)}, exit {run.returncode} {run.stderr[-500:]}")
     plain = os.path.join(rig.folder, "plain.log")
     offline(rig, "export", folder, "--to", "wireshark", "-o", plain)
     # Wireshark's own program, for its count, first and last frame.
