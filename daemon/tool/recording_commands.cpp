@@ -1,6 +1,4 @@
 // vibrig export and vibrig recover.
-#include <matio.h>
-
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -20,6 +18,7 @@
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
+#include "daemon/tool/mat_file.hpp"
 #include "daemon/tool/progress.hpp"
 #include "proto/recording_csv.hpp"
 
@@ -61,46 +60,6 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
     std::cerr << '\n';
 }
 
-/// One variable of a .mat file.
-class MatFile {
-  public:
-    explicit MatFile(const std::string& path)
-        : path_(path), file_(Mat_CreateVer(path.c_str(), nullptr, MAT_FT_MAT5)) {
-        if (file_ == nullptr) throw std::runtime_error(path + ": cannot be written");
-    }
-    ~MatFile() { Mat_Close(file_); }
-    MatFile(const MatFile&) = delete;
-    MatFile& operator=(const MatFile&) = delete;
-
-    /// `rows` of `width` numbers, row by row.
-    void add(const char* name, const std::vector<double>& values, std::size_t width = 1) {
-        const std::size_t rows = values.size() / width;
-        // MATLAB keeps columns together.
-        std::vector<double> turned(values.size());
-        for (std::size_t r = 0; r < rows; ++r) {
-            for (std::size_t c = 0; c < width; ++c) turned[c * rows + r] = values[r * width + c];
-        }
-        std::array<std::size_t, 2> size{rows, width};
-        write(name,
-              Mat_VarCreate(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, size.data(), turned.data(), 0));
-    }
-    void add(const char* name, std::string text) {
-        std::array<std::size_t, 2> size{1, text.size()};
-        write(name, Mat_VarCreate(name, MAT_C_CHAR, MAT_T_UTF8, 2, size.data(), text.data(), 0));
-    }
-
-  private:
-    void write(const char* name, matvar_t* variable) {
-        const bool good =
-            variable != nullptr && Mat_VarWrite(file_, variable, MAT_COMPRESSION_ZLIB) == 0;
-        if (variable != nullptr) Mat_VarFree(variable);
-        if (!good) throw std::runtime_error(path_ + ": " + name + ": cannot be written");
-    }
-
-    std::string path_;
-    mat_t* file_;
-};
-
 void export_mat(const record::Campaign& campaign, const std::string& path) {
     std::vector<double> time, sequence, angle, force, table, quality, run, position;
     const auto dwells = record::recorded_dwells(campaign);
@@ -122,7 +81,6 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
         run.push_back(of[i][0]);
         position.push_back(of[i][1]);
     }
-    fs::remove(path);
     MatFile file(path);
     file.add("name", campaign.head.name);
     file.add("configuration", campaign.head.configuration);
@@ -167,6 +125,7 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
     file.add("dwell_value", value, estimator::kParameters);
     file.add("dwell_sigma", sigma, estimator::kParameters);
     file.add("covariance", covariance, estimator::kParameters);
+    file.finish();
     std::cerr << path << ": " << campaign.samples.size() << " samples\n";
 }
 

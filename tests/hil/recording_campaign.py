@@ -11,8 +11,10 @@ import json
 import math
 import os
 import re
+import resource
 import signal
 import sqlite3
+import stat
 import subprocess
 import sys
 import tempfile
@@ -259,6 +261,16 @@ def exports(checks, rig, folder, path):
                             capture_output=True, text=True, cwd=rig.folder, env={**os.environ, "RECORDING": path})
     checks.equal(octave.stdout, expected, "Octave opens the HDF5 file and the MATLAB file, with the same numbers")
     checks.note(octave.stderr[-1000:])
+    # No file grows beyond 100 kB, as if the disk were full then; what is no file is left alone.
+    small = subprocess.run([rig.program("vibrig"), "export", folder, "--to", "mat", "-o", "small.mat"], stdin=subprocess.DEVNULL,
+                           capture_output=True, text=True, cwd=rig.folder, restore_signals=False,
+                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)))
+    checks.check(small.returncode == 2 and "small.mat" in small.stderr and "cannot be written whole" in small.stderr,
+                 "a MATLAB file that is not whole is told", small.stderr)
+    os.mkfifo(os.path.join(rig.folder, "fifo"))
+    to_fifo = offline(rig, "export", folder, "--to", "mat", "-o", "fifo")
+    checks.check(to_fifo.returncode == 2 and "expected one or a new name" in to_fifo.stderr and
+                 stat.S_ISFIFO(os.stat(os.path.join(rig.folder, "fifo")).st_mode), "what is no file is left alone", to_fifo.stderr)
     offline(rig, "export", folder, "--to", "candump", "-o", "x.log")
     log = os.path.join(rig.folder, "x.log")
     with open(log, encoding="ascii") as file:
