@@ -29,8 +29,8 @@ Database::Database(const std::string& path) : path_(path) {
     execute("PRAGMA journal_mode = WAL");
     execute("PRAGMA synchronous = FULL");
     execute("PRAGMA foreign_keys = ON");
-    // What is written is seldom read again: of 2 MB, the usual, a daemon would fill each byte in its
-    // first night.
+    // What is written is seldom read again: of 2 MB, the usual, a daemon would fill each byte in
+    // its first night.
     execute("PRAGMA cache_size = -256");
 }
 

@@ -197,7 +197,7 @@ void allan_plot(const AllanAnalysis& analysis, const std::string& path) {
                          (dynamic ? surface_chart(analysis) : deviation_chart(analysis)).svg());
         return;
     }
-    std::filesystem::create_directories(where);
+    plot::make_folder(path);
     plot::write_file((where / "deviation.svg").string(), deviation_chart(analysis).svg());
     if (dynamic) {
         plot::write_file((where / "surface.svg").string(), surface_chart(analysis).svg());

@@ -245,7 +245,7 @@ void plot_run(const std::string& path, const levelling::SimulatedStart& run) {
         plot::write_file(path, tilt.svg());
         return;
     }
-    std::filesystem::create_directories(where);
+    plot::make_folder(path);
     plot::write_file((where / "tilt.svg").string(), tilt.svg());
     plot::write_file((where / "rate.svg").string(), rate.svg());
 }

@@ -75,7 +75,7 @@ int run(Options& options) {
         if (!options.plot.empty()) {
             std::filesystem::path path(options.plot);
             if (path.extension() != ".svg") {
-                std::filesystem::create_directories(path);
+                plot::make_folder(options.plot);
                 path /= "sphere.svg";
             }
             plot::write_file(path.string(), plan_picture(result, frame_of(options.request)));

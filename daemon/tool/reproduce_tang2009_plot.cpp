@@ -31,7 +31,7 @@ void write(const Convergence& of, const std::vector<Coefficients>& values, const
 }  // namespace
 
 void plot_convergence(const Convergence& convergence, const std::string& folder) {
-    std::filesystem::create_directories(folder);
+    plot::make_folder(folder);
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         write(convergence, convergence.joint, "joint", gyro, folder);
         write(convergence, convergence.two_step, "two-step", gyro, folder);

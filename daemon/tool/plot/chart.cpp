@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
@@ -309,6 +310,16 @@ void write_file(const std::string& path, const std::string& text) {
     if (!file) {
         throw std::runtime_error(path +
                                  ": cannot be written: " + std::generic_category().message(errno));
+    }
+}
+
+void make_folder(const std::string& path) {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error || !std::filesystem::is_directory(path)) {
+        throw std::runtime_error(path + ": cannot be a folder for charts: " +
+                                 (error ? error.message() : "it is something else") +
+                                 "; expected a folder or a name that ends in .svg");
     }
 }
 

@@ -42,5 +42,7 @@ struct Chart {
 
 /// Throws std::runtime_error naming the path.
 void write_file(const std::string& path, const std::string& text);
+/// A folder for charts, made if there is none. Throws std::runtime_error naming the path.
+void make_folder(const std::string& path);
 
 }  // namespace vibrig::tool::plot
