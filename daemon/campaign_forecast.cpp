@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "daemon/campaign/campaign.hpp"
 #include "daemon/plan/forecast.hpp"
 
 namespace vibrig {
@@ -38,6 +39,9 @@ std::optional<plan::AdaptivePlan> adaptive_plan(const configuration::Configurati
     settings.timing.dwell_s = c.campaign.dwell_s;
     settings.timing.settle_s = c.campaign.settle_s;
     settings.timing.ramp_s = c.campaign.ramp_s;
+    const campaign::StageTimes stages = campaign::stage_times(c.campaign);
+    settings.levelling_s = stages.levelling_s;
+    settings.closing_s = stages.closing_s;
     settings.time_limit_s = c.campaign.time_limit_s;
     settings.period_s = period_s(c);
     return plan::AdaptivePlan(c.estimator, settings);

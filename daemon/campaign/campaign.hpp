@@ -29,6 +29,13 @@ class ZeroingStage;
 /// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
 [[nodiscard]] std::string check_stages(const Settings& settings, const proto::Dbc& dbc,
                                        drivers::CanPort& port);
+/// How long the stages at rest take, if they go well; of those that are not asked for 0. Throws as
+/// the stages do, where check_stages() says why.
+struct StageTimes {
+    double levelling_s = 0;  ///< before each position
+    double closing_s = 0;    ///< after the last one: zeros again
+};
+[[nodiscard]] StageTimes stage_times(const Settings& settings);
 [[nodiscard]] rt::StageFeedSettings stage_feed_settings(const Settings& settings);
 
 /// What an adaptive campaign does next.
@@ -178,6 +185,10 @@ class Campaign {
     [[nodiscard]] double used_s(drivers::Time now) const {
         return used_before_s_ + drivers::to_seconds(now - started_);
     }
+    /// Of one position, from levelling to rest.
+    [[nodiscard]] double nominal_stop_s() const {
+        return times_.levelling_s + settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
+    }
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
@@ -186,6 +197,7 @@ class Campaign {
     static constexpr drivers::Time kRampGrace = 10 * drivers::kSecond;
 
     Settings settings_;
+    StageTimes times_;
     Ports ports_;
     CampaignState state_ = CampaignState::idle;
     drivers::Time entered_ = 0;  ///< when state_ began

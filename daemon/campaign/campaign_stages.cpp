@@ -51,6 +51,22 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
     return {};
 }
 
+StageTimes stage_times(const Settings& settings) {
+    StageTimes times;
+    if (settings.levelling) {
+        const LevellingStage stage(settings.level, settings.rig,
+                                   settings.level.torquer_limit_deg_h);
+        times.levelling_s = stage.expected_s();
+    }
+    if (settings.zeroing) {
+        // The gimbals go half a turn at most to where each way begins, and are levelled there.
+        const double before_s = 180 / settings.zero.slew_deg_per_s + times.levelling_s;
+        times.closing_s = ZeroingStage(settings.zero, settings.rig).expected_s() +
+                          (settings.zero.both_ways ? 2 : 1) * before_s;
+    }
+    return times;
+}
+
 rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
     rt::StageFeedSettings feed;
     feed.increments = settings.zeroing;
@@ -61,6 +77,7 @@ rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
 }
 
 void Campaign::make_stages() {
+    times_ = stage_times(settings_);
     loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
     if (settings_.levelling && ports_.torquer != nullptr && ports_.feed != nullptr) {
         level_ = std::make_shared<LevellingStage>(settings_.level, settings_.rig,

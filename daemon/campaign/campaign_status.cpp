@@ -38,13 +38,11 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.progress = begun ? done / total : 0;
     if (active()) {
         // What is left at the pace so far, at first at the nominal one.
-        const double nominal = settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s +
-                               (level_ ? level_->expected_s() : 0);
         const auto before = static_cast<double>(positions_before_);
         const double pace = positions_done_ > positions_before_
                                 ? drivers::to_seconds(now - started_) / (done - before)
-                                : nominal;
-        status.remaining_s = (total - done) * pace;
+                                : nominal_stop_s();
+        status.remaining_s = (total - done) * pace + times_.closing_s;
         const bool vibrating =
             state_ == State::ramping || state_ == State::settling || state_ == State::recording;
         status.command_table_g = vibrating ? table_g() : 0;

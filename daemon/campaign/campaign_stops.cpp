@@ -50,7 +50,10 @@ void Campaign::plan_stops() {
 Campaign::Choice Campaign::choose_next(Time now) {
     if (!settings_.adaptive) return at_ < stops_.size() ? Choice::more : Choice::end;
     const bool begun = at_ > 0;
-    if (begun && dwells_.back().flagged && repeats_ < kMostRepeats) {
+    const bool in_time =
+        settings_.time_limit_s <= 0 ||
+        used_s(now) + nominal_stop_s() + times_.closing_s <= settings_.time_limit_s;
+    if (begun && dwells_.back().flagged && repeats_ < kMostRepeats && in_time) {
         ++repeats_;
         const Stop again = stops_[at_ - 1].stop;
         ports_.event(Severity::warning, "flagged dwell: the position is repeated");
@@ -63,7 +66,10 @@ Campaign::Choice Campaign::choose_next(Time now) {
     if (!next) return Choice::thinking;
     repeats_ = 0;
     ports_.event(Severity::info, next->words);
-    if (!next->more) return Choice::end;
+    if (!next->more) {
+        expected_ = stops_.size();
+        return Choice::end;
+    }
     add_stop(next->stop);
     expected_ = at_ + next->left;
     return Choice::more;

@@ -57,7 +57,7 @@ AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSe
 }
 
 double AdaptivePlan::time_of(const PlannedRun& run, const std::array<double, 3>& here_deg) const {
-    return planning::slew_s(here_deg, run.position_deg, adaptive_.timing) +
+    return planning::slew_s(here_deg, run.position_deg, adaptive_.timing) + adaptive_.levelling_s +
            adaptive_.timing.settle_s + adaptive_.timing.dwell_s +
            (run.table_g > 0 ? 2 * adaptive_.timing.ramp_s : 0);
 }
@@ -101,9 +101,9 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
         decision.left_s += time_of(candidates_[j], at);
         at = candidates_[j].position_deg;
     }
-    const bool over = adaptive_.time_limit_s > 0 &&
-                      elapsed_s + time_of(decision.run, here_deg) > adaptive_.time_limit_s;
-    if (over) {
+    const double limit_s = adaptive_.time_limit_s - adaptive_.closing_s;
+    const bool limited = adaptive_.time_limit_s > 0;
+    if (limited && elapsed_s + time_of(decision.run, here_deg) > limit_s) {
         decision.verdict = Verdict::time_limit;
         decision.words = "the time limit has come; targets missed: " + unmet + "; " + state;
         return decision;
@@ -112,9 +112,8 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
     std::snprintf(text.data(), text.size(), "; %s%zu more dwells, %.0f s",
                   plan.met ? "" : "more than ", decision.left, decision.left_s);
     decision.words = state + text.data();
-    if (adaptive_.time_limit_s > 0 && elapsed_s + decision.left_s > adaptive_.time_limit_s) {
+    if (limited && elapsed_s + decision.left_s > limit_s)
         decision.words += ": the time limit will come first";
-    }
     return decision;
 }
 

@@ -17,6 +17,8 @@ struct AdaptiveSettings {
     std::vector<double> table_g;     ///< levels to choose from, peak at the table
     std::array<double, 3> target{};  ///< sigma of bias, linear, quadratic terms; 0: any
     planning::Timing timing;         ///< of one dwell
+    double levelling_s = 0;          ///< before each dwell
+    double closing_s = 0;            ///< after the last dwell, within the limit, too
     double time_limit_s = 0;         ///< 0: none
     double period_s = 0.025;         ///< between samples
 };

@@ -432,6 +432,22 @@ TEST_F(CampaignTest, AnAdaptiveCampaignRepeatsFlaggedDwellsAndEndsWhenToldTo) {
     EXPECT_NE(std::ranges::find(events, "flagged dwell: the position is repeated"), events.end());
 }
 
+TEST_F(CampaignTest, AFlaggedDwellIsNotRepeatedBeyondTheTimeLimit) {
+    // GIVEN a flagged dwell after which there is no time for another
+    settings.adaptive = true;
+    settings.time_limit_s = 1.5 * settings.dwell_s;
+    stops_to_choose = {{{0, 0, 45}, 9}};
+    flagged_order = 1;
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    // THEN it is not repeated, and nothing is left to do
+    EXPECT_EQ(orders.size(), 1U);
+    EXPECT_EQ(status().progress, 1.0);
+    EXPECT_EQ(std::ranges::find(events, "flagged dwell: the position is repeated"), events.end());
+}
+
 TEST_F(CampaignTest, AnAdaptiveCampaignWaitsAtRestWhileItsPlanIsThoughtOver) {
     settings.adaptive = true;
     stops_to_choose = {{{0, 0, 45}, 9}};

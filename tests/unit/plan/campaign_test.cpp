@@ -190,6 +190,34 @@ TEST(AdaptivePlan, SaysWhetherTargetsOrTimeEndIt) {
     EXPECT_THROW(AdaptivePlan(settings, adaptive), std::runtime_error);
 }
 
+TEST(AdaptivePlan, EndsBeforeItsTimeLimitWithLevellingAndWhatComesAfterTheLastDwell) {
+    // GIVEN dwells that are levelled before, and 400 s of zeroing after the last
+    const estimator::Settings settings;
+    AdaptiveSettings adaptive;
+    adaptive.table_g = {9, 0};
+    adaptive.target = {0.006, 0.005, 0.0005};
+    adaptive.time_limit_s = 3000;
+    const std::array<double, 3> here{};
+    const auto plain = AdaptivePlan(settings, adaptive).outlook();
+    adaptive.levelling_s = 130;
+    adaptive.closing_s = 400;
+    const AdaptivePlan plan(settings, adaptive);
+    std::vector<double> covariance(kParameters * kParameters, 0.0);
+    for (std::size_t i = 0; i < kParameters; ++i) covariance[i * kParameters + i] = 100;
+    const auto run = plan.next(covariance, here, 0).run;
+    const double dwell_s = planning::slew_s(here, run.position_deg, adaptive.timing) +
+                           adaptive.timing.settle_s + adaptive.timing.dwell_s +
+                           (run.table_g > 0 ? 2 * adaptive.timing.ramp_s : 0);
+    // THEN the next dwell is begun only if it and the zeroing will be over in time
+    const auto verdict = [&](double elapsed_s) {
+        return plan.next(covariance, here, elapsed_s).verdict;
+    };
+    EXPECT_EQ(verdict(3000 - 400 - 130 - dwell_s - 0.1), AdaptivePlan::Verdict::go_on);
+    EXPECT_EQ(verdict(3000 - 400 - 130 - dwell_s + 0.1), AdaptivePlan::Verdict::time_limit);
+    // AND the outlook counts the levelling
+    EXPECT_GE(plan.outlook().left_s, plain.left_s + 129 * static_cast<double>(plain.left));
+}
+
 TEST(AdaptivePlanSeeds, ReachesTheAccuracyOfTheFourteenPositionsInHalfTheShakerTime) {
     constexpr std::uint64_t kSeeds = 20;
     const estimator::Settings settings;
