@@ -22,7 +22,10 @@ constexpr double kStartsWork = 6e8;
 
 class Fedorov {
   public:
-    Fedorov(const Matrix& g, Matrix kept) : g_(g), kept_(std::move(kept)) {}
+    Fedorov(const Matrix& g, Matrix kept, Vector cost, double kept_cost)
+        : g_(g), kept_(std::move(kept)), cost_(std::move(cost)), kept_cost_(kept_cost) {
+        costs_ = cost_.maxCoeff() > cost_.minCoeff();
+    }
 
     void start(std::size_t runs, std::mt19937_64& random) {
         std::uniform_int_distribution<Eigen::Index> any(0, g_.rows() - 1);
@@ -42,7 +45,8 @@ class Fedorov {
         }
     }
 
-    /// Returns log det; -infinity if the plan is singular.
+    /// Returns log det, of the information per cost where runs cost more or less; -infinity if the
+    /// plan is singular.
     double climb() {
         for (int swaps = 0;; ++swaps) {
             if (swaps % kRefactor == 0 && !refactor()) {
@@ -50,7 +54,8 @@ class Fedorov {
             }
             if (!swap_best()) break;
         }
-        return refactor() ? log_det_ : -std::numeric_limits<double>::infinity();
+        if (!refactor()) return -std::numeric_limits<double>::infinity();
+        return log_det_ - (costs_ ? coefficients() * std::log(total_cost()) : 0);
     }
 
     [[nodiscard]] Counts counts() const {
@@ -60,6 +65,13 @@ class Fedorov {
     }
 
   private:
+    [[nodiscard]] double coefficients() const { return static_cast<double>(g_.cols()); }
+    [[nodiscard]] double total_cost() const {
+        double total = kept_cost_;
+        for (const Eigen::Index i : in_plan_) total += cost_[i];
+        return total;
+    }
+
     bool refactor() {
         information_ = kept_;
         for (const Eigen::Index i : in_plan_) information_ += g_.row(i).transpose() * g_.row(i);
@@ -73,6 +85,7 @@ class Fedorov {
     bool swap_best() {
         const Matrix gw = linear_algebra::product(g_, inverse_);
         const Vector d = gw.cwiseProduct(g_).rowwise().sum();
+        const double total = total_cost();
         double best = 1 + kLeastFactor;
         std::size_t out = in_plan_.size();
         Eigen::Index in = 0;
@@ -83,8 +96,11 @@ class Fedorov {
             before = i;
             const Vector dij = gw * g_.row(i).transpose();
             Eigen::Index j = 0;
-            const double factor =
-                (1 + d.array() - d[i] - (d[i] * d.array() - dij.array().square())).maxCoeff(&j);
+            Vector gain = 1 + d.array() - d[i] - (d[i] * d.array() - dij.array().square());
+            if (costs_) {
+                gain.array() *= (total / (total - cost_[i] + cost_.array())).pow(coefficients());
+            }
+            const double factor = gain.maxCoeff(&j);
             if (factor > best) {
                 best = factor;
                 out = k;
@@ -104,6 +120,9 @@ class Fedorov {
 
     const Matrix& g_;
     Matrix kept_, information_, inverse_;
+    Vector cost_;
+    double kept_cost_;
+    bool costs_ = false;  ///< not all the same
     std::vector<Eigen::Index> in_plan_;
     double log_det_ = 0;
 };
@@ -132,7 +151,13 @@ Counts exact_design(const Problem& problem, std::size_t runs, const ExactSearch&
         starts = static_cast<std::size_t>(std::clamp(kStartsWork / work, 20.0, 300.0));
     }
     std::mt19937_64 random(search.seed);
-    Fedorov fedorov(g, kept);
+    Vector cost(g.rows());
+    double kept_cost = 0;
+    for (std::size_t i = 0; i < problem.size(); ++i) {
+        cost[at(i)] = problem.points[i].cost;
+        if (i < search.done.size()) kept_cost += search.done[i] * cost[at(i)];
+    }
+    Fedorov fedorov(g, kept, cost, kept_cost);
     Counts best;
     double highest = -std::numeric_limits<double>::infinity();
     for (std::size_t n = 0; n < starts; ++n) {

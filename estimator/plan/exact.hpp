@@ -19,8 +19,8 @@ struct ExactSearch {
 };
 
 /// The best plan of `runs` runs that Fedorov's exchange finds from random starts (Fedorov 1972, ch.
-/// 3). Throws PlanError if there are fewer runs than coefficients or the points do not determine
-/// them.
+/// 3); where runs differ in cost, the one with most information per cost. Throws PlanError if there
+/// are fewer runs than coefficients or the points do not determine them.
 [[nodiscard]] Counts exact_design(const Problem& problem, std::size_t runs,
                                   const ExactSearch& search);
 

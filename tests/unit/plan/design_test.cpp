@@ -168,6 +168,38 @@ TEST(Plan, ExactPlansReachTheirEfficiencies) {
     EXPECT_TRUE(evaluate(problem, all).identifies_all());
 }
 
+TEST(Plan, AnExactPlanTakesMoreOfWhatCostsLess) {
+    // GIVEN runs that take four times as long with vibration as at rest
+    Problem problem = rig({0, 6});
+    const Counts blind = exact_design(problem, 14, {});
+    for (std::size_t i = 26; i < problem.size(); ++i) problem.points[i].cost = 4;
+    const Optimum best = d_optimum(problem);
+    // WHEN 14 are chosen
+    const Counts counts = exact_design(problem, 14, {});
+    // THEN more of them are at rest than if all cost the same, and they tell more per unit of time
+    const auto efficiency = [&](const Counts& plan) {
+        return d_efficiency(evaluate(problem, effort_of(plan)), best.log_det);
+    };
+    const auto at_rest = [](const Counts& plan) {
+        return std::accumulate(plan.begin(), plan.begin() + 26, std::size_t{0});
+    };
+    const double chosen = efficiency(counts);
+    EXPECT_GT(at_rest(counts), at_rest(blind));
+    EXPECT_GT(chosen, efficiency(blind));
+    // AND no run can be exchanged for a better one
+    for (std::size_t out = 0; out < counts.size(); ++out) {
+        for (std::size_t in = 0; counts[out] > 0 && in < counts.size(); ++in) {
+            Counts other = counts;
+            --other[out];
+            ++other[in];
+            const Evaluation e = evaluate(problem, effort_of(other));
+            if (e.identifies_all()) {
+                EXPECT_LE(d_efficiency(e, best.log_det), chosen + 1e-9) << out << " for " << in;
+            }
+        }
+    }
+}
+
 TEST(Plan, RoundingKeepsTheSumAndTheShares) {
     // GIVEN shares; WHEN rounded to n runs (Pukelsheim and Rieder 1992)
     const Effort share{0.5, 0.3, 0.2, 0.0};
