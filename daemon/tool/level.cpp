@@ -17,6 +17,7 @@
 
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
+#include "daemon/tool/finite.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
 #include "estimator/levelling/simulation.hpp"
@@ -92,6 +93,13 @@ levelling::LevellerSettings settings_of(const Options& options) {
     return loop;
 }
 
+void check_samples(const char* option, double duration_s, double period_s) {
+    if (duration_s / period_s > 2e7) {
+        throw std::invalid_argument(text("%s: %g s are %g samples, expected at most 2e7", option,
+                                         duration_s, duration_s / period_s));
+    }
+}
+
 Json budget_json(const levelling::Leveller& loop) {
     const levelling::NoiseBudget& budget = loop.budget();
     return {{"reference_arcmin", budget.reference / kArcmin},
@@ -124,6 +132,7 @@ plot::Chart response_chart(const Options& options, const levelling::LevellerSett
     start.loop.noise = {};
     start.tilt = {kArcmin, 0};
     start.duration_s = 2 * loop.settling_s;
+    check_samples("--plot", start.duration_s, loop.period_s);
     plot::Curve curve{"sampled loop", {}, {}, {}, {}, plot::Look::line};
     const auto run = levelling::simulate(start);
     const std::size_t every = std::max<std::size_t>(1, run.trace.size() / 1000);
@@ -209,9 +218,10 @@ levelling::Scenario scenario_of(const Options& options) {
     start.step_s = options.step_s;
     start.duration_s =
         options.duration_s > 0 ? options.duration_s : 3.1 * options.specification.settling_s;
-    if (start.duration_s / options.period_s > 2e7) {
-        throw std::invalid_argument(text("--duration: %g s are %g samples, expected at most 2e7",
-                                         start.duration_s, start.duration_s / options.period_s));
+    check_samples("--duration", start.duration_s, options.period_s);
+    if (options.step != 0 && options.step_s < 0 && options.runs == 1) {
+        throw std::invalid_argument(text(
+            "--step: found %g without --step-at, expected the time of the step", options.step));
     }
     start.seed = options.seed;
     return start;
@@ -374,51 +384,67 @@ int run_simulate(const Options& options) {
 }
 
 void add_design_options(CLI::App& command, Options& o) {
-    command.add_option("--settling", o.specification.settling_s, "settling time in s (100)");
-    command.add_option("--residual", o.specification.residual,
-                       "fraction of the initial tilt left then (0.005)");
-    command.add_option("--damping", o.specification.damping, "ratio xi (0.7)");
+    command.add_option("--settling", o.specification.settling_s, "settling time in s (100)")
+        ->check(finite(kAboveZero, 1e7));
+    command
+        .add_option("--residual", o.specification.residual,
+                    "fraction of the initial tilt left then (0.005)")
+        ->check(finite());
+    command.add_option("--damping", o.specification.damping, "ratio xi (0.7)")->check(finite());
     command.add_option("--gains", o.gains, "K1,K2,K3 instead of a design")
         ->expected(3)
-        ->delimiter(',');
-    command.add_option("--period", o.period_s, "s between samples (0.1)");
-    command.add_option("--window", o.window_s,
-                       "of the means in s (1); shaker on: whole vibration periods");
+        ->delimiter(',')
+        ->check(finite());
+    command.add_option("--period", o.period_s, "s between samples (0.1)")->check(finite(1e-4, 1e4));
+    command
+        .add_option("--window", o.window_s,
+                    "of the means in s (1); shaker on: whole vibration periods")
+        ->check(finite(kAboveZero, 3600));
     command
         .add_option("--tolerance", o.tolerance,
                     "arcmin; default the larger of 0.05 and four times the noise")
-        ->check(CLI::PositiveNumber);
+        ->check(finite(kAboveZero, 300));
     command.add_option("--reference-noise", o.reference_noise, "m/s per sample (0)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(finite(0, 1000));
     command.add_option("--accelerometer-noise", o.accelerometer_noise_g, "g per sample (1e-5)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(finite(0, 1));
     command.add_option("--gyro-noise", o.gyro_noise, "random walk, deg/sqrt(h) (0)")
-        ->check(CLI::NonNegativeNumber);
-    command.add_option("--gravity", o.gravity, "m/s^2 (9.80665)")->check(CLI::Range(1.0, 30.0));
+        ->check(finite(0, 100));
+    command.add_option("--gravity", o.gravity, "m/s^2 (9.80665)")->check(finite(1, 30));
     command.add_flag("--json", o.json, "print the result as JSON");
     command.add_option("--plot", o.plot, "an SVG file (simulate: or a folder)");
 }
 
 void add_simulate_options(CLI::App& command, Options& o) {
-    const auto two = [&](const char* name, std::vector<double>& value, const char* help) {
-        command.add_option(name, value, help)->expected(2)->delimiter(',');
+    const auto two = [&](const char* name, std::vector<double>& value, double most,
+                         const char* help) {
+        command.add_option(name, value, help)
+            ->expected(2)
+            ->delimiter(',')
+            ->check(finite(-most, most));
     };
-    two("--tilt", o.tilt, "of both channels at the start, arcmin (30,-20)");
-    two("--drift", o.drift, "deg/h (0.1,-0.1)");
-    two("--zero", o.zero_mg, "of the accelerometers, mg (0,0)");
-    two("--reference-error", o.reference_error, "constant, m/s (0,0)");
-    command.add_option("--step", o.step, "both channels tip by so much, arcmin");
-    command.add_option("--step-at", o.step_s, "when, s; with --runs at any time");
+    constexpr double kRightAngle = 5400;  // arcmin
+    two("--tilt", o.tilt, kRightAngle, "of both channels at the start, arcmin (30,-20)");
+    two("--drift", o.drift, 1e6, "deg/h (0.1,-0.1)");
+    two("--zero", o.zero_mg, 1000, "of the accelerometers, mg (0,0)");
+    two("--reference-error", o.reference_error, 1000, "constant, m/s (0,0)");
+    auto* step = command.add_option("--step", o.step, "both channels tip by so much, arcmin")
+                     ->check(finite(-kRightAngle, kRightAngle));
+    command.add_option("--step-at", o.step_s, "when, s; with --runs at any time")
+        ->check(finite(0))
+        ->needs(step);
     command.add_option("--slow", o.slow, "K1,K2,K3 to ramp to after settling")
         ->expected(3)
-        ->delimiter(',');
-    command.add_option("--ramp", o.ramp_s, "length of that ramp, s (60)");
+        ->delimiter(',')
+        ->check(finite());
+    command.add_option("--ramp", o.ramp_s, "length of that ramp, s (60)")
+        ->check(finite(kAboveZero, 1e6));
     command.add_option("--torquer-limit", o.torquer_limit, "deg/h (3276.7)")
-        ->check(CLI::PositiveNumber);
+        ->check(finite(kAboveZero, 1e9));
     command.add_option("--network", o.network, "fast (default), conventional, undamped")
         ->check(CLI::IsMember({"fast", "conventional", "undamped"}));
     command.add_option("--duration", o.duration_s, "s (3.1 settling times)")
-        ->check(CLI::PositiveNumber);
+        ->check(finite(kAboveZero, 1e9));
     command.add_option("--seed", o.seed, "of the noise (1)");
     command
         .add_option("--runs", o.runs,

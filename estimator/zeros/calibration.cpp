@@ -56,6 +56,10 @@ void check_settings(const CalibrationSettings& s) {
     for (const double value : s.target_mg) {
         require(value > 0 && std::isfinite(value), "target", value, "mg, more than 0");
     }
+    for (const auto& [name, value] : {std::pair{"saturation", s.saturation_g},
+                                      std::pair{"vibration limit", s.vibration_limit_g}}) {
+        require(value > 0 && std::isfinite(value), name, value, "g, more than 0");
+    }
     if (!s.allow_unobservable) check_observable(s.plan, s.site);
 }
 

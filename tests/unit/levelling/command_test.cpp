@@ -98,6 +98,27 @@ TEST_F(LevelCommand, RefusesBadInput) {
     expect_refusal("level simulate --network best", "best");
     expect_refusal("level design --plot no/such/folder/x.svg", "no/such/folder/x.svg");
     expect_refusal("level", "subcommand");
+    expect_refusal("level simulate --step 2", "--step: found 2 without --step-at");
+    expect_refusal("level simulate --step-at 2", "--step");
+    expect_refusal("level design --settling 1e7 --period 0.5 --plot a.svg", "--plot: 2e+07 s");
+    // What is no number passes no option, and the one line names it.
+    for (const char* option :
+         {"--settling", "--residual", "--damping", "--period", "--window", "--tolerance",
+          "--reference-noise", "--accelerometer-noise", "--gyro-noise", "--gravity", "--step",
+          "--step-at", "--ramp", "--torquer-limit", "--duration"}) {
+        for (const char* value : {"nan", "inf", "-inf"}) {
+            expect_refusal(std::string("level simulate ") + option + "=" + value,
+                           std::string(option) + ": found " + value + ", expected a finite number");
+        }
+    }
+    for (const char* option : {"--tilt", "--drift", "--zero", "--reference-error"}) {
+        expect_refusal(std::string("level simulate ") + option + "=1,nan",
+                       std::string(option) + ": found nan, expected a finite number");
+    }
+    for (const char* option : {"--gains", "--slow"}) {
+        expect_refusal(std::string("level simulate ") + option + "=1,inf,1",
+                       std::string(option) + ": found inf, expected a finite number");
+    }
 }
 
 TEST_F(LevelCommand, ReproducesTheTable) {

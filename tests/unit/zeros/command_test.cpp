@@ -95,10 +95,26 @@ TEST_F(ZeroCommand, RefusesBadInput) {
     expect_refusal("zero simulate --slews 0", "rank 12 of 15");
     expect_refusal("zero simulate --slews 0,360", "phi_E with nab_y");
     expect_refusal("zero simulate --rate 0.00139 --duration 30", "smallest singular value");
-    expect_refusal("zero simulate --rate -5", "slew rate");
+    expect_refusal("zero simulate --rate=-5", "--rate: found -5, expected a finite number above 0");
+    expect_refusal("zero simulate --rate 1e9", "--rate: found 1e9");
     expect_refusal("zero simulate --latitude 90", "latitude");
     expect_refusal("zero simulate --duration 86400 --period 0.0001", "expected at most 1e7");
     expect_refusal("zero simulate --write no/such/run.csv --duration 80", "no/such/run.csv");
+    expect_refusal("zero simulate --vibration-limit=-1", "--vibration-limit: found -1");
+    // What is no number passes no option, and the line names it.
+    for (const char* option :
+         {"--latitude", "--gravity", "--slews", "--rate", "--duration", "--gyro-noise",
+          "--accelerometer-noise", "--velocity-noise", "--position-noise", "--scale-uncertainty",
+          "--vibration-limit", "--period", "--vibration"}) {
+        for (const char* value : {"nan", "inf", "-inf"}) {
+            expect_refusal(std::string("zero simulate ") + option + "=" + value,
+                           std::string(option) + ": found " + value + ", expected a finite number");
+        }
+    }
+    for (const char* option : {"--lever-arm", "--zero", "--scale"}) {
+        expect_refusal(std::string("zero simulate ") + option + "=1,nan,1",
+                       std::string(option) + ": found nan, expected a finite number");
+    }
 }
 
 TEST_F(ZeroCommand, ReproducesTheTable) {
