@@ -104,6 +104,19 @@ TEST_F(PlanCommand, JudgesPositionLists) {
     EXPECT_NE(error.find("D12 not at all (D_IOx"), std::string::npos) << error;
 }
 
+TEST_F(PlanCommand, NumbersHaveToBeFiniteAndWithinReason) {
+    for (const char* option :
+         {"--forbidden-within nan", "--noise-per-g nan", "--noise-per-g 1e300", "--dwell nan",
+          "--settle inf", "--slew nan", "--ramp nan", "--grid nan", "--levels 0,nan",
+          "--outer nan,60", "--targets nan,0,0", "--dwell -1"}) {
+        EXPECT_EQ(vibrig(std::string("plan ") + option), 2) << option;
+        EXPECT_NE(error.find("expected a finite number"), std::string::npos) << error;
+        EXPECT_NE(error.find(std::string(option).substr(0, std::string(option).find(' '))),
+                  std::string::npos)
+            << error;
+    }
+}
+
 TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     ASSERT_EQ(vibrig("plan --runs 14 --outer -60,60 --azimuth -100,100 --levels 0,6 --json"), 0)
         << error;
