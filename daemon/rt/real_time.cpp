@@ -16,6 +16,8 @@ namespace {
 // Address space that has to be left below the limit of locked memory: stacks of 8 MB and arenas of
 // 64 MB count in full, although little of them is ever touched.
 constexpr std::size_t kRoom = std::size_t{1} << 30;
+/// Blocks as large are mapped and given back whole, bytes.
+constexpr int kLargeBlock = 64 * 1024;
 constexpr std::size_t kStack = std::size_t{256} * 1024;  // deeper than any real-time thread goes
 constexpr std::size_t kPage = 4096;                      // the smallest there is
 
@@ -103,9 +105,11 @@ MemoryLock lock_memory() {
         ::mmap(nullptr, kRoom, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (room == MAP_FAILED) return not_locked("1 GB of address space for later");
     ::munmap(room, kRoom);
-    // Memory given back interrupts every CPU that runs a thread of ours.
+    // Memory given back interrupts every CPU that runs a thread of ours. But what a campaign has
+    // large (its filter, half a megabyte at a time) goes with it: small blocks that outlive it
+    // would take a piece of each place it leaves, and every campaign would need a new one.
     ::mallopt(M_TRIM_THRESHOLD, -1);
-    ::mallopt(M_MMAP_MAX, 0);
+    ::mallopt(M_MMAP_THRESHOLD, kLargeBlock);
     return {true, {}};
 }
 
