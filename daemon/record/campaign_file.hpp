@@ -79,6 +79,12 @@ void close_part(const std::string& path, const std::string& next);
 [[nodiscard]] std::string identification_sections(const std::string& configuration);
 /// The raw log's files in order, compressed or not.
 [[nodiscard]] std::vector<std::string> raw_files(const std::string& folder);
+/// Of raw-0003.log, compressed or not: 3; 0 for other names.
+[[nodiscard]] int raw_number(const std::string& path);
+/// Logs in the order in which they are read: segments of one folder by their numbers, each once
+/// where both it and its compressed one are given; others as they are given. Throws
+/// std::runtime_error if one is given twice.
+[[nodiscard]] std::vector<std::string> in_order(std::vector<std::string> logs);
 
 /// What mending did, and what is not there.
 struct Recovery {
@@ -93,6 +99,7 @@ struct Recovery {
     std::uint64_t missing = 0;  ///< sync counts that are not there between the first and the last
     std::string cut_dwell;      ///< the dwell that was in progress; empty: none
     std::vector<std::string> words;
+    std::vector<std::string> missing_raw;  ///< segments of the raw log that are not there
 };
 
 /// Makes the files of a campaign whose writer died readable for every program again, takes what the

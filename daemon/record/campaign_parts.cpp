@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <set>
 
 #include "daemon/record/campaign_file.hpp"
 #include "proto/text.hpp"
@@ -275,20 +276,41 @@ std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign) {
     return dwells;
 }
 
+int raw_number(const std::string& path) {
+    const std::string name = fs::path(path).filename().string();
+    std::string_view digits = name;
+    int number = 0;
+    if (digits.ends_with(".zst")) digits.remove_suffix(4);
+    if (!digits.starts_with("raw-") || !digits.ends_with(".log")) return 0;
+    digits = digits.substr(4, digits.size() - 8);
+    return proto::read_number(digits, number) && number > 0 ? number : 0;
+}
+
+std::vector<std::string> in_order(std::vector<std::string> logs) {
+    const bool of_one = std::ranges::all_of(logs, [&](const std::string& path) {
+        return raw_number(path) > 0 && folder_of(path) == folder_of(logs.front());
+    });
+    if (of_one) std::ranges::stable_sort(logs, {}, raw_number);
+    // Between the compressed one and the end of the other both are there for a moment.
+    std::erase_if(logs, [&](const std::string& name) {
+        return std::ranges::find(logs, name + ".zst") != logs.end();
+    });
+    std::set<fs::path> seen;
+    for (const auto& path : logs) {
+        std::error_code error;
+        if (!seen.insert(fs::weakly_canonical(path, error)).second && !error)
+            throw std::runtime_error(path + ": found it twice, expected each log once");
+    }
+    return logs;
+}
+
 std::vector<std::string> raw_files(const std::string& folder) {
     std::vector<std::string> files;
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(folder, error)) {
-        const std::string name = entry.path().filename().string();
-        if (name.starts_with("raw-") && (name.ends_with(".log") || name.ends_with(".log.zst")))
-            files.push_back(entry.path().string());
+        if (raw_number(entry.path().string()) > 0) files.push_back(entry.path().string());
     }
-    std::ranges::sort(files);
-    // Between the compressed one and the end of the other both are there for a moment.
-    std::erase_if(files, [&](const std::string& name) {
-        return name.ends_with(".log") && std::ranges::find(files, name + ".zst") != files.end();
-    });
-    return files;
+    return in_order(std::move(files));
 }
 
 }  // namespace vibrig::record

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <utility>
 
 #include "daemon/journal/database.hpp"
 #include "daemon/record/campaign_file.hpp"
@@ -228,36 +230,63 @@ std::string find_campaign(const std::string& argument, const std::vector<std::st
                     : ", expected one of" + known + (count > kMostNamed ? " ..." : "")));
 }
 
-void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell) {
+namespace {
+
+/// What the index beside a campaign's folder has of it; nothing without an index.
+std::vector<IndexedFile> indexed_files(const std::string& campaign_folder,
+                                       const Index::Tell& tell) {
     std::error_code error;
     const fs::path folder = fs::weakly_canonical(campaign_folder, error);
     const std::string beside = folder.parent_path().string();
-    if (error || !fs::exists(Index::path_in(beside), error)) return;
-    std::vector<IndexedCampaign> all;
+    if (error || !fs::exists(Index::path_in(beside), error)) return {};
     try {
-        all = Index(beside, tell).campaigns();
+        for (auto& campaign : Index(beside, tell).campaigns()) {
+            if (campaign.key == base_name(folder)) return std::move(campaign.files);
+        }
     } catch (const std::exception&) {
-        return;  // of somebody else: nothing to compare with
+        // Of somebody else: nothing to compare with.
     }
-    for (const auto& campaign : all) {
-        if (campaign.key != base_name(folder)) continue;
-        for (const auto& file : campaign.files) {
-            const fs::path path = folder / file.name;
-            if (!fs::exists(path, error)) {
-                if (file.part > 0)
-                    throw std::runtime_error(
-                        fmt::format("{}: missing {} of campaign {}, which the index has with {} "
-                                    "samples",
-                                    campaign_folder, file.name, campaign.key, file.rows));
-                tell(
-                    fmt::format("{}: missing {}, which the index has", campaign_folder, file.name));
-            } else if (file.closed &&
-                       static_cast<std::int64_t>(fs::file_size(path, error)) != file.bytes) {
-                tell(fmt::format("{}: found {} bytes, {} when it was closed: changed since",
-                                 path.string(), fs::file_size(path, error), file.bytes));
-            }
+    return {};
+}
+
+}  // namespace
+
+void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell) {
+    std::error_code error;
+    const fs::path folder = fs::weakly_canonical(campaign_folder, error);
+    for (const auto& file : indexed_files(campaign_folder, tell)) {
+        const fs::path path = folder / file.name;
+        if (!fs::exists(path, error)) {
+            if (file.part > 0)
+                throw std::runtime_error(fmt::format(
+                    "{}: missing {} of campaign {}, which the index has with {} samples",
+                    campaign_folder, file.name, base_name(folder), file.rows));
+        } else if (file.closed &&
+                   static_cast<std::int64_t>(fs::file_size(path, error)) != file.bytes) {
+            tell(fmt::format("{}: found {} bytes, {} when it was closed: changed since",
+                             path.string(), fs::file_size(path, error), file.bytes));
         }
     }
+    for (const auto& words : missing_raw(campaign_folder, raw_files(campaign_folder), tell))
+        tell(campaign_folder + ": missing " + words);
+}
+
+std::vector<std::string> missing_raw(const std::string& campaign_folder,
+                                     const std::vector<std::string>& logs,
+                                     const Index::Tell& tell) {
+    std::map<int, std::string> expected;
+    const auto there = raw_files(campaign_folder);
+    for (int n = there.empty() ? 0 : raw_number(there.back()); n > 0; --n)
+        expected[n] = fmt::format("raw-{:04d}.log", n);
+    for (const auto& file : indexed_files(campaign_folder, tell)) {
+        if (const int n = raw_number(file.name); n > 0)
+            expected[n] = fmt::format("{}, which the index has with {} frames, SHA-256 {}",
+                                      file.name, file.rows, file.sha256);
+    }
+    for (const auto& path : logs) expected.erase(raw_number(path));
+    std::vector<std::string> words;
+    for (auto& [number, text] : expected) words.push_back(std::move(text));
+    return words;
 }
 
 }  // namespace vibrig::record

@@ -121,7 +121,11 @@ void RawLog::open() {
     segment_.from = buffer_from_;
     const std::string path = folder_ + "/" + segment_.file;
     fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-    if (fd_ < 0) return refuse(path + ": " + std::strerror(errno));
+    if (fd_ < 0) {
+        const int error = errno;
+        if (error != EEXIST) --number_;  // a hole in the numbers is a segment that is missing
+        return refuse(path + ": " + std::strerror(error));
+    }
     if (std::exchange(goes_on_, false)) buffer_.insert(0, std::string(kStartLine) + "\n");
 }
 
@@ -139,10 +143,11 @@ void RawLog::flush() {
         if (n <= 0) {
             const int error = errno;
             // No half line: the next segment begins where this one ends.
-            if (::ftruncate(fd_, static_cast<off_t>(segment_.bytes)) != 0) ++number_;
+            const bool whole = ::ftruncate(fd_, static_cast<off_t>(segment_.bytes)) == 0;
             const std::string file = segment_.file;
             end_segment();
-            return refuse(folder_ + "/" + file + ": " + std::strerror(error));
+            return refuse(folder_ + "/" + file + ": " + std::strerror(error) +
+                          (whole ? "" : "; its last line is cut off"));
         }
         done += static_cast<std::size_t>(n);
     }

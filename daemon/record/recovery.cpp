@@ -176,6 +176,7 @@ std::vector<Recovery> recover(const std::string& argument, const Index::Tell& te
         const std::string path = campaign_path(folder);
         done.push_back(recover_one(path));
         done.back().path = path;
+        done.back().missing_raw = missing_raw(folder_of(path), raw_files(folder_of(path)), tell);
     }
     try {
         const std::string campaign = fs::weakly_canonical(folder_of(done.back().path)).string();

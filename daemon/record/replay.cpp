@@ -12,6 +12,7 @@
 #include <optional>
 #include <sstream>
 #include <thread>
+#include <utility>
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/noise/noise_monitor.hpp"
@@ -182,6 +183,7 @@ class FrameReader {
     void read(const std::string& path) {
         std::string rest;
         std::size_t number = 0;
+        first_ = true;
         read_raw(path, [&](std::string_view piece) {
             rest += piece;
             std::size_t begin = 0;
@@ -209,7 +211,10 @@ class FrameReader {
                            [this](const drivers::Sample& sample) { to_.push_back(sample); });
     }
     void line(std::string_view text, const std::string& path, std::size_t number) {
-        if (text == kStartLine) begin();
+        if (text == kStartLine) {
+            begin();
+            last_ = 0;  // UTC may have been set back meanwhile
+        }
         if (text.empty() || text.front() == '#') return;
         proto::LoggedFrame logged;
         try {
@@ -227,6 +232,13 @@ class FrameReader {
         frame.fd = logged.fd;
         std::copy_n(logged.data.begin(), logged.size, frame.frame.data);
         if (logged.error) return;
+        // Behind one another; a second for time stamps that are not quite in order.
+        if (std::exchange(first_, false) && last_ > 0 && frame.time + drivers::kSecond < last_)
+            throw std::runtime_error(
+                fmt::format("{}:{}: found a time {:.6f} s before the end of the log before it, "
+                            "expected logs in their order",
+                            path, number, drivers::to_seconds(last_ - frame.time)));
+        last_ = std::max(last_, frame.time);
         until_ = std::max(until_, frame.time);
         ++frames_;
         if (rig_time_ != nullptr && frame.frame.can_id == rig_time_->id) {
@@ -247,6 +259,8 @@ class FrameReader {
     const proto::Message* rig_time_ = nullptr;
     const proto::Signal* tick_end_ = nullptr;
     bool rig_ = false;
+    bool first_ = true;  ///< frame of a log
+    Time last_ = 0;      ///< since the daemon was started
     Time until_ = 0;
     std::uint64_t frames_ = 0;
 };
@@ -461,7 +475,7 @@ Campaign campaign_from_candump(const std::vector<std::string>& logs, const std::
     campaign.head.configuration = configuration;
     read_dwells(dwells, campaign);
     FrameReader reader(dbc, configuration, campaign.head.utc_offset_ns, campaign.samples);
-    for (const auto& path : logs) reader.read(path);
+    for (const auto& path : in_order(logs)) reader.read(path);
     reader.finish();
     if (campaign.samples.empty())
         throw std::runtime_error(

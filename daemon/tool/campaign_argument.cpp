@@ -30,4 +30,10 @@ record::Campaign read_named_campaign(const std::string& argument) {
     return record::read_campaign(path);
 }
 
+bool tell_missing_raw(const std::string& folder, const std::vector<std::string>& logs) {
+    const auto missing = record::missing_raw(folder, logs, tell_on_error);
+    for (const auto& words : missing) std::cerr << folder << ": missing " << words << '\n';
+    return missing.empty();
+}
+
 }  // namespace vibrig::tool

@@ -16,4 +16,9 @@ inline constexpr const char* kCampaignHelp =
 /// one is missing.
 [[nodiscard]] record::Campaign read_named_campaign(const std::string& argument);
 
+/// Says on standard error which segments of the raw log in `folder` are not among `logs`; true:
+/// none.
+[[nodiscard]] bool tell_missing_raw(const std::string& folder,
+                                    const std::vector<std::string>& logs);
+
 }  // namespace vibrig::tool

@@ -151,7 +151,8 @@ class PlainLines {
     std::string rest_, plain_;
 };
 
-void export_candump(const record::Campaign& campaign, const std::string& path, bool plain) {
+/// False: a segment is missing.
+bool export_candump(const record::Campaign& campaign, const std::string& path, bool plain) {
     const auto files = record::raw_files(campaign.folder);
     if (files.empty())
         throw std::runtime_error(campaign.folder +
@@ -173,6 +174,7 @@ void export_candump(const record::Campaign& campaign, const std::string& path, b
     if (!good) throw std::runtime_error(path + ": cannot be written");
     if (to != stdout)
         std::cerr << path << ": " << bytes << " bytes of " << files.size() << " segments\n";
+    return tell_missing_raw(campaign.folder, files);
 }
 
 int export_campaign(const std::string& argument, const std::string& format, std::string path) {
@@ -189,8 +191,8 @@ int export_campaign(const std::string& argument, const std::string& format, std:
         export_csv(campaign, path);
     } else if (format == "mat") {
         export_mat(campaign, path);
-    } else {
-        export_candump(campaign, path, format == "wireshark");
+    } else if (!export_candump(campaign, path, format == "wireshark")) {
+        return kNo;
     }
     return 0;
 }
@@ -210,6 +212,7 @@ nlohmann::ordered_json recovery_json(const record::Recovery& found) {
     root["dwell_in_progress"] = nullptr;
     if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
     root["raw_beyond_s"] = found.raw_until_s;
+    root["missing_raw"] = found.missing_raw;
     root["lost"] = found.words;
     return root;
 }
@@ -234,13 +237,16 @@ std::string recovery_text(const record::Recovery& found) {
     if (found.missing > 0)
         text += "lost: " + std::to_string(found.missing) + " sync counts within what is there\n";
     for (const auto& words : found.words) text += "lost: " + words + "\n";
+    for (const auto& words : found.missing_raw) text += "missing " + words + "\n";
     return text;
 }
 
 int recover(const std::string& argument, bool json) {
     const auto found = record::recover(
         named_campaign(argument), [](const std::string& words) { std::cerr << words << '\n'; });
+    int code = 0;
     for (const auto& campaign : found) {
+        if (!campaign.missing_raw.empty()) code = kNo;
         if (json) {
             std::cout << recovery_json(campaign).dump() << '\n';
         } else {
@@ -248,7 +254,7 @@ int recover(const std::string& argument, bool json) {
             std::cout << recovery_text(campaign);
         }
     }
-    return 0;
+    return code;
 }
 
 }  // namespace
@@ -276,7 +282,9 @@ void add_recordings(CLI::App& app, int& exit_code) {
         "Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv\n"
         "A sample takes 79 bytes in the recording's HDF5 file (93 with estimates and covariances), "
         "59 as\n"
-        "frames in its compressed raw log (470 as text).");
+        "frames in its compressed raw log (470 as text).\n"
+        "Exit codes: 0, 1 a segment of the raw log is missing (candump, wireshark), 2 bad usage or "
+        "input.");
     exporting->callback([options, &exit_code] {
         exit_code = guarded(
             [&] { return export_campaign(options->campaign, options->format, options->output); });
@@ -292,7 +300,8 @@ void add_recordings(CLI::App& app, int& exit_code) {
     recovering->add_flag("--json", options->json, "print what was found as JSON");
     recovering->footer(
         "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
-        "A file that was closed in order is left as it is.");
+        "A file that was closed in order is left as it is.\n"
+        "Exit codes: 0, 1 a segment of the raw log is missing, 2 bad usage or input.");
     recovering->callback([options, &exit_code] {
         exit_code = guarded([&] { return recover(options->campaign, options->json); });
     });

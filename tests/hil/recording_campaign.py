@@ -150,6 +150,21 @@ def resumed(checks, rig):
                      f"{command[0]}: a missing part is named", run.stderr)
     os.rename(os.path.join(rig.folder, "aside.h5"), os.path.join(folder, "campaign.h5"))
     played(checks, rig, folder)
+    missing_segment(checks, rig, folder)
+
+
+def missing_segment(checks, rig, folder):
+    """One segment of the raw log is gone: whoever reads the log or tells of it names it, and says no."""
+    path = sorted(glob.glob(os.path.join(folder, "raw-0002.log*")))[0]
+    aside = os.path.join(rig.folder, "aside.log")
+    os.rename(path, aside)
+    for command in (("replay", *r.raw_logs(folder)), ("export", folder, "--to", "candump", "-o", "holed.log"), ("recover", folder)):
+        run = offline(rig, *command)
+        checks.check(run.returncode == 1 and f"missing {os.path.basename(path)}, which the index has" in run.stdout + run.stderr,
+                     f"{command[0]}: a missing segment is named", f"status {run.returncode} {run.stdout} {run.stderr}")
+    os.rename(aside, path)
+    whole = offline(rig, "export", folder, "--to", "candump", "-o", "whole.log")
+    checks.check(whole.returncode == 0 and "missing" not in whole.stderr, "with it nothing is missing", whole.stderr)
 
 
 def played(checks, rig, folder):

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -201,6 +202,70 @@ TEST_F(Parts, AreFoundAgainWhenTheIndexIsDamaged) {
         << told[0];
     EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
     EXPECT_EQ(told.size(), 1U);
+}
+
+/// Three segments of a raw log, a minute each, and another's log of the time between.
+class RawSegments : public Parts {
+  protected:
+    RawSegments() {
+        write(head(1), 10 * kSecond, {1}, 1);
+        for (int n = 1; n <= 3; ++n) log(segment(n), 60 * n);
+        std::ofstream(folder_ / "dwells.csv")
+            << kDwellsHeader << "\n1,1,9,1700000070,1700000100,,0,0,0,0,0,0,0,0,0\n";
+    }
+    [[nodiscard]] std::string segment(int n) const {
+        return (folder_ / ("raw-000" + std::to_string(n) + ".log")).string();
+    }
+    static void log(const std::string& path, int from_s) {
+        std::ofstream file(path);
+        for (int i = 0; i < 60; ++i)
+            file << "(" << 1'700'000'000 + from_s + i << ".000000) vcan0 7FF#AB R\n";
+    }
+    /// Of frames that are no platform's: what comes before there is found no sample in them.
+    [[nodiscard]] std::string refusal_of(const std::vector<std::string>& logs) const {
+        try {
+            static_cast<void>(
+                campaign_from_candump(logs, (folder_ / "dwells.csv").string(), "", ""));
+        } catch (const std::runtime_error& error) {
+            return error.what();
+        }
+        return {};
+    }
+    [[nodiscard]] std::vector<std::string> missing(const std::vector<std::string>& logs) const {
+        return missing_raw(folder_.string(), logs, [](const std::string&) {});
+    }
+};
+
+TEST_F(RawSegments, ThatAreMissingAreNamed) {
+    const auto nothing = [](const std::string&) {};
+    EXPECT_THAT(missing(raw_files(folder_.string())), ::testing::IsEmpty());
+    // WHEN some are left out, or one is gone
+    EXPECT_THAT(missing({segment(2)}), ::testing::ElementsAre("raw-0001.log", "raw-0003.log"));
+    fs::remove(segment(2));
+    EXPECT_THAT(missing(raw_files(folder_.string())), ::testing::ElementsAre("raw-0002.log"));
+    EXPECT_THAT(recover(folder_.string(), nothing).at(0).missing_raw,
+                ::testing::ElementsAre("raw-0002.log"));
+    // WHEN it is the last one, THEN the index knows it
+    log(segment(2), 120);
+    Index(recordings_.string(), nothing).note(folder_.string());
+    fs::remove(segment(3));
+    EXPECT_THAT(missing(raw_files(folder_.string())),
+                ::testing::ElementsAre(::testing::HasSubstr("raw-0003.log, which the index has")));
+    EXPECT_EQ(recover(folder_.string(), nothing).at(0).missing_raw.size(), 1U);
+}
+
+TEST_F(RawSegments, AreReadInOrderAndOnce) {
+    EXPECT_THAT(in_order({segment(3), segment(1), segment(2)}),
+                ::testing::ElementsAre(segment(1), segment(2), segment(3)));
+    EXPECT_THAT(refusal_of({segment(2), segment(1)}), ::testing::HasSubstr("no sample in them"));
+    EXPECT_THAT(refusal_of({segment(1), segment(2), segment(1)}),
+                ::testing::HasSubstr("found it twice"));
+    // AND of others the time must not go back
+    const std::string other = (recordings_ / "other.log").string();
+    log(other, 180);
+    EXPECT_THAT(refusal_of({segment(2), other}), ::testing::HasSubstr("no sample in them"));
+    EXPECT_THAT(refusal_of({segment(3), other}),
+                ::testing::HasSubstr("other.log:1: found a time 59.000000 s before the end"));
 }
 
 }  // namespace
