@@ -71,6 +71,9 @@ struct Span {
                                                            const Head& head);
 /// Makes a part whose writer died readable for every program; nothing if it is closed. Throws.
 void close_part(const std::string& path, const std::string& next);
+/// `what` about a campaign's file that cannot be read, with how to do without it if its raw log is
+/// there.
+[[nodiscard]] std::string with_raw_log(std::string what, const std::string& path);
 /// HDF5 by its first bytes; false for what cannot be read.
 [[nodiscard]] bool is_hdf5(const std::string& path);
 [[nodiscard]] std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign);
@@ -89,6 +92,8 @@ void close_part(const std::string& path, const std::string& next);
 /// What mending did, and what is not there.
 struct Recovery {
     std::string path;  ///< of the campaign's first file
+    std::string
+        failed;  ///< why it could not be recovered, and nothing else is known; empty: it was
     bool was_closed = false;
     std::size_t samples = 0, dwells = 0;
     double recorded_s = 0;
@@ -104,7 +109,7 @@ struct Recovery {
 
 /// Makes the files of a campaign whose writer died readable for every program again, takes what the
 /// raw log has beyond them, and says what is lost. Does nothing to closed files. Of a folder with
-/// several campaigns all, and its index is made anew. Throws.
+/// several campaigns all, each on its own, and its index is made anew. Throws, of one campaign.
 [[nodiscard]] std::vector<Recovery> recover(const std::string& argument, const Index::Tell& tell);
 
 }  // namespace vibrig::record

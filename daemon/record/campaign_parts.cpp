@@ -7,6 +7,7 @@
 #include <set>
 
 #include "daemon/record/campaign_file.hpp"
+#include "daemon/record/hdf5.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::record {
@@ -163,7 +164,8 @@ std::string campaign_path(const std::string& argument) {
     std::error_code error;
     if (fs::is_regular_file(argument, error)) {
         if (!is_hdf5(argument))
-            throw std::runtime_error(argument + ": found no HDF5 file, expected a campaign's");
+            throw std::runtime_error(
+                with_raw_log(argument + ": found no HDF5 file, expected a campaign's", argument));
         return argument;
     }
     if (!fs::is_directory(argument, error))
@@ -185,8 +187,17 @@ std::string campaign_path(const std::string& argument) {
                                  : argument + ": found several campaigns, expected one of" + names);
 }
 
-Campaign read_campaign(const std::string& argument) {
-    const std::string path = campaign_path(argument);
+std::string with_raw_log(std::string what, const std::string& path) {
+    const std::string folder = folder_of(path);
+    if (!raw_files(folder).empty())
+        what += "; its raw log is there: vibrig replay " + folder +
+                "/raw-* --config FILE, with the campaign's configuration, gives its result";
+    return what;
+}
+
+namespace {
+
+Campaign read_parts(const std::string& path) {
     const Head first = read_part_head(path).head;
     const std::string folder = folder_of(path);
     const auto there = part_files(folder);
@@ -220,6 +231,17 @@ Campaign read_campaign(const std::string& argument) {
         }
     }
     return campaign;
+}
+
+}  // namespace
+
+Campaign read_campaign(const std::string& argument) {
+    const std::string path = campaign_path(argument);
+    try {
+        return read_parts(path);
+    } catch (const hdf5::Error& error) {
+        throw std::runtime_error(with_raw_log(error.what(), path));
+    }
 }
 
 std::optional<Campaign> interrupted_campaign(const std::string& folder, const Head& head) {

@@ -156,6 +156,19 @@ Recovery recover_one(const std::string& path) {
     return recovery;
 }
 
+Recovery recover_folder(const std::string& folder, const Index::Tell& tell) {
+    const std::string path = campaign_path(folder);
+    Recovery recovery;
+    try {
+        recovery = recover_one(path);
+    } catch (const hdf5::Error& error) {
+        throw std::runtime_error(with_raw_log(error.what(), path));
+    }
+    recovery.path = path;
+    recovery.missing_raw = missing_raw(folder_of(path), raw_files(folder_of(path)), tell);
+    return recovery;
+}
+
 }  // namespace
 
 std::vector<Recovery> recover(const std::string& argument, const Index::Tell& tell) {
@@ -173,10 +186,15 @@ std::vector<Recovery> recover(const std::string& argument, const Index::Tell& te
     if (!all) folders.push_back(argument);
     std::vector<Recovery> done;
     for (const auto& folder : folders) {
-        const std::string path = campaign_path(folder);
-        done.push_back(recover_one(path));
-        done.back().path = path;
-        done.back().missing_raw = missing_raw(folder_of(path), raw_files(folder_of(path)), tell);
+        try {
+            done.push_back(recover_folder(folder, tell));
+        } catch (const std::exception& why) {
+            if (!all) throw;
+            Recovery failed;
+            failed.path = part_files(folder).begin()->second;
+            failed.failed = why.what();
+            done.push_back(std::move(failed));
+        }
     }
     try {
         const std::string campaign = fs::weakly_canonical(folder_of(done.back().path)).string();

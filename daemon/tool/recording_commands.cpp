@@ -200,6 +200,10 @@ int export_campaign(const std::string& argument, const std::string& format, std:
 nlohmann::ordered_json recovery_json(const record::Recovery& found) {
     nlohmann::ordered_json root;
     root["campaign"] = found.path;
+    if (!found.failed.empty()) {
+        root["error"] = found.failed;
+        return root;
+    }
     root["was_closed"] = found.was_closed;
     root["parts"] = found.parts;
     root["samples"] = found.samples;
@@ -246,14 +250,17 @@ int recover(const std::string& argument, bool json) {
         named_campaign(argument), [](const std::string& words) { std::cerr << words << '\n'; });
     int code = 0;
     for (const auto& campaign : found) {
-        if (!campaign.missing_raw.empty()) code = kNo;
+        if (!campaign.missing_raw.empty() || !campaign.failed.empty()) code = kNo;
         if (json) {
             std::cout << recovery_json(campaign).dump() << '\n';
-        } else {
+        } else if (campaign.failed.empty()) {
             if (found.size() > 1) std::cout << campaign.path << ": ";
             std::cout << recovery_text(campaign);
         }
     }
+    std::cout << std::flush;
+    for (const auto& campaign : found)
+        if (!campaign.failed.empty()) std::cerr << campaign.failed << '\n';
     return code;
 }
 
@@ -301,7 +308,8 @@ void add_recordings(CLI::App& app, int& exit_code) {
     recovering->footer(
         "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
         "A file that was closed in order is left as it is.\n"
-        "Exit codes: 0, 1 a segment of the raw log is missing, 2 bad usage or input.");
+        "Exit codes: 0, 1 a segment of the raw log is missing or one of several campaigns cannot "
+        "be\nrecovered, 2 bad usage or input.");
     recovering->callback([options, &exit_code] {
         exit_code = guarded([&] { return recover(options->campaign, options->json); });
     });

@@ -71,10 +71,17 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
     std::string configuration, dbc, mark;
     const auto parts = record::part_files(folder.empty() ? "." : folder.string());
     if (!parts.empty()) {
-        const auto beside = record::read_part_head(parts.rbegin()->second);
-        configuration = beside.head.configuration;
-        dbc = beside.head.dbc;
-        mark = beside.mark;
+        try {
+            const auto beside = record::read_part_head(parts.rbegin()->second);
+            configuration = beside.head.configuration;
+            dbc = beside.head.dbc;
+            mark = beside.mark;
+        } catch (const std::exception& error) {
+            if (arguments.config.empty())
+                throw std::runtime_error(std::string(error.what()) +
+                                         "; expected it, or --config FILE in its place");
+            std::cerr << error.what() << "; whether the campaign is marked is not known\n";
+        }
     }
     if (!arguments.config.empty()) {
         const auto loaded = configuration::load(arguments.config, false);

@@ -268,5 +268,30 @@ TEST_F(RawSegments, AreReadInOrderAndOnce) {
                 ::testing::HasSubstr("other.log:1: found a time 59.000000 s before the end"));
 }
 
+TEST_F(RawSegments, AreNamedWhereTheFileBesideThemIsCutOff) {
+    const auto nothing = [](const std::string&) {};
+    const fs::path bad = recordings_ / "test-0", file = bad / "campaign.h5";
+    fs::copy(folder_, bad);
+    for (const std::uintmax_t size : {fs::file_size(file) / 2, std::uintmax_t{0}}) {
+        // GIVEN a campaign's file that is cut off, beside a good campaign
+        fs::resize_file(file, size);
+        const std::string words = "vibrig replay " + bad.string() + "/raw-*";
+        const auto hint = ::testing::ThrowsMessage<std::runtime_error>(
+            ::testing::AllOf(::testing::HasSubstr(file.string()), ::testing::HasSubstr(words)));
+        EXPECT_THAT([&] { static_cast<void>(recover(bad.string(), nothing)); }, hint);
+        EXPECT_THAT([&] { static_cast<void>(read_campaign(bad.string())); }, hint);
+        EXPECT_THAT([&] { static_cast<void>(read_campaign(file.string())); }, hint);
+        // WHEN all are recovered, THEN the other one is, and the index has it
+        const auto all = recover(recordings_.string(), nothing);
+        ASSERT_EQ(all.size(), 2U);
+        EXPECT_THAT(all[0].failed, ::testing::HasSubstr(words));
+        EXPECT_EQ(all[1].failed, "");
+        EXPECT_EQ(all[1].samples, 400U);
+        const auto known = Index(recordings_.string(), nothing).campaigns();
+        ASSERT_EQ(known.size(), 1U);
+        EXPECT_EQ(known[0].key, "test-1");
+    }
+}
+
 }  // namespace
 }  // namespace vibrig::record
