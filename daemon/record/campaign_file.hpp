@@ -95,6 +95,7 @@ struct Recovery {
     std::string
         failed;  ///< why it could not be recovered, and nothing else is known; empty: it was
     bool was_closed = false;
+    bool recovered = false;  ///< its writer died, and it was mended now or before
     std::size_t samples = 0, dwells = 0;
     double recorded_s = 0;
     std::int64_t ends_utc_ns = 0;  ///< of the last sample; 0: there is none

@@ -28,7 +28,8 @@ void set_end(File& file, const std::string& state, const std::string& reason, st
 Time last_time(const Campaign& part) { return part.samples.empty() ? 0 : part.samples.back().time; }
 
 /// What the raw log has of this part beyond its last sample comes from the frames themselves.
-std::vector<drivers::Sample> more_from_raw(const Campaign& part, Recovery& recovery) {
+/// `gap`: from that sample to the end of the log.
+std::vector<drivers::Sample> more_from_raw(const Campaign& part, Gap& gap, std::string& failure) {
     // The log may hold earlier lives, too.
     const Time begin = part.head.utc_ns - part.head.utc_offset_ns;
     const Time last = std::max(last_time(part), begin);
@@ -37,17 +38,23 @@ std::vector<drivers::Sample> more_from_raw(const Campaign& part, Recovery& recov
     try {
         more = samples_from_raw(part, until);
     } catch (const std::exception& error) {
-        recovery.words.push_back(std::string("raw log: ") + error.what());
+        failure = std::string("raw log: ") + error.what();
     }
     std::erase_if(more, [last](const drivers::Sample& s) { return s.time <= last; });
-    if (until > last) recovery.raw_until_s = drivers::to_seconds(until - last);
+    gap.from = last;
+    gap.to = std::max(last, until);
     return more;
 }
 
-void mend_last(const std::string& path, Recovery& recovery) {
+/// What was done and lost stands in the file's gaps: told from there, now and every time after.
+void mend_last(const std::string& path) {
     File::open(path, File::Mode::mend).close();
     const Campaign part = read_part(path);
-    const auto more = more_from_raw(part, recovery);
+    Gap gap;
+    gap.stream = "end";
+    gap.reason = "the recorder died; nothing is recorded after this";
+    std::string failure;
+    const auto more = more_from_raw(part, gap, failure);
     const Time end = more.empty() ? last_time(part) : more.back().time;
     File file = File::open(path, File::Mode::write);
     {
@@ -57,10 +64,10 @@ void mend_last(const std::string& path, Recovery& recovery) {
         samples.commit();
         hdf5::Table gaps(file, "/gaps", gap_columns());
         gaps.keep(part.gaps.size());
-        put_gap(gaps, {end, end, "end", 0, "the recorder died; nothing is recorded after this"});
+        if (!failure.empty()) put_gap(gaps, {end, end, "raw log", 0, failure});
+        put_gap(gaps, gap);
         gaps.commit();
     }
-    recovery.samples_from_raw = more.size();
     set_end(file, "recovered", "the recorder died before the campaign was over",
             end + part.head.utc_offset_ns);
     file.close();
@@ -129,13 +136,20 @@ Recovery recover_one(const std::string& path) {
                                      ": found it being written by a running vibrigd, expected one "
                                      "whose writer died");
         if (number == last) {
-            mend_last(file, recovery);
+            mend_last(file);
         } else {
             close_part(file, part_name(number + 1));
         }
     }
     const Campaign campaign = read_campaign(path);
     recovery.parts = campaign.parts.size();
+    recovery.recovered = campaign.state == "recovered";
+    if (recovery.recovered && !campaign.gaps.empty()) {
+        const Gap& end = campaign.gaps.back();
+        recovery.raw_until_s = drivers::to_seconds(end.to - end.from);
+        recovery.samples_from_raw = static_cast<std::size_t>(std::ranges::count_if(
+            campaign.samples, [&end](const auto& sample) { return sample.time > end.from; }));
+    }
     recovery.samples = campaign.samples.size() - recovery.samples_from_raw;
     recovery.dwells = campaign.dwells.size();
     recovery.missing = missing_instants(campaign);
@@ -150,7 +164,9 @@ Recovery recover_one(const std::string& path) {
         recovery.words.push_back(
             gap.lost > 0
                 ? fmt::format("{} {} while recording: {}", gap.lost, gap.stream, gap.reason)
-                : fmt::format("{:.3f} s: {}", drivers::to_seconds(gap.to - gap.from), gap.reason));
+            : gap.to > gap.from
+                ? fmt::format("{:.3f} s: {}", drivers::to_seconds(gap.to - gap.from), gap.reason)
+                : gap.reason);
     }
     if (!campaign.incomplete.empty()) recovery.words.push_back(campaign.incomplete);
     return recovery;

@@ -197,6 +197,17 @@ int export_campaign(const std::string& argument, const std::string& format, std:
     return 0;
 }
 
+std::vector<std::string> lost(const record::Recovery& found) {
+    std::vector<std::string> lost;
+    if (found.recovered && found.ends_utc_ns > 0)
+        lost.push_back("everything after " + report::utc_text(found.ends_utc_ns));
+    if (!found.cut_dwell.empty()) lost.push_back("the end of " + found.cut_dwell);
+    if (found.missing > 0)
+        lost.push_back(std::to_string(found.missing) + " sync counts within what is there");
+    lost.insert(lost.end(), found.words.begin(), found.words.end());
+    return lost;
+}
+
 nlohmann::ordered_json recovery_json(const record::Recovery& found) {
     nlohmann::ordered_json root;
     root["campaign"] = found.path;
@@ -205,6 +216,7 @@ nlohmann::ordered_json recovery_json(const record::Recovery& found) {
         return root;
     }
     root["was_closed"] = found.was_closed;
+    root["recovered"] = found.recovered;
     root["parts"] = found.parts;
     root["samples"] = found.samples;
     root["samples_from_raw"] = found.samples_from_raw;
@@ -217,30 +229,27 @@ nlohmann::ordered_json recovery_json(const record::Recovery& found) {
     if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
     root["raw_beyond_s"] = found.raw_until_s;
     root["missing_raw"] = found.missing_raw;
-    root["lost"] = found.words;
+    root["lost"] = lost(found);
     return root;
 }
 
 std::string recovery_text(const record::Recovery& found) {
     std::array<char, 200> line{};
-    std::string text = found.was_closed ? "closed in order: nothing to mend\n" : "mended\n";
+    std::string text = !found.was_closed ? "mended\n"
+                       : found.recovered ? "mended before: nothing to mend\n"
+                                         : "closed in order: nothing to mend\n";
     std::snprintf(line.data(), line.size(), "%zu samples over %.3f s, %zu dwells done, %zu %s\n",
                   found.samples, found.recorded_s, found.dwells, found.parts,
                   found.parts == 1 ? "file" : "files");
     text += line.data();
-    if (!found.was_closed) {
+    if (found.recovered) {
         std::snprintf(line.data(), line.size(),
                       "%zu samples more from the raw log, which goes on %.3f s longer\n",
                       found.samples_from_raw, found.raw_until_s);
         text += line.data();
-        if (found.ends_utc_ns > 0)
-            text += "lost: everything after " + report::utc_text(found.ends_utc_ns) + "\n";
-        text += found.cut_dwell.empty() ? "no dwell was in progress\n"
-                                        : "lost: the end of " + found.cut_dwell + "\n";
+        if (found.cut_dwell.empty()) text += "no dwell was in progress\n";
     }
-    if (found.missing > 0)
-        text += "lost: " + std::to_string(found.missing) + " sync counts within what is there\n";
-    for (const auto& words : found.words) text += "lost: " + words + "\n";
+    for (const auto& words : lost(found)) text += "lost: " + words + "\n";
     for (const auto& words : found.missing_raw) text += "missing " + words + "\n";
     return text;
 }

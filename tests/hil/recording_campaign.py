@@ -85,6 +85,9 @@ def killed(checks, rig):
     found = json.loads(mended.stdout or "{}")
     checks.check(mended.returncode == 0 and not found["was_closed"] and found["samples"] >= rows,
                  "recover mends it and counts", mended.stdout + mended.stderr)
+    twice = json.loads(offline(rig, "recover", folders(rig)[-1], "--json").stdout or "{}")
+    checks.equal({**twice, "was_closed": False}, found, "a second time it tells the same")
+    checks.check(any(words.startswith("everything after") for words in found["lost"]), "with what was lost", str(found["lost"]))
     checks.check(subprocess.run(["h5dump", "-H", path], capture_output=True).returncode == 0, "h5dump opens it then")
     with h5py().File(path, "r") as file:
         checks.equal(file["samples/time_ns"].shape[0], found["samples"] + found["samples_from_raw"],

@@ -150,7 +150,11 @@ TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
     EXPECT_EQ(read.gaps[0].stream, "end");
     // AND a second time there is nothing to do
     const std::string bytes = file(path);
-    EXPECT_TRUE(recover(path, {}).at(0).was_closed);
+    const Recovery again = recover(path, {}).at(0);
+    EXPECT_TRUE(again.was_closed);
+    EXPECT_TRUE(again.recovered);
+    EXPECT_EQ(again.cut_dwell, recovery.cut_dwell);
+    EXPECT_EQ(again.words, recovery.words);
     EXPECT_EQ(file(path), bytes);
 }
 
