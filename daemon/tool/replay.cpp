@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,18 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
     return campaign;
 }
 
+/// The result; where it is not the recording's, with a word about that.
+std::string replayed_json(const record::ReplayResult& replayed, bool same_build) {
+    std::string text = result_json(replayed.result);
+    if (replayed.different == 0) return text;
+    const nlohmann::ordered_json replay{{"dwells", replayed.compared},
+                                        {"not_as_recorded", replayed.different},
+                                        {"first", replayed.first_difference},
+                                        {"same_build", same_build}};
+    text.back() = ',';
+    return text + "\"replay\":" + replay.dump() + "}";
+}
+
 int replay(const ReplayArguments& arguments) {
     estimator::use_instruction_set(arguments.instruction_set);
     record::ReplayOptions options;
@@ -118,7 +131,11 @@ int replay(const ReplayArguments& arguments) {
     const auto& files = arguments.files;
     const bool whole = !std::ranges::all_of(files, record::raw_number) ||
                        tell_missing_raw(record::folder_of(files.front()), files);
-    std::cout << (arguments.json ? result_json(replayed.result) + "\n"
+    if (!arguments.config.empty()) replayed.different = replayed.compared = 0;
+    const bool same_build = campaign.head.version == VIBRIG_VERSION &&
+                            campaign.head.compiler == estimator::compiler() &&
+                            campaign.head.instruction_set == estimator::instruction_set();
+    std::cout << (arguments.json ? replayed_json(replayed, same_build) + "\n"
                                  : result_table(replayed.result))
               << std::flush;
     std::array<char, 160> text{};
@@ -127,20 +144,23 @@ int replay(const ReplayArguments& arguments) {
                   replayed.samples, replayed.dwells.size(), replayed.recorded_s, replayed.took_s,
                   replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
     std::cerr << text.data() << '\n';
-    if (arguments.config.empty() && replayed.compared > 0) {
+    if (replayed.compared > 0) {
         if (replayed.different == 0) {
             std::cerr << "estimates after each of " << replayed.compared
                       << " dwells: as recorded, to the last bit\n";
         } else {
             std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
                       << " dwells are not as recorded (" << replayed.first_difference
-                      << "); recorded by " << campaign.head.compiler << ", "
-                      << campaign.head.instruction_set << "; this is " << estimator::compiler()
-                      << ", " << estimator::instruction_set() << '\n';
+                      << "); recorded by " << campaign.head.version << ", "
+                      << campaign.head.compiler << ", " << campaign.head.instruction_set
+                      << "; this is " << VIBRIG_VERSION << ", " << estimator::compiler() << ", "
+                      << estimator::instruction_set()
+                      << (same_build ? ": expected the same\n" : "\n");
         }
     }
     if (!std::cout) throw std::runtime_error("standard output: cannot be written");
-    return whole && all_observable(replayed.result) ? 0 : kNo;
+    const bool as_recorded = replayed.different == 0 || !same_build;
+    return whole && as_recorded && all_observable(replayed.result) ? 0 : kNo;
 }
 
 }  // namespace
@@ -171,9 +191,9 @@ void add_replay(CLI::App& app, int& exit_code) {
         "the last bit; standard error says whether they did. 28 dwells of 100 s at 40 samples/s "
         "(142 000\n"
         "samples) take about a second.\n"
-        "Exit codes: 0 all 30 coefficients are determined, 1 some are not or a segment of the raw "
-        "log "
-        "is\nmissing, 2 bad usage or input.");
+        "Exit codes: 0 all 30 coefficients are determined, 1 some are not, a segment of the raw "
+        "log is\nmissing, or the recording's build and instruction set give other estimates (then "
+        "\"replay\" in\nthe JSON), 2 bad usage or input.");
     command->callback(
         [arguments, &exit_code] { exit_code = guarded([&] { return replay(*arguments); }); });
 }

@@ -12,6 +12,7 @@ import math
 import os
 import re
 import resource
+import shutil
 import signal
 import sqlite3
 import stat
@@ -243,9 +244,30 @@ def complete(checks, rig):
         file.write("[noise]\nresolver_arcsec = 10.0\n")
     anew = offline(rig, "replay", path, "--config", other, "--json")
     checks.check(json.loads(anew.stdout)["nis"] < json.loads(result)["nis"], "other settings give another result")
+    changed(checks, rig, path)
     exports(checks, rig, folder, path)
     wrong_input(checks, rig, path)
     report(checks, rig, folder)
+
+
+def changed(checks, rig, path):
+    """One sample in a dwell is another: its replay is not as recorded, which only another build may be."""
+    other = os.path.join(rig.folder, "changed.h5")
+    shutil.copy(path, other)
+    with h5py().File(other, "r+") as file:
+        at = (file["samples/time_ns"][:] > file["orders/from_ns"][0]).nonzero()[0][100]
+        angles = file["samples/angle_rad"]
+        angles[at] = angles[at] + 1e-9
+    run = offline(rig, "replay", other, "--json")
+    replay = json.loads(run.stdout).get("replay", {})
+    checks.check(run.returncode == 1 and replay.get("same_build") is True and replay.get("not_as_recorded") == replay.get("dwells")
+                 and "are not as recorded" in run.stderr and "expected the same" in run.stderr,
+                 "a changed sample shows in the replay", run.stdout[-300:] + run.stderr)
+    with h5py().File(other, "r+") as file:
+        file.attrs["compiler"] = "another"
+    run = offline(rig, "replay", other, "--json")
+    checks.check(json.loads(run.stdout).get("replay", {}).get("same_build") is False and "expected the same" not in run.stderr and
+                 "recorded by" in run.stderr, "of another build it is said so", run.stderr)
 
 
 def exports(checks, rig, folder, path):
