@@ -20,5 +20,8 @@ inline constexpr const char* kCampaignHelp =
 /// none.
 [[nodiscard]] bool tell_missing_raw(const std::string& folder,
                                     const std::vector<std::string>& logs);
+/// Refuses an output that is a file of a recording: an HDF5 file, or what lies beside one or beside
+/// the folders of campaigns. Throws std::runtime_error.
+void keep_recordings(const std::string& output);
 
 }  // namespace vibrig::tool

@@ -187,6 +187,7 @@ int export_campaign(const std::string& argument, const std::string& format, std:
     if (path.empty())
         path = campaign.head.name +
                (format == "candump" || format == "wireshark" ? ".log" : "." + format);
+    keep_recordings(path);
     if (format == "csv") {
         export_csv(campaign, path);
     } else if (format == "mat") {

@@ -80,6 +80,8 @@ void print_pdf(const std::string& html, const std::string& pdf) {
 }
 
 int make_report(const ReportArguments& arguments) {
+    keep_recordings(arguments.output);
+    keep_recordings(arguments.pdf);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
     const auto settings = report_settings(campaign, arguments.config);
@@ -217,6 +219,7 @@ int compensate(CompensateArguments arguments) {
             throw std::runtime_error("vibration: found " + filled_in("%g", level) +
                                      " g, expected 0 to 1000 g");
     }
+    keep_recordings(arguments.output);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
     report::Coefficients coefficients;

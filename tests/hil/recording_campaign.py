@@ -247,6 +247,7 @@ def complete(checks, rig):
     changed(checks, rig, path)
     exports(checks, rig, folder, path)
     wrong_input(checks, rig, path)
+    kept(checks, rig, folder)
     report(checks, rig, folder)
 
 
@@ -321,6 +322,24 @@ def exports(checks, rig, folder, path):
     ascii_log = subprocess.run(["log2asc", "-I", log, "vcan0"], capture_output=True, text=True)
     frames = sum(" vcan0 " not in line and " d " in line for line in ascii_log.stdout.splitlines())
     checks.equal(frames, len(lines), "can-utils read every line of it")
+
+
+def kept(checks, rig, folder):
+    """No command writes over a file of the recording."""
+    names = [os.path.join(folder, "campaign.h5"), r.raw_logs(folder)[0], os.path.join(folder, "dwells.csv"),
+             os.path.join(rig.results, "recordings.sqlite3")]
+    os.symlink(names[0], os.path.join(rig.folder, "link.html"))
+    before = [os.stat(name) for name in names]
+    for name in (*names, "link.html"):
+        for command in (("export", folder, "--to", "csv"), ("export", folder, "--to", "mat"), ("export", folder, "--to", "candump"),
+                        ("report", folder), ("compensate", folder, "--to", "csv")):
+            run = offline(rig, *command, "-o", name)
+            if run.returncode != 2 or "found a file of a recording" not in run.stderr:
+                checks.check(False, f"{' '.join(command)} -o {name}: refused", f"status {run.returncode} {run.stderr}")
+                return
+    after = [os.stat(name) for name in names]
+    checks.check([(a.st_size, a.st_mtime_ns) for a in before[:3]] == [(a.st_size, a.st_mtime_ns) for a in after[:3]],
+                 "files of the recording are not written over")
 
 
 def by_row(checks, rig, path):
