@@ -35,7 +35,8 @@ vibrig::serve::ServerSettings settings_of(const vibrig::configuration::Configura
         c.socket,      c.server.operator_group, c.server.status_socket,
         c.server.page, c.server.remote,         c.server.certificate,
         c.server.key,  c.server.clients_ca,     c.server.revoked};
-    settings.limits.connections = 256;
+    // Of each of four doors: together they leave descriptors for everything else.
+    settings.limits.connections = 224;
     return settings;
 }
 

@@ -249,10 +249,12 @@ ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
     }
 }
 
-void Api::turned_away(const Caller& caller, const std::string& why) {
+void Api::turned_away(const Caller& caller, const std::string& why, TokenBucket& told) {
     ++traffic.turned_away;
-    if (strangers_.take(std::chrono::steady_clock::now()))
-        source_.refused("somebody" + caller.identity, "a connection", why);
+    if (!told.take(std::chrono::steady_clock::now())) return;
+    // With TLS it begins with ", from" until there is a certificate.
+    const bool nameless = caller.identity.rfind(',', 0) == 0;
+    source_.refused((nameless ? "somebody" : "") + caller.identity, "a connection", why);
 }
 
 ApiAnswer Api::turn_away(const ApiRequest& request, std::string_view path, const Caller& caller) {

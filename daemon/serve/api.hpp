@@ -51,8 +51,8 @@ class Api {
     /// Why a browser's request is refused before it is looked at; status 200: it is not.
     [[nodiscard]] static ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
 
-    /// One who did not get as far as a request.
-    void turned_away(const Caller& caller, const std::string& why);
+    /// One who did not get as far as a request; told of while `told` lasts.
+    void turned_away(const Caller& caller, const std::string& why, TokenBucket& told);
 
     [[nodiscard]] static ApiAnswer problem(int status, const std::string& detail);
     [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
@@ -75,7 +75,6 @@ class Api {
     std::string instance_;
     StreamFeed feed_;
     TokenBucket commands_{10, 50};
-    TokenBucket strangers_{1, 20};  ///< that are told of
 };
 
 /// The value of `name` in "a=1&b=2"; empty: it is not there.

@@ -28,7 +28,7 @@ using Request = http::request<http::string_body>;
 using Response = http::response<http::string_body>;
 
 constexpr unsigned kHttp11 = 11;
-constexpr auto kHandshakeTime = std::chrono::seconds(10);
+constexpr auto kHandshakeTime = std::chrono::seconds(5);
 constexpr std::size_t kLongestStreamMessage = 1024;
 
 Response response_of(ApiAnswer answer, unsigned version, bool keep_alive) {
@@ -58,10 +58,12 @@ std::string_view view(beast::string_view text) { return {text.data(), text.size(
 class Stream : public std::enable_shared_from_this<Stream> {
   public:
     /// `admitted`: Shared::certificates when the client's was looked at.
-    Stream(AnyStream stream, StreamClient client, Shared& shared, std::uint64_t admitted)
+    Stream(AnyStream stream, StreamClient client, Shared& shared, Place place,
+           std::uint64_t admitted)
         : socket_(std::move(stream)),
           client_(std::move(client)),
           shared_(shared),
+          place_(std::move(place)),
           admitted_(admitted),
           timer_(socket_.get_executor()) {
         ++shared_.api.traffic.streams;
@@ -146,6 +148,7 @@ class Stream : public std::enable_shared_from_this<Stream> {
     websocket::stream<AnyStream> socket_;
     StreamClient client_;
     Shared& shared_;
+    const Place place_;
     const std::uint64_t admitted_;
     asio::steady_timer timer_;
     beast::flat_buffer buffer_;
@@ -157,40 +160,77 @@ class Stream : public std::enable_shared_from_this<Stream> {
 /// waits.
 class Session : public std::enable_shared_from_this<Session> {
   public:
-    Session(AnyStream stream, Caller caller, Shared& shared)
+    Session(AnyStream stream, Caller caller, Shared& shared, Places& places)
         : stream_(std::move(stream)),
           caller_(std::move(caller)),
           shared_(shared),
+          places_(places),
           admitted_(shared.certificates),
           deadline_(stream_.get_executor()),
           buffer_(shared.limits.header_bytes + shared.limits.body_bytes + 4096),
           requests_(shared.limits.requests_per_s, shared.limits.requests_per_s) {
         ++shared_.api.traffic.connections;
     }
-    ~Session() { --shared_.api.traffic.connections; }
+    ~Session() {
+        shared_.newcomers.remove(&stream_);
+        --shared_.api.traffic.connections;
+    }
     Session(const Session&) = delete;
     Session& operator=(const Session&) = delete;
 
     void start() {
-        if (!caller_.encrypted) return read();
+        if (!caller_.encrypted) {
+            if (take_place()) return read();
+            turn_away();
+            return;
+        }
+        // Strangers may hold connections open, but no place that somebody with a certificate needs:
+        // one who has one is quicker than so many others come.
+        if (shared_.newcomers.size() >= shared_.limits.newcomers) {
+            shared_.api.turned_away(caller_,
+                                    std::to_string(shared_.limits.newcomers) +
+                                        " wait to show a certificate: the oldest has to go",
+                                    shared_.crowd);
+            shared_.newcomers.front()->close();
+            shared_.newcomers.pop_front();
+        }
+        shared_.newcomers.push_back(&stream_);
         arm(kHandshakeTime);
         stream_.accept_handshake([self = shared_from_this()](error_code error) {
             if (error) {
                 const std::string why = self->stream_.certificate_problem();
                 if (!why.empty() || error.category() == asio::error::get_ssl_category())
                     self->shared_.api.turned_away(self->caller_,
-                                                  why.empty() ? error.message() : why);
+                                                  why.empty() ? error.message() : why,
+                                                  self->shared_.strangers);
                 return self->end();
             }
             const auto [name, unit] = self->stream_.peer_subject();
             Caller& who = self->caller_;
             who.role = role_named(unit);
             who.identity = "certificate " + name + ", " + name_of(who.role) + who.identity;
+            // Without a place one stays a newcomer until the first request, to be told so.
+            self->take_place();
             self->read();
         });
     }
 
   private:
+    bool take_place() {
+        place_ = places_.take();
+        if (place_) shared_.newcomers.remove(&stream_);
+        return place_ != nullptr;
+    }
+    void none_left() { shared_.api.turned_away(caller_, places_.none_left(), places_.told); }
+    void turn_away() {
+        none_left();
+        error_code ignored;
+        stream_.socket().non_blocking(true, ignored);
+        std::ostringstream text;
+        text << response_of(Api::problem(503, places_.none_left()), kHttp11, false);
+        asio::write(stream_.socket(), asio::buffer(text.str()), ignored);
+    }
+
     void arm(std::chrono::milliseconds time) {
         deadline_.expires_after(time);
         deadline_.async_wait([weak = weak_from_this()](error_code error) {
@@ -208,7 +248,7 @@ class Session : public std::enable_shared_from_this<Session> {
         parser_->header_limit(shared_.limits.header_bytes);
         parser_->body_limit(shared_.limits.body_bytes);
         // One deadline for the whole request: who sends a byte now and then does not hold a place.
-        arm(shared_.limits.idle_timeout);
+        arm(place_ ? shared_.limits.idle_timeout : kHandshakeTime);
         http::async_read(
             stream_, buffer_, *parser_,
             [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
@@ -243,6 +283,10 @@ class Session : public std::enable_shared_from_this<Session> {
         }
         if (error) return end();  // gone, or out of time
         if (caller_.encrypted && admitted_ != shared_.certificates) return finish();
+        if (!place_ && !take_place()) {
+            none_left();
+            return refuse(503, places_.none_left());
+        }
 
         const Request& request = parser_->get();
         const bool head = request.method() == http::verb::head;
@@ -293,7 +337,8 @@ class Session : public std::enable_shared_from_this<Session> {
         deadline_.cancel();
         StreamClient client(shared_.api.feed(), shared_.api.instance(), caller_.role, rate, after,
                             with_status);
-        std::make_shared<Stream>(std::move(stream_), std::move(client), shared_, admitted_)
+        std::make_shared<Stream>(std::move(stream_), std::move(client), shared_, std::move(place_),
+                                 admitted_)
             ->start(parser_->get());
         return {};
     }
@@ -312,6 +357,8 @@ class Session : public std::enable_shared_from_this<Session> {
     AnyStream stream_;
     Caller caller_;
     Shared& shared_;
+    Places& places_;
+    Place place_;
     const std::uint64_t admitted_;
     asio::steady_timer deadline_;
     beast::flat_buffer buffer_;
@@ -322,17 +369,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
 }  // namespace
 
-void serve_connection(AnyStream stream, Caller caller, Shared& shared) {
-    std::make_shared<Session>(std::move(stream), std::move(caller), shared)->start();
-}
-
-void turn_away(AnyStream::Socket socket, std::size_t limit) {
-    const std::string detail = "all " + std::to_string(limit) + " connections are taken";
-    error_code ignored;
-    socket.non_blocking(true, ignored);
-    std::ostringstream text;
-    text << response_of(Api::problem(503, detail), kHttp11, false);
-    asio::write(socket, asio::buffer(text.str()), ignored);
+void serve_connection(AnyStream stream, Caller caller, Shared& shared, Places& places) {
+    std::make_shared<Session>(std::move(stream), std::move(caller), shared, places)->start();
 }
 
 }  // namespace vibrig::serve

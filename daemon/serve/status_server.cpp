@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/basic_socket_acceptor.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -182,23 +183,9 @@ struct StatusServer::Impl {
                     });
                     return;
                 }
-                if (api.traffic.connections >= places(listener.door)) {
-                    ++api.traffic.turned_away;
-                    // In TLS nothing can be said before the handshake.
-                    if (listener.door != Door::remote)
-                        turn_away(std::move(socket), settings.limits.connections);
-                } else {
-                    welcome(listener.door, std::move(socket));
-                }
+                welcome(listener.door, std::move(socket));
                 accept(listener);
             });
-    }
-
-    /// Over the network some places stay free, so that nobody there can lock out who has to stop
-    /// the rig at its own socket.
-    [[nodiscard]] std::size_t places(Door door) const {
-        const std::size_t all = settings.limits.connections;
-        return door == Door::control ? all : all - all / 8;
     }
 
     void welcome(Door door, AnyStream::Socket socket) {
@@ -227,7 +214,8 @@ struct StatusServer::Impl {
         }
         AnyStream stream =
             caller.encrypted ? AnyStream(std::move(socket), *tls) : AnyStream(std::move(socket));
-        serve_connection(std::move(stream), std::move(caller), shared);
+        serve_connection(std::move(stream), std::move(caller), shared,
+                         places[static_cast<std::size_t>(door)]);
     }
 
     [[nodiscard]] Role role_of(Door door, uid_t uid) const {
@@ -243,6 +231,10 @@ struct StatusServer::Impl {
     std::deque<SocketFile> files;
     Api api;
     Shared shared{api, settings.limits};
+    std::array<Places, 4> places{{{"the control socket", settings.limits.connections},
+                                  {"the status socket", settings.limits.connections},
+                                  {"the page", settings.limits.connections},
+                                  {"server.remote", settings.limits.connections}}};
     std::optional<asio::ssl::context> tls;
     std::string page, remote;
     asio::io_context io{1};

@@ -12,7 +12,8 @@
 namespace vibrig::serve {
 
 struct ServerLimits {
-    std::size_t connections = 64;  ///< at a time; one more is answered 503
+    std::size_t connections = 64;  ///< at a time through each door; one more is answered 503
+    std::size_t newcomers = 64;    ///< in TLS, without a certificate so far; the oldest has to go
     std::chrono::milliseconds idle_timeout{
         30'000};  ///< for a whole request to come, and for an answer to be taken
     std::uint32_t header_bytes = 8 * 1024;

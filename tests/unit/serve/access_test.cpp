@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <list>
 #include <optional>
 #include <thread>
 
@@ -278,6 +279,57 @@ TEST_F(Access, StrangersPagesAreNotAnswered) {
     for (const char* wrong : {"rate_hz=x", "rate_hz=21", "after=-1", "after=x", "status=maybe"})
         EXPECT_EQ(status_of(ask(std::string("/api/v1/stream?") + wrong, page, upgrade)), 400)
             << wrong;
+}
+
+TEST_F(Access, WhoHoldsConnectionsOpenDoesNotLockOutTheStop) {
+    server.emplace(source, settings);
+    server->answer();
+    // GIVEN more idle connections than there are places, to the page and, without a certificate, to
+    // the remote door
+    const std::string page = without_scheme(server->page_address());
+    std::list<RawConnection> idle;
+    for (int i = 0; i < 200; ++i) {
+        idle.emplace_back(without_scheme(server->remote_address()));
+        if (i < 100) idle.emplace_back(page);
+    }
+    // WHEN an operator wants to stop the rig THEN he is heard, each time
+    const Identity ada = person("operator");
+    for (int i = 0; i < 3; ++i)
+        EXPECT_EQ(Client(remote("ada", ada)).post("/api/v1/commands", body_for("abort")).status,
+                  200);
+    EXPECT_EQ(status_of(post(settings.socket, "/api/v1/commands", body_for("abort"))), 200);
+    EXPECT_EQ(status_of(get(settings.status_socket, "/api/v1/status")), 200);
+    EXPECT_EQ(source.requests().size(), 4u);
+    // and the full door alone is told of, once
+    EXPECT_NE(RawConnection(page).until_closed().find("all 64 connections of the page are taken"),
+              std::string::npos);
+    EXPECT_TRUE(told("64 wait to show a certificate"));
+    const auto refusals = source.refusals();
+    EXPECT_EQ(std::count_if(refusals.begin(), refusals.end(),
+                            [](const std::string& text) {
+                                return text.find("connections of") != std::string::npos;
+                            }),
+              1);
+    EXPECT_EQ(refusals.size(), 2u);
+}
+
+TEST_F(Access, WhoFindsNoPlaceIsToldSoOverTlsToo) {
+    settings.limits.connections = 2;
+    server.emplace(source, settings);
+    server->answer();
+    const Identity ada = person("operator");
+    {
+        Client first(remote("ada", ada)), second(remote("ada", ada));
+        EXPECT_EQ(first.get("/healthz").status, 200);
+        EXPECT_EQ(second.get("/healthz").status, 200);
+        const Reply reply = Client(remote("ada", ada)).get("/healthz");
+        EXPECT_EQ(reply.status, 503);
+        EXPECT_NE(reply.body.find("all 2 connections of server.remote"), std::string::npos);
+    }
+    int status = 0;
+    for (int i = 0; i < 1000 && status != 200; ++i)
+        status = Client(remote("ada", ada)).get("/healthz").status;
+    EXPECT_EQ(status, 200) << "their places are free again";
 }
 
 TEST_F(Access, ManyCommandsAreTooManyButAStopNeverIs) {
