@@ -150,14 +150,6 @@ Role role_named(const std::string& name) noexcept {
     return Role::none;
 }
 
-bool TokenBucket::take(std::chrono::steady_clock::time_point now) {
-    left_ = std::min(burst_, left_ + per_s_ * std::chrono::duration<double>(now - last_).count());
-    last_ = now;
-    if (left_ < 1) return false;
-    left_ -= 1;
-    return true;
-}
-
 std::uint64_t parse_count(std::string_view name, std::string_view text) {
     std::uint64_t value = 0;
     const char* end = text.data() + text.size();
@@ -260,11 +252,20 @@ void Api::turned_away(const Caller& caller, const std::string& why, TokenBucket&
 ApiAnswer Api::turn_away(const ApiRequest& request, std::string_view path, const Caller& caller) {
     const std::string why =
         "the certificate names no role: its organisational unit is none of viewer, operator, admin";
+    return refuse(403, caller, std::string(request.method) + ' ' + in_quotes(path), why);
+}
+
+ApiAnswer Api::refuse(int status, const Caller& caller, const std::string& what,
+                      const std::string& why) {
     ++traffic.refused;
-    // What is told of is limited: a flood must not drown the events.
-    if (commands_.take(std::chrono::steady_clock::now()))
-        source_.refused(caller.identity, std::string(request.method) + ' ' + in_quotes(path), why);
-    return problem(403, why);
+    const auto now = std::chrono::steady_clock::now();
+    if (TokenBucket& told = told_.of(caller.identity, now); told.take(now)) {
+        const std::uint64_t missed = told.missed();
+        source_.refused(
+            caller.identity, what,
+            missed == 0 ? why : why + "; before that " + std::to_string(missed) + " more");
+    }
+    return problem(status, why);
 }
 
 ApiAnswer Api::get(std::string_view path, std::string_view query) {
@@ -305,37 +306,32 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
 }
 
 ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
-    const bool in_time = commands_.take(std::chrono::steady_clock::now());
-    const auto refuse = [&](int status, const std::string& what, const std::string& why) {
-        ++traffic.refused;
-        if (!in_time) return problem(429, "more than 10 commands a second");
-        source_.refused(caller.identity, what, why);
-        return problem(status, why);
-    };
     // A page of another origin can send anything but this type without asking first.
     if ((!request.content_type.empty() || caller.browser) && !is_json(request.content_type)) {
-        return refuse(415, "a command",
+        return refuse(415, caller, "a command",
                       "Content-Type: found " + in_quotes(request.content_type) +
                           ", expected application/json");
     }
     if (depth_of(request.body) > kDeepestBody) {
-        return refuse(400, "a command",
+        return refuse(400, caller, "a command",
                       "body: JSON nested deeper than " + std::to_string(kDeepestBody) + " levels");
     }
     CommandRequest parsed;
     try {
         parsed = parse_command(request.body);
     } catch (const std::invalid_argument& error) {
-        return refuse(400, "a command", error.what());
+        return refuse(400, caller, "a command", error.what());
     }
     const std::string what = std::string(word_of(parsed.kind)) + " by " + parsed.by;
     if (caller.role < Role::operate) {
-        return refuse(403, what,
+        return refuse(403, caller, what,
                       std::string("commands take an operator; this connection is a ") +
                           name_of(caller.role) + "'s: " + caller.identity);
     }
     // A stop is never one too many.
-    if (!in_time && parsed.kind != CommandRequest::Kind::abort) {
+    const auto now = std::chrono::steady_clock::now();
+    if (parsed.kind != CommandRequest::Kind::abort &&
+        !commands_.of(caller.identity, now).take(now)) {
         ++traffic.refused;
         return problem(429, "more than 10 commands a second");
     }

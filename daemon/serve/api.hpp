@@ -1,11 +1,10 @@
 #pragma once
 
-#include <array>
-#include <chrono>
 #include <string>
 #include <string_view>
 
 #include "daemon/serve/caller.hpp"
+#include "daemon/serve/rate_limit.hpp"
 #include "daemon/serve/stream_feed.hpp"
 #include "daemon/status.hpp"
 
@@ -28,17 +27,6 @@ struct ApiAnswer {
     std::string allow;       ///< for 405: the methods that would do
     bool is_page = false;    ///< part of the live page: a browser may show it
     bool try_later = false;  ///< for 429 and 503
-};
-
-/// So many a second on average, a burst at once.
-class TokenBucket {
-  public:
-    TokenBucket(double per_s, double burst) : per_s_(per_s), burst_(burst), left_(burst) {}
-    [[nodiscard]] bool take(std::chrono::steady_clock::time_point now);
-
-  private:
-    double per_s_, burst_, left_;
-    std::chrono::steady_clock::time_point last_{};
 };
 
 /// What each path answers, whatever carries it. Server thread only.
@@ -70,11 +58,15 @@ class Api {
     /// One whose certificate names no role.
     ApiAnswer turn_away(const ApiRequest& request, std::string_view path, const Caller& caller);
     ApiAnswer command(const ApiRequest& request, const Caller& caller);
+    /// What is told of is limited: a flood must not drown the events.
+    ApiAnswer refuse(int status, const Caller& caller, const std::string& what,
+                     const std::string& why);
 
     StatusSource& source_;
     std::string instance_;
     StreamFeed feed_;
-    TokenBucket commands_{10, 50};
+    TokenBuckets commands_{10, 50};
+    TokenBuckets told_{0.1, 20};  ///< refusals that are told of
 };
 
 /// The value of `name` in "a=1&b=2"; empty: it is not there.

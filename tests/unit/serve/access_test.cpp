@@ -348,6 +348,31 @@ TEST_F(Access, ManyCommandsAreTooManyButAStopNeverIs) {
     EXPECT_GE(taken, 25) << "a burst is fine";
 }
 
+TEST_F(Access, NobodyUsesUpAnothersCommands) {
+    server.emplace(source, settings);
+    server->answer();
+    // GIVEN a flood from the page, which may not command, and one from an operator
+    const std::string page = without_scheme(server->page_address());
+    const std::string body = body_for("arm");
+    const RawConnection browser(page);
+    for (int i = 0; i < 200; ++i) {
+        browser.send("POST /api/v1/commands HTTP/1.1\r\nHost: " + page +
+                     "\r\nContent-Type: application/json\r\nContent-Length: " +
+                     std::to_string(body.size()) + "\r\n\r\n" + body);
+        ASSERT_EQ(status_of(browser.answer()), 403) << i;
+    }
+    // THEN it is told of, but does not drown the events
+    EXPECT_GE(source.refusals().size(), 10u);
+    EXPECT_LE(source.refusals().size(), 50u);
+    Client local(settings.socket);
+    int status = 0;
+    for (int i = 0; i < 2000 && status != 429; ++i)
+        status = local.post("/api/v1/commands", body_for("pause")).status;
+    EXPECT_EQ(status, 429);
+    // WHEN another operator commands THEN nothing of that is hers
+    EXPECT_EQ(Client(remote("ada", person("operator"))).post("/api/v1/commands", body).status, 200);
+}
+
 TEST_F(Access, SettingsThatCannotBeAreRefusedByName) {
     struct Row {
         std::string ServerSettings::*field;
