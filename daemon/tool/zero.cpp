@@ -195,7 +195,10 @@ int run_file(const Options& options) {
     if (options.file.empty()) {
         throw std::invalid_argument("zero: FILE or `simulate` expected");
     }
-    zeros::Calibration calibration(settings_of(options));
+    zeros::CalibrationSettings settings = settings_of(options);
+    // Of a file the reference is zero: how still the unit may have stood, not a measured noise.
+    settings.noise.reference_is_bound = true;
+    zeros::Calibration calibration(settings);
     Progress progress("reading " + options.file);
     const auto show = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
     std::array<ColumnFile, 6> columns;

@@ -208,8 +208,8 @@ struct Calibration::Impl {
             level, kAxisNames[static_cast<std::size_t>(worst)], now_s, settings.vibration_limit_g));
     }
 
-    [[nodiscard]] bool outside(const InnovationStatistic& v) const {
-        return v.mean_nis > v.high || (v.mean_nis < v.low && !settings.noise.reference_is_bound);
+    [[nodiscard]] static bool outside(const InnovationStatistic& v) {
+        return v.mean_nis > v.high || v.mean_nis < v.low;
     }
 
     void account(const ZeroFilter::Innovation& found) {
@@ -219,7 +219,7 @@ struct Calibration::Impl {
         const double n = static_cast<double>(kBlock);
         constexpr double k999 = 3.2905;
         innovation.mean_nis = nis_sum / n;
-        innovation.low = chi_square(6 * n, -k999) / n;
+        innovation.low = settings.noise.reference_is_bound ? 0 : chi_square(6 * n, -k999) / n;
         innovation.high = chi_square(6 * n, k999) / n;
         ++innovation.blocks;
         if (outside(innovation)) ++innovation.outside;

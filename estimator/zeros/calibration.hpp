@@ -67,9 +67,9 @@ struct AxisResult {
 };
 
 struct InnovationStatistic {
-    double mean_nis = 0;  ///< of the last whole block of 60 updates, 6 when consistent
-    double low = 0, high = 0;
-    std::size_t blocks = 0, outside = 0;        ///< with a bound for a reference: above only
+    double mean_nis = 0;       ///< of the last whole block of 60 updates, 6 when consistent
+    double low = 0, high = 0;  ///< band of the mean; low is 0 where the reference is a bound
+    std::size_t blocks = 0, outside = 0;
     Triple velocity_ratio{}, position_ratio{};  ///< of squares to expected squares, last block
 };
 
