@@ -328,10 +328,12 @@ void Daemon::take_commands(Time now) {
             waiting.reply.set_value(alarm);
             continue;
         }
-        if (waiting.request.kind == CommandRequest::Kind::arm) tell_overdue();
+        std::string overdue;
+        if (waiting.request.kind == CommandRequest::Kind::arm) overdue = tell_overdue();
         const auto unknown = unknown_to_acknowledge(waiting.request);
-        const auto reply = unknown.empty() ? campaign_.command(waiting.request, now)
-                                           : CommandReply{false, unknown};
+        auto reply = unknown.empty() ? campaign_.command(waiting.request, now)
+                                     : CommandReply{false, unknown};
+        if (reply.accepted) reply.message += overdue;
         if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
             interlock_.acknowledge(handled);
         }

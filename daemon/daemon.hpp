@@ -118,7 +118,8 @@ class Daemon final : public StatusSource {
     /// The bus, by way of the recorder if there is one.
     [[nodiscard]] drivers::CanPort& sending_port() noexcept;
     void record_begin(const std::string& by, std::size_t dwells_before);
-    void tell_overdue();  ///< instruments whose certificate has run out
+    /// Instruments whose certificate has run out, for whoever arms.
+    std::string tell_overdue();
     void record_dwell(const estimator::DwellSummary& summary);
     void offer_unfinished(journal::Unfinished& campaign);
     [[nodiscard]] std::string resume_gate() const;

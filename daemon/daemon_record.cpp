@@ -39,15 +39,18 @@ std::string plan_json(const campaign::Settings& settings) {
 
 }  // namespace
 
-void Daemon::tell_overdue() {
+std::string Daemon::tell_overdue() {
+    std::string told;
     const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
     const std::string day = fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
     for (const auto& instrument : configuration_.paperwork.instruments) {
-        if (instrument.overdue(day))
-            log(Severity::warning, "paperwork",
-                fmt::format("{} {}: certificate {} was due on {}", instrument.name,
-                            instrument.serial, instrument.certificate, instrument.due));
+        if (!instrument.overdue(day)) continue;
+        const auto words = fmt::format("{} {}: certificate {} was due on {}", instrument.name,
+                                       instrument.serial, instrument.certificate, instrument.due);
+        log(Severity::warning, "paperwork", words);
+        told += "; warning: " + words;
     }
+    return told;
 }
 
 drivers::CanPort& Daemon::sending_port() noexcept {

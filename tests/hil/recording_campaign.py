@@ -62,6 +62,7 @@ def begin(checks, rig):
     armed, started = rig.tool("arm", "--by", "test"), rig.tool("start", "--by", "test")
     checks.check(armed.returncode == 0 and started.returncode == 0, "a campaign starts",
                  armed.stderr + started.stderr + rig.logs())
+    return armed.stdout + armed.stderr
 
 
 def folders(rig):
@@ -206,10 +207,12 @@ def played(checks, rig, folder):
 
 
 def complete(checks, rig):
-    begin(checks, rig)
+    armed = begin(checks, rig)
     said = rig.tool("events").stdout
     checks.check("shaker controller S-1: certificate C-77 was due on 2020-01-31" in said and "resolver box" not in said,
-                 "an overdue instrument is told when somebody arms", said)
+                 "an overdue instrument is an event when somebody arms", said)
+    checks.check("shaker controller S-1: certificate C-77 was due on 2020-01-31" in armed and "resolver box" not in armed,
+                 "and told to whoever arms", armed)
     status = rig.wait_for_state(("finished",), 120)
     checks.equal(r.state_of(status), "finished", "a campaign finishes")
     status = rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
