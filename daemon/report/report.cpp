@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <numbers>
 
@@ -50,6 +51,18 @@ std::string position_text(const Campaign& campaign, const record::RecordedDwell&
     return text;
 }
 
+record::Paperwork paperwork_of(const Campaign& campaign) {
+    return configuration::parse(record::identification_sections(campaign.head.configuration),
+                                "configuration in " + campaign.path, false)
+        .configuration.paperwork;
+}
+
+std::string or_dash(const std::string& text) { return text.empty() ? "not stated" : text; }
+
+std::string unit_text(const record::Paperwork& unit) {
+    return or_dash(unit.unit_type) + ", serial number " + or_dash(unit.unit_serial);
+}
+
 void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
     const auto& head = campaign.head;
     const auto observable =
@@ -61,14 +74,10 @@ void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
         head.name, utc_text(head.utc_ns), campaign.state, a.replayed.dwells.size(),
         campaign.samples.size(), observable));
     page.section("campaign", "Campaign");
-    const auto loaded = configuration::parse(record::identification_sections(head.configuration),
-                                             "configuration in " + campaign.path, false);
-    const auto& unit = loaded.configuration.paperwork;
-    const auto or_dash = [](const std::string& text) { return text.empty() ? "not stated" : text; };
+    const auto unit = paperwork_of(campaign);
     std::vector<std::vector<std::string>> rows{
         {"", ""},
-        {"Unit under test",
-         or_dash(unit.unit_type) + ", serial number " + or_dash(unit.unit_serial)},
+        {"Unit under test", unit_text(unit)},
         {"Operator", or_dash(head.started_by)},
         {"Started", utc_text(head.utc_ns)},
         {"Ended", campaign.ended_utc_ns > 0 ? utc_text(campaign.ended_utc_ns) : "not closed"},
@@ -488,9 +497,14 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
         page.paragraph("None was given (--compare CAMPAIGN).");
     } else {
         page.paragraph(
-            fmt::format("{} of {}. E_n is the difference over the root of the sum of the "
+            fmt::format("{} of {}, unit {}. E_n is the difference over the root of the sum of the "
                         "squared 95 % uncertainties (ISO 13528); up to 1 agrees.",
-                        earlier->name, earlier->when));
+                        earlier->name, earlier->when, unit_text(earlier->paperwork)));
+        if (const auto unit = paperwork_of(campaign);
+            unit.unit_type != earlier->paperwork.unit_type ||
+            unit.unit_serial != earlier->paperwork.unit_serial)
+            page.paragraph("Warning: this is another unit than that of this campaign, " +
+                           unit_text(unit) + ".");
         std::vector<std::vector<std::string>> rows{
             {"coefficient", "now", "earlier", "difference", "unit", "E_n"}};
         double square = 0;
@@ -509,13 +523,16 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
                             estimator::parameter_unit(i),
                             (std::abs(score) > 1 ? "!" : "") + num(score, 2)});
         }
-        page.table(rows);
-        if (count > 0)
+        if (count == 0)
+            page.paragraph("Nothing is comparable: no coefficient is determined by both.");
+        if (count > 0) {
+            page.table(rows);
             page.paragraph(
                 fmt::format("Repeatability: differences are {:.2f} of their expected "
                             "standard deviations, root mean square; {} of {} beyond E_n = "
                             "1, where 5 % are expected.",
                             std::sqrt(square / static_cast<double>(count)), apart, count));
+        }
     }
 
     page.section("events", "Events");
@@ -544,6 +561,16 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
 std::string utc_text(std::int64_t utc_ns) {
     return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
                        fmt::gmtime(static_cast<std::time_t>(utc_ns / drivers::kSecond)));
+}
+
+Earlier earlier_of(const Campaign& earlier, const Campaign& now) {
+    std::error_code error;
+    if (std::filesystem::equivalent(earlier.path, now.path, error) ||
+        (earlier.head.campaign == now.head.campaign && earlier.head.utc_ns == now.head.utc_ns))
+        throw std::runtime_error(earlier.path +
+                                 ": found the campaign itself, expected another one to compare");
+    return {earlier.path, earlier.head.name, utc_text(earlier.head.utc_ns), paperwork_of(earlier),
+            final_coefficients(earlier.path, earlier.dwells)};
 }
 
 std::string make_page(const Campaign& campaign, const Analysis& analysis,

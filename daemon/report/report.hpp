@@ -10,8 +10,12 @@ namespace vibrig::report {
 /// Another campaign of the same unit.
 struct Earlier {
     std::string path, name, when;
+    record::Paperwork paperwork;
     Coefficients coefficients;
 };
+
+/// Of a recorded campaign; throws for the campaign that it is to be compared with itself.
+[[nodiscard]] Earlier earlier_of(const record::Campaign& earlier, const record::Campaign& now);
 
 /// One page that needs nothing else: HTML with its plots as inline SVG, light and dark, for print
 /// too.

@@ -87,9 +87,8 @@ int make_report(const ReportArguments& arguments) {
     const auto settings = report_settings(campaign, arguments.config);
     std::optional<report::Earlier> earlier;
     if (!arguments.compare.empty()) {
-        const auto other = read_named_campaign(arguments.compare);
-        earlier = {other.path, other.head.name, report::utc_text(other.head.utc_ns),
-                   report::final_coefficients(other.path, other.dwells)};
+        earlier = report::earlier_of(read_named_campaign(arguments.compare), campaign);
+        std::cerr << "compared with " << earlier->path << " of " << earlier->when << '\n';
     }
     report::Analysis analysis;
     {

@@ -268,7 +268,7 @@ def changed(checks, rig, path):
                  and "are not as recorded" in run.stderr and "expected the same" in run.stderr,
                  "a changed sample shows in the replay", run.stdout[-300:] + run.stderr)
     with h5py().File(other, "r+") as file:
-        file.attrs["compiler"] = "another"
+        file.attrs.create("compiler", b"another", dtype="S7")
     run = offline(rig, "replay", other, "--json")
     checks.check(json.loads(run.stdout).get("replay", {}).get("same_build") is False and "expected the same" not in run.stderr and
                  "recorded by" in run.stderr, "of another build it is said so", run.stderr)
@@ -398,7 +398,12 @@ def wrong_input(checks, rig, path):
 
 
 def report(checks, rig, folder):
-    made = offline(rig, "report", folder, "-o", "x.html", "--compare", folder)
+    itself = offline(rig, "report", folder, "-o", "itself.html", "--compare", os.path.join(folder, "campaign.h5"))
+    checks.check(itself.returncode == 2 and "found the campaign itself" in itself.stderr, "not compared with itself", itself.stderr)
+    with h5py().File(shutil.copy(os.path.join(folder, "campaign.h5"), os.path.join(rig.folder, "earlier.h5")), "r+") as file:
+        file.attrs.modify("started_utc_ns", file.attrs["started_utc_ns"] - 86400 * 10**9)
+        file["configuration"][()] = file["configuration"][()].replace(b'"0017"', b'"0018"')
+    made = offline(rig, "report", folder, "-o", "x.html", "--compare", "earlier.h5")
     checks.equal(made.returncode, 0, "a report is written", )
     with open(os.path.join(rig.folder, "x.html"), encoding="utf-8") as file:
         page = file.read()
@@ -406,7 +411,8 @@ def report(checks, rig, folder):
         digest = hashlib.sha256(file.read()).hexdigest()
     for what, words in (("unit under test", "GP-3, serial number 0017"), ("overdue instrument", "overdue at the time"),
                         ("hash of the recording", digest), ("plan", "has rank 6 of 10"), ("replay", "as recorded, to the last bit"),
-                        ("comparison", "Repeatability")):
+                        ("comparison", "Repeatability"), ("earlier unit", "GP-3, serial number 0018"),
+                        ("warning of another unit", "Warning: this is another unit")):
         checks.check(words in page, f"the report has its {what}")
     foreign = re.findall(r"(?:src|href)=\"(?!#)[^\"]*\"|https?://(?!www.w3.org/2000/svg)\S+", page)
     checks.equal(foreign, [], "it needs nothing else")
