@@ -14,6 +14,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@
 #include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
+#include "proto/text.hpp"
 
 namespace vibrig::tool {
 
@@ -39,8 +41,8 @@ struct ReportArguments {
 
 struct CompensateArguments {
     std::string campaign, format = "text", output, config;
+    std::optional<std::string> platform_g, table_g;  ///< as given
     std::vector<double> attitude;
-    double platform_g = -1, table_g = -1;
 };
 
 std::string filled_in(const char* format, auto... values) {
@@ -124,7 +126,7 @@ Json prediction_json(const report::Prediction& predicted, const CompensateArgume
 }
 
 std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
-                              const Json& prediction) {
+                              const estimator::Settings& settings, const Json& prediction) {
     Json root;
     root["campaign"] = campaign.head.name;
     root["started"] = report::utc_text(campaign.head.utc_ns);
@@ -141,12 +143,49 @@ std::string coefficients_json(const record::Campaign& campaign, const report::Co
                         {"unit", estimator::parameter_unit(i)}});
     }
     root["coefficients"] = std::move(list);
+    for (std::size_t g = 0; g < 3; ++g) {
+        Json axes = Json::array();
+        for (const auto& axis : settings.gyro_axes[g])
+            axes.push_back(filled_in("%c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]));
+        root["axes"][filled_in("gyro_%c", "xyz"[g])] = std::move(axes);
+    }
+    root["drift_sign"] = settings.drift_sign;
     root["prediction"] = prediction;
     return root.dump(2) + "\n";
 }
 
-std::string coefficients_csv(const report::Coefficients& c) {
-    std::string text = "name,value,sigma,unit\n";
+std::string axes_line(const estimator::Settings& settings) {
+    std::string text = "input, output, spin axis (I, O, S) in platform axes:";
+    for (std::size_t g = 0; g < 3; ++g) {
+        text += filled_in("%s gyro %c", g == 0 ? "" : ",", "xyz"[g]);
+        for (const auto& axis : settings.gyro_axes[g])
+            text += filled_in(" %c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]);
+    }
+    return text + filled_in("; drift sign %+d", settings.drift_sign);
+}
+
+/// For comments: what the numbers refer to, and what they predict.
+std::vector<std::string> comment_lines(const estimator::Settings& settings,
+                                       const report::Prediction& predicted,
+                                       const CompensateArguments& arguments, double kappa) {
+    std::vector<std::string> lines{
+        axes_line(settings),
+        filled_in("predicted at %g, %g, %g deg with %.4g g peak at the platform, deg/h:",
+                  arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                  std::sqrt(2 * (kappa - 1)))};
+    for (std::size_t k = 0; k < 3; ++k)
+        lines.push_back(
+            filled_in("gyro %c: drift %.6f, left after compensation 0 +- %.6f (1 sigma)%s",
+                      "xyz"[k], predicted.drift_dph[k], predicted.residual_dph[k],
+                      predicted.determined[k] ? "" : ", rests on what is not determined"));
+    return lines;
+}
+
+std::string coefficients_csv(const report::Coefficients& c,
+                             const std::vector<std::string>& comments) {
+    std::string text;
+    for (const auto& line : comments) text += "# " + line + "\n";
+    text += "name,value,sigma,unit\n";
     for (std::size_t i = 0; i < kParameters; ++i) {
         text += estimator::parameter_names()[i];
         text += c.observable[i] ? filled_in(",%.17g,%.17g,", c.value[i], c.sigma[i])
@@ -156,7 +195,8 @@ std::string coefficients_csv(const report::Coefficients& c) {
     return text;
 }
 
-std::string coefficients_header(const record::Campaign& campaign, const report::Coefficients& c) {
+std::string coefficients_header(const record::Campaign& campaign, const report::Coefficients& c,
+                                const std::vector<std::string>& comments) {
     // A name in a comment must not end it.
     std::string name;
     for (const char ch : campaign.head.name)
@@ -166,8 +206,9 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
                        ".\n * deg/h, deg/h/g, deg/h/g^2. Drift about the input axis of a gyro:\n"
                        " *   D = c[0] + c[1] aI + c[2] aO + c[3] aS + c[4] aI^2 + c[5] aO^2 + c[6] "
                        "aS^2\n *       + c[7] aI aO + c[8] aI aS + c[9] aO aS\n"
-                       " * with a the specific force along input, output and spin axis, g.\n */\n"
-                       "#ifndef VIBRIG_COEFFICIENTS_H\n#define VIBRIG_COEFFICIENTS_H\n\n";
+                       " * with a the specific force along input, output and spin axis, g.\n";
+    for (const auto& line : comments) text += " * " + line + "\n";
+    text += " */\n#ifndef VIBRIG_COEFFICIENTS_H\n#define VIBRIG_COEFFICIENTS_H\n\n";
     for (const bool sigma : {false, true}) {
         text += std::string("static const double vibrig_coefficient") + (sigma ? "_sigma" : "") +
                 "[3][10] = {\n";
@@ -183,7 +224,8 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
     return text + "\n#endif\n";
 }
 
-std::string coefficients_text(const report::Coefficients& c, const report::Prediction& predicted,
+std::string coefficients_text(const report::Coefficients& c, const std::string& axes,
+                              const report::Prediction& predicted,
                               const CompensateArguments& arguments, double kappa) {
     std::string text = filled_in("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
     for (std::size_t i = 0; i < kParameters; ++i) {
@@ -193,6 +235,7 @@ std::string coefficients_text(const report::Coefficients& c, const report::Predi
                     : filled_in("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
                                 "not determined", "-", estimator::parameter_unit(i));
     }
+    text += "\n" + axes + "\n";
     text += filled_in("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
                       arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
                       std::sqrt(2 * (kappa - 1)));
@@ -204,8 +247,28 @@ std::string coefficients_text(const report::Coefficients& c, const report::Predi
     return text;
 }
 
+/// Peak acceleration of an option, g.
+double level_of(const char* option, const std::string& text) {
+    double level = 0;
+    if (!proto::read_number(std::string_view(text), level) || !(level >= 0) || !(level <= 1000))
+        throw std::runtime_error(std::string(option) + ": found '" + proto::printable(text) +
+                                 "', expected 0 to 1000 g");
+    return level;
+}
+
+void check_finite(const std::string& path, const report::Coefficients& c) {
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (const double number : {c.value[i], c.sigma[i]}) {
+            if (c.observable[i] && !std::isfinite(number))
+                throw std::runtime_error(path + ": " + estimator::parameter_names()[i] +
+                                         ": found " + filled_in("%g", number) +
+                                         ", expected a finite number");
+        }
+    }
+}
+
 int compensate(CompensateArguments arguments) {
-    if (arguments.platform_g >= 0 && arguments.table_g >= 0)
+    if (arguments.platform_g && arguments.table_g)
         throw std::runtime_error("--table-g: found it beside --platform-g, expected one of them");
     if (arguments.attitude.empty()) arguments.attitude = {0, 0, 0};
     for (const double angle : arguments.attitude) {
@@ -213,11 +276,9 @@ int compensate(CompensateArguments arguments) {
             throw std::runtime_error("--attitude: found " + filled_in("%g", angle) +
                                      ", expected -360 to 360 deg");
     }
-    for (const double level : {arguments.platform_g, arguments.table_g}) {
-        if (!std::isfinite(level) || level > 1000)
-            throw std::runtime_error("vibration: found " + filled_in("%g", level) +
-                                     " g, expected 0 to 1000 g");
-    }
+    double level = 0;
+    if (arguments.platform_g) level = level_of("--platform-g", *arguments.platform_g);
+    if (arguments.table_g) level = level_of("--table-g", *arguments.table_g);
     keep_recordings(arguments.output);
     auto campaign = read_named_campaign(arguments.campaign);
     if (!arguments.config.empty()) record::forget_noise(campaign);
@@ -229,8 +290,8 @@ int compensate(CompensateArguments arguments) {
         const auto replayed = record::replay(campaign, settings, {});
         coefficients = report::final_coefficients(campaign.path, replayed.dwells);
     }
-    double level = std::max(0.0, arguments.platform_g);
-    if (arguments.table_g >= 0) level = arguments.table_g * settings.transmission;
+    check_finite(campaign.path, coefficients);
+    if (arguments.table_g) level *= settings.transmission;
     const double kappa = 1 + level * level / 2;
     const auto predicted = report::predict(
         settings, coefficients,
@@ -241,12 +302,14 @@ int compensate(CompensateArguments arguments) {
             campaign.path +
             ": found coefficients that are not determined, expected all 30 for "
             "a C header");
+    const auto comments = comment_lines(settings, predicted, arguments, kappa);
     const std::string text =
-        arguments.format == "json"  ? coefficients_json(campaign, coefficients,
+        arguments.format == "json"  ? coefficients_json(campaign, coefficients, settings,
                                                         prediction_json(predicted, arguments, kappa))
-        : arguments.format == "csv" ? coefficients_csv(coefficients)
-        : arguments.format == "c"   ? coefficients_header(campaign, coefficients)
-                                    : coefficients_text(coefficients, predicted, arguments, kappa);
+        : arguments.format == "csv" ? coefficients_csv(coefficients, comments)
+        : arguments.format == "c"
+            ? coefficients_header(campaign, coefficients, comments)
+            : coefficients_text(coefficients, axes_line(settings), predicted, arguments, kappa);
     if (arguments.output.empty()) {
         std::cout << text << std::flush;
     } else {
@@ -290,9 +353,10 @@ void add_reports(CLI::App& app, int& exit_code) {
                      "outer, inner, azimuth in deg at which the drift is predicted (default 0,0,0)")
         ->delimiter(',')
         ->expected(3);
+    // As text: CLI11 takes an empty one for 0.
     compensating->add_option("--platform-g", compensation->platform_g,
-                             "vibration, peak at the platform (default 0)");
-    compensating->add_option("--table-g", compensation->table_g, "or peak at the table");
+                             "vibration, peak at the platform, g (default 0)");
+    compensating->add_option("--table-g", compensation->table_g, "or peak at the table, g");
     compensating->add_option("--config", compensation->config,
                              "identify anew with these settings instead of the recorded ones");
     compensating->footer(

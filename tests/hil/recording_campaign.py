@@ -397,6 +397,19 @@ def wrong_input(checks, rig, path):
     checks.check(True, "empty, truncated and foreign files: one clear message each")
 
 
+def determined(rig, folder, value):
+    """A copy of the recording that says of its last dwell that all coefficients are determined; the value of one."""
+    path = shutil.copy(os.path.join(folder, "campaign.h5"), os.path.join(rig.folder, "determined.h5"))
+    with h5py().File(path, "r+") as file:
+        last = len(file["dwells/run"]) - 1
+        file["dwells/observable"][last] = 1
+        for name in ("value", "sigma"):
+            numbers = file["dwells/" + name]
+            numbers[last] = [0.5 if math.isnan(x) else x for x in numbers[last]]
+        file["dwells/value"][last, 7] = value
+    return path
+
+
 def report(checks, rig, folder):
     itself = offline(rig, "report", folder, "-o", "itself.html", "--compare", os.path.join(folder, "campaign.h5"))
     checks.check(itself.returncode == 2 and "found the campaign itself" in itself.stderr, "not compared with itself", itself.stderr)
@@ -418,8 +431,25 @@ def report(checks, rig, folder):
     checks.equal(foreign, [], "it needs nothing else")
     table = json.loads(offline(rig, "compensate", folder, "--json", "--attitude", "0,0,0").stdout)
     checks.equal(len(table["coefficients"]), 30, "compensate gives the table of coefficients")
+    rows = offline(rig, "compensate", folder, "--to", "csv", "--attitude", "45,0,90", "--table-g", "9").stdout.splitlines()
+    comments = [row for row in rows if row.startswith("# ")]
+    checks.check(any("gyro x +x +y +z" in row and "drift sign -1" in row for row in comments) and
+                 any("at 45, 0, 90 deg with 6 g peak" in row for row in comments) and
+                 len([row for row in comments if "1 sigma" in row]) == 3 and len(rows) == len(comments) + 31,
+                 "as CSV it says the axes and what is predicted", "\n".join(rows[:8]))
+    header = offline(rig, "compensate", determined(rig, folder, 0.5), "--to", "c", "--attitude", "45,0,90", "--table-g", "9")
+    compiled = subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-Wno-unused-variable", "-x", "c", "-fsyntax-only", "-"],
+                              input=header.stdout, capture_output=True, text=True)
+    checks.check(header.returncode == compiled.returncode == 0 and "drift sign -1" in header.stdout and
+                 "at 45, 0, 90 deg with 6 g peak" in header.stdout, "so does the C header", header.stderr + compiled.stderr)
+    for to in ("c", "csv", "json", "text"):
+        run = offline(rig, "compensate", determined(rig, folder, math.nan), "--to", to)
+        checks.check(run.returncode == 2 and "found nan, expected a finite number" in run.stderr,
+                     f"to {to}: what is not finite is refused", f"status {run.returncode} {run.stdout[:300]} {run.stderr}")
     for arguments in (("replay", "nowhere"), ("export", folder, "--to", "pdf"), ("report", "/dev/null"),
-                      ("compensate", folder, "--attitude", "nan,0,0"), ("replay", folder, "--speed", "-1")):
+                      ("compensate", folder, "--attitude", "nan,0,0"), ("compensate", folder, "--table-g", "-1"),
+                      ("compensate", folder, "--table-g", ""), ("compensate", folder, "--platform-g", "-2"),
+                      ("compensate", folder, "--platform-g", "nan"), ("replay", folder, "--speed", "-1")):
         run = offline(rig, *arguments)
         checks.check(run.returncode == 2 and run.stderr.strip(), "refused: " + arguments[0] + " " + arguments[-1],
                      f"status {run.returncode} {run.stderr}")
