@@ -130,6 +130,12 @@ int depth_of(std::string_view json) {
     return deepest;
 }
 
+/// "GET '/path'"
+std::string asked_by(const ApiRequest& request) {
+    return std::string(request.method) + ' ' +
+           in_quotes(request.target.substr(0, request.target.find('?')));
+}
+
 const char* word_of(CommandRequest::Kind kind) {
     constexpr std::array<const char*, 7> kNames{"arm",   "start",       "pause",   "resume",
                                                 "abort", "acknowledge", "selftest"};
@@ -190,14 +196,16 @@ ApiAnswer Api::check_browser(const ApiRequest& request, const Caller& caller) {
         const std::string port = caller.host.substr(caller.host.rfind(':'));
         if (request.host != caller.host && request.host != "localhost" + port &&
             request.host != "127.0.0.1" + port && request.host != "[::1]" + port) {
-            return problem(421, "Host: found " + in_quotes(request.host) + ", expected " +
-                                    in_quotes(caller.host));
+            return refuse(
+                421, caller, asked_by(request),
+                "Host: found " + in_quotes(request.host) + ", expected " + in_quotes(caller.host));
         }
     }
     const std::string own = (caller.encrypted ? "https://" : "http://") + std::string(request.host);
     if (!request.origin.empty() && request.origin != own) {
-        return problem(403, "Origin: found " + in_quotes(request.origin) + ", expected " +
-                                in_quotes(own) + ": other pages are not answered");
+        return refuse(403, caller, asked_by(request),
+                      "Origin: found " + in_quotes(request.origin) + ", expected " +
+                          in_quotes(own) + ": other pages are not answered");
     }
     return {};
 }
@@ -212,7 +220,11 @@ ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
         const std::string_view query =
             request.target.substr(std::min(mark + 1, request.target.size()));
         const bool takes_commands = path == kCommands;
-        if (caller.role == Role::none) return turn_away(request, path, caller);
+        if (caller.role == Role::none) {
+            return refuse(403, caller, asked_by(request),
+                          "the certificate names no role: its organisational unit is none of "
+                          "viewer, operator, admin");
+        }
         if (caller.browser && request.method == "GET") {
             if (const auto* file = page_file(path)) {
                 ApiAnswer page;
@@ -247,12 +259,6 @@ void Api::turned_away(const Caller& caller, const std::string& why, TokenBucket&
     // With TLS it begins with ", from" until there is a certificate.
     const bool nameless = caller.identity.rfind(',', 0) == 0;
     source_.refused((nameless ? "somebody" : "") + caller.identity, "a connection", why);
-}
-
-ApiAnswer Api::turn_away(const ApiRequest& request, std::string_view path, const Caller& caller) {
-    const std::string why =
-        "the certificate names no role: its organisational unit is none of viewer, operator, admin";
-    return refuse(403, caller, std::string(request.method) + ' ' + in_quotes(path), why);
 }
 
 ApiAnswer Api::refuse(int status, const Caller& caller, const std::string& what,
@@ -332,8 +338,7 @@ ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
     const auto now = std::chrono::steady_clock::now();
     if (parsed.kind != CommandRequest::Kind::abort &&
         !commands_.of(caller.identity, now).take(now)) {
-        ++traffic.refused;
-        return problem(429, "more than 10 commands a second");
+        return refuse(429, caller, what, "more than 10 commands a second");
     }
     // The name is what the person says; the rest is what the kernel or a certificate says. The
     // audit line has both.

@@ -37,7 +37,7 @@ class Api {
     /// Never throws for what a client sends; a failing source is a 500.
     [[nodiscard]] ApiAnswer answer(const ApiRequest& request, const Caller& caller);
     /// Why a browser's request is refused before it is looked at; status 200: it is not.
-    [[nodiscard]] static ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
+    [[nodiscard]] ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
 
     /// One who did not get as far as a request; told of while `told` lasts.
     void turned_away(const Caller& caller, const std::string& why, TokenBucket& told);
@@ -55,8 +55,6 @@ class Api {
 
   private:
     ApiAnswer get(std::string_view path, std::string_view query);
-    /// One whose certificate names no role.
-    ApiAnswer turn_away(const ApiRequest& request, std::string_view path, const Caller& caller);
     ApiAnswer command(const ApiRequest& request, const Caller& caller);
     /// What is told of is limited: a flood must not drown the events.
     ApiAnswer refuse(int status, const Caller& caller, const std::string& what,

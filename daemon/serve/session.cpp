@@ -315,7 +315,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
     /// Hands the connection to a Stream; status 200: done.
     ApiAnswer upgrade(const ApiRequest& asked) {
-        if (ApiAnswer refusal = Api::check_browser(asked, caller_); refusal.status != 200)
+        if (ApiAnswer refusal = shared_.api.check_browser(asked, caller_); refusal.status != 200)
             return refusal;
         const std::size_t mark = std::min(asked.target.find('?'), asked.target.size());
         const std::string_view query = asked.target.substr(std::min(mark + 1, asked.target.size()));

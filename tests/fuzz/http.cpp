@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
     FakeSource source;
     Api api(source, "fuzz");
-    const ApiAnswer browser = Api::check_browser(request, caller);
+    const ApiAnswer browser = api.check_browser(request, caller);
     const ApiAnswer answer = api.answer(request, caller);
     if (browser.status < 200 || answer.status < 200 || answer.status > 599) std::abort();
     if (answer.content_type.find("json") != std::string::npos &&

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -276,6 +277,10 @@ TEST_F(Access, StrangersPagesAreNotAnswered) {
     EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + "Origin: http://evil.example\r\n")),
               403);
     EXPECT_EQ(status_of(ask("/api/v1/streams", page, upgrade)), 404);
+    // and who tried it is told of
+    EXPECT_TRUE(told("GET '/' | page, from 127.0.0.1 | Host: found 'evil.example" + port));
+    EXPECT_TRUE(told("GET '/api/v1/status' | page, from 127.0.0.1 | Origin: found 'null'"));
+    EXPECT_TRUE(told("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found 'http://evil"));
     for (const char* wrong : {"rate_hz=x", "rate_hz=21", "after=-1", "after=x", "status=maybe"})
         EXPECT_EQ(status_of(ask(std::string("/api/v1/stream?") + wrong, page, upgrade)), 400)
             << wrong;
@@ -369,6 +374,7 @@ TEST_F(Access, NobodyUsesUpAnothersCommands) {
     for (int i = 0; i < 2000 && status != 429; ++i)
         status = local.post("/api/v1/commands", body_for("pause")).status;
     EXPECT_EQ(status, 429);
+    EXPECT_TRUE(told("pause by Ada | uid " + std::to_string(::getuid()) + " | more than 10"));
     // WHEN another operator commands THEN nothing of that is hers
     EXPECT_EQ(Client(remote("ada", person("operator"))).post("/api/v1/commands", body).status, 200);
 }
