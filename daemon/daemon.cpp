@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "daemon/serve/one_line.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/version.hpp"
 #include "estimator/plan_report.hpp"
@@ -295,14 +296,15 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
     record.time = clock_.now();
     record.severity = severity;
     record.source = source;
-    record.text = text;
+    // Every event comes through here, and much of what they say comes from outside.
+    record.text = serve::one_line(text);
     event_log_.append(record);
     if (journal_) journal_->event(record);
     if (recorder_) recorder_->event(record);
     const auto level = severity == Severity::info      ? spdlog::level::info
                        : severity == Severity::warning ? spdlog::level::warn
                                                        : spdlog::level::err;
-    spdlog::log(level, "{}: {}", source, text);
+    spdlog::log(level, "{}: {}", source, record.text);
 }
 
 bool Daemon::may_feed() const noexcept {

@@ -78,10 +78,8 @@ std::pair<std::string, std::string> AnyStream::peer_subject() const {
         const int size =
             ASN1_STRING_to_UTF8(&text, X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at)));
         if (size < 0) return {};
-        std::string found(text, text + size);
+        const std::string found(text, text + size);
         OPENSSL_free(text);
-        // It goes into one readable line of the audit.
-        for (char& c : found) c = static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? '?' : c;
         return found;
     };
     return {entry(NID_commonName), entry(NID_organizationalUnitName)};

@@ -15,6 +15,8 @@
 #include <sstream>
 #include <utility>
 
+#include "daemon/serve/one_line.hpp"
+
 namespace vibrig::serve {
 namespace {
 
@@ -208,7 +210,9 @@ class Session : public std::enable_shared_from_this<Session> {
             const auto [name, unit] = self->stream_.peer_subject();
             Caller& who = self->caller_;
             who.role = role_named(unit);
-            who.identity = "certificate " + name + ", " + name_of(who.role) + who.identity;
+            // It goes into the audit.
+            who.identity =
+                "certificate " + one_line(name) + ", " + name_of(who.role) + who.identity;
             // Without a place one stays a newcomer until the first request, to be told so.
             self->take_place();
             self->read();

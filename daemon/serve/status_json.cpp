@@ -2,9 +2,9 @@
 
 #include <google/protobuf/util/json_util.h>
 
-#include <algorithm>
 #include <stdexcept>
 
+#include "daemon/serve/one_line.hpp"
 #include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_message.hpp"
 #include "proto/vibrig.pb.h"
@@ -31,8 +31,7 @@ void check_line(const std::string& field, const std::string& text, std::size_t l
         throw std::invalid_argument(field + ": " + std::to_string(text.size()) +
                                     " bytes, expected " + std::to_string(longest) + " at most");
     }
-    const auto control = [](unsigned char c) { return c < 0x20 || c == 0x7F; };
-    if (std::any_of(text.begin(), text.end(), control)) {
+    if (one_line(text) != text) {
         throw std::invalid_argument(field + ": contains a control character, expected one line");
     }
 }

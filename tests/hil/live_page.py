@@ -125,6 +125,21 @@ def check_description(checks, address):
         checks.check(good, f"{method} {path} {json.dumps(headers)} is refused as a problem ({expected})", f"{status} {text[:300]}")
 
 
+def check_injection(checks, rig, address):
+    """What a refused body says stays one line of the log and the events."""
+    body = b'{"kind":"explode\n2026-01-01 faked \x1b[31m\xff","by":"x"}'
+    status, _, _ = get(address, "/api/v1/commands", {"Content-Type": "application/json"}, "POST", body)
+    checks.equal(status, 400, "a command with control characters is refused")
+    # What protobuf says of a name quotes it.
+    body = '{"kind":"abort","by":"x","\\n2026-01-01 faked \\u001b[31m":1}'
+    status, _, _ = get(address, "/api/v1/commands", {"Content-Type": "application/json"}, "POST", body)
+    checks.equal(status, 400, "in a key, too")
+    told = [line for line in rig.daemon.text().split("\n") if "refused a command" in line]
+    told += [line for line in rig.tool("events").stdout.split("\n") if "refused a command" in line]
+    checks.check(len(told) >= 4 and all(c.isprintable() for line in told for c in line), "and told of in one clean line", str(told))
+    checks.check(not any(line.startswith("2026-01-01") for line in rig.daemon.text().split("\n")), "no line is faked", rig.logs())
+
+
 def check_prometheus(checks, address, folder, seen):
     """`seen`: the metrics while a campaign was recording."""
     _, _, text = get(address, "/metrics")
@@ -373,6 +388,7 @@ def main():
             address = page_address(rig)
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
             check_description(checks, address)
+            check_injection(checks, rig, address)
             check_remote(checks, rig, "https://" + remote, folder)
             page = Page()
             seen = check_page(checks, rig, page, address, control, "https://" + remote, pki)

@@ -43,6 +43,10 @@ TEST(Command, IsRefusedWithTheFieldAndWhatWasExpected) {
     EXPECT_NE(error_of(R"({"kind":"arm","by":"   "})").find("by: empty"), std::string::npos);
     EXPECT_NE(error_of(R"({"kind":"arm","by":"A\nfaked line"})").find("control character"),
               std::string::npos);
+    for (const char* c : {"\\u001b", "\\u009b", "\\u2028", "\\u202e"})
+        EXPECT_NE(error_of(std::string(R"({"kind":"arm","by":"A)") + c + "\"}").find("control"),
+                  std::string::npos)
+            << c;
     EXPECT_NE(
         error_of(R"({"kind":"arm","by":")" + std::string(101, 'x') + "\"}").find("by: 101 bytes"),
         std::string::npos);
