@@ -40,6 +40,7 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
             const drivers::Torquer torquer(dbc, settings.level.torquer, port);
             limit = torquer.limit();
             const LevellingStage stage(settings.level, settings.rig, limit);
+            if (auto why = stage.refusal(); !why.empty()) return why;
         }
         if (settings.zeroing) const ZeroingStage stage(settings.zero, settings.rig);
         const rt::StageFeed feed(dbc, stage_feed_settings(settings), nullptr);

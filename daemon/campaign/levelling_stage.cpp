@@ -44,6 +44,19 @@ LevellingStage::LevellingStage(const LevellingSettings& settings, const estimato
       loop_(loop_of(settings, rig, torquer_limit_deg_h)),
       leveller_(loop_) {}
 
+std::string LevellingStage::refusal() const {
+    const level::Leveller loop(loop_);
+    if (loop.verdict() != level::Verdict::cannot_settle) return {};
+    const auto window = loop.window_needed_s();
+    return fmt::format(
+        "levelling.tolerance_arcmin: found {:g}, expected at least {:.3g} with levelling.window_s "
+        "= {:g} and noise.accelerometer_g = {:g} (four times the noise of the mean specific "
+        "force){}",
+        settings_.tolerance_arcmin, loop.tolerance_needed() / level::kArcmin, settings_.window_s,
+        rig_.accelerometer_g,
+        window ? fmt::format(", or levelling.window_s of at least {:.3g}", *window) : "");
+}
+
 void LevellingStage::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
     leveller_.emplace(loop_);
     largest_at_first_ = 0;

@@ -19,6 +19,9 @@ class LevellingStage {
     LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
                    double torquer_limit_deg_h);
 
+    /// Which key of [levelling] cannot work with the noise, what was found and expected; empty:
+    /// none.
+    [[nodiscard]] std::string refusal() const;
     /// `zeros`: of the accelerometers, platform axes.
     void begin(const Vector& encoder_deg, const ZeroStatus& zeros);
     /// Torquing rates in platform axes, deg/h, that answer this mean.

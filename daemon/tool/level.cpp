@@ -11,6 +11,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -132,7 +133,6 @@ plot::Chart response_chart(const Options& options, const levelling::LevellerSett
     start.loop.noise = {};
     start.tilt = {kArcmin, 0};
     start.duration_s = 2 * loop.settling_s;
-    check_samples("--plot", start.duration_s, loop.period_s);
     plot::Curve curve{"sampled loop", {}, {}, {}, {}, plot::Look::line};
     const auto run = levelling::simulate(start);
     const std::size_t every = std::max<std::size_t>(1, run.trace.size() / 1000);
@@ -154,13 +154,32 @@ plot::Chart response_chart(const Options& options, const levelling::LevellerSett
     return chart;
 }
 
+/// Of the start with the largest tilt and drift that the options allow, s.
+std::optional<double> declared_within(const Options& options,
+                                      const levelling::LevellerSettings& loop) {
+    check_samples("--settling", levelling::kPatience * loop.settling_s, loop.period_s);
+    const Pair tilt = pair(options.tilt, kArcmin);
+    const Pair drift = pair(options.drift, kDegPerHour);
+    const Pair zero = pair(options.zero_mg, 1e-3);
+    double most_tilt = 0;
+    double most_drift = 0;
+    for (std::size_t i = 0; i < 2; ++i) {
+        most_tilt = std::max(most_tilt, std::abs(tilt[i]) + std::abs(zero[i]));
+        most_drift =
+            std::max(most_drift, std::abs(drift[i]) +
+                                     std::abs(options.reference_error[i]) / loop.earth.radius_m);
+    }
+    return levelling::declared_within_s(loop, most_tilt + std::abs(options.step) * kArcmin,
+                                        most_drift);
+}
+
 int run_design(const Options& options) {
     const levelling::LevellerSettings loop = settings_of(options);
     const levelling::Leveller leveller(loop);
     const levelling::Gains& gains = loop.fast;
     const double sigma = leveller.sigma();
     const auto roots = levelling::roots(gains, loop.earth);
-    const double declared = loop.settling_s + loop.window_s + 1 / sigma;
+    const auto declared = declared_within(options, loop);
     if (!options.plot.empty()) {
         plot::write_file(options.plot, response_chart(options, loop).svg());
     }
@@ -176,7 +195,7 @@ int run_design(const Options& options) {
                           {"routh",
                            {{"K1_times_1_plus_K2", gains.k1 * (1 + gains.k2)}, {"K3", gains.k3}}},
                           {"longest_period_s", levelling::kMostStep / sigma},
-                          {"declared_within_s", declared},
+                          {"declared_within_s", declared ? Json(*declared) : Json(nullptr)},
                           {"tolerance_arcmin", leveller.tolerance() / kArcmin},
                           {"noise", budget_json(leveller)},
                           {"message", leveller.message()}}
@@ -193,15 +212,22 @@ int run_design(const Options& options) {
                     gains.k3)
             << text("sample period %.4g s, at most %.4g s\n", loop.period_s,
                     levelling::kMostStep / sigma)
-            << text("tolerance %.3g'; declared settled within about %.4g s from a tilt of %.4g'\n",
-                    leveller.tolerance() / kArcmin, declared,
-                    leveller.tolerance() / kArcmin / options.specification.residual)
+            << text(
+                   "tolerance %.3g'; from tilts up to %.4g' and %.4g' with drifts up to %.4g and "
+                   "%.4g deg/h ",
+                   leveller.tolerance() / kArcmin, options.tilt[0], options.tilt[1],
+                   options.drift[0], options.drift[1])
+            << (declared ? text("declared settled within %.4g s (one start in twenty at most is "
+                                "more than 5 %% late)\n",
+                                *declared)
+                         : text("not sure to be declared settled within %.4g s\n",
+                                levelling::kPatience * loop.settling_s))
             << budget_table(leveller);
         if (!leveller.message().empty()) {
             std::cout << "note: " << leveller.message() << '\n';
         }
     }
-    return leveller.verdict() == levelling::Verdict::cannot_settle ? kNo : 0;
+    return declared ? 0 : kNo;
 }
 
 levelling::Scenario scenario_of(const Options& options) {
@@ -269,7 +295,8 @@ int run_many(const Options& options) {
     std::size_t never = 0;
     const levelling::LevellerSettings loop = settings_of(options);
     const levelling::Leveller leveller(loop);
-    const double bound = 1.05 * (loop.settling_s + loop.window_s + 1 / leveller.sigma());
+    const auto declared = declared_within(options, loop);
+    const double bound = declared ? 1.05 * *declared : levelling::kPatience * loop.settling_s;
     std::size_t falsely = 0;
     for (std::size_t n = 0; n < options.runs; ++n) {
         progress.show(n, options.runs);
@@ -306,7 +333,7 @@ int run_many(const Options& options) {
                    ? std::nan("")
                    : times[static_cast<std::size_t>(part * static_cast<double>(times.size() - 1))];
     };
-    const bool good = never == 0 && late == 0 && falsely == 0;
+    const bool good = never == 0 && 20 * late <= options.runs && falsely == 0;
     if (options.json) {
         std::cout << Json{{"runs", options.runs},
                           {"settled", times.size()},
@@ -383,7 +410,16 @@ int run_simulate(const Options& options) {
     return fast && run.settled_s < 0 ? kNo : 0;
 }
 
+constexpr double kRightAngle = 5400;  // arcmin
+
+void add_two(CLI::App& command, const char* name, std::vector<double>& value, double most,
+             const char* help) {
+    command.add_option(name, value, help)->expected(2)->delimiter(',')->check(finite(-most, most));
+}
+
 void add_design_options(CLI::App& command, Options& o) {
+    add_two(command, "--tilt", o.tilt, kRightAngle, "of both channels at first, arcmin (30,-20)");
+    add_two(command, "--drift", o.drift, 1e6, "deg/h (0.1,-0.1)");
     command.add_option("--settling", o.specification.settling_s, "settling time in s (100)")
         ->check(finite(kAboveZero, 1e7));
     command
@@ -402,7 +438,7 @@ void add_design_options(CLI::App& command, Options& o) {
         ->check(finite(kAboveZero, 3600));
     command
         .add_option("--tolerance", o.tolerance,
-                    "arcmin; default the larger of 0.05 and four times the noise")
+                    "arcmin; default the larger of 0.05 and four times the noise of the means")
         ->check(finite(kAboveZero, 300));
     command.add_option("--reference-noise", o.reference_noise, "m/s per sample (0)")
         ->check(finite(0, 1000));
@@ -416,18 +452,8 @@ void add_design_options(CLI::App& command, Options& o) {
 }
 
 void add_simulate_options(CLI::App& command, Options& o) {
-    const auto two = [&](const char* name, std::vector<double>& value, double most,
-                         const char* help) {
-        command.add_option(name, value, help)
-            ->expected(2)
-            ->delimiter(',')
-            ->check(finite(-most, most));
-    };
-    constexpr double kRightAngle = 5400;  // arcmin
-    two("--tilt", o.tilt, kRightAngle, "of both channels at the start, arcmin (30,-20)");
-    two("--drift", o.drift, 1e6, "deg/h (0.1,-0.1)");
-    two("--zero", o.zero_mg, 1000, "of the accelerometers, mg (0,0)");
-    two("--reference-error", o.reference_error, 1000, "constant, m/s (0,0)");
+    add_two(command, "--zero", o.zero_mg, 1000, "of the accelerometers, mg (0,0)");
+    add_two(command, "--reference-error", o.reference_error, 1000, "constant, m/s (0,0)");
     auto* step = command.add_option("--step", o.step, "both channels tip by so much, arcmin")
                      ->check(finite(-kRightAngle, kRightAngle));
     command.add_option("--step-at", o.step_s, "when, s; with --runs at any time")
@@ -449,7 +475,7 @@ void add_simulate_options(CLI::App& command, Options& o) {
     command
         .add_option("--runs", o.runs,
                     "many starts, tilt and drift drawn up to those given; exit 0 if all are "
-                    "declared in time and none falsely")
+                    "declared, 19 of 20 in the time that `level design` says + 5 %, none falsely")
         ->check(CLI::Range(std::size_t{1}, std::size_t{1000000}));
 }
 

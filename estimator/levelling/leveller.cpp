@@ -12,7 +12,6 @@ namespace {
 constexpr double kLeastTolerance = 0.05 * kArcmin;
 constexpr double kLargestTilt = 5 * kPi / 180;
 constexpr int kMissingAllowed = 3;
-constexpr double kPatience = 3;  // settling times
 constexpr double kSureness = 4;  // standard deviations
 
 Gains between(const Gains& a, const Gains& b, double part) noexcept {
@@ -79,20 +78,29 @@ Leveller::Leveller(const LevellerSettings& settings)
       axis_{FastNetwork(settings.earth), FastNetwork(settings.earth)},
       force_{Window(samples(settings)), Window(samples(settings))},
       rate_{Window(samples(settings)), Window(samples(settings))} {
-    if (tolerance_ == 0) {
-        tolerance_ = std::max(kLeastTolerance, kSureness * budget_.total);
-    } else if (tolerance_ < 2 * budget_.total) {
-        // A whole hold time within two standard deviations does not come about.
-        verdict_ = Verdict::cannot_settle;
-        note(Trouble::tolerance_below_noise, 0, tolerance_);
-    }
     const double n = static_cast<double>(samples(settings));
     const double per_w =
         (1 + settings.fast.k2) / (settings.earth.radius_m * sigma_);  // rad per m/s
-    const double of_reference = per_w * settings.noise.reference_mps / std::sqrt(n);
-    const double of_force = per_w * settings.noise.accelerometer_mps2 *
-                            std::sqrt(settings.period_s / (2 * settings.fast.k1));
-    rate_tolerance_ = std::max(tolerance_, kSureness * std::hypot(of_reference, of_force));
+    force_noise_ = std::hypot(budget_.total, settings.noise.accelerometer_mps2 /
+                                                 (settings.earth.gravity_mps2 * std::sqrt(n)));
+    rate_noise_ = per_w * std::hypot(budget_.velocity, settings.noise.reference_mps / std::sqrt(n));
+    if (tolerance_ == 0) {
+        tolerance_ = std::max(kLeastTolerance, tolerance_needed());
+    } else if (tolerance_ < tolerance_needed()) {
+        // A whole hold time within fewer standard deviations does not come about.
+        verdict_ = Verdict::cannot_settle;
+        note(Trouble::tolerance_below_noise, 0, tolerance_);
+    }
+    rate_tolerance_ = std::max(tolerance_, kSureness * rate_noise_);
+}
+
+double Leveller::tolerance_needed() const noexcept { return kSureness * force_noise_; }
+
+std::optional<double> Leveller::window_needed_s() const noexcept {
+    const double left = std::pow(tolerance_ / kSureness, 2) - std::pow(budget_.total, 2);
+    if (left <= 0) return std::nullopt;
+    const double one = settings_.noise.accelerometer_mps2 / settings_.earth.gravity_mps2;
+    return settings_.period_s * std::max(1.0, std::ceil(one * one / left));
 }
 
 void Leveller::note(Trouble trouble, std::size_t channel, double value) noexcept {
@@ -193,17 +201,26 @@ void Leveller::judge(const LevelInput& input) noexcept {
             note(Trouble::tilt_too_large, i, tilt);
             return;
         }
-        quiet = quiet && std::abs(tilt) <= tolerance_ &&
-                std::abs(observables_.rate_rad[i]) <= rate_tolerance_;
+        const double rate = observables_.rate_rad[i];
+        if (std::abs(rate) > rate_tolerance_) {
+            outside_ = {"rate of z", i, time_s_, rate, rate_tolerance_};
+            quiet = false;
+        }
+        if (std::abs(tilt) > tolerance_) {
+            outside_ = {"mean specific force", i, time_s_, tilt, tolerance_};
+            quiet = false;
+        }
     }
     held_s_ = quiet ? held_s_ + settings_.period_s : 0;
     if (quiet && held_s_ * sigma_ >= 1 && verdict_ != Verdict::cannot_settle) {
         // A jump just now is not yet in the means: the newest sample must not speak of one. On a
         // moving base, and with a noisy reference, that sample alone says nothing.
-        const double newest = std::max(std::abs(input.force[0]), std::abs(input.force[1]));
+        const std::size_t i = std::abs(input.force[1]) > std::abs(input.force[0]) ? 1 : 0;
+        const double newest = input.force[i] / settings_.earth.gravity_mps2;
+        const double band = tolerance_ + kSureness * settings_.noise.accelerometer_mps2 /
+                                             settings_.earth.gravity_mps2;
         const bool still = settings_.noise.reference_mps > 0 || input.reference != Pair{} ||
-                           newest <= tolerance_ * settings_.earth.gravity_mps2 +
-                                         kSureness * settings_.noise.accelerometer_mps2;
+                           std::abs(newest) <= band;
         if (still) {
             verdict_ = Verdict::settled;
             settled_s_ = time_s_;
@@ -213,6 +230,7 @@ void Leveller::judge(const LevelInput& input) noexcept {
             }
             return;
         }
+        outside_ = {"newest specific force", i, time_s_, newest, band};
     }
     if (verdict_ == Verdict::settling && time_s_ > kPatience * settings_.settling_s) {
         verdict_ = Verdict::not_settled;
@@ -277,6 +295,11 @@ double Leveller::drift_sigma() const noexcept {
 
 std::string Leveller::message() const {
     const char* channel = trouble_channel_ % 2 == 0 ? "first" : "second";
+    const auto remedy = [&]() -> std::string {
+        const auto window = window_needed_s();
+        return window ? text("; a window of %.4g s would do", *window)
+                      : std::string("; no window would do");
+    };
     const auto failure = [&]() -> std::string {
         switch (trouble_) {
             case Trouble::none:
@@ -309,9 +332,11 @@ std::string Leveller::message() const {
                     trouble_value_ / kDegPerHour);
             case Trouble::tolerance_below_noise:
                 return text(
-                    "cannot settle: tolerance %.3g' is below twice the noise of %.3g' "
-                    "(mostly %s)",
-                    trouble_value_ / kArcmin, budget_.total / kArcmin, budget_.dominant());
+                           "cannot settle: tolerance %.3g' is below %g times the noise of the mean "
+                           "specific force over %.4g s, %.3g' (of that the tilt %.3g', mostly %s)",
+                           trouble_value_ / kArcmin, kSureness, settings_.window_s,
+                           force_noise_ / kArcmin, budget_.total / kArcmin, budget_.dominant()) +
+                       remedy();
             case Trouble::drift_above_limit:
                 return text(
                     "cannot settle: the %s channel still demands more than the torquer "
@@ -323,13 +348,14 @@ std::string Leveller::message() const {
     if (verdict_ != Verdict::not_settled) {
         return failure;
     }
-    const auto largest = [](const Pair& p) { return std::max(std::abs(p[0]), std::abs(p[1])); };
-    return text(
-               "not settled within %.4g s: mean specific force %.3g' and rate of z %.3g' against "
-               "%.3g' and %.3g'; noise %.3g', mostly %s",
-               kPatience * settings_.settling_s, largest(observables_.force_rad) / kArcmin,
-               largest(observables_.rate_rad) / kArcmin, tolerance_ / kArcmin,
-               rate_tolerance_ / kArcmin, budget_.total / kArcmin, budget_.dominant()) +
+    return text("not settled within %.4g s: ", kPatience * settings_.settling_s) +
+           (outside_.time_s < 0
+                ? std::string("no whole window of samples")
+                : text("%s of the %s channel was the last to leave its band, %.3g' against %.3g' "
+                       "at %.4g s; noise %.3g' of the force, %.3g' of the rate, mostly %s",
+                       outside_.what, outside_.channel == 0 ? "first" : "second",
+                       outside_.value / kArcmin, outside_.band / kArcmin, outside_.time_s,
+                       force_noise_ / kArcmin, rate_noise_ / kArcmin, budget_.dominant())) +
            (failure.empty() ? "" : "; " + failure);
 }
 

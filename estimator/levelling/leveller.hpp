@@ -13,14 +13,17 @@
 
 namespace vibrig::estimator::levelling {
 
+inline constexpr double kPatience = 3;  ///< settling times that a loop is given to settle
+
 struct LevellerSettings {
     Gains fast;
     double settling_s = 100;    ///< that the fast gains are for
     std::optional<Gains> slow;  ///< after settling; none: stay fast (exact reference)
     double ramp_s = 60;         ///< from fast to slow
     double period_s = 0.1;
-    double window_s = 1;       ///< of the means; on a vibrating base whole vibration periods
-    double tolerance_rad = 0;  ///< 0: the larger of 0.05' and four times the noise budget
+    double window_s = 1;  ///< of the means; on a vibrating base whole vibration periods
+    /// 0: the larger of 0.05' and four times the noise of the mean specific force
+    double tolerance_rad = 0;
     double torquer_limit = std::numeric_limits<double>::infinity();  ///< rad/s
     Noise noise;
     Earth earth;
@@ -79,6 +82,14 @@ class Leveller {
     [[nodiscard]] double tolerance() const noexcept { return tolerance_; }  ///< rad
     /// Of the second observable, whose noise is larger where the reference is noisy; rad.
     [[nodiscard]] double rate_tolerance() const noexcept { return rate_tolerance_; }
+    /// 1 sigma of the observables once the loop is steady, rad. The first is that of the tilt
+    /// together with what is left of the accelerometers' in the mean over the window.
+    [[nodiscard]] double force_noise() const noexcept { return force_noise_; }
+    [[nodiscard]] double rate_noise() const noexcept { return rate_noise_; }
+    /// Shortest window with which the tolerance is four times the noise, s; empty: none would do.
+    [[nodiscard]] std::optional<double> window_needed_s() const noexcept;
+    /// Smallest tolerance that can be held, rad.
+    [[nodiscard]] double tolerance_needed() const noexcept;
     [[nodiscard]] double sigma() const noexcept { return sigma_; }
     [[nodiscard]] double time_s() const noexcept { return time_s_; }
     [[nodiscard]] std::optional<double> settled_s() const noexcept { return settled_s_; }
@@ -114,7 +125,15 @@ class Leveller {
     [[nodiscard]] LevelOutput limited(Pair rate) noexcept;
 
     LevellerSettings settings_;
-    double sigma_, tolerance_, rate_tolerance_ = 0;
+    /// Of an observable that was outside its band.
+    struct Outside {
+        const char* what = "mean specific force";
+        std::size_t channel = 0;
+        double time_s = -1, value = 0, band = 0;
+    };
+
+    double sigma_, tolerance_, rate_tolerance_ = 0, force_noise_ = 0, rate_noise_ = 0;
+    Outside outside_;
     NoiseBudget budget_;
     std::array<FastNetwork, 2> axis_;
     std::array<Window, 2> force_, rate_;

@@ -40,6 +40,13 @@ NoiseBudget noise_budget(const Gains& gains, const Noise& noise, double period_s
         noise.accelerometer_mps2 * noise.accelerometer_mps2 * period_s, 0, gains.k3 / r, 0);
     const double gyro_drift = deviation(noise.gyro_random_walk * noise.gyro_random_walk, 0, 0, d0);
     budget.drift = std::hypot(accelerometer_drift, gyro_drift);
+    // w: s^2 / D from the accelerometer, g s / D from the gyro, and from the reference velocity
+    // -(s^3 + ws^2 s) / D = -1 + (K1 s^2 + K2 ws^2 s + K3 ws^2) / D.
+    const double g = earth.gravity_mps2;
+    budget.velocity = std::hypot(
+        deviation(noise.reference_mps * noise.reference_mps * period_s, d2, gains.k2 * ws2, d0),
+        deviation(noise.accelerometer_mps2 * noise.accelerometer_mps2 * period_s, 1, 0, 0),
+        deviation(noise.gyro_random_walk * noise.gyro_random_walk, 0, g, 0));
     budget.total = std::hypot(budget.reference, budget.accelerometer, budget.gyro);
     return budget;
 }

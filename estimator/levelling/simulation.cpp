@@ -1,5 +1,6 @@
 #include "estimator/levelling/simulation.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -92,6 +93,28 @@ SimulatedStart simulate(const Scenario& scenario) {
     result.observables = leveller.observables();
     result.message = leveller.message();
     return result;
+}
+
+std::optional<double> declared_within_s(const LevellerSettings& loop, double tilt, double drift) {
+    constexpr double kMargin = 3;  // of the four standard deviations that the bands have at least
+    const Leveller leveller(loop);
+    if (leveller.verdict() == Verdict::cannot_settle) return std::nullopt;
+    Scenario start;
+    start.loop = loop;
+    start.loop.noise = {};
+    start.loop.tolerance_rad =
+        std::min(leveller.tolerance() - kMargin * leveller.force_noise(),
+                 leveller.rate_tolerance() - kMargin * leveller.rate_noise());
+    // The loop is linear: what is smaller, of either sign, stays within these two.
+    start.tilt = {tilt, tilt};
+    start.drift = {drift, -drift};
+    start.duration_s = kPatience * loop.settling_s;
+    start.until_settled = true;
+    const SimulatedStart run = simulate(start);
+    const double declared =
+        std::max(run.settled_s, loop.settling_s + loop.window_s + 1 / leveller.sigma());
+    if (run.verdict != Verdict::settled || 1.05 * declared > start.duration_s) return std::nullopt;
+    return declared;
 }
 
 }  // namespace vibrig::estimator::levelling

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "estimator/levelling/leveller.hpp"
@@ -47,5 +48,12 @@ struct SimulatedStart {
 };
 
 [[nodiscard]] SimulatedStart simulate(const Scenario& scenario);
+
+/// Time, s, within which a start with tilt (rad) and drift (rad/s) up to these in both channels is
+/// declared settled; at most one in twenty is more than 5 % late. Response of the loop into the
+/// bands less three standard deviations of the observables, window and hold time; at least settling
+/// time + window + 1/sigma. Empty: the loop does not wait so long, or cannot settle.
+[[nodiscard]] std::optional<double> declared_within_s(const LevellerSettings& loop, double tilt,
+                                                      double drift);
 
 }  // namespace vibrig::estimator::levelling

@@ -96,6 +96,59 @@ TEST(LevellingManyStarts, All1000AreDeclaredInTimeAndNoneFalsely) {
     }
 }
 
+TEST(LevellingManyStarts, AreDeclaredWithinTheTimeThatIsSaidOfThem) {
+    // GIVEN loops whose bands are narrow against the noise of the means, or against the tilt
+    struct Case {
+        double settling_s, period_s, window_s, tolerance, tilt;  // arcmin
+        Noise noise;
+    };
+    const Noise quiet{0, 1e-5 * kG, 0};
+    const std::vector<Case> cases{{100, 0.1, 1, 0, 10, quiet},
+                                  {100, 0.1, 1, 0, 250, quiet},
+                                  {600, 1, 1, 0, 30, quiet},
+                                  {100, 0.1, 1, 0, 30, {0, 3e-5 * kG, 0}},
+                                  {100, 0.9, 0.9, 0, 30, quiet},
+                                  {600, 1, 1, 0, 10, {0, 1e-5 * kG, 0.005 * kArcmin}},
+                                  {600, 1, 1, 0, 10, {0.2, 1e-5 * kG, 0}},
+                                  {100, 0.1, 1, 0.0448, 30, quiet}};
+    for (const Case& c : cases) {
+        Scenario start;
+        start.loop.fast = design({c.settling_s, 0.005, 0.7}).gains;
+        start.loop.settling_s = c.settling_s;
+        start.loop.period_s = c.period_s;
+        start.loop.window_s = c.window_s;
+        start.loop.tolerance_rad = c.tolerance * kArcmin;
+        start.loop.noise = c.noise;
+        start.until_settled = true;
+        start.duration_s = kPatience * c.settling_s;
+        const double drift = 0.1 * kDegPerHour;
+        const auto within = declared_within_s(start.loop, c.tilt * kArcmin, drift);
+        ASSERT_TRUE(within.has_value()) << c.settling_s << ' ' << c.tilt;
+        // WHEN 100 start with tilts of at least half of that
+        constexpr std::uint64_t kStarts = 100;
+        std::uint64_t late = 0;
+        for (start.seed = 1; start.seed <= kStarts; ++start.seed) {
+            std::mt19937_64 generator(start.seed ^ 0x77U);
+            std::uniform_real_distribution<double> half(0.5, 1);
+            for (std::size_t i = 0; i < 2; ++i) {
+                start.tilt[i] = half(generator) * c.tilt * kArcmin;
+                start.drift[i] = std::copysign(drift, half(generator) - 0.75);
+            }
+            const SimulatedStart result = simulate(start);
+            ASSERT_EQ(result.verdict, Verdict::settled)
+                << "seed " << start.seed << ' ' << result.message;
+            late += result.settled_s > 1.05 * *within ? 1U : 0U;
+        }
+        // THEN all are declared and at most one in twenty late
+        EXPECT_LE(late, kStarts / 20)
+            << c.settling_s << " s, tilt " << c.tilt << "', seeds 1 to " << kStarts;
+    }
+    // AND nothing is promised that the loop does not wait for
+    LevellerSettings weak = rig();
+    weak.torquer_limit = 10 * kDegPerHour;  // 50' in three settling times
+    EXPECT_FALSE(declared_within_s(weak, 60 * kArcmin, 0).has_value());
+}
+
 TEST(Leveller, FindsTheDriftAndLeavesOnlyTheZero) {
     // GIVEN a tilted platform with drift and accelerometer zeros
     Leveller loop(rig());
@@ -292,18 +345,35 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
         in.force[0] += (k / 100) % 2 == 0 ? 2 * kArcmin * kG : -2 * kArcmin * kG;
     });
     EXPECT_EQ(out.verdict, Verdict::not_settled);
-    expect_words(loop.message(), {"not settled within 300 s", "mean specific force", "rate of z",
-                                  "noise", "accelerometer"});
+    expect_words(loop.message(),
+                 {"not settled within 300 s",
+                  "mean specific force of the first channel was the last to leave its band",
+                  "against 0.2'", "noise", "accelerometer"});
     // AND a tolerance below the noise is refused from the start
     LevellerSettings s = rig();
     s.noise.accelerometer_mps2 = 1e-2 * kG;
     s.tolerance_rad = 0.05 * kArcmin;
     Leveller hopeless(s);
     EXPECT_EQ(hopeless.step({}).verdict, Verdict::cannot_settle);
-    expect_words(hopeless.message(), {"cannot settle", "below", "accelerometer"});
-    // AND the default tolerance follows the noise
+    expect_words(hopeless.message(),
+                 {"cannot settle", "below 4 times the noise", "accelerometer", "no window"});
+    // AND the default tolerance follows the noise: of the tilt and, over 100 samples, of the means
     s.tolerance_rad = 0;
-    EXPECT_NEAR(Leveller(s).tolerance(), 4 * Leveller(s).budget().total, 1e-15);
+    EXPECT_NEAR(Leveller(s).tolerance(), 4 * std::hypot(Leveller(s).budget().total, 1e-2 / 10),
+                1e-9);
+    // AND what the mean over one sample cannot do, that over the window named can
+    LevellerSettings brief = rig();
+    brief.window_s = 0.1;
+    EXPECT_EQ(Leveller(brief).verdict(), Verdict::settling);  // 4 x 0.0345' against 0.2'
+    brief.tolerance_rad = 0.05 * kArcmin;
+    const Leveller refused(brief);
+    EXPECT_EQ(refused.verdict(), Verdict::cannot_settle);
+    ASSERT_TRUE(refused.window_needed_s().has_value());
+    // 0.034378'^2 / (0.0125'^2 - 0.002628'^2) samples: 7.9
+    EXPECT_NEAR(*refused.window_needed_s(), 0.8, 1e-9);
+    expect_words(refused.message(), {"a window of 0.8 s would do"});
+    brief.window_s = 0.8;
+    EXPECT_EQ(Leveller(brief).verdict(), Verdict::settling);
     s.noise = {};
     EXPECT_NEAR(Leveller(s).tolerance() / kArcmin, 0.05, 1e-12);
 }
