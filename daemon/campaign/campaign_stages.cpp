@@ -42,7 +42,10 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
             const LevellingStage stage(settings.level, settings.rig, limit);
             if (auto why = stage.refusal(); !why.empty()) return why;
         }
-        if (settings.zeroing) const ZeroingStage stage(settings.zero, settings.rig);
+        if (settings.zeroing) {
+            const ZeroingStage stage(settings.zero, settings.rig);
+            if (auto why = stage.refusal(); !why.empty()) return why;
+        }
         const rt::StageFeed feed(dbc, stage_feed_settings(settings), nullptr);
     } catch (const estimator::levelling::DesignError& error) {
         return std::string("levelling: ") + error.what();

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "estimator/zeros/observability.hpp"
+#include "estimator/zeros/simulation.hpp"
 
 namespace vibrig::campaign {
 
@@ -45,6 +46,52 @@ ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Set
     static_cast<void>(frame_.azimuth_vertical_deg(0, false));
     const auto s = plan(false);
     zeros::check_observable(s.plan, s.site);
+}
+
+std::string ZeroingStage::refusal() const {
+    const auto s = plan(false);
+    const double sweep_s = s.plan.sweep_s();
+    if (sweep_s > settings_.duration_s) {
+        return fmt::format(
+            "zeroing.duration_s: found {:g}, expected more than {:g}, one sweep there and back "
+            "with "
+            "zeroing.slew_deg_per_s = {:g}",
+            settings_.duration_s, sweep_s, settings_.slew_deg_per_s);
+    }
+    // The best that can be: a unit that stands still, with nothing to find.
+    auto still = s;
+    still.noise.velocity_reference = still.noise.position_reference = 1e-9;
+    constexpr double kPeriod_s = 0.05;
+    zeros::UnitErrors errors;
+    errors.zero_mg = errors.gyro_bias_deg_h = {};
+    errors.tilt_east_deg = errors.tilt_north_deg = errors.azimuth_deg = 0;
+    zeros::UnitSimulation unit(still, errors, kPeriod_s, 1);
+    zeros::Calibration run(s);
+    double time_s = 0;
+    const auto go_on = [&](double until_s) {
+        while (time_s < until_s && run.add(unit.next())) time_s += kPeriod_s;
+        return run.result();
+    };
+    const auto result = go_on(settings_.duration_s);
+    if (result.valid) return {};
+    std::size_t i = 0;
+    while (i < 3 && result.axis[i].converged_s) ++i;
+    if (i == 3 || run.given_up()) {
+        return "zeroing: cannot work even with a simulated unit: " + result.problems.front();
+    }
+    const double got = std::max(result.axis[i].filter_sigma_mg, result.axis[i].movement_mg);
+    const auto found = [&] {
+        return fmt::format("{} comes to {:.3g} mg at best in {:g} s", "xyz"[i], got,
+                           settings_.duration_s);
+    };
+    while (time_s < settings_.duration_s + 2 * sweep_s) {
+        if (!go_on(time_s + 1).valid) continue;
+        return fmt::format(
+            "zeroing.duration_s: found {:g}, expected at least {:.0f} with zeroing.target_mg; {}",
+            settings_.duration_s, std::ceil(time_s), found());
+    }
+    return fmt::format("zeroing.target_mg: found {:g} for {}, expected more than it can reach; {}",
+                       s.target_mg[i], "xyz"[i], found());
 }
 
 void ZeroingStage::begin() {

@@ -20,6 +20,9 @@ class ZeroingStage {
     /// Throws estimator::SettingsError or estimator::zeros::ZeroError if the plan cannot work.
     ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig);
 
+    /// Which key of [zeroing] cannot work with these figures, what was found and expected; empty:
+    /// none. Runs a simulated unit.
+    [[nodiscard]] std::string refusal() const;
     void reset() { first_.reset(), present_ = {}; }  ///< a new campaign
     void begin();
     /// Encoder angles to slew to, deg; after the last one of the plan there and back again.

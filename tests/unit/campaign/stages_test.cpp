@@ -204,6 +204,39 @@ TEST_F(StagesTest, LevelsBeforeEachPositionAndLetsThePlatformDriftFreelyDuringTh
     }
 }
 
+TEST_F(StagesTest, WhatCannotWorkIsRefusedBeforehandWithKeyValueAndWhatIsExpected) {
+    const auto check = [this] { return check_stages(settings, dbc, *this); };
+    settings.levelling = settings.zeroing = true;
+    EXPECT_EQ(check(), "");
+    // GIVEN a tolerance that the mean of ten blocks cannot hold: 1e-4 g / sqrt(40) is 0.054'
+    settings.level.tolerance_arcmin = 0.05;
+    settings.level.window_s = 1;
+    const std::string narrow = check();
+    for (const char* word : {"levelling.tolerance_arcmin: found 0.05, expected at least 0.22",
+                             "levelling.window_s = 1", "noise.accelerometer_g = 0.0001"}) {
+        EXPECT_THAT(narrow, HasSubstr(word));
+    }
+    settings.level.tolerance_arcmin = 0.001;
+    EXPECT_THAT(check(), HasSubstr("levelling.tolerance_arcmin: found 0.001, expected at least"));
+    settings.level = {};
+    // GIVEN zeroings of less than what one sweep and the first fixes take; 90 s do
+    settings.zero.duration_s = 60;
+    EXPECT_THAT(check(), HasSubstr("zeroing.duration_s: found 60, expected more than 72, one sweep"
+                                   " there and back with zeroing.slew_deg_per_s = 5"));
+    settings.zero.duration_s = 75;
+    EXPECT_THAT(check(), HasSubstr("zeroing.duration_s: found 75, expected at least "));
+    settings.zero.duration_s = 90;
+    EXPECT_EQ(check(), "");
+    settings.zero.duration_s = 60;
+    settings.zero.slew_deg_per_s = 0.1;
+    EXPECT_THAT(check(), HasSubstr("expected more than 3600, one sweep there and back with "
+                                   "zeroing.slew_deg_per_s = 0.1"));
+    // GIVEN a target that no zeroing reaches
+    settings.zero = {};
+    settings.zero.target_mg = {0.15, 1e-6, 0.01};
+    EXPECT_THAT(check(), HasSubstr("zeroing.target_mg: found 1e-06 for y, expected more than"));
+}
+
 TEST_F(StagesTest, GoesOverToQuieterGainsOnceSettledAndOnlyThenBeginsTheDwell) {
     // GIVEN gains of 300 s to go over to within 20 s
     settings.levelling = true;
