@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -154,6 +155,33 @@ TEST(ZeroSeeds, FiftySeedsMeetTheResidualsInTimeAndAreConsistent) {
     EXPECT_LT(nees, 214.1);
     // Each run's blocks of innovations are outside their 99.9 % band about once in a hundred runs.
     EXPECT_GE(valid, kSeeds - 3);
+}
+
+TEST(ZeroCalibration, TheStatedSigmaOfZIsHonestOverFiftyScaleErrors) {
+    // GIVEN 50 units whose scale errors are drawn with 100 ppm, known to no more than that
+    CalibrationSettings s = thirty_degrees_north();
+    s.noise.scale_factor = 100e-6;
+    constexpr std::uint64_t kSeeds = 50;
+    double of_stated = 0;
+    double of_filter = 0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        std::mt19937_64 generator(seed);
+        std::normal_distribution<double> scale(0, 100e-6);
+        UnitErrors errors;
+        for (double& error : errors.scale) error = scale(generator);
+        // WHEN z is found, at a tenth of the rig's rate of increments
+        const AxisResult z = simulate(s, errors, 0.1, seed).result().axis[2];
+        const double error = z.zero_mg - errors.zero_mg[2];
+        of_stated += std::pow(error / z.sigma_mg, 2);
+        // AND what is off beyond the scale error is the filter's share
+        of_filter += std::pow((error - errors.scale[2] * 1e3) / z.filter_sigma_mg, 2);
+        EXPECT_GT(z.sigma_mg, 10 * z.filter_sigma_mg) << "seed " << seed;
+    }
+    // THEN the squares over those stated are within the 99.9 % band of chi-square, 50 degrees of
+    // freedom
+    EXPECT_GT(of_stated, 23.5) << "seeds 1 to 50";
+    EXPECT_LT(of_stated, 90.0) << "seeds 1 to 50";
+    EXPECT_LT(of_filter, 90.0) << "seeds 1 to 50";
 }
 
 TEST(ZeroCalibration, OfZItSaysZeroPlusScaleAndBothWaysSeparatesThem) {
