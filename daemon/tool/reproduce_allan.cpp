@@ -230,7 +230,8 @@ Reproduction reproduce_allan(const ReproduceOptions& options) {
         "N 0.001 deg/rt-h, and s = 0.02 deg/h, tm = 1.5 h or B 0.01, K 0.02, R 0.02",
         seeds, static_cast<int>(kFirstSeed)));
     table.notes.emplace_back(
-        "the direct fit agrees when its rms errors are at most Q 2, N 3, B 10, K 60, R 60 %");
+        "the direct fit agrees when its rms errors are at most Q 2, N 3, B 10, K 60, R 60 %; "
+        "errors of the estimates, those below detection too");
     table.notes.emplace_back("the paper's own laser gyro data and its Table 1 are not available");
     return table;
 }

@@ -15,9 +15,7 @@ using Eigen::VectorXd;
 
 constexpr int kMostIterations = 50;
 constexpr double kConverged = 1e-9;
-constexpr double kBound = 2;     // standard errors above the estimate
-constexpr double kDetected = 3;  // standard errors
-constexpr double kSharers = 3;   // share the level of a dwell's alarms
+constexpr double kSharers = 3;  // share the level of a dwell's alarms
 constexpr double kSameLevel = 0.005;
 
 double squared(double x) { return x * x; }

@@ -50,6 +50,7 @@ std::vector<std::size_t> window_factors(std::size_t window) {
 DynamicAllan::DynamicAllan(const DynamicSettings& settings)
     : settings_(settings),
       near_(settings.tau0, checked_window(settings.window), window_factors(settings.window)),
+      covariance_(near_.factors(), settings.window + 1, settings.tau0),
       hop_(std::max<std::uint64_t>(
           1, static_cast<std::uint64_t>(static_cast<double>(settings.window) *
                                         (1 - std::clamp(settings.overlap, 0.0, 1.0))))) {
@@ -109,7 +110,7 @@ WindowRow DynamicAllan::row() const {
                       kLargestMissingShare * static_cast<double>(settings_.window) ||
                   curve.size() < 2 || classical.size() < kPowers.size();
     if (!row.refused) {
-        row.fit = fit_noise(curve, settings_.window + 1, tau0, settings_.wanted);
+        row.fit = fit_noise(curve, covariance_, settings_.wanted);
         row.classical_fit = fit_classical(classical, settings_.mode);
     }
     return row;
@@ -167,8 +168,8 @@ DynamicSummary summarise(const DynamicAllan& dynamic, const std::vector<WindowRo
         coefficient /= n;
     }
     const double tau0 = settings.tau0;
-    summary.fit = fit_noise(curve_of(allan, share, factors, tau0), settings.window + 1, tau0,
-                            settings.wanted);
+    summary.fit =
+        fit_noise(curve_of(allan, share, factors, tau0), dynamic.covariance(), settings.wanted);
     const double shortest = tau0;
     const double longest = static_cast<double>(factors.back()) * tau0;
     summary.classical = interpret(a, settings.mode == MeanMode::known_mean, shortest, longest);

@@ -59,10 +59,13 @@ class DynamicAllan {
     /// Factors (of tau0) and variances beyond the window; empty before sixteen windows have passed.
     [[nodiscard]] std::vector<VariancePoint> beyond() const;
     [[nodiscard]] std::uint64_t faults() const;
+    /// Of the Allan variances of one window.
+    [[nodiscard]] const CurveCovariance& covariance() const { return covariance_; }
 
   private:
     DynamicSettings settings_;
     SlidingVariance near_;
+    CurveCovariance covariance_;
     std::optional<SlidingVariance> far_;
     std::uint64_t hop_;
     double block_ = 0;

@@ -6,36 +6,28 @@
 #include <string>
 #include <vector>
 
-#include "estimator/allan/edf.hpp"
+#include "estimator/allan/curve_covariance.hpp"
+#include "estimator/allan/noise_terms.hpp"
 
 namespace vibrig::estimator::allan {
 
-inline constexpr std::size_t kTerms = 5;
-/// Quantisation, angle random walk, bias instability, rate random walk, rate ramp.
-enum class Term : unsigned char { Q, N, B, K, R };
-inline constexpr std::array<const char*, kTerms> kTermNames{"Q", "N", "B", "K", "R"};
-inline constexpr std::array<const char*, kTerms> kTermUnits{"arcsec", "deg/rt-h", "deg/h",
-                                                            "deg/h^1.5", "deg/h^2"};
-using Terms = std::array<double, kTerms>;  ///< by Term, in the units above
-
-/// Allan variance, (deg/h)^2, that a unit coefficient gives at tau: 3/tau^2, 3600/tau, 2 ln2/pi,
-/// tau/10800, tau^2/(2 3600^2) (IEEE Std 952; tau in s).
-[[nodiscard]] double term_variance(Term term, double tau);
-[[nodiscard]] double model_variance(const Terms& terms, double tau);
-/// The noise that contributes most at tau, as an exponent of the rate spectrum.
-[[nodiscard]] Alpha dominant_noise(const Terms& terms, double tau);
+/// A term is detected above this many standard errors of its square (as in the dwell monitor),
+inline constexpr double kDetected = 3;
+/// and otherwise below this many above the estimate.
+inline constexpr double kBound = 2;
 
 struct FittedTerm {
     bool detected = false;
-    double value = 0;
-    double sigma = 0;  ///< 1 sigma, of the detected value
-    double below = 0;  ///< not detected: adds one standard error to the curve at its best tau
+    double value = 0;  ///< best estimate, detected or not; 0 where its square would be negative
+    double sigma = 0;  ///< 1 sigma of the value, meaningful when detected; 0 if the value is
+    double below = 0;  ///< the term is not larger, when it is not detected
 };
 
 struct Fit {
     std::array<FittedTerm, kTerms> terms;
     /// Not empty when the ramp cannot be told from the rate random walk in this record.
     std::string ramp_note;
+    /// Best estimates, detected or not.
     [[nodiscard]] Terms values() const;
 };
 
@@ -49,8 +41,19 @@ struct VariancePoint {
 
 inline constexpr std::array<bool, kTerms> kAllTerms{true, true, true, true, true};
 
-/// Non-negative least squares on the overlapping Allan variance, weights sqrt(edf / 2) / model,
-/// re-weighted 12 times. `points` phase points at step tau0 (s) made the curve. Needs two points.
+/// Non-negative least squares on the overlapping Allan variance, weights W = sqrt(edf / 2) / model,
+/// re-weighted 12 times. Needs two points.
+///
+/// Overlapping variances at near averaging times come from the same differences, so that the normal
+/// matrix alone makes errors much too small. With the basis F (one column a term) the squared
+/// coefficients are x = G v, G = (F' W^2 F)^-1 F' W^2 of the terms that are not zero; their
+/// covariance is G C G' with C = cov(v) of the fitted model (CurveCovariance; a record with gaps:
+/// entries over sqrt(share share)). A coefficient c = sqrt(x) has sigma(x) / (2 c). It is detected
+/// when x > kDetected sigma(x), otherwise below sqrt(x + kBound sigma(x)). For a term whose square
+/// would be negative x is 0 and sigma(x) that of a fit with it added.
+[[nodiscard]] Fit fit_noise(std::span<const VariancePoint> curve, const CurveCovariance& covariance,
+                            const std::array<bool, kTerms>& wanted = kAllTerms);
+/// For one curve of `points` phase points at step tau0 (s).
 [[nodiscard]] Fit fit_noise(std::span<const VariancePoint> curve, std::size_t points, double tau0,
                             const std::array<bool, kTerms>& wanted = kAllTerms);
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -23,13 +24,14 @@ std::vector<VariancePoint> exact_curve(const Terms& terms) {
     return curve;
 }
 
-Fit fit_record(const std::vector<double>& rate) {
+Fit fit_record(const std::vector<double>& rate, const CurveCovariance* covariance = nullptr) {
     std::vector<VariancePoint> curve;
     for (const Point& p : deviations(Series::from_rate(rate, 1.0), Statistic::oadev,
                                      log_factors(rate.size() / 2, 30))) {
         curve.push_back({p.tau, p.m, p.dev * p.dev, 1.0});
     }
-    return fit_noise(curve, rate.size() + 1, 1.0);
+    return covariance != nullptr ? fit_noise(curve, *covariance)
+                                 : fit_noise(curve, rate.size() + 1, 1.0);
 }
 
 TEST(Fit, RecoversEachCoefficientFromAnExactCurve) {
@@ -37,7 +39,9 @@ TEST(Fit, RecoversEachCoefficientFromAnExactCurve) {
     const Terms truth{0.1, 0.001, 0.01, 0.02, 0.02};
     const Fit fit = fit_noise(exact_curve(truth), kPoints, 1.0);
     for (std::size_t j = 0; j < kTerms; ++j) {
-        EXPECT_TRUE(fit.terms[j].detected) << kTermNames[j];
+        // K and R of this size are known to about 48 % only in 10 h.
+        EXPECT_EQ(fit.terms[j].detected, j < 3) << kTermNames[j];
+        EXPECT_GT(fit.terms[j].below, truth[j]) << kTermNames[j];
         EXPECT_NEAR(fit.terms[j].value, truth[j], 1e-6 * truth[j]) << kTermNames[j];
         EXPECT_GT(fit.terms[j].sigma, 0) << kTermNames[j];
     }
@@ -48,13 +52,117 @@ TEST(Fit, SaysNotDetectedWithABoundForWhatIsNotThere) {
     const Terms truth{0.1, 0.001, 0, 0, 0};
     // WHEN
     const Fit fit = fit_noise(exact_curve(truth), kPoints, 1.0);
-    // THEN the others are zero, below a bound that is not silly: at its best tau the bound adds one
-    // standard error to the curve
+    // THEN the others are zero, below a bound that is not silly
     for (const Term term : {Term::B, Term::K, Term::R}) {
         const FittedTerm& found = fit.terms[static_cast<std::size_t>(term)];
-        EXPECT_FALSE(found.detected && found.value > 1e-6) << static_cast<int>(term);
+        EXPECT_FALSE(found.detected) << static_cast<int>(term);
         EXPECT_GT(found.below, 1e-5);
         EXPECT_LT(found.below, 0.1);
+    }
+}
+
+/// Generalised covariance of the angle at step 1, as in the docstring.
+double angle_covariance(const Terms& terms, double t) {
+    const double a = std::abs(t);
+    return (a > 0 ? 0 : terms[0] * terms[0]) - std::pow(60 * terms[1], 2) * a / 2 +
+           (a > 0 ? std::pow(terms[2] * a, 2) * std::log(a) / (2 * std::numbers::pi) : 0) +
+           std::pow(terms[3] / 60, 2) * a * a * a / 12;
+}
+
+/// Over all pairs of differences, without any sampling.
+double plain_covariance(const Terms& terms, std::size_t points, std::size_t m, std::size_t l) {
+    const auto covariance_at = [&](double lag) {
+        const auto first = static_cast<double>(m);
+        const auto second = static_cast<double>(l);
+        double c = 0;
+        for (const auto& [a, weight_a] : {std::pair{0, 1}, {1, -2}, {2, 1}}) {
+            for (const auto& [b, weight_b] : {std::pair{0, 1}, {1, -2}, {2, 1}}) {
+                c += weight_a * weight_b * angle_covariance(terms, lag + a * first - b * second);
+            }
+        }
+        return c;
+    };
+    std::vector<double> by_lag;
+    for (std::size_t i = 0; i < 2 * points; ++i) {
+        by_lag.push_back(covariance_at(static_cast<double>(i) - static_cast<double>(points)));
+    }
+    const double tau2 = static_cast<double>(m * l);
+    const double mean = std::pow(terms[4] / 3600 * tau2, 2);
+    double sum = 0;
+    for (std::size_t i = 0; i < points - 2 * m; ++i) {
+        for (std::size_t k = 0; k < points - 2 * l; ++k) {
+            const double c = by_lag[points + i - k];
+            sum += 2 * c * c + 4 * mean * c;
+        }
+    }
+    return sum / (4 * tau2 * tau2 * static_cast<double>((points - 2 * m) * (points - 2 * l)));
+}
+
+TEST(Fit, CovarianceOfTheCurveIsTheSumOverAllPairsOfDifferences) {
+    // GIVEN each noise alone, and all of them about as strong, WHEN summed over sampled lags
+    constexpr std::size_t kShort = 501;
+    const std::vector<std::size_t> factors{1, 2, 7, 40, 150, 250};
+    for (const Terms& terms :
+         {Terms{1, 0, 0, 0, 0}, Terms{0, 1, 0, 0, 0}, Terms{0, 0, 1, 0, 0}, Terms{0, 0, 0, 1, 0},
+          Terms{10, 0.05, 0.3, 2, 0}, Terms{0, 0.05, 0, 0, 20}}) {
+        const Eigen::MatrixXd found = CurveCovariance(factors, kShort, 1.0).of(factors, terms);
+        // THEN it is the sum over all of them
+        for (std::size_t i = 0; i < factors.size(); ++i) {
+            for (std::size_t j = 0; j < factors.size(); ++j) {
+                const auto row = static_cast<Eigen::Index>(i);
+                const auto column = static_cast<Eigen::Index>(j);
+                const double plain = plain_covariance(terms, kShort, factors[i], factors[j]);
+                const double scale = std::sqrt(found(row, row) * found(column, column));
+                EXPECT_NEAR(found(row, column), plain, 0.01 * scale)
+                    << "m " << factors[i] << ", " << factors[j] << ", N " << terms[1];
+            }
+        }
+    }
+}
+
+TEST(Fit, StatedErrorsAreThoseOfWhiteNoise) {
+    // GIVEN 200 records of white noise of one kind
+    constexpr int kRuns = 200;
+    constexpr std::size_t kSamples = 20000;
+    constexpr std::uint64_t kSeed = 7000;
+    constexpr double kTruth = 0.001;
+    const std::vector<std::size_t> factors = log_factors(kSamples / 2, 30);
+    const CurveCovariance covariance(factors, kSamples + 1, 1.0);
+    double squares = 0;
+    std::array<int, kTerms> detected{};
+    for (int run = 0; run < kRuns; ++run) {
+        const Fit fit = fit_record(
+            synthetic_rate({0, kTruth, 0, 0, 0}, kSamples, 1.0, kSeed + static_cast<unsigned>(run)),
+            &covariance);
+        squares += std::pow((fit.terms[1].value - kTruth) / fit.terms[1].sigma, 2) / kRuns;
+        for (std::size_t j = 0; j < kTerms; ++j) {
+            detected[j] += fit.terms[j].detected ? 1 : 0;
+        }
+    }
+    // THEN errors of N are as large as stated: chi-square band of 200 runs at 1e-3 (0.165), 0.05
+    // for the covariance, which is that of the fitted model
+    EXPECT_NEAR(std::sqrt(squares), 1, 0.165 + 0.05) << "seeds from " << kSeed;
+    EXPECT_EQ(detected[1], kRuns);
+    // and nothing else is there: three standard errors let 0.27 of 200 through, 3 or more in 3e-3
+    for (const Term term : {Term::Q, Term::B, Term::K, Term::R}) {
+        EXPECT_LE(detected[static_cast<std::size_t>(term)], 2)
+            << kTermNames[static_cast<std::size_t>(term)] << ", seeds from " << kSeed;
+    }
+}
+
+TEST(Fit, APureRampIsNothingElse) {
+    // GIVEN 1, 2, 3 ... deg/h at 1 s
+    std::vector<double> rate;
+    for (int i = 1; i <= 1000; ++i) {
+        rate.push_back(i);
+    }
+    const Fit fit = fit_record(rate);
+    // THEN there is a ramp of 3600 deg/h^2, and rounding is not taken for a random walk
+    EXPECT_TRUE(fit.terms[4].detected);
+    EXPECT_NEAR(fit.terms[4].value, 3600, 1e-3);
+    for (std::size_t j = 0; j < 4; ++j) {
+        EXPECT_FALSE(fit.terms[j].detected) << kTermNames[j] << " " << fit.terms[j].value;
+        EXPECT_TRUE(std::isfinite(fit.terms[j].below)) << kTermNames[j];
     }
 }
 
@@ -64,20 +172,26 @@ TEST(Fit, MonteCarloErrorsStayWithinTheirLimits) {
     constexpr std::uint64_t kSeed = 4000;
     const Terms truth{0.1, 0.001, 0.01, 0.02, 0.02};
     Terms squares{};
-    Terms reported{};
+    Terms scores{};
     for (int run = 0; run < kRuns; ++run) {
         const Fit fit =
             fit_record(synthetic_rate(truth, kPoints - 1, 1.0, kSeed + static_cast<unsigned>(run)));
         for (std::size_t j = 0; j < kTerms; ++j) {
             squares[j] += std::pow(fit.values()[j] / truth[j] - 1, 2) / kRuns;
-            reported[j] += fit.terms[j].detected ? fit.terms[j].sigma / truth[j] / kRuns : 0;
+            if (j < 3) {
+                scores[j] +=
+                    std::pow((fit.terms[j].value - truth[j]) / fit.terms[j].sigma, 2) / kRuns;
+            }
         }
     }
     // WHEN, THEN rms errors are at most 2, 3, 10, 60, 60 %
     const Terms limit{0.02, 0.03, 0.10, 0.60, 0.60};
     for (std::size_t j = 0; j < kTerms; ++j) {
         EXPECT_LT(std::sqrt(squares[j]), limit[j]) << kTermNames[j] << ", seeds from " << kSeed;
-        EXPECT_GT(std::sqrt(squares[j]), reported[j] / 4) << kTermNames[j];
+    }
+    // and those of what can be detected are as stated: band of 60 runs at 1e-3 (0.3), 0.05 as above
+    for (std::size_t j = 0; j < 3; ++j) {
+        EXPECT_NEAR(std::sqrt(scores[j]), 1, 0.35) << kTermNames[j] << ", seeds from " << kSeed;
     }
 }
 
