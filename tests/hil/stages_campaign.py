@@ -192,18 +192,24 @@ def effect(checks, programs, coefficients):
             worst = max(worst, abs((b / a - 1) / expected - 1))
     checks.check(seen >= 14 and worst <= 0.1, f"the level of {seen} dwells is wrong as predicted, within 10 %", worst)
 
-    worst, largest = 0, 0
-    value = {run: {p["name"]: p["value"] for p in run.result["parameters"]} for run in (exact, wrong, right)}
+    found = {run: {p["name"]: p for p in run.result["parameters"]} for run in (exact, wrong, right)}
+    significant, biased, left = 0, [], []
     for gyro in range(3):
         bias = predicted_bias(gyro, truth[gyro], dwells, zero_g)
-        for k in range(4, 10):
-            name = f"D_{NAMES[k]}{'xyz'[gyro]}"
-            moved = value[wrong][name] - value[exact][name]
-            largest = max(largest, abs(bias[k]))
-            worst = max(worst, abs(moved - bias[k]))
-    checks.check(largest > 1e-2 and worst <= 0.1 * largest,
-                 "the quadratic coefficients are biased as predicted, within 10 % of the largest bias",
-                 f"largest {largest:.3g}, off by {worst:.3g} deg/h/g^2")
+        for k, kind in enumerate(NAMES):
+            name = f"D_{kind}{'xyz'[gyro]}"
+            moved = found[wrong][name]["value"] - found[exact][name]["value"]
+            noise = 5 * math.hypot(found[wrong][name]["sigma"], found[exact][name]["sigma"])
+            significant += k >= 4 and abs(bias[k]) > noise
+            if abs(moved - bias[k]) > 0.1 * abs(bias[k]) + noise:
+                biased.append(f"{name} moved by {moved:.3g}, predicted {bias[k]:.3g}, noise {noise:.2g}")
+            error, sigma = found[right][name]["value"] - truth[gyro][k], found[right][name]["sigma"]
+            if abs(error) > 5 * sigma:
+                left.append(f"{name} off by {error:.3g}, sigma {sigma:.2g}")
+    checks.check(significant >= 10, "the biases of at least 10 quadratic coefficients stand out of the noise (5 sigma)",
+                 significant)
+    checks.check(not biased, "each coefficient is biased as predicted, within 10 % of its bias and its noise", biased)
+    checks.check(not left, "with zeroing no coefficient is off by more than 5 sigma of the noise", left)
 
     zeros = right.last["campaign"]["zeros"]
     off = [abs(z - 1e3 * b) for z, b in zip(zeros["zero_mg"], zero_g)]
