@@ -57,7 +57,8 @@ SimulatedStart simulate(const Scenario& scenario) {
             input.force[i] = loop.earth.gravity_mps2 * tilt[i] + scenario.zero[i] +
                              loop.noise.accelerometer_mps2 * normal(generator);
             input.reference[i] =
-                scenario.reference_error[i] + loop.noise.reference_mps * normal(generator);
+                (now >= scenario.reference_error_s ? scenario.reference_error[i] : 0) +
+                loop.noise.reference_mps * normal(generator);
         }
         for (std::size_t i = 0; k == 0 && i < 2; ++i) {
             conventional[i].start(input.reference[i]);

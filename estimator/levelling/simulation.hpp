@@ -14,12 +14,13 @@ enum class Network : std::uint8_t { undamped, conventional, fast };
 struct Scenario {
     LevellerSettings loop;
     Network network = Network::fast;
-    Pair tilt{};             ///< at the start, rad
-    Pair drift{};            ///< rad/s
-    Pair zero{};             ///< of the accelerometers, m/s^2
-    Pair reference_error{};  ///< constant, m/s
-    double step_s = -1;      ///< when the platform tips; negative: never
-    Pair step{};             ///< by how much, rad
+    Pair tilt{};                   ///< at the start, rad
+    Pair drift{};                  ///< rad/s
+    Pair zero{};                   ///< of the accelerometers, m/s^2
+    Pair reference_error{};        ///< constant, m/s
+    double reference_error_s = 0;  ///< from then on; the loop begins at the reference
+    double step_s = -1;            ///< when the platform tips; negative: never
+    Pair step{};                   ///< by how much, rad
     double duration_s = 600;
     bool until_settled = false;
     std::uint64_t seed = 1;

@@ -145,6 +145,24 @@ TEST_F(LevelCommand, ReproducesTheTable) {
                               row["computed"].get<std::string>().find("202.5") == 0);
     }
     EXPECT_TRUE(erratum) << out;
+    // The six-run tables' means are on show, with what cannot be recomputed.
+    const auto row_of = [&](const std::string& item) {
+        for (const Json& row : result["rows"]) {
+            if (row["item"] == item) return row;
+        }
+        return Json{{"published", "none"}, {"computed", ""}};
+    };
+    const Json east = row_of("Table 1, means of six runs, east");
+    const Json north = row_of("Table 2, means of six runs, north");
+    EXPECT_EQ(east["published"], "2.872 1.394 0.1105");
+    EXPECT_EQ(north["published"], "1.551 1.490 0.1060");
+    EXPECT_NE(north["computed"].get<std::string>().find("not recomputed"), std::string::npos);
+    // A reference that is wrong from the start on does less harm than one that becomes so.
+    const auto first = [&](const std::string& item) {
+        return std::stod(row_of(item)["computed"].get<std::string>());
+    };
+    EXPECT_NEAR(first("reductions, reference 0.5 m/s wrong, noise 0.2 m/s, from 3'"), 88, 1.5);
+    EXPECT_NEAR(first("the same from 3', wrong by a step after the start"), 83, 1.5);
 }
 
 }  // namespace
