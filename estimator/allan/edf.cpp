@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <unsupported/Eigen/SpecialFunctions>
 #include <vector>
 
@@ -12,6 +13,7 @@ namespace {
 // Above this factor sums over lags are sampled: the terms are smooth in lag / m.
 constexpr std::size_t kLagResolution = 64;
 constexpr std::size_t kFewestForIdentification = 30;
+constexpr std::size_t kFewestInPart = 20;
 
 double real(std::size_t n) { return static_cast<double>(n); }
 
@@ -131,17 +133,24 @@ double statistic_edf(Statistic statistic, Alpha alpha, std::size_t points, std::
     return 1.0;
 }
 
-/// Lag-1 autocorrelation about the mean.
-double lag_one(const std::vector<double>& z) {
-    double mean = 0;
-    for (const double value : z) {
-        mean += value / real(z.size());
+/// Lag-1 autocorrelation, all parts together. Phase has an offset of its own in each part; the mean
+/// of its differences is common, and taken from short parts it would lower the correlation.
+double lag_one(const std::vector<std::vector<double>>& parts, bool common_mean) {
+    double all = 0;
+    double count = 0;
+    for (const std::vector<double>& z : parts) {
+        all = std::accumulate(z.begin(), z.end(), all);
+        count += real(z.size());
     }
     double zero = 0;
     double one = 0;
-    for (std::size_t i = 0; i < z.size(); ++i) {
-        zero += (z[i] - mean) * (z[i] - mean);
-        one += i > 0 ? (z[i] - mean) * (z[i - 1] - mean) : 0;
+    for (const std::vector<double>& z : parts) {
+        const double mean =
+            common_mean ? all / count : std::accumulate(z.begin(), z.end(), 0.0) / real(z.size());
+        for (std::size_t i = 0; i < z.size(); ++i) {
+            zero += (z[i] - mean) * (z[i] - mean);
+            one += i > 0 ? (z[i] - mean) * (z[i - 1] - mean) : 0;
+        }
     }
     return zero > 0 ? one / zero : 0;
 }
@@ -155,25 +164,33 @@ double edf(Statistic statistic, Alpha alpha, std::size_t points, std::size_t m) 
 }
 
 Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback) {
-    const Segment& part = series.longest();
-    if (part.points() / m < kFewestForIdentification) {
-        return fallback;
+    std::vector<std::vector<double>> parts;
+    std::size_t count = 0;
+    for (const Segment& segment : series.segments) {
+        // Less than this about its own mean, a random walk of the phase looks white.
+        if (segment.points() / m < kFewestInPart) {
+            continue;
+        }
+        std::vector<double>& z = parts.emplace_back();
+        for (std::size_t i = segment.begin; i < segment.end; i += m) {
+            z.push_back(series.phase[i]);
+        }
+        count += z.size();
     }
-    std::vector<double> z;
-    for (std::size_t i = part.begin; i < part.end; i += m) {
-        z.push_back(series.phase[i]);
+    if (count < kFewestForIdentification) {
+        return fallback;
     }
     constexpr int kMostDifferences = 2;
     for (int order = 0;; ++order) {
-        const double r = lag_one(z);
+        const double r = lag_one(parts, order > 0);
         const double delta = r / (1 + r);
         if (order == kMostDifferences || delta < 0.25) {
             return std::clamp(static_cast<int>(std::lround(2 - 2 * (delta + order))), -2, 2);
         }
-        for (std::size_t i = 0; i + 1 < z.size(); ++i) {
-            z[i] = z[i + 1] - z[i];
+        for (std::vector<double>& z : parts) {
+            std::adjacent_difference(z.begin(), z.end(), z.begin());
+            z.erase(z.begin());
         }
-        z.pop_back();
     }
 }
 

@@ -18,7 +18,8 @@ using Alpha = int;
 [[nodiscard]] double edf(Statistic statistic, Alpha alpha, std::size_t points, std::size_t m);
 
 /// Dominant noise at averaging factor m from the lag-1 autocorrelation of phase decimated by m
-/// (SP 1065, section 5.5.3). Returns `fallback` when fewer than 30 points are left.
+/// (SP 1065, section 5.5.3), over all segments of at least 20 such points together. Returns
+/// `fallback` when fewer than 30 points are left.
 [[nodiscard]] Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback);
 
 /// x with P(chi-square <= x) = probability for any real number of degrees of freedom > 0.

@@ -182,6 +182,27 @@ TEST(Gap, LowersTheDegreesOfFreedomAndKeepsTheDeviation) {
                  DataError);
 }
 
+TEST(Gap, NeverRaisesTheDegreesOfFreedom) {
+    // GIVEN 100 records of white noise, one sample in 997 missing, WHEN the noise is identified
+    constexpr std::uint64_t kSeed = 9000;
+    constexpr std::size_t kSamples = 20000;
+    for (std::uint64_t run = 0; run < 100; ++run) {
+        std::vector<double> rate = white(kSamples, 1.0, kSeed + run);
+        for (std::size_t i = 500; i < rate.size(); i += 997) {
+            rate[i] = kNaN;
+        }
+        const auto gappy =
+            deviations(Series::from_rate(rate, 1.0), Statistic::oadev, octave_factors(256));
+        ASSERT_EQ(gappy.size(), 9U);
+        for (const Point& point : gappy) {
+            // THEN it is white FM at every factor, with fewer degrees of freedom than without gaps
+            EXPECT_EQ(point.alpha, 0) << "m " << point.m << ", seed " << kSeed + run;
+            EXPECT_LT(point.edf, edf(Statistic::oadev, 0, kSamples + 1, point.m))
+                << "m " << point.m << ", seed " << kSeed + run;
+        }
+    }
+}
+
 TEST(Data, UnusableRecordsAreRefusedWithNumbers) {
     const auto why = [](const std::vector<double>& rate) -> std::string {
         try {
