@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace vibrig::tool {
 
@@ -64,12 +65,18 @@ class Parser {
             text.remove_prefix(3);
         }
         const std::string_view content = trimmed(text);
-        if (content.empty() || content.front() == '#' || content.front() == '%') {
+        if (content.empty()) {
+            // The only field of the row is empty; at the end of the file it is no row.
+            blank_ += single_ && !file_.values.empty() ? 1U : 0U;
+            return;
+        }
+        if (content.front() == '#' || content.front() == '%') {
             return;
         }
         if (!known_ && first(content)) {
             return;
         }
+        file_.values.insert(file_.values.end(), std::exchange(blank_, 0U), kMissing);
         file_.values.push_back(field(text, value_, file_.column));
         if (time_ != kNoColumn) {
             file_.times.push_back(field(text, time_, request_.time));
@@ -152,6 +159,7 @@ class Parser {
         }
         value_ = request_.column.empty() ? 0 : index_of(fields, request_.column);
         time_ = request_.time.empty() ? kNoColumn : index_of(fields, request_.time);
+        single_ = fields.size() == 1;
         file_.column = fields[value_];
         return header;
     }
@@ -182,9 +190,11 @@ class Parser {
     ColumnRequest request_;
     ColumnFile file_;
     std::size_t number_ = 0;
+    std::size_t blank_ = 0;  ///< rows since the last number
     std::size_t value_ = 0;
     std::size_t time_ = kNoColumn;
     char separator_ = ' ';
+    bool single_ = false;
     bool known_ = false;
 };
 

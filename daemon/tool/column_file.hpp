@@ -8,7 +8,8 @@
 namespace vibrig::tool {
 
 /// A column of numbers from a text or CSV file, plain or gzip. An empty field, "nan" and "NA" are
-/// missing values (NaN).
+/// missing values (NaN), and so is a blank row between the numbers of a file with one column; other
+/// blank rows are skipped.
 struct ColumnFile {
     std::vector<double> values;
     std::vector<double> times;  ///< if a time column was asked for

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 
 #include "tests/unit/allan/support.hpp"
@@ -123,11 +124,18 @@ TEST_F(AllanCommand, MissingSamplesAreFoundByNanByEmptyFieldAndByTime) {
         ++i;
     }
     write("nan.txt", nan);
+    std::string blank = "\n\n" + std::regex_replace(nan, std::regex("nan"), "") + "\n\n";
+    write("blank.txt", blank);
+    write("quoted.csv", "y\r\n" + std::regex_replace(nan, std::regex("nan"), "\"\""));
     write("empty.csv", empty);
     write("time.csv", time);
     ASSERT_EQ(vibrig("allan nan.txt --tau0 0.25 --json"), 0) << error;
     const std::string expected = out;
     EXPECT_EQ(Json::parse(out)["missing"], 2);
+    for (const std::string name : {"blank.txt", "quoted.csv"}) {
+        EXPECT_EQ(vibrig("allan " + name + " --tau0 0.25 --json"), 0) << error;
+        EXPECT_EQ(out, expected) << name;
+    }
     EXPECT_EQ(vibrig("allan empty.csv --column y --tau0 0.25 --json"), 0) << error;
     EXPECT_EQ(out, expected);
     EXPECT_EQ(vibrig("allan time.csv --column y --time t --json"), 0) << error;
