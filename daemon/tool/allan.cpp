@@ -4,11 +4,11 @@
 #include <CLI/Validators.hpp>
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <exception>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <stdexcept>
 #include <vector>
 
 #include "daemon/tool/allan_analysis.hpp"
@@ -30,14 +30,22 @@ struct Options {
     bool json = false;
 };
 
-/// CLI11's own check for positive numbers lets nan through and prints all digits of the largest
-/// one.
-std::string not_seconds(std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool good = error == std::errc{} && end == text.data() + text.size() && value > 0 &&
-                      std::isfinite(value);
-    return good ? std::string() : "found \"" + text + "\", expected seconds above zero";
+/// A number within [low, high]. CLI11's own checks let nan through.
+CLI::Validator number_in(double low, double high, const std::string& expected) {
+    return CLI::Validator(
+        [low, high, expected](std::string& text) {
+            double value = 0;
+            const auto [end, error] =
+                std::from_chars(text.data(), text.data() + text.size(), value);
+            const bool good = error == std::errc{} && end == text.data() + text.size() &&
+                              value >= low && value <= high;
+            return good ? std::string() : "found \"" + text + "\", expected " + expected;
+        },
+        "");
+}
+
+CLI::Validator seconds() {
+    return number_in(kShortestStep, kLongestStep, "seconds from 1e-9 to 1e9");
 }
 
 int run(Options& options) {
@@ -54,6 +62,10 @@ int run(Options& options) {
         if (!options.reference.empty()) {
             allan::Terms terms{};
             std::copy(options.reference.begin(), options.reference.end(), terms.begin());
+            if (std::all_of(terms.begin(), terms.end(), [](double t) { return t <= 0; })) {
+                throw std::runtime_error(
+                    "--reference: five zeros found, expected at least one of Q,N,B,K,R above zero");
+            }
             request.reference = terms;
         }
         analysis = analyse(request);
@@ -79,22 +91,26 @@ void add_dynamic_options(CLI::App& command, Options& options) {
     AllanRequest& request = options.request;
     command.add_option("--dynamic", request.window_s, "windows of W s: surface, traces, alarms")
         ->type_name("W")
-        ->check(CLI::Validator(not_seconds, ""));
-    command.add_option("--overlap", request.overlap, "of neighbouring windows (0.5)");
+        ->check(seconds());
+    command.add_option("--overlap", request.overlap, "of neighbouring windows (0.5)")
+        ->check(number_in(0, 0.9999, "a number from 0 to 0.9999"));
     command
         .add_option("--mean", options.mean,
                     "classical variance about: corrected (default), known-mean, window-mean (the "
                     "paper's way, biased)")
         ->check(CLI::IsMember({"corrected", "known-mean", "window-mean"}));
-    command.add_option("--known-mean", request.known_mean,
-                       "mean rate in deg/h for --mean known-mean");
-    command.add_option("--alpha", request.alpha, "level of the alarms of one window (0.001)");
+    command
+        .add_option("--known-mean", request.known_mean, "mean rate in deg/h for --mean known-mean")
+        ->check(number_in(-kLargestValue, kLargestValue, "a mean rate in deg/h"));
+    command.add_option("--alpha", request.alpha, "level of the alarms of one window (0.001)")
+        ->check(number_in(1e-12, 0.5, "a probability from 1e-12 to 0.5"));
     command
         .add_option("--reference", options.reference,
                     "accepted Q,N,B,K,R (arcsec, deg/rt-h, deg/h, deg/h^1.5, deg/h^2); without it "
                     "the first five windows teach")
         ->expected(static_cast<int>(allan::kTerms))
-        ->delimiter(',');
+        ->delimiter(',')
+        ->check(number_in(0, kLargestValue, "Q,N,B,K,R, each zero or above"));
 }
 
 }  // namespace
@@ -110,7 +126,7 @@ void add_allan(CLI::App& app, int& exit_code) {
         ->required();
     command->add_option("--tau0", request.tau0, "s between samples; or give --time")
         ->type_name("S")
-        ->check(CLI::Validator(not_seconds, ""));
+        ->check(seconds());
     command->add_option("--column", request.column, "name or number (from 1) of the column");
     command->add_option("--time", request.time, "column with time stamps in s");
     command->add_option("--data", options->data, "rate (default) or phase")
@@ -121,7 +137,7 @@ void add_allan(CLI::App& app, int& exit_code) {
                         "adev, oadev (default), mdev, hdev, ohdev, tdev, totdev");
     command->add_option("--taus", request.taus, "octave (default), decade, all, or s: 1,10,100");
     command->add_option("--confidence", request.confidence, "of the intervals (0.683)")
-        ->check(CLI::Range(0.01, 0.9999));
+        ->check(number_in(0.01, 0.9999, "a number from 0.01 to 0.9999"));
     command->add_flag("--fit", request.fit, "Q, N, B, K, R with errors");
     command->add_flag("--drop-outliers", request.drop_outliers, "treat outliers as missing");
     add_dynamic_options(*command, *options);

@@ -110,6 +110,10 @@ std::vector<std::size_t> factors_asked(const AllanRequest& request, std::size_t 
         }
         taus.push_back(tau);
     }
+    if (taus.empty()) {
+        throw std::runtime_error(
+            "--taus: nothing found, expected octave, decade, all or seconds such as 1,10,100");
+    }
     return allan::factors_of(taus, request.tau0, largest);
 }
 
@@ -219,6 +223,20 @@ AllanAnalysis analyse(const AllanRequest& asked) {
     if (!(request.tau0 > 0) || !std::isfinite(request.tau0)) {
         throw std::runtime_error(
             "--tau0: the step between samples in s is needed (or --time COLUMN)");
+    }
+    if (request.tau0 < kShortestStep || request.tau0 > kLongestStep) {
+        std::ostringstream message;
+        message << request.file << ": steps of " << request.tau0
+                << " s found, expected 1e-9 to 1e9 s";
+        fail(message);
+    }
+    const auto large = std::find_if(values.begin(), values.end(),
+                                    [](double v) { return std::abs(v) > kLargestValue; });
+    if (large != values.end()) {
+        std::ostringstream message;
+        message << request.file << ": sample " << large - values.begin() + 1 << ": " << *large
+                << " found, expected at most " << kLargestValue;
+        fail(message);
     }
     // A phase wanders far without an outlier: its steps are what can be judged.
     std::vector<double> steps;

@@ -13,6 +13,9 @@ namespace vibrig::tool {
 namespace allan = estimator::allan;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  ///< no value
+constexpr double kShortestStep = 1e-9;                             ///< s
+constexpr double kLongestStep = 1e9;                               ///< s
+constexpr double kLargestValue = 1e60;  ///< its square times those of steps and counts is finite
 
 /// What the user asked `vibrig allan` for.
 struct AllanRequest {
