@@ -1,6 +1,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
 #include <algorithm>
 #include <charconv>
@@ -26,6 +27,7 @@ struct Options {
     std::string type = "oadev";
     std::string mean = "corrected";
     std::vector<double> reference;
+    CLI::Option* known_mean = nullptr;
     std::string plot;
     bool json = false;
 };
@@ -59,6 +61,10 @@ int run(Options& options) {
             {"corrected", allan::MeanMode::corrected},
             {"known-mean", allan::MeanMode::known_mean}};
         request.mode = modes.at(options.mean);
+        if (request.mode == allan::MeanMode::known_mean && options.known_mean->count() == 0) {
+            throw std::runtime_error(
+                "--mean: known-mean found without --known-mean, expected the mean rate in deg/h");
+        }
         if (!options.reference.empty()) {
             allan::Terms terms{};
             std::copy(options.reference.begin(), options.reference.end(), terms.begin());
@@ -99,9 +105,11 @@ void add_dynamic_options(CLI::App& command, Options& options) {
                     "classical variance about: corrected (default), known-mean, window-mean (the "
                     "paper's way, biased)")
         ->check(CLI::IsMember({"corrected", "known-mean", "window-mean"}));
-    command
-        .add_option("--known-mean", request.known_mean, "mean rate in deg/h for --mean known-mean")
-        ->check(number_in(-kLargestValue, kLargestValue, "a mean rate in deg/h"));
+    options.known_mean =
+        command
+            .add_option("--known-mean", request.known_mean,
+                        "mean rate in deg/h for --mean known-mean")
+            ->check(number_in(-kLargestValue, kLargestValue, "a mean rate in deg/h"));
     command.add_option("--alpha", request.alpha, "level of the alarms of one window (0.001)")
         ->check(number_in(1e-12, 0.5, "a probability from 1e-12 to 0.5"));
     command

@@ -222,6 +222,7 @@ TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     expect_refusal(window + "--reference 0,1,-1,0,0", {"--reference", "-1", "zero or above"});
     expect_refusal(window + "--reference 0,0,0,0,0", {"--reference", "five zeros"});
     expect_refusal(window + "--known-mean nan", {"--known-mean", "nan"});
+    expect_refusal(window + "--mean known-mean", {"--mean", "without --known-mean"});
     expect_refusal("allan ok.txt --tau0 1 --plot none/x.svg", {"none/x.svg"});
 }
 
