@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "daemon/configuration/value.hpp"
 
@@ -74,11 +75,34 @@ void CrossCheck::for_daemon() {
                    " with ready_timeout_s " + plain(c_.campaign.ready_timeout_s),
                "a window shorter than the timeout");
     }
+    doors();
     broker();
     adaptive();
     set_points_fit();
     limits();
     frequency();
+}
+
+void CrossCheck::doors() {
+    const auto& server = c_.server;
+    if (sound({"server.page"}) && !server.page.empty()) {
+        std::string host = server.page.substr(0, server.page.rfind(':'));
+        if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
+        if (!loopback(host))
+            refuse({"server.page"}, '"' + server.page + '"',
+                   "this machine's loopback, \"127.0.0.1:PORT\" or \"[::1]:PORT\": the page over "
+                   "plain HTTP is for nobody else");
+    }
+    if (sound({"server.remote"}) && !server.remote.empty()) {
+        using Row = std::pair<const char*, std::string>;
+        for (const auto& [key, value] :
+             {Row{"server.certificate", server.certificate}, Row{"server.key", server.key},
+              Row{"server.clients_ca", server.clients_ca}}) {
+            if (value.empty())
+                refuse({"server.remote"}, '"' + server.remote + "\" without " + key,
+                       "a file in PEM; `vibrig pki init` makes one");
+        }
+    }
 }
 
 void CrossCheck::broker() {

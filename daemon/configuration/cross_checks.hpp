@@ -27,6 +27,7 @@ class CrossCheck {
                 const std::string& expected);
     void bus();
     void broker();
+    void doors();
     void adaptive();
     void rig_clock();
     void registers();

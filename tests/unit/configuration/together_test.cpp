@@ -42,6 +42,31 @@ TEST(Together, TheRigsClockNeedsASimulatedBusAndALoopbackShaker) {
         HasSubstr("a serial line"));
 }
 
+TEST(Together, ThePageIsForThisMachineAlone) {
+    for (const char* page : {"127.0.0.1:8979", "[::1]:0", "localhost:8979", "127.1.2.3:1"})
+        EXPECT_EQ(complaint(std::string("server.page = \"") + page + "\"", true), "") << page;
+    for (const char* page : {"0.0.0.0:8979", "[::]:8979", "10.0.0.7:8979", "127.evil.example:1"})
+        EXPECT_THAT(complaint(std::string("server.page = \"") + page + "\"", true),
+                    AllOf(StartsWith(std::string("rig.toml:1:15: server.page: found \"") + page),
+                          HasSubstr("expected this machine's loopback")))
+            << page;
+}
+
+TEST(Together, RemoteNeedsCertificates) {
+    const std::string remote = "[server]\nremote = \"0.0.0.0:8443\"\n";
+    const std::string certificate = "certificate = \"rig.crt\"\n", key = "key = \"rig.key\"\n";
+    const std::string authority = "clients_ca = \"authority.crt\"\n";
+    EXPECT_EQ(complaint(remote + certificate + key + authority, true), "");
+    EXPECT_EQ(complaint(remote, false), "") << "a recording needs no server";
+    EXPECT_THAT(complaint(remote + key + authority, true),
+                AllOf(StartsWith("rig.toml:2:10: server.remote: found \"0.0.0.0:8443\" without "
+                                 "server.certificate"),
+                      HasSubstr("expected a file in PEM")));
+    EXPECT_THAT(complaint(remote + certificate + authority, true), HasSubstr("without server.key"));
+    EXPECT_THAT(complaint(remote + certificate + key, true),
+                HasSubstr("without server.clients_ca"));
+}
+
 TEST(Together, SetPointsBeyondTheShakerAreRefusedWithTheNumbers) {
     // a / (2 pi f)^2 = 9 * 9.80665 / 94.248^2 = 9.9362 mm, a / (2 pi f) = 0.93647 m/s
     EXPECT_THAT(
