@@ -190,6 +190,10 @@ ApiAnswer Api::problem(int status, const std::string& detail) {
 }
 
 ApiAnswer Api::check_browser(const ApiRequest& request, const Caller& caller) {
+    // Which of them counts would be anybody's guess.
+    if (!request.repeated.empty())
+        return refuse(400, caller, asked_by(request),
+                      std::string(request.repeated) + ": found it twice, expected it once");
     if (!caller.browser) return {};
     // Another name that resolves to this machine would make a stranger's page ours.
     if (!caller.host.empty()) {

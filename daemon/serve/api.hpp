@@ -18,6 +18,7 @@ struct ApiRequest {
     std::string_view host;
     std::string_view origin;  ///< empty: not from a page
     std::string body;
+    std::string_view repeated = {};  ///< a header that comes twice and may not; empty: none does
 };
 
 struct ApiAnswer {

@@ -54,6 +54,12 @@ Response response_of(ApiAnswer answer, unsigned version, bool keep_alive) {
     return response;
 }
 
+std::string_view repeated(const Request& request) {
+    if (request.count(http::field::host) > 1) return "Host";
+    if (request.count(http::field::origin) > 1) return "Origin";
+    return request.count(http::field::content_type) > 1 ? "Content-Type" : "";
+}
+
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
 /// One WebSocket client of the stream. Server thread only; lives while a handler of it waits.
@@ -302,7 +308,8 @@ class Session : public std::enable_shared_from_this<Session> {
                                view(request[http::field::content_type]),
                                view(request[http::field::host]),
                                view(request[http::field::origin]),
-                               request.body()};
+                               request.body(),
+                               repeated(request)};
         ApiAnswer answer;
         if (!requests_.take(Clock::now())) {
             answer = Api::problem(429, "too many requests on this connection");

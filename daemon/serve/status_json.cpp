@@ -2,6 +2,8 @@
 
 #include <google/protobuf/util/json_util.h>
 
+#include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 
 #include "daemon/serve/one_line.hpp"
@@ -33,6 +35,27 @@ void check_line(const std::string& field, const std::string& text, std::size_t l
     }
     if (one_line(text) != text) {
         throw std::invalid_argument(field + ": contains a control character, expected one line");
+    }
+}
+
+/// protobuf takes the last of two, whoever read it before may have taken the first.
+void refuse_repeated_keys(const std::string& json) {
+    std::set<std::string> keys;
+    const auto look = [&](int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+        if (event == nlohmann::json::parse_event_t::key && depth == 1 &&
+            !keys.insert(parsed.get<std::string>()).second) {
+            throw std::invalid_argument("found \"" + parsed.get<std::string>() +
+                                        "\" twice, expected it once");
+        }
+        return true;
+    };
+    try {
+        const nlohmann::json whole = nlohmann::json::parse(json, look);
+    } catch (const nlohmann::json::parse_error& error) {
+        throw std::invalid_argument("not a Command in JSON: wrong at byte " +
+                                    std::to_string(error.byte));
+    } catch (const nlohmann::json::exception&) {
+        throw std::invalid_argument("not a Command in JSON: a number out of range");
     }
 }
 
@@ -134,6 +157,7 @@ std::string problem_json(int status, const std::string& title, const std::string
 }
 
 CommandRequest parse_command(const std::string& json) {
+    refuse_repeated_keys(json);
     v1::Command message;
     const auto parsed = google::protobuf::util::JsonStringToMessage(json, &message);
     if (!parsed.ok()) {

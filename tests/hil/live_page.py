@@ -278,7 +278,9 @@ def check_stop(checks, rig, page, until, remote, pki):
     shutil.copy(os.path.join(pki, "ada.key"), os.path.join(pki, "gone.key"))
     run = subprocess.run([rig.program("vibrig"), "pki", "revoke", "--folder", pki, "ada"], capture_output=True, text=True)
     checks.check(run.returncode == 0, "vibrig pki revoke", run.stderr)
-    until("her page is cut off at once", "document.getElementById('alert').textContent.startsWith('LINK LOST')", 30)
+    # Its text stays when it is hidden, from before the page was connected.
+    until("her page is cut off at once", "!document.getElementById('alert').hidden && "
+          "document.getElementById('alert').textContent.startsWith('LINK LOST')", 30)
     host = urllib.parse.urlparse(remote).netloc
     for name, code in (("gone", 2), ("bob", 1)):
         run = subprocess.run([rig.program("vibrig"), "resume", "--by", name, "--host", host, "--identity", os.path.join(pki, name)],

@@ -277,7 +277,13 @@ TEST_F(Access, StrangersPagesAreNotAnswered) {
     EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + "Origin: http://evil.example\r\n")),
               403);
     EXPECT_EQ(status_of(ask("/api/v1/streams", page, upgrade)), 404);
+    const std::string host = "Host: " + page + "\r\n", origin = "Origin: http://" + page + "\r\n";
+    EXPECT_EQ(status_of(ask("/", page, host)), 400);
+    EXPECT_EQ(status_of(ask("/", page, "Host: evil.example\r\n")), 400);
+    EXPECT_EQ(status_of(ask("/", page, origin + "Origin: http://evil.example\r\n")), 400);
+    EXPECT_EQ(status_of(ask("/api/v1/stream", page, upgrade + origin + origin)), 400);
     // and who tried it is told of
+    EXPECT_TRUE(told("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found it twice"));
     EXPECT_TRUE(told("GET '/' | page, from 127.0.0.1 | Host: found 'evil.example" + port));
     EXPECT_TRUE(told("GET '/api/v1/status' | page, from 127.0.0.1 | Origin: found 'null'"));
     EXPECT_TRUE(told("GET '/api/v1/stream' | page, from 127.0.0.1 | Origin: found 'http://evil"));

@@ -53,6 +53,14 @@ TEST(Command, IsRefusedWithTheFieldAndWhatWasExpected) {
     EXPECT_NE(error_of(R"({"kind":"arm","by":"A","force":true})").find("force"), std::string::npos);
     EXPECT_NE(error_of(R"({"kind":"acknowledge","by":"A"})").find("argument: empty"),
               std::string::npos);
+    for (const char* twice : {R"({"kind":"abort","kind":"arm","by":"A"})",
+                              R"({"by":"A","kind":"arm","k\u0069nd":"arm"})",
+                              R"({"kind":"arm","kind":"arm","by":"A"})"})
+        EXPECT_NE(error_of(twice).find("\"kind\" twice"), std::string::npos) << twice;
+    EXPECT_NE(error_of(R"({"kind":"arm","by":"A","by":"B"})").find("\"by\" twice"),
+              std::string::npos);
+    EXPECT_NE(error_of(R"({kind:"arm","by":"A"})").find("at byte 2"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":1e999,"by":"A"})").find("out of range"), std::string::npos);
     EXPECT_NE(error_of("[]"), "none");
     EXPECT_NE(error_of("null"), "none");
     EXPECT_NE(error_of(std::string(10'000, '[')), "none");
