@@ -156,6 +156,7 @@ void add_coefficients(Page& page, const Analysis& a) {
     chart.title = "Correlation of the coefficients";
     chart.x = Axis("coefficient, in the order of the table");
     chart.y = Axis("coefficient");
+    for (Axis* axis : {&chart.x, &chart.y}) axis->exact = true;
     tool::plot::HeatMap map;
     map.label = "absolute correlation";
     for (std::size_t i = 0; i <= kParameters; ++i) {
@@ -484,7 +485,8 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     add_zeros(page, campaign);
     std::size_t told = 0;
     for (const auto& event : campaign.events) {
-        if (event.text.find("level") == std::string::npos &&
+        if (!event.text.starts_with("level after") &&
+            event.text.find("levelling") == std::string::npos &&
             event.text.find("zero") == std::string::npos)
             continue;
         page.paragraph(event.text);

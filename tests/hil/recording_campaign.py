@@ -333,9 +333,10 @@ def kept(checks, rig, folder):
              os.path.join(rig.results, "recordings.sqlite3")]
     os.symlink(names[0], os.path.join(rig.folder, "link.html"))
     before = [os.stat(name) for name in names]
+    commands = [("compensate", folder, "--to", "csv"), ("report", folder), ("export", folder, "--to", "csv"),
+                ("export", folder, "--to", "mat"), ("export", folder, "--to", "candump")]
     for name in (*names, "link.html"):
-        for command in (("export", folder, "--to", "csv"), ("export", folder, "--to", "mat"), ("export", folder, "--to", "candump"),
-                        ("report", folder), ("compensate", folder, "--to", "csv")):
+        for command in commands if name == names[0] else commands[:1]:
             run = offline(rig, *command, "-o", name)
             if run.returncode != 2 or "found a file of a recording" not in run.stderr:
                 checks.check(False, f"{' '.join(command)} -o {name}: refused", f"status {run.returncode} {run.stderr}")
@@ -416,8 +417,12 @@ def report(checks, rig, folder):
     with h5py().File(shutil.copy(os.path.join(folder, "campaign.h5"), os.path.join(rig.folder, "earlier.h5")), "r+") as file:
         file.attrs.modify("started_utc_ns", file.attrs["started_utc_ns"] - 86400 * 10**9)
         file["configuration"][()] = file["configuration"][()].replace(b'"0017"', b'"0018"')
-    made = offline(rig, "report", folder, "-o", "x.html", "--compare", "earlier.h5")
-    checks.equal(made.returncode, 0, "a report is written", )
+    made = offline(rig, "report", folder, "-o", "x.html", "--compare", "earlier.h5", "--pdf", "x.pdf")
+    checks.check(made.returncode == 0, "a report is written", made.stderr)
+    with open(os.path.join(rig.folder, "x.pdf"), "rb") as file:
+        pdf = file.read()
+    pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
+    checks.check(pdf.startswith(b"%PDF-") and b"%%EOF" in pdf[-32:] and pages > 3, "and printed as PDF", f"{len(pdf)} bytes, {pages} pages")
     with open(os.path.join(rig.folder, "x.html"), encoding="utf-8") as file:
         page = file.read()
     with open(os.path.join(folder, "campaign.h5"), "rb") as file:
@@ -427,6 +432,12 @@ def report(checks, rig, folder):
                         ("comparison", "Repeatability"), ("earlier unit", "GP-3, serial number 0018"),
                         ("warning of another unit", "Warning: this is another unit")):
         checks.check(words in page, f"the report has its {what}")
+    axes = page[page.index("Correlation of the coefficients"):]
+    axes = re.findall(r">(\d+)</text>", axes[:axes.index("</svg>")])
+    checks.check("30" in axes and "35" not in axes and "0" not in axes[:12], "its correlations are of 30 coefficients", str(axes))
+    level = page[page.index("Accelerometer zeros in force"):]
+    level = level[:level.index("Comparison with an earlier")]
+    checks.check("do not determine" not in level and "No levelling" in level, "of levelling it says what there was", level[:500])
     foreign = re.findall(r"(?:src|href)=\"(?!#)[^\"]*\"|https?://(?!www.w3.org/2000/svg)\S+", page)
     checks.equal(foreign, [], "it needs nothing else")
     table = json.loads(offline(rig, "compensate", folder, "--json", "--attitude", "0,0,0").stdout)

@@ -55,6 +55,7 @@ void Axis::settle() {
             low -= margin;
             high += margin;
         }
+        if (exact) return;
         const double by = step();
         low = by * std::floor(low / by + 1e-9);
         high = by * std::ceil(high / by - 1e-9);
@@ -76,7 +77,7 @@ std::vector<double> Axis::ticks() const {
         }
     } else {
         const double by = step();
-        for (double k = std::round(low / by); k * by <= high + by * 1e-9; ++k) {
+        for (double k = std::ceil(low / by - 1e-9); k * by <= high + by * 1e-9; ++k) {
             at.push_back(k * by);
         }
     }
@@ -100,7 +101,13 @@ std::vector<double> Axis::minor() const {
 
 std::string Axis::text_of(double tick) const {
     std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.6g",
+    // As many digits as tell one tick from the next.
+    int digits = 6;
+    if (!log && high > low)
+        digits = std::max(
+            digits,
+            2 + static_cast<int>(std::log10(std::max(std::abs(low), std::abs(high)) / step())));
+    std::snprintf(text.data(), text.size(), "%.*g", std::min(digits, 15),
                   std::abs(tick) < 1e-12 * (high - low) ? 0 : tick);
     return text.data();
 }

@@ -17,9 +17,10 @@ class Axis {
     bool log = false;
     double low = 0;
     double high = 0;
+    bool exact = false;  ///< keeps its range; else it is rounded to ticks
 
     void include(double value);                       ///< widens the range; log: only if > 0
-    void settle();                                    ///< rounds the range to ticks
+    void settle();                                    ///< makes the range one to be drawn
     [[nodiscard]] double place(double value) const;   ///< 0 at low, 1 at high
     [[nodiscard]] std::vector<double> ticks() const;  ///< labelled
     [[nodiscard]] std::vector<double> minor() const;  ///< not labelled, log axes only
