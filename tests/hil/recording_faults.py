@@ -145,7 +145,7 @@ def accounts(checks, rig, disk):
     dump = subprocess.run(["h5dump", "-H", os.path.join(folder, "campaign-2.h5")], capture_output=True)
     checks.equal(dump.returncode, 0, "others can read a file that was given up")
     text = subprocess.run([rig.program("vibrig"), "recover", folder], capture_output=True, text=True).stdout
-    checks.check("closed in order" in text and "Read-only" in text, "a second time there is nothing to mend", text)
+    checks.check("mended before: nothing to mend" in text and "Read-only" in text, "a second time there is nothing to mend", text)
 
 
 def main():
