@@ -167,6 +167,9 @@ def missing_segment(checks, rig, folder):
         run = offline(rig, *command)
         checks.check(run.returncode == 1 and f"missing {os.path.basename(path)}, which the index has" in run.stdout + run.stderr,
                      f"{command[0]}: a missing segment is named", f"status {run.returncode} {run.stdout} {run.stderr}")
+    made = offline(rig, "report", folder, "-o", "holed.html")
+    with open(os.path.join(rig.folder, "holed.html"), encoding="utf-8") as file:
+        checks.check(f"Missing: {os.path.basename(path)}, which the index has" in file.read(), "the report names it", made.stderr)
     os.rename(aside, path)
     whole = offline(rig, "export", folder, "--to", "candump", "-o", "whole.log")
     checks.check(whole.returncode == 0 and "missing" not in whole.stderr, "with it nothing is missing", whole.stderr)
