@@ -107,7 +107,8 @@ Json budget_json(const levelling::Leveller& loop) {
             {"accelerometer_arcmin", budget.accelerometer / kArcmin},
             {"gyro_arcmin", budget.gyro / kArcmin},
             {"total_arcmin", budget.total / kArcmin},
-            {"dominant", budget.dominant()}};
+            {"dominant", budget.dominant()},
+            {"mean_force_arcmin", loop.force_noise() / kArcmin}};
 }
 
 Json gains_json(const levelling::Gains& gains) {
@@ -118,9 +119,9 @@ std::string budget_table(const levelling::Leveller& loop) {
     const levelling::NoiseBudget& budget = loop.budget();
     return text(
         "noise of the tilt, 1 sigma: reference %.4g', accelerometer %.4g', gyro %.4g'; "
-        "together %.4g' (mostly %s)\n",
+        "together %.4g' (mostly %s); of the mean specific force %.4g'\n",
         budget.reference / kArcmin, budget.accelerometer / kArcmin, budget.gyro / kArcmin,
-        budget.total / kArcmin, budget.dominant());
+        budget.total / kArcmin, budget.dominant(), loop.force_noise() / kArcmin);
 }
 
 plot::Chart response_chart(const Options& options, const levelling::LevellerSettings& loop) {

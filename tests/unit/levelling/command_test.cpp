@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -57,6 +58,9 @@ TEST_F(LevelCommand, DesignsGainsWithTheirNoise) {
     EXPECT_EQ(result["roots"].size(), 3U);
     EXPECT_NEAR(result["longest_period_s"].get<double>(), 0.05 / sigma, 1e-9);
     EXPECT_EQ(result["noise"]["dominant"], "reference velocity");
+    // of the tilt, and 1e-5 g of the one sample in the mean
+    EXPECT_NEAR(result["noise"]["mean_force_arcmin"],
+                std::hypot(result["noise"]["total_arcmin"].get<double>(), 0.034378), 1e-5);
     EXPECT_EQ(vibrig("level design --plot response.svg"), 0) << error;
     EXPECT_NE(content_of(folder_ / "response.svg").find("<svg"), std::string::npos);
     EXPECT_NE(out.find("Routh"), std::string::npos);
