@@ -57,10 +57,18 @@ std::string value_schema(const pb::FieldDescriptor& field) {
     return reference(schema_name(*field.message_type()));
 }
 
+bool always_there(const pb::FieldDescriptor& field) {
+    // Of a command, which comes in, the one field that may be left out is known here alone.
+    if (field.containing_type() == v1::Command::descriptor()) return field.name() != "argument";
+    // A status has all its parts, whatever the rig does.
+    if (field.containing_type() == v1::Status::descriptor()) return true;
+    return !field.has_presence();
+}
+
 void add_schema(const pb::Descriptor& message, Names& done, std::string& out) {
     const std::string name = schema_name(message);
     if (!done.insert(name).second) return;
-    std::string properties, inside;
+    std::string properties, required, inside;
     for (int i = 0; i < message.field_count(); ++i) {
         const pb::FieldDescriptor& field = *message.field(i);
         std::string schema;
@@ -73,13 +81,15 @@ void add_schema(const pb::Descriptor& message, Names& done, std::string& out) {
             schema = value_schema(field);
         }
         properties += (i > 0 ? ",\"" : "\"") + field.name() + "\":" + schema;
+        // What has no presence is always printed: a number, a text, a list, though it be empty.
+        if (always_there(field)) required += (required.empty() ? "\"" : ",\"") + field.name() + '"';
         const pb::Descriptor* const type = field.message_type();
         if (type != nullptr && !field.is_map() && type->file() == message.file())
             add_schema(*type, done, inside);
     }
     if (!out.empty()) out += ',';
-    out += '"' + name + R"(":{"type":"object","additionalProperties":false,"properties":{)" +
-           properties + "}}";
+    out += '"' + name + R"(":{"type":"object","additionalProperties":false,"required":[)" +
+           required + R"(],"properties":{)" + properties + "}}";
     if (!inside.empty()) out += ',' + inside;
 }
 
