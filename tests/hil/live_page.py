@@ -91,7 +91,7 @@ def free_port():
             return probe.getsockname()[1]
 
 
-def check_description(checks, address):
+def check_description(checks, rig, address):
     """Every path of the OpenAPI description answers as it says."""
     status, _, text = get(address, "/api/v1/openapi.json")
     checks.check(status == 200, "the OpenAPI description is served")
@@ -123,6 +123,17 @@ def check_description(checks, address):
         status, kind, text = get(address, path, headers, method, body)
         good = status == expected and kind == "application/problem+json" and not wrong(problem, json.loads(text))
         checks.check(good, f"{method} {path} {json.dumps(headers)} is refused as a problem ({expected})", f"{status} {text[:300]}")
+
+
+    with contextlib.closing(http.client.HTTPConnection("localhost", timeout=10)) as control:
+        control.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        control.sock.settimeout(10)
+        control.sock.connect(rig.socket)
+        control.request("POST", "/api/v1/commands", '{"kind":"abort","by":"x"}', {"Content-Type": "application/json"})
+        answer = control.getresponse()
+        text = answer.read().decode()
+        said = wrong(api["paths"]["/api/v1/commands"]["post"]["responses"]["200"]["content"]["application/json"]["schema"], json.loads(text))
+        checks.check(answer.status == 200 and not said, "a command that is taken is answered as described", f"{answer.status} {text} {said}")
 
 
 def check_injection(checks, rig, address):
@@ -389,7 +400,7 @@ def main():
             rig.start_daemon()
             address = page_address(rig)
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
-            check_description(checks, address)
+            check_description(checks, rig, address)
             check_injection(checks, rig, address)
             check_remote(checks, rig, "https://" + remote, folder)
             page = Page()
