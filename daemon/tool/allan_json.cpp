@@ -26,7 +26,21 @@ Json fit_json(const allan::Fit& fit) {
     return terms;
 }
 
-Json classical_json(const allan::ClassicalFit& fit) {
+/// Without a known mean the slow class is known up to the constant a0, which is left out.
+Json class_sums_json(const allan::ClassicalFit& fit, const std::vector<double>& taus) {
+    allan::Polynomial a = fit.a;
+    a[0] = fit.a0_known ? a[0] : 0;
+    Json slow = Json::array();
+    Json fast = Json::array();
+    for (const double tau : taus) {
+        const allan::ClassSums sums = allan::class_sums(a, tau);
+        slow.push_back(number(sums.slow));
+        fast.push_back(number(sums.fast));
+    }
+    return {{"a0_known", fit.a0_known}, {"slow", std::move(slow)}, {"fast", std::move(fast)}};
+}
+
+Json classical_json(const allan::ClassicalFit& fit, const std::vector<double>& taus) {
     Json a = Json::object();
     for (std::size_t k = 0; k < fit.a.size(); ++k) {
         a["a" + std::to_string(k)] = k == 0 && !fit.a0_known ? Json(nullptr) : number(fit.a[k]);
@@ -35,7 +49,10 @@ Json classical_json(const allan::ClassicalFit& fit) {
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         terms[allan::kTermNames[j]] = number(fit.terms[j]);
     }
-    return {{"a", std::move(a)}, {"terms", std::move(terms)}, {"notes", fit.notes}};
+    return {{"a", std::move(a)},
+            {"terms", std::move(terms)},
+            {"class_sums", class_sums_json(fit, taus)},
+            {"notes", fit.notes}};
 }
 
 Json alarms_json(const std::vector<allan::Alarm>& alarms) {
@@ -52,7 +69,7 @@ Json alarms_json(const std::vector<allan::Alarm>& alarms) {
 
 Json dynamic_json(const AllanAnalysis& analysis) {
     const double tau0 = analysis.request.tau0;
-    Json taus = Json::array();
+    std::vector<double> taus;
     for (const std::size_t m : analysis.factors) {
         taus.push_back(static_cast<double>(m) * tau0);
     }
@@ -69,7 +86,7 @@ Json dynamic_json(const AllanAnalysis& analysis) {
              {"refused", row.refused},
              {"dev", std::move(dev)},
              {"fit", row.refused ? Json(nullptr) : fit_json(row.fit)},
-             {"classical", row.refused ? Json(nullptr) : classical_json(row.classical_fit)},
+             {"classical", row.refused ? Json(nullptr) : classical_json(row.classical_fit, taus)},
              {"alarms", alarms_json(alarms)}});
     }
     Json summary = nullptr;
@@ -77,14 +94,14 @@ Json dynamic_json(const AllanAnalysis& analysis) {
         summary = {{"windows", analysis.summary->windows},
                    {"refused", analysis.summary->refused},
                    {"fit", fit_json(analysis.summary->fit)},
-                   {"classical", classical_json(analysis.summary->classical)},
+                   {"classical", classical_json(analysis.summary->classical, taus)},
                    {"recomputation_faults", analysis.summary->faults}};
     }
     return {{"window", analysis.request.window_s},
             {"overlap", analysis.request.overlap},
             {"smallest_change",
              analysis.smallest_change > 0 ? number(analysis.smallest_change) : Json(nullptr)},
-            {"taus", std::move(taus)},
+            {"taus", taus},
             {"rows", std::move(rows)},
             {"summary", std::move(summary)}};
 }

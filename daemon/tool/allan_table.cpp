@@ -86,6 +86,16 @@ std::string summary_table(const AllanAnalysis& analysis) {
         out += std::isnan(value) ? line("  %s -", allan::kTermNames[j])
                                  : line("  %s %.4g", allan::kTermNames[j], value);
     }
+    allan::Polynomial a = summary.classical.a;
+    a[0] = summary.classical.a0_known ? a[0] : 0;
+    out += line("\n  class sums [(deg/h)^2], slow%s and fast:",
+                summary.classical.a0_known ? "" : " without a0");
+    for (const std::size_t k :
+         {std::size_t{0}, analysis.factors.size() / 2, analysis.factors.size() - 1}) {
+        const double tau = static_cast<double>(analysis.factors[k]) * analysis.request.tau0;
+        const allan::ClassSums sums = allan::class_sums(a, tau);
+        out += line("%s tau %.4g s %.3g, %.3g", k == 0 ? "" : ";", tau, sums.slow, sums.fast);
+    }
     out += "\n";
     for (const std::string& note : summary.classical.notes) {
         out += "  " + note + "\n";

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <complex>
-#include <initializer_list>
 #include <limits>
 #include <sstream>
 
@@ -19,18 +18,14 @@ constexpr double kFlickerFloor = 0.664;
 double root(double square) { return square >= 0 ? std::sqrt(square) : kNaN; }
 
 /// Range of tau within [shortest, longest] where a class has a negative sum.
-void check_class(const char* name, const Polynomial& a, std::initializer_list<std::size_t> members,
-                 double shortest, double longest, std::vector<std::string>& notes) {
+void check_class(const char* name, const Polynomial& a, double ClassSums::*member, double shortest,
+                 double longest, std::vector<std::string>& notes) {
     constexpr int kSteps = 200;
     double first = 0;
     double last = 0;
     for (int i = 0; i <= kSteps; ++i) {
         const double tau = shortest * std::pow(longest / shortest, i / double{kSteps});
-        double sum = 0;
-        for (const std::size_t k : members) {
-            sum += a[k] * std::pow(tau, kPowers[k]);
-        }
-        if (sum < 0) {
+        if (class_sums(a, tau).*member < 0) {
             first = first > 0 ? first : tau;
             last = tau;
         }
@@ -67,6 +62,10 @@ double allan_variance(std::span<const Oscillation> oscillations, double q, doubl
 }
 
 double allan_multiplier(int power) { return 2 * (1 - std::pow(2.0, power)); }
+
+ClassSums class_sums(const Polynomial& a, double tau) {
+    return {a[0] + tau * (a[1] + tau * a[2]), (a[3] + a[4] / tau) / tau};
+}
 
 Polynomial limits_of(const Oscillation& o) {
     const double s2 = o.s * o.s;
@@ -137,9 +136,9 @@ ClassicalFit interpret(const Polynomial& a, bool a0_known, double shortest, doub
         fit.notes.emplace_back(
             "a0 and B: not identifiable with the window's mean removed; give a known mean");
     } else {
-        check_class("slow", a, {0, 1, 2}, shortest, longest, fit.notes);
+        check_class("slow", a, &ClassSums::slow, shortest, longest, fit.notes);
     }
-    check_class("fast", a, {3, 4}, shortest, longest, fit.notes);
+    check_class("fast", a, &ClassSums::fast, shortest, longest, fit.notes);
     return fit;
 }
 

@@ -28,6 +28,12 @@ using Polynomial = std::array<double, 5>;
 inline constexpr std::array<int, 5> kPowers{0, 1, 2, -1, -2};
 /// AVAR of a_k tau^n: 2 (1 - 2^n), that is 0, -2, -6, 1, 1.5.
 [[nodiscard]] double allan_multiplier(int power);
+/// The two parts of the classical variance at tau, (deg/h)^2.
+struct ClassSums {
+    double slow = 0;  ///< a0 + a1 tau + a2 tau^2
+    double fast = 0;  ///< a3 / tau + a4 / tau^2
+};
+[[nodiscard]] ClassSums class_sums(const Polynomial& a, double tau);
 /// Limits of one oscillation for tau much shorter (a0 a1 a2) and much longer (a3 a4) than tm.
 [[nodiscard]] Polynomial limits_of(const Oscillation& oscillation);
 

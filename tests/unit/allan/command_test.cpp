@@ -171,6 +171,27 @@ TEST_F(AllanCommand, DynamicAlarmsMakeTheExitCodeOne) {
     EXPECT_NE(out.find("alarm since"), std::string::npos);
 }
 
+TEST_F(AllanCommand, TheClassSumsOfTheClassicalModelArePrinted) {
+    write_noise("white.txt", 2000, 1);
+    const std::string command =
+        "allan white.txt --tau0 1 --dynamic 500 --mean known-mean "
+        "--known-mean 0 --reference 0,0.0167,0,0,0";
+    ASSERT_LE(vibrig(command + " --json"), 1) << error;
+    const Json dynamic = Json::parse(out)["dynamic"];
+    const Json& classical = dynamic["summary"]["classical"];
+    const Json& sums = classical["class_sums"];
+    ASSERT_EQ(sums["slow"].size(), dynamic["taus"].size());
+    EXPECT_TRUE(sums["a0_known"]);
+    for (std::size_t k = 0; k < dynamic["taus"].size(); ++k) {
+        const double tau = dynamic["taus"][k];
+        const auto a = [&](const char* name) { return classical["a"][name].get<double>(); };
+        EXPECT_NEAR(sums["slow"][k], a("a0") + a("a1") * tau + a("a2") * tau * tau, 1e-9);
+        EXPECT_NEAR(sums["fast"][k], a("a3") / tau + a("a4") / tau / tau, 1e-9);
+    }
+    ASSERT_LE(vibrig(command), 1) << error;
+    EXPECT_NE(out.find("class sums [(deg/h)^2], slow and fast: tau 1 s"), std::string::npos) << out;
+}
+
 TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     write_noise("ok.txt", 100);
     write("word.txt", "1\n2\nthree\n4\n");
