@@ -83,13 +83,14 @@ class Ring {
   private:
     // Indices grow for ever and are masked on use, so "full" and "empty" differ without a spare
     // slot. Each side keeps a copy of the other's index and reads the shared line only when the
-    // copy says full or empty.
+    // copy says full or empty. What a side keeps for itself is on another line than what it shows:
+    // written there, it would take that line away from the side that looks.
     alignas(64) std::atomic<std::uint64_t> head_{0};
-    std::uint64_t cached_tail_ = 0;
+    alignas(64) std::uint64_t cached_tail_ = 0;
     std::uint32_t unreported_ = 0;
     std::atomic<std::uint64_t> dropped_{0};
     alignas(64) std::atomic<std::uint64_t> tail_{0};
-    std::uint64_t cached_head_ = 0;
+    alignas(64) std::uint64_t cached_head_ = 0;
     alignas(64) std::size_t mask_;
     std::unique_ptr<T[]> slots_;
 };
