@@ -47,8 +47,10 @@ class Ring {
         const std::size_t n = records.size() < room ? records.size() : room;
         for (std::size_t i = 0; i < n; ++i) slots_[(head + i) & mask_] = records[i];
         if (n > 0) {
-            slots_[head & mask_].dropped_before += unreported_;
-            unreported_ = 0;
+            if (unreported_ > 0) {
+                slots_[head & mask_].dropped_before += unreported_;
+                unreported_ = 0;
+            }
             head_.store(head + n, std::memory_order_release);
         }
         if (const std::size_t lost = records.size() - n; lost > 0) {
@@ -82,15 +84,16 @@ class Ring {
 
   private:
     // Indices grow for ever and are masked on use, so "full" and "empty" differ without a spare
-    // slot. Each side keeps a copy of the other's index and reads the shared line only when the
-    // copy says full or empty. What a side keeps for itself is on another line than what it shows:
-    // written there, it would take that line away from the side that looks.
+    // slot. Each side has one line, which the other side looks at: besides its index, a copy of the
+    // other's index, so that the other's line is read only when the copy says full or empty. A push
+    // that finds room writes nothing there but the index: each write takes the line away from the
+    // side that looks.
     alignas(64) std::atomic<std::uint64_t> head_{0};
-    alignas(64) std::uint64_t cached_tail_ = 0;
+    std::uint64_t cached_tail_ = 0;
     std::uint32_t unreported_ = 0;
     std::atomic<std::uint64_t> dropped_{0};
     alignas(64) std::atomic<std::uint64_t> tail_{0};
-    alignas(64) std::uint64_t cached_head_ = 0;
+    std::uint64_t cached_head_ = 0;
     alignas(64) std::size_t mask_;
     std::unique_ptr<T[]> slots_;
 };
