@@ -6,10 +6,13 @@
 #include <string>
 
 #include "estimator/drift_filter.hpp"
+#include "estimator/drift_model.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
+#include "estimator/kinematics.hpp"
 #include "estimator/ud_filter.hpp"
 #include "tests/bench/dense_filter.hpp"
+#include "tests/bench/multiply_adds.hpp"
 
 // The filter's step, predict and three angle updates, against the dense reference in one run on one
 // machine: absolute times do not carry from one machine to another. tests/bench/report compares the
@@ -99,6 +102,31 @@ void whole_step(benchmark::State& state, const std::string& instruction_set) {
             filter.step(0.025 * static_cast<double>(n), {noise, -noise, noise}, 19));
     }
 }
+
+/// The two parts of the filter's limit: its multiply-adds at the machine's peak, and the model.
+void peak(benchmark::State& state) {
+    double x = 0.5;
+    for (auto _ : state) benchmark::DoNotOptimize(multiply_adds_at_peak(x));
+}
+BENCHMARK(peak)->Name("multiply_adds_at_peak");
+
+void model(benchmark::State& state) {
+    const estimator::Settings settings;
+    const estimator::Kinematics kinematics(settings);
+    const estimator::DriftModel drift(settings);
+    const estimator::ParameterArray constants{};
+    Eigen::Vector3d angles(0.1, 0.2, 0.3);
+    for (auto _ : state) {
+        const estimator::Pose pose = kinematics.pose(angles);
+        const estimator::Regressors h = drift.regressors(pose.up, 19);
+        const Eigen::Vector3d rate = drift.platform_rate(pose, h, constants.data());
+        const Eigen::Matrix3d jacobian = drift.jacobian(pose, 19, constants.data(), rate);
+        benchmark::DoNotOptimize(h);
+        benchmark::DoNotOptimize(jacobian);
+        angles += 1e-6 * (pose.m * rate);
+    }
+}
+BENCHMARK(model)->Name("model_of_step");
 
 /// Everything a sample of a campaign costs: level, filter, batch cross-check.
 void identify(benchmark::State& state) {
