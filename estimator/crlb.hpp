@@ -13,6 +13,7 @@ struct PlannedDwell {
     std::array<double, 3> angles_deg{};  ///< gimbal angles at its start: outer, inner, azimuth
     double kappa = 1;                    ///< 1 + a0^2 / 2, a0 at the platform in g
     double duration_s = 100;
+    int run = 1;
 };
 
 /// Variance of one angle rate, (deg/h)^2, from a dwell whose rate is otherwise unknown.

@@ -6,6 +6,7 @@
 
 #include "estimator/kinematics.hpp"
 #include "estimator/observability.hpp"
+#include "estimator/two_step.hpp"
 
 namespace vibrig::estimator {
 
@@ -17,6 +18,15 @@ PlanReport report_plan(const Settings& settings, const std::vector<PlannedDwell>
     for (const PlannedDwell& dwell : plan) levels.add(dwell.kappa);
     const Observability found = observability(posterior, prior, levels);
     PlanReport report;
+    if (settings.method == Method::two_step) {
+        std::map<int, KappaSpread> runs;
+        for (const PlannedDwell& dwell : plan) runs[dwell.run].add(dwell.kappa);
+        report.obstacle = two_step_obstacle(runs);
+        if (!report.obstacle.empty()) {
+            report.sigma.fill(std::numeric_limits<double>::quiet_NaN());
+            return report;
+        }
+    }
     for (std::size_t i = 0; i < kParameters; ++i) {
         const std::size_t a = internal_of(i);
         const auto k = static_cast<Eigen::Index>(a);
@@ -32,10 +42,12 @@ std::vector<PlannedDwell> campaign_plan(const Settings& settings,
                                         const std::vector<std::array<double, 3>>& positions_deg,
                                         const std::vector<double>& table_g, double dwell_s) {
     std::vector<PlannedDwell> plan;
+    int run = 0;
     for (const double level : table_g) {
+        ++run;
         const double a0 = settings.transmission * level;
         for (const std::array<double, 3>& position : positions_deg) {
-            plan.push_back({gimbal_deg(settings, position), 1.0 + 0.5 * a0 * a0, dwell_s});
+            plan.push_back({gimbal_deg(settings, position), 1.0 + 0.5 * a0 * a0, dwell_s, run});
         }
     }
     return plan;
@@ -49,6 +61,10 @@ std::vector<std::string> plan_warnings(const PlanReport& report) {
     }
     if (names.empty()) return lines;
     lines.push_back("these positions and levels do not determine one by one:" + names);
+    if (!report.obstacle.empty()) {
+        lines.push_back(report.obstacle);
+        return lines;
+    }
     if (report.combinations.empty()) lines.emplace_back("no combination of them is determined");
     for (const Combination& combination : report.combinations) {
         std::string sum;

@@ -13,6 +13,7 @@ struct PlanReport {
     std::array<bool, kParameters> observable{};
     std::array<double, kParameters> sigma{};  ///< expected, prior included; NaN: not determined
     std::vector<Combination> combinations;    ///< determined in place of what is not; value 0
+    std::string obstacle;  ///< why the two-step route cannot work: then nothing is determined
 };
 
 /// Throws SettingsError. Two vibration levels are told apart as in the result of a run.

@@ -10,6 +10,18 @@ ParameterArray two_step_prior(const ParameterArray& prior) noexcept {
     return fixed;
 }
 
+std::string two_step_obstacle(const std::map<int, KappaSpread>& runs) {
+    const std::string needs =
+        "the two-step route needs exactly two runs of different vibration level, found ";
+    if (runs.size() != 2) return needs + std::to_string(runs.size()) + " with good dwells";
+    const double first = runs.begin()->second.mean, second = runs.rbegin()->second.mean;
+    KappaSpread both;
+    both.add(first);
+    both.add(second);
+    if (!both.one_level()) return {};
+    return needs + "kappa " + std::to_string(first) + " and " + std::to_string(second);
+}
+
 bool recover(const RunSolution& first, const RunSolution& second, RunSolution& out) noexcept {
     const RunSolution& one = first.kappa >= second.kappa ? first : second;
     const RunSolution& two = first.kappa >= second.kappa ? second : first;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <map>
+#include <string>
+
 #include "estimator/observability.hpp"
 #include "estimator/parameters.hpp"
 
@@ -21,5 +24,9 @@ struct RunSolution {
 /// untouched, if the two kappas are equal.
 [[nodiscard]] bool recover(const RunSolution& first, const RunSolution& second,
                            RunSolution& out) noexcept;
+
+/// Why the route cannot work with these runs, for people; empty: it can. Levels of the dwells of
+/// each run, by its number.
+[[nodiscard]] std::string two_step_obstacle(const std::map<int, KappaSpread>& runs);
 
 }  // namespace vibrig::estimator

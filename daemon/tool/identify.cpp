@@ -108,7 +108,7 @@ class SeenDwell {
         if (kappa - 1 < 1e-4) kappa = 1;  // at rest
         const double duration_s = end_s_ - *begin_s_;
         if (!(duration_s > 0) || !std::isfinite(kappa)) return std::nullopt;
-        return estimator::PlannedDwell{angles_deg_, kappa, duration_s};
+        return estimator::PlannedDwell{angles_deg_, kappa, duration_s, 1};
     }
 
   private:
@@ -120,6 +120,9 @@ class SeenDwell {
     estimator::GrowingHann force_;
 };
 
+int run_of(const Dwell& dwell) { return dwell.run; }
+int run_of(const record::RecordedDwell& dwell) { return dwell.order->run; }
+
 /// Says what these dwells cannot determine, before they are gone through. `show(dwell, seen)` adds
 /// all measurements of a dwell to `seen`.
 template <typename Dwells, typename Show>
@@ -128,7 +131,10 @@ void tell_before(const Dwells& dwells, const estimator::Settings& settings, cons
     for (const auto& dwell : dwells) {
         SeenDwell seen(settings);
         show(dwell, seen);
-        if (const auto one = seen.planned()) plan.push_back(*one);
+        if (auto one = seen.planned()) {
+            one->run = run_of(dwell);
+            plan.push_back(*one);
+        }
     }
     if (plan.empty()) return;
     for (const std::string& line :

@@ -115,6 +115,37 @@ TEST(PlanReport, OneLevelIsToldByNameWithTheCombinationBeforeAndAfterTheRun) {
     EXPECT_NE(lines.at(1).find("determined is D_Fx + 19 D_OOx"), std::string::npos) << lines.at(1);
 }
 
+TEST(PlanReport, WhatTheTwoStepRouteCannotDoIsToldBeforeAndAfterTheRun) {
+    Settings settings;
+    settings.method = Method::two_step;
+    settings.transmission = 2.0 / 3.0;
+    EXPECT_TRUE(
+        plan_warnings(report_plan(settings, campaign_plan(settings, positions(14), {9, 7}, 20)))
+            .empty());
+    // GIVEN two equal levels, three levels, and one
+    struct Case {
+        std::vector<double> table_g;
+        std::string found;
+    };
+    for (const Case& c :
+         {Case{{9, 9}, "found kappa 19"}, Case{{9, 7, 5}, "found 3 with good dwells"},
+          Case{{9}, "found 1 with good dwells"}}) {
+        SCOPED_TRACE(c.found);
+        const PlanReport report =
+            report_plan(settings, campaign_plan(settings, positions(14), c.table_g, 20));
+        const std::vector<std::string> lines = plan_warnings(report);
+        // THEN all 30 are named before the run, with the reason
+        EXPECT_EQ(std::count(report.observable.begin(), report.observable.end(), true), 0);
+        ASSERT_EQ(lines.size(), 2U);
+        EXPECT_NE(lines[0].find("D_OSz"), std::string::npos);
+        EXPECT_NE(lines[1].find(c.found), std::string::npos) << lines[1];
+    }
+    // AND after it
+    const Result result = identified(settings, {6, 6});
+    EXPECT_EQ(std::count(result.observable.begin(), result.observable.end(), true), 0);
+    EXPECT_TRUE(told(result, "two runs of different vibration level, found kappa "));
+}
+
 TEST(PlanReport, TooFewPositionsOrAnUnsuitableVerticalAreTold) {
     Settings settings;
     const auto undetermined = [](const PlanReport& report) {
