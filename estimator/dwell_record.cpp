@@ -11,6 +11,14 @@ namespace {
 constexpr double kForceTolerance = 0.02;     ///< of 1 g, spec section 6.3 of the method
 constexpr double kRejectedTolerance = 0.01;  ///< of the samples
 constexpr double kLevelTolerance = 0.1;      ///< change of kappa within a dwell
+constexpr double kLevelDrift = 0.01;         ///< the same, followed but told
+constexpr double kLeastReadings = 0.5;       ///< of those that a steady rate would give
+constexpr double kCrowdedTolerance = 0.1;    ///< of the readings
+constexpr double kCrowded = 0.6;             ///< of the period
+
+constexpr const char* kSaturated[3] = {"accelerometer x is saturated: dwell rejected",
+                                       "accelerometer y is saturated: dwell rejected",
+                                       "accelerometer z is saturated: dwell rejected"};
 
 }  // namespace
 
@@ -51,6 +59,11 @@ void DwellRecord::note_level(double kappa) noexcept {
     largest_kappa = std::max(largest_kappa, kappa);
 }
 
+void DwellRecord::note_interval(double periods) noexcept {
+    slots += std::max(1.0, std::round(periods));
+    if (periods < kCrowded) ++crowded;
+}
+
 DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     DwellVerdict verdict;
     DwellSummary& s = verdict.summary;
@@ -60,7 +73,9 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     s.used = r.used;
     s.rejected = r.rejected;
     s.reinitialised = r.reinitialised;
-    if (r.level_samples > 0) {
+    const bool sparse =
+        r.forces < kLeastReadings * r.slots || r.crowded > kCrowdedTolerance * r.samples;
+    if (r.level_samples > 0 && !sparse) {
         s.kappa = r.kappa_sum / r.level_samples;
         s.mean_force_g = r.mean_force_sum / r.level_samples;
     }
@@ -81,6 +96,10 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("no samples", true);
     } else if (r.level_samples <= 0) {
         flag("no usable specific force", true);
+    } else if (sparse) {
+        flag("too many readings are missing to know the vibration level: dwell rejected", true);
+    } else if (r.saturated_axis >= 0) {
+        flag(kSaturated[r.saturated_axis], true);
     } else if (!(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
         flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
     } else if (r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
@@ -102,6 +121,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("a resolver stood still", false);
     } else if (s.rejected > kRejectedTolerance * s.samples) {
         flag("more than 1 % of the samples rejected", false);
+    } else if (r.largest_kappa > (1.0 + kLevelDrift) * r.least_kappa) {
+        flag("the vibration level drifted by more than 1 % of kappa: followed", false);
     }
     if (verdict.rejected) {
         s.used = 0;

@@ -23,9 +23,16 @@ struct DwellRecord {
     double period_s = 0, span_s = 0;
     double least_kappa = 0, largest_kappa = 0;  ///< of the streaming level; 0: none yet
     std::uint32_t stuck = 0;                    ///< samples with a resolver that stands still
+    int saturated_axis = -1;                    ///< of the accelerometers; -1: none
+    /// Periods from reading to reading, readings with a good force, and readings closer together
+    /// than the period: where many are missing, it is not known.
+    double slots = 0;
+    std::uint32_t forces = 0, crowded = 0;
 
     void count(const StepResult& step) noexcept;
     void note_level(double kappa) noexcept;
+    /// `periods` from the reading before to this one; not across a pause.
+    void note_interval(double periods) noexcept;
 };
 
 /// Summary of an ended dwell; `rejected` tells whether its data must be taken out of the filter

@@ -38,6 +38,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
       accelerometer_zero_(s.accelerometer_zero_g[0], s.accelerometer_zero_g[1],
                           s.accelerometer_zero_g[2]),
       stuck_(s),
+      saturation_(s.accelerometer_g),
       buffer_(VibrationLevel::kFirstWindow_s, kBufferCapacity),
       level_(s.level_window_s, s.accelerometer_g, s.frequency_hz),
       paper_(s.frequency_hz, s.forgetting) {
@@ -85,6 +86,7 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     buffer_.clear();
     primed_ = false;
     stuck_.clear();
+    saturation_.clear();
     bad_times_in_a_row_ = 0;
     active_ = filter_of(dwell.run);
     if (active_ == nullptr) {
@@ -140,6 +142,10 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         reading.angles_good = false;
         ++record_.stuck;
     }
+    if (reading.force_good) {
+        ++record_.forces;
+        saturation_.add(measurement.force_g);
+    }
     return accept(reading);
 }
 
@@ -173,6 +179,7 @@ StepResult Identification::Impl::replay() noexcept {
         const double slots =
             std::min(std::round((reading.time_s - previous) / period_s_), 1.0 / period_s_);
         for (double k = 1; k < slots; ++k) level_.add_first_missing();
+        record_.note_interval((reading.time_s - previous) / period_s_);
         previous = reading.time_s;
         if (reading.force_good && vertical_known) {
             level_.add_first(up.dot(reading.force));
@@ -199,6 +206,7 @@ StepResult Identification::Impl::replay() noexcept {
 
 void Identification::Impl::to_level(const Reading& reading) noexcept {
     const double slots = std::round((reading.time_s - last_time_s_) / period_s_);
+    record_.note_interval((reading.time_s - last_time_s_) / period_s_);
     for (double k = 1; k < slots; ++k) level_.add_missing();
     // The filter's angles, not the encoders': a spike must not tilt the vertical.
     if (reading.force_good) {
@@ -253,6 +261,7 @@ void Identification::Impl::end_stretch() noexcept {
 DwellSummary Identification::Impl::end_dwell() noexcept {
     if (!in_dwell_) return {};
     if (active_ != nullptr) end_stretch();
+    record_.saturated_axis = saturation_.axis();
     DwellVerdict verdict = judge(record_, settings);
     if (active_ == nullptr) {
         verdict.rejected = verdict.summary.flagged = true;

@@ -115,8 +115,7 @@ struct DwellSummary {
     double mean_force_g = 0;  ///< W{fu}; 1 within 2 % or the dwell is rejected
     double nis_per_dof = 0;
     double innovation_correlation = 0;  ///< from one sample to the next; 0 when noise is white
-    bool flagged =
-        false;  ///< more than 1 % rejected, or vertical force not 1 g, or excluded frequency
+    bool flagged = false;     ///< something is to be known of this dwell, or it is rejected:
     const char* reason = "";  ///< static text; empty when not flagged
     NoiseLevels noise;        ///< that the filter took in this dwell
 };

@@ -11,6 +11,7 @@
 #include "estimator/identification.hpp"
 #include "estimator/observability.hpp"
 #include "estimator/paper_level.hpp"
+#include "estimator/saturation_detector.hpp"
 #include "estimator/stuck_detector.hpp"
 #include "estimator/two_step.hpp"
 #include "estimator/vibration_level.hpp"
@@ -84,6 +85,7 @@ struct Identification::Impl {
     Eigen::Matrix3d accelerometer_matrix_;
     Eigen::Vector3d accelerometer_zero_;
     StuckDetector stuck_;
+    SaturationDetector saturation_;
     DwellBuffer buffer_;
     VibrationLevel level_;
     PaperLevel paper_;

@@ -63,8 +63,10 @@ std::vector<std::string> dwell_warnings(const std::vector<DwellSummary>& dwells)
     for (const DwellSummary& d : dwells) {
         if (d.flagged) {
             std::string text = dwell_name(d) + d.reason;
-            text += " (mean vertical force " + std::to_string(d.mean_force_g) + " g, " +
-                    std::to_string(d.rejected) + " of " + std::to_string(d.samples) +
+            text += " (";
+            if (d.mean_force_g > 0)
+                text += "mean vertical force " + std::to_string(d.mean_force_g) + " g, ";
+            text += std::to_string(d.rejected) + " of " + std::to_string(d.samples) +
                     " samples rejected)";
             warnings.push_back(std::move(text));
         }
@@ -216,9 +218,18 @@ Result Identification::Impl::result() const {
     out.rejected = rejected;
     out.dwells = dwells;
     out.warnings = dwell_warnings(dwells);
-    if (settings.method == Method::two_step && (refused_run || !two_runs())) {
-        out.warnings.emplace_back(
-            "the two-step route needs exactly two runs of different vibration level");
+    if (settings.method == Method::two_step) {
+        std::map<int, KappaSpread> levels;
+        for (const RunFilter& filter : filters) {
+            if (filter.kappa.dwells > 0) levels[filter.run] = filter.kappa;
+        }
+        // What a third one's level was has not been looked at.
+        for (const DwellSummary& dwell : dwells) {
+            if (refused_run && dwell.run != filters[0].run && dwell.run != filters[1].run)
+                levels[dwell.run];
+        }
+        if (std::string text = two_step_obstacle(levels); !text.empty())
+            out.warnings.push_back(std::move(text));
     }
     if (std::string text = unobservable_warning(out.observable); !text.empty()) {
         out.warnings.push_back(std::move(text));

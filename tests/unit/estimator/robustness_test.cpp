@@ -25,10 +25,10 @@ struct Campaign {
 
     Campaign() { plan.duration_s = 40; }
 
-    Result run(const Spoil& spoil) {
+    Result run(const Spoil& spoil, std::array<double, 2> amplitudes_g = {6.0, 14.0 / 3.0}) {
         Identification identification{Settings{}};
         rig.spoil = spoil;
-        rig.campaign(identification, {6.0, 14.0 / 3.0}, plan);
+        rig.campaign(identification, amplitudes_g, plan);
         return identification.result();
     }
 };
@@ -97,6 +97,82 @@ TEST(Robustness, AnglesMayPassThroughZeroAndThreeHundredAndSixtyDegrees) {
     expect_within_four_sigma(result);
 }
 
+std::size_t with_reason(const Result& result, const std::string& part) {
+    return static_cast<std::size_t>(
+        std::count_if(result.dwells.begin(), result.dwells.end(), [&](const DwellSummary& d) {
+            return std::string(d.reason).find(part) != std::string::npos;
+        }));
+}
+
+TEST(Robustness, CrestsCutByLittleAreTold) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    struct Case {
+        const char* name;
+        double high_g, range_g;
+    };
+    // GIVEN accelerometers whose range ends so near the crest (13 g, 7 g) that gravity still comes
+    // out as 1 g within 2 %, and far from it
+    for (const Case c : {Case{"0.3 g of 13", 12, 12.7}, Case{"0.25 g of 13", 12, 12.75},
+                         Case{"0.2 g of 7", 6, 6.8}, Case{"3 g of 13", 12, 10}}) {
+        SCOPED_TRACE(c.name);
+        std::array<int, 14> cut{};
+        const Result result = Campaign().run(
+            [&](const DwellInfo& dwell, int, Measurement& m) {
+                if (dwell.run != 1) return;
+                for (double& f : m.force_g) {
+                    if (std::abs(f) <= c.range_g) continue;
+                    f = std::copysign(c.range_g, f);
+                    ++cut[static_cast<std::size_t>(dwell.position - 1)];
+                }
+            },
+            {c.high_g, 14.0 / 3.0});
+        // THEN the dwells whose samples meet the crests, an eighth of them at 8 samples in 3
+        // periods, are refused with the reason
+        const auto hurt = std::count_if(cut.begin(), cut.end(), [](int n) { return n >= 100; });
+        EXPECT_GE(hurt, 4);
+        EXPECT_EQ(with_reason(result, "saturated"), static_cast<std::size_t>(hurt));
+        EXPECT_EQ(std::count(cut.begin(), cut.end(), 0), 14 - hurt);
+        expect_within_four_sigma(result);
+    }
+}
+
+TEST(Robustness, AnAccelerometerWithinItsRangeIsNotCalledSaturated) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN converters much finer, as fine as and much coarser than the noise of 1e-4 g, and none
+    for (const double step_g : {0.0, 4e-6, 5e-5, 1e-4, 2e-4, 3e-4, 1e-3}) {
+        SCOPED_TRACE("step " + std::to_string(step_g) + " g");
+        Campaign campaign;
+        campaign.plan.duration_s = 20;
+        const Result result = campaign.run([&](const DwellInfo&, int, Measurement& m) {
+            if (step_g == 0) return;
+            for (double& f : m.force_g) f = step_g * std::round(f / step_g);
+        });
+        EXPECT_EQ(with_reason(result, "saturated"), 0U);
+    }
+}
+
+TEST(Robustness, ADwellWithMostReadingsMissingIsRefusedForThat) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN 60 and 90 % of the samples lost
+    for (const double lost : {0.6, 0.9}) {
+        Campaign campaign;
+        campaign.plan.lost_probability = lost;
+        const Result result = campaign.run({});
+        // THEN every dwell is refused with this reason, and no level is made up
+        EXPECT_EQ(with_reason(result, "missing"), 28U) << lost;
+        for (const DwellSummary& dwell : result.dwells) {
+            EXPECT_EQ(dwell.mean_force_g, 0);
+            EXPECT_EQ(dwell.used, 0U);
+        }
+    }
+    // WHEN a third is lost, THEN all are good
+    Campaign campaign;
+    campaign.plan.lost_probability = 0.33;
+    const Result result = campaign.run({});
+    EXPECT_EQ(flagged(result), 0U);
+    expect_within_four_sigma(result);
+}
+
 TEST(Robustness, ASaturatedAccelerometerIsNotTakenForALowerLevel) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
     // GIVEN accelerometers that stop at 5 g while the platform feels 7
@@ -104,8 +180,8 @@ TEST(Robustness, ASaturatedAccelerometerIsNotTakenForALowerLevel) {
         if (dwell.run != 1) return;
         for (double& f : m.force_g) f = std::clamp(f, -5.0, 5.0);
     });
-    // THEN the eight positions with an axis along the vertical are refused, since gravity does not
-    // come out as 1 g; with 45 deg between no axis reaches its limit
+    // THEN the eight positions with an axis along the vertical are refused; with 45 deg between no
+    // axis reaches its limit
     EXPECT_EQ(flagged(result), 8U);
     expect_within_four_sigma(result);
 }
@@ -174,13 +250,23 @@ TEST(Robustness, EncodersThatAverageAreToldByTheCorrelationOfTheirNoise) {
     }
 }
 
-TEST(Robustness, AnAmplitudeThatDriftsByTwoPercentIsFollowed) {
+TEST(Robustness, AnAmplitudeThatDriftsByTwoPercentIsFollowedAndTold) {
     SCOPED_TRACE("seed " + std::to_string(kSeed));
-    Campaign campaign;
-    campaign.plan.amplitude_drift = 0.02;
-    const Result result = campaign.run({});
-    expect_within_four_sigma(result);
-    EXPECT_LE(result.rejected, 5U);
+    struct Case {
+        std::array<double, 2> amplitudes_g;
+        double duration_s;
+    };
+    for (const Case& c : {Case{{6.0, 14.0 / 3.0}, 40}, Case{{12.0, 28.0 / 3.0}, 100}}) {
+        SCOPED_TRACE(std::to_string(c.amplitudes_g[0]) + " g");
+        Campaign campaign;
+        campaign.plan.duration_s = c.duration_s;
+        campaign.plan.amplitude_drift = 0.02;
+        const Result result = campaign.run({}, c.amplitudes_g);
+        // THEN every dwell says so, and none of its samples is taken out
+        EXPECT_EQ(with_reason(result, "drifted"), 28U);
+        EXPECT_LE(result.rejected, 5U);
+        expect_within_four_sigma(result);
+    }
 }
 
 TEST(Robustness, ADwellWhoseVibrationStartsLateIsTakenOut) {
