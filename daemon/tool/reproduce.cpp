@@ -1,19 +1,25 @@
 #include "daemon/tool/reproduce.hpp"
 
+#include <unistd.h>
+
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <exception>
+#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/plot/chart.hpp"
 
 namespace vibrig::tool {
 
@@ -26,9 +32,10 @@ constexpr int kDisagrees = 1;
 struct Entry {
     const char* name;
     Reproduction (*run)(const ReproduceOptions&);
+    bool has_charts = false;
 };
 constexpr std::array kEntries{
-    Entry{"tang2009", reproduce_tang2009},
+    Entry{"tang2009", reproduce_tang2009, true},
     Entry{"allan", reproduce_allan},
     Entry{"dplan", reproduce_dplan},
     Entry{"zha2019", reproduce_zha2019},
@@ -70,16 +77,40 @@ std::string table(const Reproduction& reproduction) {
 Json json(const Reproduction& reproduction) {
     Json rows = Json::array();
     for (const ReproducedRow& row : reproduction.rows) {
+        Json values = Json::object();
+        for (const auto& [key, value] : row.values) {
+            values[key] = std::isfinite(value) ? Json(value) : Json(nullptr);
+        }
         rows.push_back({{"item", row.item},
                         {"published", row.published},
                         {"computed", row.computed},
-                        {"agrees", row.agrees ? Json(*row.agrees) : Json(nullptr)}});
+                        {"agrees", row.agrees ? Json(*row.agrees) : Json(nullptr)},
+                        {"values", std::move(values)}});
     }
     return {{"name", reproduction.name},
             {"title", reproduction.title},
             {"agrees", agrees(reproduction)},
             {"rows", std::move(rows)},
             {"notes", reproduction.notes}};
+}
+
+/// Throws what is wrong with the folder before a study of minutes has run.
+void check_plot(const std::string& name, const std::string& folder) {
+    if (folder.empty())
+        throw std::runtime_error("--plot: found \"\", expected a folder for charts");
+    for (const Entry& entry : kEntries) {
+        if (name == entry.name && !entry.has_charts) {
+            throw std::runtime_error("--plot: found " + folder + ", but " + name +
+                                     " has no charts");
+        }
+    }
+    if (std::filesystem::exists(folder) && !std::filesystem::is_directory(folder)) {
+        throw std::runtime_error("--plot: found " + folder + ", expected a folder for charts");
+    }
+    plot::make_folder(folder);
+    if (access(folder.c_str(), W_OK) != 0) {
+        throw std::runtime_error("--plot: found " + folder + ", which cannot be written to");
+    }
 }
 
 int run(const std::string& name, const ReproduceOptions& options, bool as_json) {
@@ -134,13 +165,22 @@ void add_reproduce(CLI::App& app, int& exit_code) {
         ->check(CLI::IsMember(names));
     command->add_option("--seeds", options->reproduce.seeds, "Monte-Carlo runs of each study")
         ->check(CLI::Range(std::size_t{2}, std::size_t{100000}));
-    command->add_option("--plot", options->reproduce.plot,
-                        "folder for charts, where there is something to see (SVG)");
+    const CLI::Option* plot = command->add_option("--plot", options->reproduce.plot,
+                                                  "folder for charts of tang2009 (SVG)");
     command->add_flag("--json", options->json, "print the result as JSON");
     command->footer(
         "Example: vibrig reproduce tang2009 --seeds 32 --plot charts\n"
         "Exit codes: 0 everything agrees, 1 something differs (marked), 2 bad usage.");
-    command->callback([options, &exit_code] {
+    command->callback([options, plot, &exit_code] {
+        if (plot->count() > 0) {
+            try {
+                check_plot(options->name, options->reproduce.plot);
+            } catch (const std::exception& error) {
+                std::cerr << "reproduce: " << error.what() << '\n';
+                exit_code = kBadInput;
+                return;
+            }
+        }
         exit_code = run(options->name, options->reproduce, options->json);
     });
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace vibrig::tool {
@@ -17,6 +18,8 @@ struct ReproducedRow {
     std::string published;
     std::string computed;
     std::optional<bool> agrees = {};  ///< nothing to compare with: empty
+    /// The numbers of the texts, by name, for machines.
+    std::vector<std::pair<std::string, double>> values = {};
 };
 
 /// A paper's table, published next to computed.
