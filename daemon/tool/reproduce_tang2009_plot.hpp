@@ -6,8 +6,8 @@
 
 namespace vibrig::tool::tang2009 {
 
-/// Charts like the paper's Figure 3, one for each gyro and route. Throws std::runtime_error naming
-/// the path.
-void plot_convergence(const Convergence& convergence, const std::string& folder);
+/// Charts like the paper's Figure 3, one for each gyro and route of a study. Throws
+/// std::runtime_error naming the path.
+void plot_convergence(const Study& study, const std::string& folder);
 
 }  // namespace vibrig::tool::tang2009

@@ -21,6 +21,7 @@ using estimator::kParameters;
 using estimator::Method;
 
 constexpr std::array<double, 4> kTable_g{9, 7, 0, 2};
+constexpr std::size_t kSamplesBetweenNotes = 400;  ///< 10 s
 
 struct Plan {
     Method method;
@@ -33,17 +34,20 @@ constexpr std::array<Plan, kRoutes> kPlans{{{Method::two_step, {true, true, fals
                                             {Method::joint, {true, false, false, false}},
                                             {Method::joint, {true, false, true, false}}}};
 
+estimator::Covariance correlation_of(const estimator::Result& result) {
+    const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> sigma(result.sigma.data());
+    return sigma.cwiseInverse().asDiagonal() * result.covariance *
+           sigma.cwiseInverse().asDiagonal();
+}
+
 double nees(const estimator::Result& result) {
     // On the correlation matrix: the coefficients differ by orders of magnitude.
-    Eigen::Matrix<double, kParameters, 1> error, sigma;
+    Eigen::Matrix<double, kParameters, 1> error;
     for (std::size_t i = 0; i < kParameters; ++i) {
         const auto k = static_cast<Eigen::Index>(i);
-        sigma[k] = result.sigma[i];
         error[k] = (result.value[i] - truth()[i]) / result.sigma[i];
     }
-    const estimator::Covariance correlation =
-        sigma.cwiseInverse().asDiagonal() * result.covariance * sigma.cwiseInverse().asDiagonal();
-    return error.dot(estimator::linear_algebra::covariance_inverse(correlation) * error);
+    return error.dot(estimator::linear_algebra::covariance_inverse(correlation_of(result)) * error);
 }
 
 /// One route while the rig runs.
@@ -82,6 +86,7 @@ struct Follower {
         outcome.sigma = estimate.sigma;
         outcome.nees = nees(result);
         outcome.nis = result.nis_per_dof;
+        outcome.correlation_square = correlation_of(result).squaredNorm();
         return outcome;
     }
 };
@@ -98,14 +103,13 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Converge
     std::vector<Follower> followers;
     for (const Plan& of : kPlans) followers.emplace_back(of);
 
-    double minutes = 0;
-    std::size_t position = 0;
+    std::size_t samples = 0;  // of trial 1
     const auto note = [&] {
-        if (convergence == nullptr || followers[kJoint1].run == 0 || minutes == 0) return;
+        if (convergence == nullptr) return;
         estimator::Estimate joint, two_step;
         followers[kJoint1].identification.estimate(joint);
         followers[kTwoStep1].identification.estimate(two_step);
-        convergence->minutes.push_back(minutes);
+        convergence->minutes.push_back(static_cast<double>(samples) * 0.025 / 60);
         convergence->joint.push_back(joint.value);
         convergence->two_step.push_back(two_step.value);
     };
@@ -121,11 +125,7 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Converge
             for (Follower& follower : followers) {
                 follower.take(sample, m, plan.table_g[sample.run - 1]);
             }
-            if (sample.run <= 2) {
-                if (sample.position != position) note();
-                position = sample.position;
-                minutes += 0.025 / 60;
-            }
+            if (sample.run <= 2 && ++samples % kSamplesBetweenNotes == 0) note();
         },
         [&](std::size_t, std::size_t) { dwell_done(); });
     std::array<Outcome, kRoutes> outcomes;
@@ -134,9 +134,9 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Converge
     return outcomes;
 }
 
-Coefficients bound_of_trial_1(const Study& study) {
+Coefficients bound_of(const Study& study, const std::array<double, 2>& levels) {
     std::vector<estimator::PlannedDwell> plan;
-    for (const double table_g : {9.0, 7.0}) {
+    for (const double table_g : levels) {
         const double a0 = study.platform_g(table_g);
         for (const plant::Vec3& p : plant::CampaignPlan::table1()) {
             plan.push_back({{p[0], p[1], p[2]}, 1 + a0 * a0 / 2, 100});
@@ -162,7 +162,8 @@ std::vector<Study> run_studies(const std::vector<double>& scales, std::size_t se
     for (std::size_t s = 0; s < scales.size(); ++s) {
         studies[s].scale = scales[s];
         studies[s].seeds.resize(seeds);
-        studies[s].bound = bound_of_trial_1(studies[s]);
+        studies[s].bound = bound_of(studies[s], {9, 7});
+        studies[s].bound_trial_2 = bound_of(studies[s], {0, 2});
     }
     const std::size_t jobs = scales.size() * seeds;
     const std::size_t all = jobs * kTable_g.size() * plant::CampaignPlan::table1().size();

@@ -26,9 +26,11 @@ struct Outcome {
     Coefficients value{}, sigma{};
     double nees = 0;  ///< of the 30 coefficients; NaN where they are not all determined
     double nis = 0;   ///< mean per degree of freedom
+    /// Sum of the squared correlations between all coefficients; 30: none correlate.
+    double correlation_square = 0;
 };
 
-/// Estimates of trial 1 at the end of each dwell, one seed.
+/// Estimates of trial 1 every 10 s of its dwells, one seed.
 struct Convergence {
     std::vector<double> minutes;
     std::vector<Coefficients> joint, two_step;
@@ -39,8 +41,8 @@ struct Convergence {
 struct Study {
     double scale = 1;
     std::vector<std::array<Outcome, kRoutes>> seeds;
-    Convergence convergence;  ///< of the first seed
-    Coefficients bound{};     ///< Cramer-Rao, 1 sigma, trial 1
+    Convergence convergence;                ///< of the first seed
+    Coefficients bound{}, bound_trial_2{};  ///< Cramer-Rao, 1 sigma
 
     [[nodiscard]] double platform_g(double table_g) const { return scale * table_g * 2.0 / 3.0; }
 };
