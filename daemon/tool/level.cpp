@@ -18,10 +18,10 @@
 
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
-#include "daemon/tool/finite.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
 #include "estimator/levelling/simulation.hpp"
+#include "proto/option_value.hpp"
 
 namespace vibrig::tool::level_command {
 
@@ -415,39 +415,44 @@ constexpr double kRightAngle = 5400;  // arcmin
 
 void add_two(CLI::App& command, const char* name, std::vector<double>& value, double most,
              const char* help) {
-    command.add_option(name, value, help)->expected(2)->delimiter(',')->check(finite(-most, most));
+    command.add_option(name, value, help)
+        ->expected(2)
+        ->delimiter(',')
+        ->check(proto::finite(-most, most));
 }
 
 void add_design_options(CLI::App& command, Options& o) {
     add_two(command, "--tilt", o.tilt, kRightAngle, "of both channels at first, arcmin (30,-20)");
     add_two(command, "--drift", o.drift, 1e6, "deg/h (0.1,-0.1)");
     command.add_option("--settling", o.specification.settling_s, "settling time in s (100)")
-        ->check(finite(kAboveZero, 1e7));
+        ->check(proto::finite(proto::kAboveZero, 1e7));
     command
         .add_option("--residual", o.specification.residual,
                     "fraction of the initial tilt left then (0.005)")
-        ->check(finite());
-    command.add_option("--damping", o.specification.damping, "ratio xi (0.7)")->check(finite());
+        ->check(proto::finite());
+    command.add_option("--damping", o.specification.damping, "ratio xi (0.7)")
+        ->check(proto::finite());
     command.add_option("--gains", o.gains, "K1,K2,K3 instead of a design")
         ->expected(3)
         ->delimiter(',')
-        ->check(finite());
-    command.add_option("--period", o.period_s, "s between samples (0.1)")->check(finite(1e-4, 1e4));
+        ->check(proto::finite());
+    command.add_option("--period", o.period_s, "s between samples (0.1)")
+        ->check(proto::finite(1e-4, 1e4));
     command
         .add_option("--window", o.window_s,
                     "of the means in s (1); shaker on: whole vibration periods")
-        ->check(finite(kAboveZero, 3600));
+        ->check(proto::finite(proto::kAboveZero, 3600));
     command
         .add_option("--tolerance", o.tolerance,
                     "arcmin; default the larger of 0.05 and four times the noise of the means")
-        ->check(finite(kAboveZero, 300));
+        ->check(proto::finite(proto::kAboveZero, 300));
     command.add_option("--reference-noise", o.reference_noise, "m/s per sample (0)")
-        ->check(finite(0, 1000));
+        ->check(proto::finite(0, 1000));
     command.add_option("--accelerometer-noise", o.accelerometer_noise_g, "g per sample (1e-5)")
-        ->check(finite(0, 1));
+        ->check(proto::finite(0, 1));
     command.add_option("--gyro-noise", o.gyro_noise, "random walk, deg/sqrt(h) (0)")
-        ->check(finite(0, 100));
-    command.add_option("--gravity", o.gravity, "m/s^2 (9.80665)")->check(finite(1, 30));
+        ->check(proto::finite(0, 100));
+    command.add_option("--gravity", o.gravity, "m/s^2 (9.80665)")->check(proto::finite(1, 30));
     command.add_flag("--json", o.json, "print the result as JSON");
     command.add_option("--plot", o.plot, "an SVG file (simulate: or a folder)");
 }
@@ -456,23 +461,23 @@ void add_simulate_options(CLI::App& command, Options& o) {
     add_two(command, "--zero", o.zero_mg, 1000, "of the accelerometers, mg (0,0)");
     add_two(command, "--reference-error", o.reference_error, 1000, "constant, m/s (0,0)");
     auto* step = command.add_option("--step", o.step, "both channels tip by so much, arcmin")
-                     ->check(finite(-kRightAngle, kRightAngle));
+                     ->check(proto::finite(-kRightAngle, kRightAngle));
     command.add_option("--step-at", o.step_s, "when, s; with --runs at any time")
-        ->check(finite(0))
+        ->check(proto::finite(0))
         ->needs(step);
     command.add_option("--slow", o.slow, "K1,K2,K3 to ramp to after settling")
         ->expected(3)
         ->delimiter(',')
-        ->check(finite());
+        ->check(proto::finite());
     command.add_option("--ramp", o.ramp_s, "length of that ramp, s (60)")
-        ->check(finite(kAboveZero, 1e6));
+        ->check(proto::finite(proto::kAboveZero, 1e6));
     command.add_option("--torquer-limit", o.torquer_limit, "deg/h (3276.7)")
-        ->check(finite(kAboveZero, 1e9));
+        ->check(proto::finite(proto::kAboveZero, 1e9));
     command.add_option("--network", o.network, "fast (default), conventional, undamped")
         ->check(CLI::IsMember({"fast", "conventional", "undamped"}));
     command.add_option("--duration", o.duration_s, "s (3.1 settling times)")
-        ->check(finite(kAboveZero, 1e9));
-    command.add_option("--seed", o.seed, "of the noise (1)");
+        ->check(proto::finite(proto::kAboveZero, 1e9));
+    command.add_option("--seed", o.seed, "of the noise (1)")->check(proto::whole());
     command
         .add_option("--runs", o.runs,
                     "many starts, tilt and drift drawn up to those given; exit 0 if all are "

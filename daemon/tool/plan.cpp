@@ -10,10 +10,10 @@
 #include <stdexcept>
 
 #include "daemon/tool/commands.hpp"
-#include "daemon/tool/finite.hpp"
 #include "daemon/tool/plan_study.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
+#include "proto/option_value.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -106,26 +106,26 @@ void add_candidates(CLI::App& command, Options& options) {
         .add_option("--levels", request.levels_g,
                     "peak acceleration at the platform, g (0,2,4,4.667,6)")
         ->delimiter(',')
-        ->check(finite(0, 1e3));
+        ->check(proto::finite(0, 1e3));
     command.add_option("--grid", request.grid_deg, "candidates every so many deg of each gimbal")
-        ->check(finite(5, 90));
+        ->check(proto::finite(5, 90));
     for (const auto& [name, range] :
          {std::pair{"--outer", &options.outer}, std::pair{"--inner", &options.inner},
           std::pair{"--azimuth", &options.azimuth}}) {
         command.add_option(name, *range, "gimbal limits LOW,HIGH, deg")
             ->delimiter(',')
             ->expected(2)
-            ->check(finite());
+            ->check(proto::finite());
     }
     command.add_option("--forbidden", request.forbidden, "CSV of positions to keep away from");
     command
         .add_option("--forbidden-within", request.limits.forbidden_within,
                     "largest difference of the three angles that counts as near, deg (10)")
-        ->check(finite(0, 360));
+        ->check(proto::finite(0, 360));
     command
         .add_option("--noise-per-g", request.noise_per_g,
                     "noise grows with the level as hypot(1, this x level) (0)")
-        ->check(finite(0, 1e3));
+        ->check(proto::finite(0, 1e3));
     command.add_option("--without", request.without, "terms the model has not, such as D12,D13")
         ->delimiter(',');
 }
@@ -135,13 +135,13 @@ void add_time(CLI::App& command, Options& options) {
     command.add_flag("--time-costs", request.time_costs,
                      "compare plans per time, ramps included, not per run");
     command.add_option("--dwell", options.dwell, "s of one run (100)")
-        ->check(finite(kAboveZero, 1e6));
+        ->check(proto::finite(proto::kAboveZero, 1e6));
     command.add_option("--settle", options.settle, "s after the ramp (3)")
-        ->check(finite(kAboveZero, 1e6));
+        ->check(proto::finite(proto::kAboveZero, 1e6));
     command.add_option("--ramp", options.ramp, "s to the level, and back (2)")
-        ->check(finite(kAboveZero, 1e6));
+        ->check(proto::finite(proto::kAboveZero, 1e6));
     command.add_option("--slew", request.slew_deg_per_s, "deg/s of the gimbals (5)")
-        ->check(finite(kAboveZero, 1e6));
+        ->check(proto::finite(proto::kAboveZero, 1e6));
     command
         .add_option("--order", request.order,
                     "travel (default): little gimbal travel; random: in blocks; list")
@@ -174,9 +174,9 @@ void add_plan(CLI::App& app, int& exit_code) {
                      "deg/h/g, deg/h/g^2; 0: any)")
         ->delimiter(',')
         ->expected(3)
-        ->check(finite(0));
+        ->check(proto::finite(0));
     planner::add_time(*command, *options);
-    command->add_option("--seed", request.seed, "of the random starts (1)");
+    command->add_option("--seed", request.seed, "of the random starts (1)")->check(proto::whole());
     command->add_option("--config", request.config, "configuration file (TOML) of the rig");
     command->add_option("-o,--output", options->output, "plan file for vibrigd ([campaign] plan)");
     command->add_option("--plot", options->plot, "an SVG file, or a folder: the directions");

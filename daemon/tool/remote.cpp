@@ -16,7 +16,7 @@
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
-#include "daemon/tool/finite.hpp"
+#include "proto/option_value.hpp"
 
 namespace vibrig::tool {
 namespace {
@@ -277,7 +277,7 @@ void add_remote(CLI::App& app, int& exit_code) {
         "--until-finished", watch_options->until_finished,
         "End with the campaign: exit code 0 when it finished, 1 when aborted or tripped");
     watching.add_option("--interval", watch_options->interval_s, "Time between two looks, s")
-        ->check(finite(0.05, 3600))
+        ->check(proto::finite(0.05, 3600))
         ->capture_default_str();
     watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
     watching.callback([watch_options, &exit_code] {

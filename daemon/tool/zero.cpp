@@ -18,11 +18,11 @@
 #include "daemon/tool/column_file.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
-#include "daemon/tool/finite.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
+#include "proto/option_value.hpp"
 
 namespace vibrig::tool::zero_command {
 
@@ -275,39 +275,40 @@ int run_simulate(const Options& options) {
 
 void add_common(CLI::App& command, Options& o) {
     zeros::CalibrationSettings& s = o.calibration;
-    command.add_option("--latitude", o.latitude_deg, "deg (45.75)")->check(finite(-89, 89));
-    command.add_option("--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)")->check(finite(1, 30));
+    command.add_option("--latitude", o.latitude_deg, "deg (45.75)")->check(proto::finite(-89, 89));
+    command.add_option("--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)")
+        ->check(proto::finite(1, 30));
     command.add_option("--slews", o.slews, "azimuths in deg (0,90,-90,90); the last two repeat")
         ->delimiter(',')
-        ->check(finite(-360, 360));
+        ->check(proto::finite(-360, 360));
     command.add_option("--rate", s.plan.rate_deg_s, "of the slews, deg/s (5)")
-        ->check(finite(kAboveZero, 100));
+        ->check(proto::finite(proto::kAboveZero, 100));
     command.add_option("--duration", s.plan.duration_s, "s (180)")
-        ->check(finite(kAboveZero, 86400));
+        ->check(proto::finite(proto::kAboveZero, 86400));
     command.add_flag("--static", s.allow_unobservable,
                      "go on with a plan that cannot tell zeros from tilt");
     command.add_flag("--inverted", s.inverted, "platform z down");
     command.add_option("--lever-arm", o.lever_arm, "from the azimuth axis, body axes, m (0,0,0)")
         ->expected(3)
         ->delimiter(',')
-        ->check(finite(-10, 10));
+        ->check(proto::finite(-10, 10));
     command.add_option("--gyro-noise", s.noise.angle_random_walk, "deg/sqrt(h) (0.01)")
-        ->check(finite(0, 100));
+        ->check(proto::finite(0, 100));
     command.add_option("--accelerometer-noise", s.noise.velocity_random_walk, "g/sqrt(Hz) (2e-5)")
-        ->check(finite(0, 1));
+        ->check(proto::finite(0, 1));
     command
         .add_option("--velocity-noise", s.noise.velocity_reference, "of the reference, m/s (0.005)")
-        ->check(finite(kAboveZero, 1000));
+        ->check(proto::finite(proto::kAboveZero, 1000));
     command
         .add_option("--position-noise", s.noise.position_reference, "of the reference, m (0.01)")
-        ->check(finite(kAboveZero, 1e6));
+        ->check(proto::finite(proto::kAboveZero, 1e6));
     command
         .add_option("--scale-uncertainty", o.scale_ppm, "of the vertical accelerometer, ppm (100)")
-        ->check(finite(0, 1e6));
+        ->check(proto::finite(0, 1e6));
     command
         .add_option("--vibration-limit", s.vibration_limit_g,
                     "g, standard deviation within 1 s (0.01)")
-        ->check(finite(kAboveZero, 10));
+        ->check(proto::finite(proto::kAboveZero, 10));
     command.add_flag("--json", o.json, "print the result as JSON");
     command.add_option("--plot", o.plot, "an SVG file");
 }
@@ -338,16 +339,16 @@ void add_zero(CLI::App& app, int& exit_code) {
     simulate->add_option("--zero", options->zero_mg, "mg (5,-5,5)")
         ->expected(3)
         ->delimiter(',')
-        ->check(finite(-1000, 1000));
+        ->check(proto::finite(-1000, 1000));
     simulate->add_option("--scale", options->real_scale_ppm, "errors, ppm (0,0,0)")
         ->expected(3)
         ->delimiter(',')
-        ->check(finite(-1e5, 1e5));
+        ->check(proto::finite(-1e5, 1e5));
     simulate->add_option("--period", options->period_s, "of the increments, s (0.01)")
-        ->check(finite(1e-4, 0.1));
+        ->check(proto::finite(1e-4, 0.1));
     simulate->add_option("--vibration", options->vibration_g, "peak at 15 Hz, g (0)")
-        ->check(finite(0, 10));
-    simulate->add_option("--seed", options->seed, "of the noise (1)");
+        ->check(proto::finite(0, 10));
+    simulate->add_option("--seed", options->seed, "of the noise (1)")->check(proto::whole());
     simulate->add_flag("--both-ways", options->both_ways,
                        "a second run with z down, for zero and scale apart");
     simulate->add_option("--write", options->write,

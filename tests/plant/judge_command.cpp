@@ -4,6 +4,7 @@
 #include <memory>
 #include <sstream>
 
+#include "proto/option_value.hpp"
 #include "tests/plant/commands.hpp"
 #include "tests/plant/judge.hpp"
 
@@ -25,7 +26,7 @@ void add_judge_command(CLI::App& app, int& exit_code) {
     command->add_option("--truth", o->truth,
                         "truth file (JSON); default: Table 2 of Tang et al. 2009");
     command->add_option("--sigma", o->sigma, "largest error in standard deviations")
-        ->check(CLI::Range(0.1, 1000.0))
+        ->check(proto::finite(0.1, 1000.0))
         ->capture_default_str();
     command->footer(
         "Exit code 0 only if all 30 coefficients are there, observable, finite and within the "

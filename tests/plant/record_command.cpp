@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "proto/option_value.hpp"
 #include "tests/plant/commands.hpp"
 #include "tests/plant/recording.hpp"
 
@@ -32,24 +33,25 @@ void add_record_command(CLI::App& app, int& exit_code) {
         ->add_option("--table-g", o->plan.table_g,
                      "peak acceleration at the table in g, one run each")
         ->delimiter(',')
-        ->check(CLI::Range(0.0, 100.0))
+        ->check(proto::finite(0.0, 100.0))
         ->capture_default_str();
     command->add_option("--frequency", o->plan.frequency_hz, "of the vibration, Hz")
-        ->check(CLI::Range(1.0, 200.0))
+        ->check(proto::finite(1.0, 200.0))
         ->capture_default_str();
     command->add_option("--dwell", o->plan.dwell_s, "recorded at each position, s")
-        ->check(CLI::Range(0.025, 1e5))
+        ->check(proto::finite(0.025, 1e5))
         ->capture_default_str();
     command->add_option("--ramp", o->plan.ramp_s, "of the amplitude, s")
-        ->check(CLI::Range(0.01, 600.0))
+        ->check(proto::finite(0.01, 600.0))
         ->capture_default_str();
     command->add_option("--settle", o->plan.settle_s, "after the ramp, not recorded, s")
-        ->check(CLI::Range(0.0, 600.0))
+        ->check(proto::finite(0.0, 600.0))
         ->capture_default_str();
     command->add_option("--truth", o->truth,
                         "truth file (JSON); default: Table 2 of Tang et al. 2009");
     command->add_option("--write-truth", o->write_truth, "write the truth used to this file");
-    command->add_option("--seed", o->seed, "of all noise; default: the truth file's, or 1");
+    command->add_option("--seed", o->seed, "of all noise; default: the truth file's, or 1")
+        ->check(proto::whole());
     command->add_option("-o,--output", o->output, "CSV file to write, - for standard output")
         ->required();
     command->footer(

@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "proto/option_value.hpp"
 #include "tests/plant/commands.hpp"
 #include "tests/plant/control.hpp"
 #include "tests/plant/modbus_server.hpp"
@@ -176,14 +177,15 @@ void add_run_command(CLI::App& app, int& exit_code) {
     command->add_option("--truth", o->truth,
                         "truth file (JSON); default: Table 2 of Tang et al. 2009");
     command->add_option("--write-truth", o->write_truth, "write the truth used to this file");
-    command->add_option("--seed", o->seed,
-                        "of all noise and faults; default: the truth file's, or 1");
+    command
+        ->add_option("--seed", o->seed, "of all noise and faults; default: the truth file's, or 1")
+        ->check(proto::whole());
     command->add_option("--warm-up", o->warm_up_s, "until the platform reports ready, s")
-        ->check(CLI::Range(0.0, 1e6));
+        ->check(proto::finite(0.0, 1e6));
     command->add_option("--start-temperature", o->start_temperature_c, "of the platform, degC")
-        ->check(CLI::Range(-60.0, 150.0));
+        ->check(proto::finite(-60.0, 150.0));
     command->add_option("--duration", o->duration_s, "end after so many simulated seconds")
-        ->check(CLI::Range(0.0, 1e9));
+        ->check(proto::finite(0.0, 1e9));
     command->add_option("--fault", o->faults, "a fault, see below; may be given several times")
         ->expected(1);
     command->add_option("--control", o->control,

@@ -185,6 +185,40 @@ TEST_F(Identify, RefusesBadConfigurationsAndUsage) {
     EXPECT_EQ(vibrig("identify rec.csv --json >/dev/full").exit_code, 2) << "a full disk";
 }
 
+TEST_F(Identify, TheSimulatedRigRefusesWhatIsNoNumber) {
+    const auto refusal_of = [&](const std::string& arguments) {
+        const Outcome outcome = run(VIBRIG_PLANT, arguments);
+        EXPECT_EQ(outcome.exit_code, 2) << arguments;
+        EXPECT_EQ(outcome.out, "") << arguments;
+        return outcome.error;
+    };
+    for (const char* option : {"--table-g", "--frequency", "--dwell", "--ramp", "--settle"}) {
+        for (const char* value : {"nan", "inf", "-1"}) {
+            EXPECT_THAT(
+                refusal_of(std::string("record -o - ") + option + "=" + value),
+                HasSubstr(std::string(option) + ": found " + value + ", expected a finite number"));
+        }
+    }
+    EXPECT_THAT(refusal_of("record -o - --table-g 9,nan"), HasSubstr("--table-g: found nan"));
+    for (const char* option : {"--warm-up", "--start-temperature", "--duration"}) {
+        EXPECT_THAT(refusal_of(std::string("run --modbus none ") + option + "=nan"),
+                    HasSubstr(std::string(option) + ": found nan, expected a finite number"));
+    }
+    EXPECT_THAT(refusal_of("judge none.json --sigma nan"), HasSubstr("--sigma: found nan"));
+    for (const char* value : {"-1", "1.5", "x", "18446744073709551616"}) {
+        const std::string seed = std::string(" --seed=") + value;
+        const std::string text =
+            std::string("--seed: found ") + value + ", expected a whole number";
+        EXPECT_THAT(refusal_of("record -o -" + seed), HasSubstr(text));
+        EXPECT_THAT(refusal_of("run --modbus none" + seed), HasSubstr(text));
+        for (const char* command : {"zero simulate", "level simulate", "plan"}) {
+            const Outcome outcome = vibrig(command + seed);
+            EXPECT_EQ(outcome.exit_code, 2) << command << seed;
+            EXPECT_THAT(outcome.error, HasSubstr(text));
+        }
+    }
+}
+
 TEST_F(Identify, EveryCommandHasHelpWithAnExample) {
     const Outcome help = vibrig("identify --help");
     EXPECT_EQ(help.exit_code, 0);

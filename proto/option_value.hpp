@@ -2,16 +2,21 @@
 
 #include <CLI/Validators.hpp>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <string>
+#include <system_error>
 
-namespace vibrig::tool {
+namespace vibrig::proto {
 
 inline constexpr double kAboveZero = std::numeric_limits<double>::min();
 inline constexpr double kAnyLow = -std::numeric_limits<double>::max();
 inline constexpr double kAnyHigh = std::numeric_limits<double>::max();
+
+// What options of both programs, vibrig and vibrig-plant, may be given.
 
 /// A finite number from `low` to `high`; of a list, each element. CLI11's own checks let NaN pass.
 [[nodiscard]] inline CLI::Validator finite(double low = kAnyLow, double high = kAnyHigh) {
@@ -33,4 +38,18 @@ inline constexpr double kAnyHigh = std::numeric_limits<double>::max();
         "");
 }
 
-}  // namespace vibrig::tool
+/// A whole number from 0 that fits into 64 bits. CLI11 takes -1 for the largest one.
+[[nodiscard]] inline CLI::Validator whole() {
+    return CLI::Validator(
+        [](std::string& input) {
+            std::uint64_t value = 0;
+            const char* end = input.data() + input.size();
+            const auto [rest, error] = std::from_chars(input.data(), end, value);
+            return error == std::errc() && rest == end && !input.empty()
+                       ? std::string()
+                       : "found " + input + ", expected a whole number from 0";
+        },
+        "");
+}
+
+}  // namespace vibrig::proto
