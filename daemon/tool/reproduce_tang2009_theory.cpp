@@ -155,8 +155,8 @@ double propagated(std::size_t row, std::size_t column) {
     return 7 * sum / (static_cast<double>(positions.size()) * kError);
 }
 
-/// Last line of section 3.5: what second-order coefficients gain by a wrong amplitude, printed
-/// without "- 1" and with its ratio upside down.
+/// Last line of section 3.5: what second-order coefficients gain by a wrong amplitude a0',
+/// (a0^2 - a0'^2) / (a0'^2 + 2); printed without "- 1" and with its ratio upside down.
 void add_last_line(std::vector<ReproducedRow>& rows) {
     constexpr double kScale = 1e-3, kAmplitude = 6;
     Errors e;
@@ -171,8 +171,7 @@ void add_last_line(std::vector<ReproducedRow>& rows) {
     const double computed = kappa / (1 + square / 2) - 1;
     const double printed = (1 + square / 2) / (1 + truth / 2);
     rows.push_back({"section 3.5, Delta of second-order terms, scale error 1e-3 of all three axes",
-                    formatted("%.6f (as printed), %.6f ((a0^2 - a0'^2)/(a0'^2 + 2), corrected)",
-                              printed, formula),
+                    formatted("%.6f (as printed), %.6f (corrected)", printed, formula),
                     formatted("%.6f", computed),
                     std::abs(computed - formula) < 1e-6,
                     {{"as_printed", printed}, {"corrected", formula}, {"computed", computed}}});
@@ -219,13 +218,13 @@ void add_level_errors(std::vector<ReproducedRow>& rows) {
         sum += value;
         rows.push_back(
             {formatted("section 3.5, 7 x error of a0 per scale error of %s", axis[k]),
-             formatted("%.0f%s", published[k], k == 2 ? " (must be 6, see the sum)" : ""),
+             formatted("%.0f%s", published[k], k == 2 ? " (must be 6, see the note)" : ""),
              formatted("%.3f", value),
              std::abs(value - corrected[k]) < 0.02,
              {{"printed", published[k]}, {"corrected", corrected[k]}, {"computed", value}}});
     }
     rows.push_back({"section 3.5, their sum",
-                    "16 (impossible: an error dk of all three gives 2 dk, so 14; hence 6 for z)",
+                    "16 (must be 14, see the note)",
                     formatted("%.3f", sum),
                     std::abs(sum - 14) < 0.05,
                     {{"printed", 16}, {"corrected", 14}, {"computed", sum}}});
@@ -262,7 +261,7 @@ void add_level_errors(std::vector<ReproducedRow>& rows) {
     projection = std::sqrt(projection / n);
     rows.push_back(
         {"rms error of kappa, %, with scale 1e-4, misalignment 50 arcsec, bias 1e-4 g",
-         "not in the paper (other draws: 0.070 and 0.019); projection at most half",
+         "- (other draws: 0.070, 0.019); at most half",
          formatted("eqs 12-13 %.4f, projection on the vertical %.4f", 100 * eq13, 100 * projection),
          projection < 0.5 * eq13,
          {{"eqs_12_13", 100 * eq13}, {"projection", 100 * projection}}});
