@@ -118,6 +118,7 @@ struct DwellSummary {
     bool flagged = false;     ///< something is to be known of this dwell, or it is rejected:
     const char* reason = "";  ///< static text; empty when not flagged
     NoiseLevels noise;        ///< that the filter took in this dwell
+    bool followed = false;    ///< flagged, but the estimate loses nothing by it
 };
 
 /// Fixed-size state of the identification for displays; copied without allocation.

@@ -221,13 +221,9 @@ Result Identification::Impl::result() const {
     if (settings.method == Method::two_step) {
         std::map<int, KappaSpread> levels;
         for (const RunFilter& filter : filters) {
-            if (filter.kappa.dwells > 0) levels[filter.run] = filter.kappa;
+            if (filter.run != 0) levels[filter.run] = filter.kappa;
         }
-        // What a third one's level was has not been looked at.
-        for (const DwellSummary& dwell : dwells) {
-            if (refused_run && dwell.run != filters[0].run && dwell.run != filters[1].run)
-                levels[dwell.run];
-        }
+        if (refused_run) levels[std::numeric_limits<int>::max()];
         if (std::string text = two_step_obstacle(levels); !text.empty())
             out.warnings.push_back(std::move(text));
     }

@@ -8,7 +8,9 @@ namespace vibrig::estimator {
 
 /// Tells an accelerometer that stops at the end of its range from one that turns round there: noise
 /// spreads the crests of a vibration over neighbouring values, while a saturated one shows its
-/// highest or lowest value again and again. One dwell at a time.
+/// highest or lowest value again and again. One dwell at a time. Nothing is told of a converter
+/// whose steps are as large as the noise, which repeats itself everywhere, of noise added after the
+/// saturation, and of an axis with a single wild reading beyond the end.
 class SaturationDetector {
   public:
     /// `noise_g`: 1 sigma of one reading. 0: nothing can be told.
@@ -21,20 +23,19 @@ class SaturationDetector {
     [[nodiscard]] int axis() const noexcept;
 
   private:
-    static constexpr std::size_t kKept = 50;  ///< readings that a new one is compared with
+    static constexpr std::size_t kKept = 100;  ///< readings that a new one is compared with
 
     /// Readings at an end of the range: direction +1 for the highest, -1 for the lowest.
     struct End {
         double extreme = 0;
-        std::uint32_t at = 0, next_to = 0;  ///< exactly there; off by less than the noise spreads
+        std::uint32_t at = 0,
+                      next_to = 0;  ///< exactly there; within the noise of an extreme so far
         void add(double reading, double spread) noexcept;
     };
     struct Axis {
         std::array<double, kKept> kept{};    ///< the last readings
         std::uint32_t count = 0, moved = 0;  ///< moved: unlike all of those kept
-        double step = 0;                     ///< least difference of two readings; 0: none yet
         End highest, lowest;
-        [[nodiscard]] bool saturated(double noise_g) const noexcept;
         [[nodiscard]] bool saturated(const End& end) const noexcept;
     };
 

@@ -13,7 +13,10 @@ ParameterArray two_step_prior(const ParameterArray& prior) noexcept {
 std::string two_step_obstacle(const std::map<int, KappaSpread>& runs) {
     const std::string needs =
         "the two-step route needs exactly two runs of different vibration level, found ";
-    if (runs.size() != 2) return needs + std::to_string(runs.size()) + " with good dwells";
+    if (runs.size() > 2) return needs + "more than two";
+    std::size_t good = 0;
+    for (const auto& [run, levels] : runs) good += levels.dwells > 0 ? 1 : 0;
+    if (good != 2) return needs + std::to_string(good) + " with good dwells";
     const double first = runs.begin()->second.mean, second = runs.rbegin()->second.mean;
     KappaSpread both;
     both.add(first);

@@ -53,7 +53,8 @@ Campaign::Choice Campaign::choose_next(Time now) {
     const bool in_time =
         settings_.time_limit_s <= 0 ||
         used_s(now) + nominal_stop_s() + times_.closing_s <= settings_.time_limit_s;
-    if (begun && dwells_.back().flagged && repeats_ < kMostRepeats && in_time) {
+    const bool poor = begun && dwells_.back().flagged && !dwells_.back().followed;
+    if (poor && repeats_ < kMostRepeats && in_time) {
         ++repeats_;
         const Stop again = stops_[at_ - 1].stop;
         ports_.event(Severity::warning, "flagged dwell: the position is repeated");

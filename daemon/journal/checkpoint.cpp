@@ -103,7 +103,7 @@ std::string words(const estimator::NoiseLevels& levels) {
 std::string numbers_of(const estimator::DwellSummary& summary) {
     std::string bytes;
     each_number(summary, [&bytes](const auto& value) { put(bytes, value); });
-    bytes.push_back(summary.flagged ? '\1' : '\0');
+    bytes.push_back(!summary.flagged ? '\0' : summary.followed ? '\2' : '\1');
     return bytes;
 }
 
@@ -167,6 +167,7 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     char flagged = 0;
     reader.get(flagged);
     dwell.summary.flagged = flagged != 0;
+    dwell.summary.followed = flagged == 2;
     dwell.noise_known = version >= 2;
     if (dwell.noise_known) {
         each_level(dwell.summary.noise, [&reader](double& value) { reader.get(value); });

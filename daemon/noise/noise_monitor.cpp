@@ -119,7 +119,7 @@ bool NoiseMonitor::end_dwell(const estimator::DwellSummary& dwell, Knowledge now
     blocks_.clear();
     const bool ours = !blocks.empty() && blocks.front().dwell.run == dwell.run &&
                       blocks.front().dwell.position == dwell.position;
-    if (!ours || dwell.flagged || usable.size() < DwellBasis::kFewestBlocks) {
+    if (!ours || (dwell.flagged && !dwell.followed) || usable.size() < DwellBasis::kFewestBlocks) {
         ++status_.dwells_left_out;
         return false;
     }

@@ -218,7 +218,7 @@ void add_findings(const Study& study, std::vector<ReproducedRow>& rows) {
     const Drawn joint = drawn_ratio(study, kJoint2, kJoint1, kSecondOrder);
     const double least = std::min(10.0, bounds - 2 * joint.chance);
     rows.push_back({at + "error of second-order terms, trial 2 over trial 1",
-                    formatted("%.1f; joint at least %.2f", published, least),
+                    formatted("%.1f; joint at least %.2f (2 sigma)", published, least),
                     formatted("joint %.2f +- %.2f, two-step %.2f, bounds %.2f", joint.value,
                               joint.chance, two_step, bounds),
                     joint.value >= least,
@@ -340,8 +340,8 @@ Reproduction reproduce_tang2009(const ReproduceOptions& options) {
         "a ratio what chance gives it over these seeds.",
         seeds, seeds));
     result.notes.emplace_back(
-        "A demand is judged by the rms over the seeds that were run, chance excuses nothing: few "
-        "seeds may miss it without meaning anything.");
+        "A demand is judged by the rms over the seeds that were run: few seeds may miss it without "
+        "meaning anything. Chance is allowed for where a row says so, and nowhere else.");
     result.notes.emplace_back(
         "Levels are peak accelerations of the platform in the first run; the numbers of Table 2 "
         "themselves imply the doubled ones, so it is compared with those.");
