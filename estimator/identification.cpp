@@ -38,7 +38,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
       accelerometer_zero_(s.accelerometer_zero_g[0], s.accelerometer_zero_g[1],
                           s.accelerometer_zero_g[2]),
       stuck_(s),
-      saturation_(s.accelerometer_g),
+      saturation_(s.accelerometer_g, s.accelerometer_range_g),
       buffer_(VibrationLevel::kFirstWindow_s, kBufferCapacity),
       level_(s.level_window_s, s.accelerometer_g, s.frequency_hz),
       paper_(s.frequency_hz, s.forgetting) {

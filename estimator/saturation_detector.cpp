@@ -17,6 +17,7 @@ constexpr double kLeastShareAtEnd = 0.03;
 // the steps are below a fifth of the noise, and then crests are spread over many of them.
 constexpr double kSame = 1e-3;  ///< of the noise
 constexpr double kLeastMoved = 0.5;
+constexpr double kRounding = 1e-5;  ///< of the range: a converter's last step and decimals
 
 }  // namespace
 
@@ -42,6 +43,7 @@ void SaturationDetector::add(const std::array<double, 3>& force_g) noexcept {
             nearest = std::min(nearest, std::abs(reading - a.kept[i]));
         }
         if (a.count > 0 && nearest > kSame * noise_g_) ++a.moved;
+        if (range_g_ > 0 && std::abs(reading) >= range_g_ * (1 - kRounding)) ++a.beyond;
         a.kept[a.count % kKept] = reading;
         ++a.count;
         a.highest.add(reading, kSpread * noise_g_);
@@ -49,15 +51,20 @@ void SaturationDetector::add(const std::array<double, 3>& force_g) noexcept {
     }
 }
 
+bool SaturationDetector::Axis::enough(std::uint32_t readings) const noexcept {
+    return readings >= kFewestAtEnd && readings >= kLeastShareAtEnd * count;
+}
+
 bool SaturationDetector::Axis::saturated(const End& end) const noexcept {
     // An axis across the vibration may show hardly anything but one value.
-    return end.at >= kFewestAtEnd && end.at >= kLeastShareAtEnd * count && 2 * end.at <= count &&
-           end.at > end.next_to && moved > kLeastMoved * (count - end.at);
+    return enough(end.at) && 2 * end.at <= count && end.at > end.next_to &&
+           moved > kLeastMoved * (count - end.at);
 }
 
 int SaturationDetector::axis() const noexcept {
     for (std::size_t k = 0; k < 3; ++k) {
-        if (axes_[k].saturated(axes_[k].highest) || axes_[k].saturated(axes_[k].lowest))
+        const Axis& a = axes_[k];
+        if (a.enough(a.beyond) || a.saturated(a.highest) || a.saturated(a.lowest))
             return static_cast<int>(k);
     }
     return -1;

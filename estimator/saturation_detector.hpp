@@ -8,13 +8,15 @@ namespace vibrig::estimator {
 
 /// Tells an accelerometer that stops at the end of its range from one that turns round there: noise
 /// spreads the crests of a vibration over neighbouring values, while a saturated one shows its
-/// highest or lowest value again and again. One dwell at a time. Nothing is told of a converter
-/// whose steps are as large as the noise, which repeats itself everywhere, of noise added after the
-/// saturation, and of an axis with a single wild reading beyond the end.
+/// highest or lowest value again and again. One dwell at a time. Without a known range nothing is
+/// told of a converter whose steps are as large as the noise, which repeats itself everywhere, of
+/// noise added after the saturation, and of an axis with a single wild reading beyond the end.
 class SaturationDetector {
   public:
-    /// `noise_g`: 1 sigma of one reading. 0: nothing can be told.
-    explicit SaturationDetector(double noise_g) noexcept : noise_g_(noise_g) {}
+    /// `noise_g`: 1 sigma of one reading. `range_g`: readings of this size are saturated; 0: not
+    /// known.
+    SaturationDetector(double noise_g, double range_g) noexcept
+        : noise_g_(noise_g), range_g_(range_g) {}
 
     void clear() noexcept { axes_ = {}; }
     /// Raw readings, before zeros and matrix.
@@ -35,11 +37,13 @@ class SaturationDetector {
     struct Axis {
         std::array<double, kKept> kept{};    ///< the last readings
         std::uint32_t count = 0, moved = 0;  ///< moved: unlike all of those kept
+        std::uint32_t beyond = 0;            ///< of the range
         End highest, lowest;
+        [[nodiscard]] bool enough(std::uint32_t readings) const noexcept;
         [[nodiscard]] bool saturated(const End& end) const noexcept;
     };
 
-    double noise_g_;
+    double noise_g_, range_g_;
     std::array<Axis, 3> axes_{};
 };
 

@@ -72,6 +72,8 @@ void check(const Settings& s) {
             require(std::isfinite(element), "accelerometer.matrix", element, "finite elements");
         }
     }
+    require(non_negative(s.accelerometer_range_g), "accelerometer.range_g", s.accelerometer_range_g,
+            "0 or above");
     const double det = determinant(s.accelerometer_matrix);
     require(std::abs(det) > 1e-6, "accelerometer.matrix", det, "a determinant that is not 0");
     require(positive(s.resolver_arcsec), "noise.resolver_arcsec", s.resolver_arcsec, "above 0");

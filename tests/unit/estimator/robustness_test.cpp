@@ -25,8 +25,10 @@ struct Campaign {
 
     Campaign() { plan.duration_s = 40; }
 
+    Settings settings;
+
     Result run(const Spoil& spoil, std::array<double, 2> amplitudes_g = {6.0, 14.0 / 3.0}) {
-        Identification identification{Settings{}};
+        Identification identification{settings};
         rig.spoil = spoil;
         rig.campaign(identification, amplitudes_g, plan);
         return identification.result();
@@ -134,6 +136,28 @@ TEST(Robustness, CrestsCutByLittleAreTold) {
         EXPECT_EQ(std::count(cut.begin(), cut.end(), 0), 14 - hurt);
         expect_within_four_sigma(result);
     }
+}
+
+TEST(Robustness, AKnownRangeTellsSaturationOfACoarseOrWildAccelerometerToo) {
+    SCOPED_TRACE("seed " + std::to_string(kSeed));
+    // GIVEN an accelerometer that ends at 6.8 g, with steps of three times the noise and one wild
+    // reading in each dwell
+    Campaign campaign;
+    campaign.settings.accelerometer_range_g = 6.8;
+    std::array<int, 14> cut{};
+    const Result result = campaign.run([&](const DwellInfo& dwell, int n, Measurement& m) {
+        for (double& f : m.force_g) {
+            f = std::clamp(4e-4 * std::round(f / 4e-4), -6.8, 6.8);
+            if (dwell.run == 1 && std::abs(f) >= 6.8)
+                ++cut[static_cast<std::size_t>(dwell.position - 1)];
+        }
+        if (n == 500) m.force_g[1] = 7.5;
+    });
+    const auto hurt = std::count_if(cut.begin(), cut.end(), [](int n) { return n >= 100; });
+    EXPECT_GE(hurt, 4);
+    // THEN the dwells whose crests are cut are refused, no others
+    EXPECT_EQ(with_reason(result, "saturated"), static_cast<std::size_t>(hurt));
+    expect_within_four_sigma(result);
 }
 
 TEST(Robustness, AnAccelerometerWithinItsRangeIsNotCalledSaturated) {
