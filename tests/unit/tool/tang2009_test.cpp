@@ -1,39 +1,18 @@
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
+
+#include "tests/unit/support/vibrig_command.hpp"
 
 namespace {
 
 using Json = nlohmann::json;
 
-/// Runs the real program in a folder of its own.
-class Reproduce : public ::testing::Test {
+class Reproduce : public vibrig::test::VibrigCommand {
   protected:
-    Reproduce() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~Reproduce() override { std::filesystem::remove_all(folder_); }
-
-    [[nodiscard]] std::string content(const std::string& name) const {
-        std::ostringstream text;
-        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
-        return text.str();
-    }
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = content("out");
-        error = content("error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
     /// The row with this item; its verdict must be good.
     Json row_of(const std::string& item) {
         for (const Json& row : reproduction["rows"]) {
@@ -48,9 +27,6 @@ class Reproduce : public ::testing::Test {
         return row_of(item)["values"].value("computed", NAN);
     }
 
-    std::filesystem::path folder_;
-    std::string out;
-    std::string error;
     Json reproduction;
 };
 

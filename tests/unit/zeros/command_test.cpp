@@ -1,38 +1,18 @@
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tests/unit/support/vibrig_command.hpp"
+
 namespace {
 
 using Json = nlohmann::json;
 
-/// Runs the real program in a folder of its own.
-class ZeroCommand : public ::testing::Test {
+class ZeroCommand : public vibrig::test::VibrigCommand {
   protected:
-    ZeroCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~ZeroCommand() override { std::filesystem::remove_all(folder_); }
-
-    [[nodiscard]] std::string content(const char* name) const {
-        std::ostringstream text;
-        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
-        return text.str();
-    }
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = content("out");
-        error = content("error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
     Json json(const std::string& arguments, int code) {
         EXPECT_EQ(vibrig(arguments + " --json"), code) << arguments << ": " << error << out;
         return Json::parse(out, nullptr, false);
@@ -41,10 +21,6 @@ class ZeroCommand : public ::testing::Test {
         EXPECT_EQ(vibrig(arguments), 2) << arguments << "\n" << out << error;
         EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
     }
-
-    std::filesystem::path folder_;
-    std::string out;
-    std::string error;
 };
 
 TEST_F(ZeroCommand, AFileGivesWhatTheSimulatedUnitGave) {

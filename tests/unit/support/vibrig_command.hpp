@@ -1,0 +1,43 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+namespace vibrig::test {
+
+/// Runs the real program, whose path is the macro VIBRIG, in a folder of its own.
+class VibrigCommand : public ::testing::Test {
+  protected:
+    VibrigCommand() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~VibrigCommand() override { std::filesystem::remove_all(folder_); }
+
+    [[nodiscard]] std::string content(const std::string& name) const {
+        std::ostringstream text;
+        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
+        return text.str();
+    }
+    /// Its exit code; what it printed is in `out` and `error`.
+    int vibrig(const std::string& arguments) {
+        const std::string command =
+            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        out = content("out");
+        error = content("error");
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    }
+
+    std::filesystem::path folder_;
+    std::string out;
+    std::string error;
+};
+
+}  // namespace vibrig::test
