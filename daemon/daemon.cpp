@@ -112,7 +112,7 @@ Daemon::Daemon(configuration::Loaded loaded)
            },
            [this] { return dwells_with_estimator_ == 0; },
            [this] {
-               planning_ = {};  // of a campaign that was aborted
+               planning_.abandon();  // of a campaign that was aborted
                identification_ = estimator::Identification(configuration_.estimator);
                noise_monitor_.reset();
                const std::lock_guard lock(mutex_);
@@ -137,7 +137,7 @@ Daemon::Daemon(configuration::Loaded loaded)
            },
            [this] { return resume_gate(); },
            [this](const std::string& by) {
-               planning_ = {};
+               planning_.abandon();
                identification_ = std::move(interrupted_->identification);
                noise_monitor_.continue_from(std::move(interrupted_->noise));
                if (journal_) journal_->campaign_resumed(interrupted_->id, by);
@@ -162,25 +162,25 @@ Daemon::Daemon(configuration::Loaded loaded)
 
 std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& here_deg,
                                                  double elapsed_s) {
-    if (!planning_.valid()) {
-        // Between two dwells the identification is this thread's; the shaker is at rest. It takes
-        // tenths of a second, on a busy machine more than this thread may be away. The rig's clock
-        // waits for this thread, so that there the time is none.
-        planning_ =
-            std::async(rig_clock_ ? std::launch::deferred : std::launch::async,
-                       [this, here_deg, elapsed_s, covariance = identification_.covariance()] {
-                           const auto decision = adaptive_->next(covariance, here_deg, elapsed_s);
-                           control_waiter_->notify();
-                           return decision;
-                       });
+    // Between two dwells the identification is this thread's; the shaker is at rest. It takes
+    // tenths of a second, on a busy machine more than this thread may be away. The rig's clock
+    // waits for this thread, so that there the time is none.
+    std::optional<plan::AdaptivePlan::Decision> decision;
+    if (rig_clock_) {
+        decision = adaptive_->next(identification_.covariance(), here_deg, elapsed_s);
+    } else if (planning_.asked()) {
+        decision = planning_.take();
+    } else {
+        planning_.ask([this, here_deg, elapsed_s, covariance = identification_.covariance()] {
+            return adaptive_->next(covariance, here_deg, elapsed_s);
+        });
     }
-    if (planning_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return {};
-    const auto decision = planning_.get();
+    if (!decision) return {};
     campaign::Next next;
-    next.more = decision.verdict == plan::AdaptivePlan::Verdict::go_on;
-    next.stop = {decision.run.position_deg, decision.run.table_g};
-    next.left = decision.left;
-    next.words = decision.words;
+    next.more = decision->verdict == plan::AdaptivePlan::Verdict::go_on;
+    next.stop = {decision->run.position_deg, decision->run.table_g};
+    next.left = decision->left;
+    next.words = decision->words;
     return next;
 }
 
@@ -324,7 +324,7 @@ void Daemon::take_commands(Time now) {
     }
     for (auto& waiting : taken) {
         if (waiting.abandoned->exchange(true)) continue;
-        const rt::Trip handled = interlock_.tripped();
+        const rt::Tripped handled = interlock_.latched();
         if (const auto alarm = acknowledge_alarm(waiting.request); alarm.accepted) {
             if (journal_) journal_->command(waiting.request, alarm, utc_now());
             waiting.reply.set_value(alarm);
@@ -373,7 +373,7 @@ void Daemon::take_done_dwells() {
 }
 
 void Daemon::control_loop() {
-    rt::Trip handled = rt::Trip::none;
+    rt::Tripped handled;
     bool stop_was_pending = false;
     while (!give_up_.load()) {
         const Time now = clock_.now();
@@ -387,8 +387,8 @@ void Daemon::control_loop() {
         };
         port_events_.consume(words);
         shaker_events_.consume(words);
-        if (const rt::Trip trip = interlock_.tripped(); trip != handled) {
-            if (trip != rt::Trip::none) on_trip(now);
+        if (const rt::Tripped trip = interlock_.latched(); !(trip == handled)) {
+            if (trip) on_trip(trip, now);
             handled = trip;
         }
         tell_alarms();

@@ -16,6 +16,7 @@
 #include "daemon/fleet/publisher.hpp"
 #include "daemon/journal/journal.hpp"
 #include "daemon/noise/noise_monitor.hpp"
+#include "daemon/plan/aside.hpp"
 #include "daemon/record/pre_trip.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/rt/acquisition.hpp"
@@ -114,7 +115,7 @@ class Daemon final : public StatusSource {
     [[nodiscard]] std::string result_configuration() const;
     [[nodiscard]] std::unique_ptr<record::Recorder> make_recorder();
     [[nodiscard]] std::unique_ptr<record::PreTrip> make_pre_trip();
-    void on_trip(drivers::Time now);
+    void on_trip(const rt::Tripped& tripped, drivers::Time now);
     /// The bus, by way of the recorder if there is one.
     [[nodiscard]] drivers::CanPort& sending_port() noexcept;
     void record_begin(const std::string& by, std::size_t dwells_before);
@@ -161,7 +162,8 @@ class Daemon final : public StatusSource {
     drivers::Gimbal gimbal_;
     std::unique_ptr<drivers::Torquer> torquer_;  ///< null: no levelling
     std::optional<plan::AdaptivePlan> adaptive_;
-    std::future<plan::AdaptivePlan::Decision> planning_;  ///< control thread
+    plan::Aside<plan::AdaptivePlan::Decision> planning_{
+        [this] { control_waiter_->notify(); }};  ///< what the control thread may not wait for
     const PlanData plan_;
     campaign::Campaign campaign_;
     const std::unique_ptr<fleet::Publisher> publisher_;  ///< null: no broker

@@ -92,14 +92,15 @@ std::unique_ptr<record::PreTrip> Daemon::make_pre_trip() {
         [this](Severity severity, const std::string& text) { log(severity, "pre-trip", text); });
 }
 
-void Daemon::on_trip(Time now) {
-    campaign_.on_trip(interlock_.tripped_text(), now);
+void Daemon::on_trip(const rt::Tripped& tripped, Time now) {
+    const std::string text = interlock_.text_of(tripped);
+    campaign_.on_trip(text, now);
     if (!pre_trip_) return;
     const auto utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                             std::chrono::system_clock::now().time_since_epoch())
                             .count();
-    pre_trip_->tripped({rt::condition_of(interlock_.tripped()).name, interlock_.tripped_name(),
-                        interlock_.tripped_text(), now, utc_ns});
+    pre_trip_->tripped(
+        {rt::condition_of(tripped.cause).name, interlock_.name_of(tripped), text, now, utc_ns});
 }
 
 std::string Daemon::resume_gate() const {
@@ -177,7 +178,7 @@ std::string Daemon::unknown_to_acknowledge(const CommandRequest& request) const 
     if (request.kind != CommandRequest::Kind::acknowledge || what.empty() || what == "trip" ||
         what == "shaker")
         return {};
-    const std::string tripped = interlock_.tripped_name();
+    const std::string tripped = interlock_.name_of(interlock_.latched());
     if (what == tripped) return {};
     return fmt::format("found \"{}\", expected {}", what,
                        tripped.empty() ? "the name of an alarm that is raised, trip or shaker"
@@ -234,7 +235,7 @@ void Daemon::tell_journal() {
 
 InterlockStatus Daemon::interlock_status() const {
     InterlockStatus status;
-    status.tripped = interlock_.tripped_name();
+    status.tripped = interlock_.name_of(interlock_.latched());
     for (std::size_t i = 0; i < interlock_.rows(); ++i) {
         const auto row = interlock_.row(i);
         const auto& condition = rt::condition_of(row.rule->condition);

@@ -57,11 +57,12 @@ void Interlock::command(double table_g, const std::array<double, 3>& position_de
 }
 
 void Interlock::trip(Trip cause, std::size_t row, double value) noexcept {
-    Trip expected = Trip::none;
-    if (!tripped_.compare_exchange_strong(expected, cause)) return;
+    const Tripped mine{cause, static_cast<std::uint8_t>(row), ++trips_, static_cast<float>(value)};
+    Tripped other = tripped_.load();
+    do {
+        if (other) return;  // the first cause stays
+    } while (!tripped_.compare_exchange_weak(other, mine));
     shaker_.stop_now();
-    tripped_row_.store(row);
-    tripped_value_.store(value);
     control_.notify();
 }
 
@@ -94,7 +95,7 @@ void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time
     now = std::max<Time>(now, 1);  // 0 says that the condition is met
     if (since.load() == 0) since = now;
     if (now - since.load() < drivers::from_seconds(rule.dwell_s)) return;
-    if (rule.reaction == Reaction::abort && tripped_.load() == Trip::none) {
+    if (rule.reaction == Reaction::abort && !tripped_.load()) {
         if (by == By::sample && arrived_ != 0) stop_asked_.store(arrived_);
         trip(rule.condition, row, value);
     }
@@ -217,28 +218,29 @@ void Interlock::stop_written() noexcept {
         reactions_.add(wall_clock() - asked);
 }
 
-std::string Interlock::tripped_text() const {
-    const Trip trip = tripped_.load();
-    const Condition& condition = condition_of(trip);
-    const std::size_t row = tripped_row_.load();
-    if (!condition.has_limit() || row >= rules_.size() || rules_[row].condition != trip)
+std::string Interlock::text_of(const Tripped& tripped) const {
+    const Condition& condition = condition_of(tripped.cause);
+    if (!condition.has_limit() || tripped.row >= rules_.size() ||
+        rules_[tripped.row].condition != tripped.cause)
         return condition.text;
     std::array<char, 96> words{};
-    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s", tripped_value_.load(),
-                  rules_[row].limit, condition.unit);
+    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s",
+                  static_cast<double>(tripped.value), rules_[tripped.row].limit, condition.unit);
     return std::string(condition.text) + words.data();
 }
 
-std::string Interlock::tripped_name() const {
-    const Trip trip = tripped_.load();
-    if (trip == Trip::none) return {};
-    const std::size_t row = tripped_row_.load();
-    return row < rules_.size() && rules_[row].condition == trip ? rules_[row].name
-                                                                : condition_of(trip).name;
+std::string Interlock::name_of(const Tripped& tripped) const {
+    if (!tripped) return {};
+    return tripped.row < rules_.size() && rules_[tripped.row].condition == tripped.cause
+               ? rules_[tripped.row].name
+               : condition_of(tripped.cause).name;
 }
 
-void Interlock::acknowledge(Trip handled) noexcept {
-    if (!tripped_.compare_exchange_strong(handled, Trip::none)) return;
+void Interlock::acknowledge(const Tripped& handled) noexcept {
+    Tripped now = tripped_.load();
+    do {
+        if (!now || !(now == handled)) return;
+    } while (!tripped_.compare_exchange_weak(now, Tripped{}));
     for (std::size_t i = 0; i < rules_.size(); ++i) {
         if (rules_[i].reaction == Reaction::abort) states_[i].raised.store(false);
     }

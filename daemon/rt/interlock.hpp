@@ -15,6 +15,20 @@
 namespace vibrig::rt {
 
 [[nodiscard]] const char* text_of(Trip trip) noexcept;
+
+/// A latched trip: cause, row of the table and value belong together, in one atomic value.
+struct Tripped {
+    Trip cause = Trip::none;
+    std::uint8_t row = 0;
+    std::uint16_t number = 0;  ///< of this trip, so that the same one again is another
+    float value = 0;           ///< as judged to be wrong
+    [[nodiscard]] explicit operator bool() const noexcept { return cause != Trip::none; }
+    bool operator==(const Tripped& other) const noexcept {
+        return cause == other.cause && row == other.row && number == other.number;
+    }
+};
+static_assert(sizeof(Tripped) == 8 && std::atomic<Tripped>::is_always_lock_free);
+static_assert(kMostRules <= 256, "a row's number fits into a byte");
 /// CLOCK_MONOTONIC, whatever clock the rig has.
 [[nodiscard]] drivers::Time wall_clock() noexcept;
 
@@ -83,13 +97,14 @@ class Interlock {
     /// Shaker thread: a stop was written and confirmed.
     void stop_written() noexcept;
 
-    [[nodiscard]] Trip tripped() const noexcept { return tripped_.load(); }
+    [[nodiscard]] Tripped latched() const noexcept { return tripped_.load(); }
+    [[nodiscard]] Trip tripped() const noexcept { return latched().cause; }
     /// Control thread: cause in words, with the value and its limit.
-    [[nodiscard]] std::string tripped_text() const;
-    /// Name of the row that tripped; empty: none.
-    [[nodiscard]] std::string tripped_name() const;
+    [[nodiscard]] std::string text_of(const Tripped& tripped) const;
+    /// Of the row that tripped; empty: none.
+    [[nodiscard]] std::string name_of(const Tripped& tripped) const;
     /// Clears the trip if it is `handled`; one that came meanwhile stays.
-    void acknowledge(Trip handled) noexcept;
+    void acknowledge(const Tripped& handled) noexcept;
     /// Clears a latched alarm by name; false if no row of that name is raised.
     bool acknowledge_alarm(const std::string& name) noexcept;
 
@@ -127,9 +142,8 @@ class Interlock {
     std::vector<Rule> rules_;
     std::array<State, kMostRules> states_;
     std::atomic<Guard> guard_{Guard::idle};
-    std::atomic<Trip> tripped_{Trip::none};
-    std::atomic<std::size_t> tripped_row_{0};
-    std::atomic<double> tripped_value_{0};
+    std::atomic<Tripped> tripped_{Tripped{}};
+    std::atomic<std::uint16_t> trips_{0};
     std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
     std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
     std::array<std::atomic<double>, 3> position_rad_{};

@@ -227,14 +227,14 @@ TEST_P(InterlockLimits, TripsBeyondItsLimitAfterItsDwellAndLatches) {
     }
     ASSERT_EQ(rig.interlock->tripped(), one.trip);
     EXPECT_EQ(rig.count - since, static_cast<std::uint32_t>(one.dwell_s * 40));
-    EXPECT_EQ(rig.interlock->tripped_name(), "stop");
+    EXPECT_EQ(rig.interlock->name_of(rig.interlock->latched()), "stop");
     EXPECT_EQ(rig.shaker.stops_asked, 1U);
     // WHEN all is well again THEN it stays, until it is acknowledged
     go(false, 20);
     EXPECT_EQ(rig.interlock->tripped(), one.trip);
     EXPECT_TRUE(rig.interlock->row(1).raised);
     EXPECT_EQ(rig.shaker.stops_asked, 1U);
-    rig.interlock->acknowledge(one.trip);
+    rig.interlock->acknowledge(rig.interlock->latched());
     go(false, 5);
     EXPECT_EQ(rig.interlock->tripped(), Trip::none);
     EXPECT_FALSE(rig.interlock->row(1).raised);

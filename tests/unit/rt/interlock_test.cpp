@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <thread>
 
 #include "daemon/rt/real_clock.hpp"
 #include "test_bench.hpp"
@@ -46,9 +48,9 @@ TEST_F(InterlockTest, StaysLatchedWithTheFirstCauseUntilAcknowledged) {
     interlock.check(sample, platform);
     EXPECT_EQ(interlock.tripped(), Trip::loop_open);
     EXPECT_EQ(shaker.stops_asked, 1U);
-    interlock.acknowledge(Trip::over_amplitude);
+    interlock.acknowledge({Trip::over_amplitude});
     EXPECT_EQ(interlock.tripped(), Trip::loop_open) << "another cause than the handled one stays";
-    interlock.acknowledge(Trip::loop_open);
+    interlock.acknowledge(interlock.latched());
     interlock.check(sample, platform);
     EXPECT_EQ(interlock.tripped(), Trip::over_amplitude);
 }
@@ -67,7 +69,7 @@ TEST_F(InterlockTest, TripsOnTheEmergencyStopAndOnALostBus) {
     reading.emergency_stop_open = true;
     interlock.check(reading);
     EXPECT_EQ(interlock.tripped(), Trip::emergency_stop);
-    interlock.acknowledge(Trip::emergency_stop);
+    interlock.acknowledge(interlock.latched());
     interlock.lost_bus();
     EXPECT_EQ(interlock.tripped(), Trip::can_lost);
 }
@@ -90,7 +92,7 @@ TEST_F(InterlockTest, WatchesEmergencyStopFaultsAndBusFromTheArmingOn) {
     interlock.guard(Guard::armed);
     interlock.check(reading);
     EXPECT_EQ(interlock.tripped(), Trip::shaker_fault);
-    interlock.acknowledge(Trip::shaker_fault);
+    interlock.acknowledge(interlock.latched());
     interlock.lost_bus();
     EXPECT_EQ(interlock.tripped(), Trip::can_lost);
 }
@@ -104,9 +106,69 @@ TEST_F(InterlockTest, StopsAShakerThatNobodyCommanded) {
     EXPECT_EQ(interlock.tripped(), Trip::uncommanded);
     EXPECT_EQ(shaker.stops_asked, 1U);
     // WHEN the stop is on its way, THEN the same reading is no new trip
-    interlock.acknowledge(Trip::uncommanded);
+    interlock.acknowledge(interlock.latched());
     interlock.check(reading);
     EXPECT_EQ(interlock.tripped(), Trip::none);
+}
+
+TEST(TrippedValue, HasCauseRowAndValueOfOneTripWhoeverReadsWhenever) {
+    // GIVEN two threads that trip different rows with different values, and one that acknowledges
+    RealClock clock;
+    const auto control = clock.make_waiter();
+    FakeShaker shaker;
+    Interlock interlock(shaker, *control,
+                        {12.0,
+                         drivers::kSecond,
+                         {{"far", Trip::amplitude_off, Reaction::abort, 1, 0, true},
+                          {"hot", Trip::temperature, Reaction::abort, 70, 0, true}}});
+    interlock.guard(Guard::armed);
+    interlock.command(1, {0, 0, 0});
+    std::atomic<bool> over{false};
+    std::thread shaker_thread([&] {
+        drivers::ShakerReading reading;
+        reading.valid = true;
+        reading.measured_g = 2;  // 6.02 dB
+        while (!over.load()) interlock.check(reading);
+    });
+    std::thread acquisition([&] {
+        drivers::Sample sample;
+        drivers::PlatformStatus platform;
+        platform.time = 1;
+        platform.temperature_c = 80;
+        while (!over.load()) interlock.check(sample, platform);
+    });
+    // WHEN a third one reads all the while, THEN what it reads belongs together
+    std::array<int, 2> seen{};
+    std::string wrong;
+    const auto deadline = clock.now() + 60 * drivers::kSecond;
+    while (wrong.empty() && (seen[0] < 2'000 || seen[1] < 2'000) && clock.now() < deadline) {
+        const auto trip = interlock.latched();
+        if (!trip) continue;
+        const auto words = interlock.name_of(trip) + ": " + interlock.text_of(trip);
+        if (words == "far: amplitude off command: 6.021, limit 1 dB") {
+            ++seen[0];
+        } else if (words == "hot: platform temperature: 80, limit 70 degC") {
+            ++seen[1];
+        } else {
+            wrong = words;
+        }
+        interlock.acknowledge(trip);
+    }
+    over.store(true);
+    shaker_thread.join();
+    acquisition.join();
+    EXPECT_EQ(wrong, "");
+    EXPECT_TRUE(seen[0] > 0 && seen[1] > 0) << seen[0] << " " << seen[1];
+}
+
+TEST_F(InterlockTest, ASecondTripOfTheSameCauseIsNotAcknowledgedWithTheFirst) {
+    interlock.guard(Guard::excitation);
+    interlock.trip(Trip::loop_open);
+    const auto first = interlock.latched();
+    interlock.acknowledge(first);
+    interlock.trip(Trip::loop_open);
+    interlock.acknowledge(first);
+    EXPECT_EQ(interlock.tripped(), Trip::loop_open);
 }
 
 /// The table's rows and nothing else; samples come at 40 Hz.
@@ -172,8 +234,8 @@ TEST_F(TableTest, AlarmsInTheInnerBandAndAbortsInTheOuterOneAfterItsDwell) {
         EXPECT_EQ(interlock->row(0).raised, step.alarm) << step.time_s;
         EXPECT_EQ(interlock->tripped(), step.trip) << step.time_s;
     }
-    EXPECT_EQ(interlock->tripped_name(), "stop");
-    EXPECT_EQ(interlock->tripped_text(), "amplitude off command: 3.1, limit 3 dB");
+    EXPECT_EQ(interlock->name_of(interlock->latched()), "stop");
+    EXPECT_EQ(interlock->text_of(interlock->latched()), "amplitude off command: 3.1, limit 3 dB");
     EXPECT_EQ(shaker.stops_asked, 1U);
 }
 
