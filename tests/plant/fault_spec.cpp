@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -7,7 +8,17 @@
 namespace vibrig::plant {
 namespace {
 
-enum class Value : std::uint8_t { none, rate, milliseconds, degrees, seconds, factor, word };
+enum class Value : std::uint8_t {
+    none,
+    rate,
+    milliseconds,
+    degrees,
+    seconds,
+    factor,
+    slowness,
+    whole,
+    word
+};
 
 struct Description {
     FaultKind kind;
@@ -17,7 +28,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 16> kDescriptions{{
+constexpr std::array<Description, 27> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -48,6 +59,31 @@ constexpr std::array<Description, 16> kDescriptions{{
      "spike[:CHANNEL]=DEG,RATE  angles jump for one sample"},
     {FaultKind::gyro_noise, "gyro-noise", Value::factor, false,
      "gyro-noise=FACTOR     the gyros' random walk is FACTOR times as large"},
+    {FaultKind::ack_without_stop, "ack-without-stop", Value::none, false,
+     "ack-without-stop      run = 0 is acknowledged and read back, the table shakes on and the\n"
+     "                        measured amplitude says so; the watchdog still works"},
+    {FaultKind::timeout_ignored, "timeout-ignored", Value::none, false,
+     "timeout-ignored       the watchdog never fires"},
+    {FaultKind::timeout_scaled, "timeout-scaled", Value::factor, false,
+     "timeout-scaled=FACTOR  the watchdog fires after FACTOR times its timeout"},
+    {FaultKind::amplitude_scaled, "amplitude-scaled", Value::factor, false,
+     "amplitude-scaled=FACTOR  the table does FACTOR times the set-point, read back as ordered"},
+    {FaultKind::readback_echo, "readback-echo", Value::none, false,
+     "readback-echo         the measured amplitude is the set-point (0 with run = 0), whatever "
+     "the\n"
+     "                        table does"},
+    {FaultKind::stuck_contactor, "stuck-contactor", Value::none, false,
+     "stuck-contactor       after a stop state idle, amplitude 0; the table shakes on as before"},
+    {FaultKind::slow_ramp, "slow-ramp", Value::slowness, false,
+     "slow-ramp=FACTOR      ramps take FACTOR times as long, stops and watchdog included"},
+    {FaultKind::unit_rms, "unit-rms", Value::none, false,
+     "unit-rms              amplitudes are taken and read back as rms"},
+    {FaultKind::dead_table, "dead-table", Value::none, false,
+     "dead-table            the table does not move, measured amplitude 0 (but readback-echo)"},
+    {FaultKind::timeout_register, "timeout-register", Value::whole, false,
+     "timeout-register=MS   another master keeps this in the watchdog's timeout register; 0: off"},
+    {FaultKind::latched_fault, "latched-fault", Value::none, false,
+     "latched-fault         the controller trips by itself, latched until run = 0 at rest"},
 }};
 
 constexpr std::array<std::string_view, kChannels> kChannelNames{"outer", "inner", "azimuth",
@@ -70,9 +106,11 @@ double number(std::string_view spec, std::string_view text, const char* what, do
 
 const Description& describe(std::string_view spec, std::string_view name) {
     if (name == "nan") name = "out-of-range";
+    std::string hyphens(name);
+    std::replace(hyphens.begin(), hyphens.end(), '_', '-');
     std::string names;
     for (const Description& d : kDescriptions) {
-        if (d.name == name) return d;
+        if (d.name == hyphens) return d;
         names += (names.empty() ? "" : ", ") + std::string(d.name);
     }
     fail(spec, "unknown fault \"" + std::string(name) + "\", expected one of " + names);
@@ -113,6 +151,15 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
         case Value::factor:
             fault.value = number(spec, first, "a factor from 0 to 1000", 0, 1000);
             break;
+        case Value::slowness:
+            fault.value = number(spec, first, "a factor from 1 to 1000", 1, 1000);
+            break;
+        case Value::whole:
+            fault.value = number(spec, first, "a whole number from 0 to 65535", 0, 65535);
+            if (fault.value != std::floor(fault.value))
+                fail(spec, "found \"" + std::string(first) +
+                               "\", expected a whole number from 0 to 65535");
+            break;
         case Value::word:
             if (first != "exception" && first != "value") {
                 fail(spec, "found \"" + std::string(first) + "\", expected exception or value");
@@ -134,7 +181,9 @@ std::string_view name_of(FaultKind kind) noexcept {
 std::string fault_help() {
     std::string text =
         "Faults: NAME[:CHANNEL][=VALUE][@FROM[..TO]], times in simulated seconds;\n"
-        "channels outer, inner, azimuth, x, y, z; without one: all that apply.\n";
+        "channels outer, inner, azimuth, x, y, z; without one: all that apply. Names may have _ "
+        "for "
+        "-.\n";
     for (const Description& d : kDescriptions) text += std::string("  ") + d.help + "\n";
     return text;
 }
@@ -168,8 +217,7 @@ Fault parse_fault(std::string_view spec, double now_s) {
     }
     if (value) {
         read_value(spec, d, *value, fault);
-    } else if (d.value == Value::rate || d.value == Value::milliseconds ||
-               d.value == Value::degrees || d.value == Value::factor) {
+    } else if (d.value != Value::none && d.value != Value::seconds && d.value != Value::word) {
         fail(spec, "no value, expected " + std::string(d.help));
     }
     return fault;

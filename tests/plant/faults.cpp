@@ -22,6 +22,28 @@ const Fault* Faults::active(FaultKind kind, double time_s) const noexcept {
     return nullptr;
 }
 
+ShakerLies lies_at(double time_s, ShakerLies lies, const Faults& faults) noexcept {
+    const auto yes = [&](FaultKind kind, bool& lie) {
+        if (faults.active(kind, time_s) != nullptr) lie = true;
+    };
+    const auto value = [&](FaultKind kind, double& lie) {
+        if (const Fault* fault = faults.active(kind, time_s)) lie = fault->value;
+    };
+    yes(FaultKind::ack_without_stop, lies.ack_without_stop);
+    yes(FaultKind::timeout_ignored, lies.timeout_ignored);
+    value(FaultKind::timeout_scaled, lies.timeout_scaled);
+    value(FaultKind::amplitude_scaled, lies.amplitude_scaled);
+    yes(FaultKind::readback_echo, lies.readback_echo);
+    yes(FaultKind::stuck_contactor, lies.stuck_contactor);
+    value(FaultKind::slow_ramp, lies.slow_ramp);
+    yes(FaultKind::unit_rms, lies.unit_rms);
+    yes(FaultKind::dead_table, lies.dead_table);
+    if (const Fault* fault = faults.active(FaultKind::timeout_register, time_s))
+        lies.timeout_register = static_cast<std::uint16_t>(fault->value);
+    yes(FaultKind::latched_fault, lies.latched_fault);
+    return lies;
+}
+
 void Faults::spoil(Sample& sample, double time_s) {
     std::array<bool, kChannels> stuck{};
     for (const Fault& fault : faults_) {

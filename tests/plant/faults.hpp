@@ -12,6 +12,7 @@
 
 #include "tests/plant/random.hpp"
 #include "tests/plant/sensors.hpp"
+#include "tests/plant/shaker_lies.hpp"
 
 namespace vibrig::plant {
 
@@ -31,7 +32,18 @@ enum class FaultKind : std::uint8_t {
     loop_open,
     platform_fault,
     spike,
-    gyro_noise
+    gyro_noise,
+    ack_without_stop,
+    timeout_ignored,
+    timeout_scaled,
+    amplitude_scaled,
+    readback_echo,
+    stuck_contactor,
+    slow_ramp,
+    unit_rms,
+    dead_table,
+    timeout_register,
+    latched_fault
 };
 
 /// Channels of a sample: outer, inner, azimuth, then the accelerometers x, y, z.
@@ -48,8 +60,8 @@ struct Fault {
 };
 
 /// NAME[:CHANNEL][=VALUE[,RATE]][@FROM[..TO]], for instance "lose=0.01@100..200" or
-/// "stuck:outer@50"; the times are simulated seconds, from `now_s` on where none are given. Throws
-/// PlantError saying what was found and expected.
+/// "stuck:outer@50"; a name may be written with _ for -; the times are simulated seconds, from
+/// `now_s` on where none are given. Throws PlantError saying what was found and expected.
 [[nodiscard]] Fault parse_fault(std::string_view spec, double now_s);
 /// One line per fault, for --help and error messages.
 [[nodiscard]] std::string fault_help();
@@ -91,5 +103,9 @@ class Faults {
     Random random_;
     std::uint64_t lost_ = 0;
 };
+
+/// The shaker's lies at a time: those of the rig from the start, and the faults on top.
+[[nodiscard]] ShakerLies lies_at(double time_s, ShakerLies from_start,
+                                 const Faults& faults) noexcept;
 
 }  // namespace vibrig::plant

@@ -22,6 +22,7 @@ Rig::Rig(const Truth& truth)
       increments_(truth),
       gyro_noise_(truth.seed, 0),
       slew_noise_(truth.seed, 7) {
+    shaker_.lie(truth.shaker_lies);
     read();
 }
 

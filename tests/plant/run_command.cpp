@@ -187,7 +187,7 @@ void add_run_command(CLI::App& app, int& exit_code) {
     command->add_option("--duration", o->duration_s, "end after so many simulated seconds")
         ->check(proto::finite(0.0, 1e9));
     command->add_option("--fault", o->faults, "a fault, see below; may be given several times")
-        ->expected(1);
+        ->allow_extra_args(false);
     command->add_option("--control", o->control,
                         "take commands, one a line, from this FIFO, or - for standard input");
     command->add_option("--dbc", o->dbc, "messages of the bus; default: the built-in rig.dbc");

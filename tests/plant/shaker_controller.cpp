@@ -34,6 +34,12 @@ double ShakerController::frequency_hz() const noexcept { return value(holding_, 
 double ShakerController::set_point_g() const noexcept { return value(holding_, kMap.amplitude); }
 double ShakerController::ramp_s() const noexcept { return value(holding_, kMap.ramp_time); }
 
+double ShakerController::amplitude_g() const noexcept {
+    if (lies_.dead_table) return 0;
+    const double unit = lies_.unit_rms ? std::numbers::sqrt2 : 1;
+    return lies_.amplitude_scaled * unit * std::max(drive_g_, held_g_);
+}
+
 ShakerController::Answer ShakerController::write(std::size_t address,
                                                  std::span<const std::uint16_t> values) noexcept {
     if (values.empty() || address + values.size() > kHolding) return Answer::illegal_address;
@@ -44,16 +50,17 @@ ShakerController::Answer ShakerController::write(std::size_t address,
     const double amplitude = value(next, kMap.amplitude);
     const bool run = next[kMap.run.address] != 0;
     const bool was_running = holding_[kMap.run.address] != 0;
-    const bool moving = state_ != ShakerState::idle || amplitude_g_ > 0;
+    const bool moving = state_ != ShakerState::idle || drive_g_ > 0;
     if (frequency != frequency_hz() && (moving || frequency < 1 || frequency > 200))
         return Answer::illegal_value;
     if (amplitude > limit_g_) return Answer::illegal_value;
     if (next[kMap.run.address] > 1) return Answer::illegal_value;
     if (run && !was_running &&
-        (emergency_stop_open_ || state_ == ShakerState::fault || amplitude_g_ > 0)) {
+        (emergency_stop_open_ || state_ == ShakerState::fault || drive_g_ > 0)) {
         return Answer::illegal_value;
     }
 
+    if (lies_.timeout_register) next[kMap.watchdog_timeout.address] = *lies_.timeout_register;
     if (next[kMap.watchdog->address] != holding_[kMap.watchdog->address]) since_feed_s_ = 0;
     const double old_amplitude = set_point_g();
     holding_ = next;
@@ -62,12 +69,11 @@ ShakerController::Answer ShakerController::write(std::size_t address,
         state_ = ShakerState::ramping;
         ramp_to(amplitude, ramp_s());
     } else if (!run && was_running) {
-        state_ = ShakerState::stopping;
-        ramp_to(0, ramp_s());
+        if (!lies_.ack_without_stop) stop(ShakerState::stopping, ramp_s());
     } else if (run && amplitude != old_amplitude && state_ != ShakerState::fault) {
         state_ = ShakerState::ramping;
         ramp_to(amplitude, ramp_s());
-    } else if (!run && state_ == ShakerState::fault && amplitude_g_ == 0 && !emergency_stop_open_ &&
+    } else if (!run && state_ == ShakerState::fault && drive_g_ == 0 && !emergency_stop_open_ &&
                address <= kMap.run.address && address + values.size() > kMap.run.address) {
         state_ = ShakerState::idle;  // run = 0 written at rest acknowledges
         faults_ = 0;
@@ -80,7 +86,9 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     words[kMap.state.address] = static_cast<std::uint16_t>(state_);
     words[kMap.fault.address] = faults_;
     words[kMap.emergency_stop.address] = emergency_stop_open_ ? 1 : 0;
-    split(words, kMap.measured_amplitude.address, amplitude_g_ / kMap.measured_amplitude.scale);
+    double measured = lies_.dead_table ? 0 : drive_g_;
+    if (lies_.readback_echo) measured = holding_[kMap.run.address] != 0 ? set_point_g() : 0;
+    split(words, kMap.measured_amplitude.address, measured / kMap.measured_amplitude.scale);
     return words;
 }
 
@@ -89,35 +97,55 @@ void ShakerController::open_emergency_stop(bool open) noexcept {
     emergency_stop_open_ = open;
 }
 
+void ShakerController::lie(const ShakerLies& lies) noexcept {
+    const bool broke = lies.latched_fault && !lies_.latched_fault;
+    lies_ = lies;
+    if (broke) trip(kFaultInternal, kWatchdogStop);
+    if (lies_.timeout_register) holding_[kMap.watchdog_timeout.address] = *lies_.timeout_register;
+    if (!lies_.stuck_contactor) held_g_ = 0;
+    // What was only said to be stopped is stopped at last.
+    const bool excited = state_ == ShakerState::ramping || state_ == ShakerState::running;
+    if (!lies_.ack_without_stop && excited && holding_[kMap.run.address] == 0)
+        stop(ShakerState::stopping, ramp_s());
+}
+
 void ShakerController::ramp_to(double target_g, double time_s) noexcept {
     target_g_ = target_g;
-    slope_g_per_s_ = std::abs(target_g - amplitude_g_) / std::max(time_s, 1e-3);
+    slope_g_per_s_ = std::abs(target_g - drive_g_) / std::max(time_s, 1e-3);
 }
 
 void ShakerController::trip(std::uint16_t fault, double stop_s) noexcept {
     faults_ |= fault;
-    state_ = ShakerState::fault;
     holding_[kMap.run.address] = 0;
-    ramp_to(0, stop_s);
+    stop(ShakerState::fault, stop_s);
+}
+
+void ShakerController::stop(ShakerState state, double time_s) noexcept {
+    state_ = state;
+    if (lies_.stuck_contactor) held_g_ = std::max(held_g_, drive_g_);
+    ramp_to(0, time_s);
 }
 
 void ShakerController::advance(double dt_s) noexcept {
     const bool excited = state_ == ShakerState::ramping || state_ == ShakerState::running;
-    const double timeout = value(holding_, kMap.watchdog_timeout);
+    const double timeout = lies_.timeout_scaled * value(holding_, kMap.watchdog_timeout);
     since_feed_s_ += dt_s;
-    if (excited && timeout > 0 && since_feed_s_ > timeout) trip(kFaultWatchdog, kWatchdogStop);
+    if (excited && timeout > 0 && !lies_.timeout_ignored && since_feed_s_ > timeout)
+        trip(kFaultWatchdog, kWatchdogStop);
 
-    const double step = slope_g_per_s_ * dt_s;
-    const double gap = target_g_ - amplitude_g_;
+    // An amplifier without power is not slow.
+    const double slow = emergency_stop_open_ ? 1 : lies_.slow_ramp;
+    if (emergency_stop_open_) held_g_ = std::min(held_g_, drive_g_);
+    const double step = slope_g_per_s_ * dt_s / slow;
+    const double gap = target_g_ - drive_g_;
     // A rounding error must not cost a further tick.
-    amplitude_g_ =
-        std::abs(gap) <= step * (1 + 1e-9) ? target_g_ : amplitude_g_ + std::copysign(step, gap);
-    if (amplitude_g_ == target_g_) {
+    drive_g_ = std::abs(gap) <= step * (1 + 1e-9) ? target_g_ : drive_g_ + std::copysign(step, gap);
+    if (drive_g_ == target_g_) {
         if (state_ == ShakerState::ramping) state_ = ShakerState::running;
         if (state_ == ShakerState::stopping) state_ = ShakerState::idle;
     }
     const double omega = 2 * std::numbers::pi * frequency_hz();
-    const double peak_mm = 1e3 * amplitude_g_ * kMetrePerSecond2 / (omega * omega);
+    const double peak_mm = 1e3 * amplitude_g() * kMetrePerSecond2 / (omega * omega);
     if (peak_mm > limit_mm_ && state_ != ShakerState::fault) trip(kFaultLimit, kWatchdogStop);
 }
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <span>
 
+#include "tests/plant/shaker_lies.hpp"
+
 namespace vibrig::plant {
 
 enum class ShakerState : std::uint16_t { idle, ramping, running, stopping, fault };
@@ -11,9 +13,11 @@ enum class ShakerState : std::uint16_t { idle, ramping, running, stopping, fault
 inline constexpr std::uint16_t kFaultWatchdog = 1;  ///< bits of the fault register
 inline constexpr std::uint16_t kFaultEmergencyStop = 2;
 inline constexpr std::uint16_t kFaultLimit = 4;
+inline constexpr std::uint16_t kFaultInternal = 8;
 
 /// The shaker's controller as its Modbus registers show it: set-points, ramps, watchdog, emergency
-/// stop. Addresses are those of proto::ShakerRegisters.
+/// stop; and the table it drives, which need not do what they say. Addresses are those of
+/// proto::ShakerRegisters.
 class ShakerController {
   public:
     static constexpr std::size_t kHolding = 8;
@@ -30,22 +34,23 @@ class ShakerController {
     [[nodiscard]] std::array<std::uint16_t, kInput> input() const noexcept;
 
     void open_emergency_stop(bool open) noexcept;
+    /// From now on.
+    void lie(const ShakerLies& lies) noexcept;
     /// Time goes on by dt; the table's amplitude follows its ramp.
     void advance(double dt_s) noexcept;
 
     [[nodiscard]] ShakerState state() const noexcept { return state_; }
     [[nodiscard]] std::uint16_t faults() const noexcept { return faults_; }
-    [[nodiscard]] double amplitude_g() const noexcept {
-        return amplitude_g_;
-    }  ///< of the table now, peak
+    [[nodiscard]] double amplitude_g() const noexcept;  ///< of the table now, peak, in truth
     [[nodiscard]] double frequency_hz() const noexcept;
     [[nodiscard]] double set_point_g() const noexcept;
     [[nodiscard]] double ramp_s() const noexcept;
-    [[nodiscard]] bool at_rest() const noexcept { return amplitude_g_ == 0; }
+    [[nodiscard]] bool at_rest() const noexcept { return amplitude_g() == 0; }
 
   private:
     void ramp_to(double target_g, double time_s) noexcept;
     void trip(std::uint16_t fault, double stop_s) noexcept;
+    void stop(ShakerState state, double time_s) noexcept;
 
     double limit_g_;
     double limit_mm_;
@@ -54,9 +59,11 @@ class ShakerController {
     ShakerState state_ = ShakerState::idle;
     std::uint16_t faults_ = 0;
     bool emergency_stop_open_ = false;
-    double amplitude_g_ = 0;
+    ShakerLies lies_;
+    double drive_g_ = 0;  ///< what the controller believes the table does
     double target_g_ = 0;
     double slope_g_per_s_ = 0;  ///< positive
+    double held_g_ = 0;         ///< what a contactor that is stuck keeps up when the drive goes
     double since_feed_s_ = 0;
 };
 

@@ -16,6 +16,16 @@ struct SharedRig {
         return 1e-6 * static_cast<double>(rig.time_us());
     }
 
+    /// What the faults do to the rig itself, as from now.
+    void apply_faults() noexcept {
+        const double now = now_s();
+        const Fault* noise = faults.active(FaultKind::gyro_noise, now);
+        rig.gyro_noise_times(noise == nullptr ? 1 : noise->value);
+        rig.shaker().lie(lies_at(now, rig.truth().shaker_lies, faults));
+        rig.shaker().open_emergency_stop(emergency_stop_by_hand ||
+                                         faults.active(FaultKind::estop, now) != nullptr);
+    }
+
     std::mutex mutex;
     Rig rig;
     Faults faults;

@@ -54,8 +54,6 @@ void Simulation::run() {
             return;
         if (tick > 0) {
             const std::scoped_lock lock(shared_.mutex);
-            const Fault* noise = shared_.faults.active(FaultKind::gyro_noise, shared_.now_s());
-            shared_.rig.gyro_noise_times(noise == nullptr ? 1 : noise->value);
             shared_.rig.advance();
         }
         make_tick();
@@ -68,9 +66,7 @@ void Simulation::run() {
 void Simulation::make_tick() {
     const std::scoped_lock lock(shared_.mutex);
     const double now = shared_.now_s();
-    const bool open =
-        shared_.emergency_stop_by_hand || shared_.faults.active(FaultKind::estop, now) != nullptr;
-    shared_.rig.shaker().open_emergency_stop(open);
+    shared_.apply_faults();
     Sample sample;
     sample.readings = shared_.rig.readings();
     shared_.faults.spoil(sample, now);

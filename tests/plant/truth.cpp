@@ -4,6 +4,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -50,6 +51,17 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "second_harmonic", t.second_harmonic, 0.0, 0.5);
     field("shaker", "limit_g", t.limit_g, 0.1, 100.0);
     field("shaker", "limit_mm", t.limit_mm, 0.1, 1000.0);
+    field("shaker", "ack_without_stop", t.shaker_lies.ack_without_stop, 0, 0);
+    field("shaker", "timeout_ignored", t.shaker_lies.timeout_ignored, 0, 0);
+    field("shaker", "timeout_scaled", t.shaker_lies.timeout_scaled, 0.0, 1000.0);
+    field("shaker", "amplitude_scaled", t.shaker_lies.amplitude_scaled, 0.0, 1000.0);
+    field("shaker", "readback_echo", t.shaker_lies.readback_echo, 0, 0);
+    field("shaker", "stuck_contactor", t.shaker_lies.stuck_contactor, 0, 0);
+    field("shaker", "slow_ramp", t.shaker_lies.slow_ramp, 1.0, 1000.0);
+    field("shaker", "unit_rms", t.shaker_lies.unit_rms, 0, 0);
+    field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
+    field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
+    field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
 }
 
 std::string text_of(const Json& json) {
@@ -89,6 +101,18 @@ struct Reader {
         }
         out = json.get<int>();
     }
+    void value(const std::string& key, const Json& json, bool& out, int, int) const {
+        if (!json.is_boolean()) fail(key, "found " + text_of(json) + ", expected true or false");
+        out = json.get<bool>();
+    }
+    void value(const std::string& key, const Json& json, std::optional<std::uint16_t>& out, int low,
+               int high) const {
+        out.reset();
+        if (json.is_null()) return;
+        int whole = 0;
+        value(key, json, whole, low, high);
+        out = static_cast<std::uint16_t>(whole);
+    }
     void value(const std::string& key, const Json& json, Axis& out, int, int) const {
         const std::string text = json.is_string() ? json.get<std::string>() : std::string();
         if (text.size() != 2 || (text[0] != '+' && text[0] != '-') || text[1] < 'x' ||
@@ -123,6 +147,8 @@ struct Writer {
 
     static Json json(double v) { return v; }
     static Json json(int v) { return v; }
+    static Json json(bool v) { return v; }
+    static Json json(const std::optional<std::uint16_t>& v) { return v ? Json(*v) : Json(nullptr); }
     static Json json(const Axis& axis) {
         return std::string(axis.sign > 0 ? "+" : "-") + static_cast<char>('x' + axis.index);
     }

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "tests/plant/shaker_lies.hpp"
 #include "tests/plant/vec3.hpp"
 
 namespace vibrig::plant {
@@ -81,6 +82,7 @@ struct Truth {
     double second_harmonic = 0;  ///< of the table's acceleration, relative to the fundamental
     double limit_g = 20;         ///< largest set-point accepted
     double limit_mm = 25;        ///< peak displacement that trips the limit switch
+    ShakerLies shaker_lies;
 
     std::uint64_t seed = 1;
 

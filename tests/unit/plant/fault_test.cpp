@@ -46,6 +46,8 @@ TEST(FaultSpec, ReadsNameChannelValueAndTimes) {
     EXPECT_EQ(parse_fault("lose:0.25", 0).value, 0.25);
     EXPECT_EQ(parse_fault("nan:x", 0).kind, FaultKind::out_of_range);
     EXPECT_EQ(parse_fault("gyro-noise=8", 0).value, 8);
+    EXPECT_EQ(parse_fault("ack_without_stop@3", 0).kind, FaultKind::ack_without_stop);
+    EXPECT_EQ(parse_fault("timeout-register=0", 0).value, 0);
 }
 
 TEST(FaultSpec, SaysWhatIsWrong) {
@@ -69,6 +71,12 @@ TEST(FaultSpec, SaysWhatIsWrong) {
     expect("lose=0.1@5..", "a time");
     expect("lose=0.1@200..100", "after the first");
     expect("modbus-wrong=maybe", "exception or value");
+    expect("stuck-contactor=1", "takes no value");
+    expect("amplitude_scaled", "no value");
+    expect("slow_ramp=0.5", "a factor from 1 to 1000");
+    expect("timeout_register=0.5", "a whole number from 0 to 65535");
+    expect("timeout_register=65536", "a whole number from 0 to 65535");
+    expect("timeout_register", "no value");
 }
 
 TEST(Faults, LoseTheShareAskedForAndNothingOutsideTheirTime) {

@@ -28,9 +28,14 @@ TEST(Truth, SurvivesWritingAndReading) {
     truth.up = {2, -1};
     truth.matrix[0][1] = 2.4e-4;
     truth.seed = 0xffffffffffffffffULL;
+    truth.shaker_lies.stuck_contactor = true;
+    truth.shaker_lies.timeout_register = 0;
     const std::string json = to_json(truth);
     EXPECT_EQ(to_json(parse_truth(json, "truth.json")), json);
     EXPECT_EQ(parse_truth(json, "truth.json").coefficients, truth.coefficients);
+    EXPECT_EQ(parse_truth(json, "truth.json").shaker_lies.timeout_register, 0);
+    EXPECT_FALSE(
+        parse_truth(to_json(Truth{}), "truth.json").shaker_lies.timeout_register.has_value());
 }
 
 TEST(Truth, DefaultIsTable2) {
@@ -71,6 +76,10 @@ TEST(Truth, NamesTheKeyOfBadInput) {
     expect(replaced(good, "\"drift_sign\": -1", "\"drift_sign\": 0"), "expected -1 or 1");
     expect(replaced(good, "\"transmission\":", "\"transmission\": \"a lot\", \"x\":"),
            "isolator.transmission");
+    expect(replaced(good, "\"dead_table\": false", "\"dead_table\": 1"),
+           "shaker.dead_table: found 1, expected true or false");
+    expect(replaced(good, "\"timeout_register\": null", "\"timeout_register\": -1"),
+           "shaker.timeout_register: found -1");
     expect(replaced(good, "\"seed\": 1", "\"seed\": -1"), "seed: found -1");
     expect("", "not JSON");
     expect("[1, 2]", "expected an object");

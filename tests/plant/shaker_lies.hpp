@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace vibrig::plant {
+
+/// What the shaker's controller does otherwise than its registers say. The emergency stop cuts the
+/// power whatever the controller does.
+struct ShakerLies {
+    bool ack_without_stop = false;  ///< run = 0 is taken and read back, the table shakes on
+    bool timeout_ignored = false;   ///< the watchdog never fires
+    double timeout_scaled = 1;      ///< it fires after so many times its register
+    double amplitude_scaled = 1;    ///< the table does so many times what the registers say
+    bool readback_echo = false;     ///< the measured amplitude is the set-point, or 0 with run = 0
+    /// A stop leaves the table as it is: the controller believes itself at rest and says so.
+    bool stuck_contactor = false;
+    double slow_ramp = 1;     ///< ramps take so many times their time, a stop's too
+    bool unit_rms = false;    ///< amplitudes are rms, set-point and measured
+    bool dead_table = false;  ///< the table does not move; the measured amplitude is 0
+    /// Another master keeps this in the watchdog's timeout register, which obeys it; ms, 0: off.
+    std::optional<std::uint16_t> timeout_register{};
+    bool latched_fault = false;  ///< trips by itself when this begins
+};
+
+}  // namespace vibrig::plant
