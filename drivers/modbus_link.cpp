@@ -264,4 +264,20 @@ Reply ModbusLink::write(std::uint16_t address, std::span<const std::uint16_t> wo
     return reply_of(result, count, errno);
 }
 
+Reply ModbusLink::read_coil(std::uint16_t address, bool& on) noexcept {
+    if (!connected_) return {ReplyKind::lost, ENOTCONN};
+    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    std::uint8_t bit = 0;
+    const int result = modbus_read_bits(context_.get(), address, 1, &bit);
+    on = bit != 0;
+    return reply_of(result, 1, errno);
+}
+
+Reply ModbusLink::write_coil(std::uint16_t address, bool on) noexcept {
+    if (!connected_) return {ReplyKind::lost, ENOTCONN};
+    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    const int result = modbus_write_bit(context_.get(), address, on ? 1 : 0);
+    return reply_of(result, 1, errno);
+}
+
 }  // namespace vibrig::drivers

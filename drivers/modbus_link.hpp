@@ -55,6 +55,10 @@ class ModbusLink {
     /// One word is written with function 6, more with function 16.
     [[nodiscard]] Reply write(std::uint16_t address, std::span<const std::uint16_t> words) noexcept;
 
+    /// One coil; write uses function 5.
+    [[nodiscard]] Reply read_coil(std::uint16_t address, bool& on) noexcept;
+    [[nodiscard]] Reply write_coil(std::uint16_t address, bool on) noexcept;
+
     /// Ends a TCP request in flight, which then returns lost. Any thread; never blocks. On a serial
     /// line nothing may be sent while a device may still be answering, so there it does nothing:
     /// the response timeout ends the request.
