@@ -17,6 +17,9 @@ namespace {
 
 constexpr double kRadian = std::numbers::pi / 180;
 constexpr double kSureness = 3;  // standard deviations
+// The gimbals take the shorter way round, and of half a turn neither way is the shorter: what a
+// slew ends beside its target would decide. 2 deg short of it at either end, it is decided.
+const std::vector<double> kAzimuths_deg{0, 88, -88, 88};
 
 }  // namespace
 
@@ -24,6 +27,7 @@ zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
     zeros::CalibrationSettings s;
     s.site.latitude_rad = kRadian * rig_.latitude_deg;
     s.site.gravity_mps2 = rig_.gravity_mps2;
+    s.plan.targets_deg = kAzimuths_deg;
     s.plan.rate_deg_s = settings_.slew_deg_per_s;
     s.plan.duration_s = settings_.duration_s;
     s.inverted = down;
@@ -115,7 +119,7 @@ void ZeroingStage::start_run(bool down) {
 }
 
 Vector ZeroingStage::target_deg() const {
-    const auto& targets = zeros::SlewPlan{}.targets_deg;
+    const auto& targets = kAzimuths_deg;
     const std::size_t n = targets.size();
     const std::size_t k = target_ < n ? target_ : n - 2 + (target_ - n) % 2;
     Vector target = frame_.azimuth_vertical_deg(targets[k], down_);

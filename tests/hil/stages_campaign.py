@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 """The stages with the table at rest, levelling and zeroing, over the seqpacket bus on the rig's clock.
 
-usage: stages_campaign.py PROGRAMS
+usage: stages_campaign.py PROGRAMS [--seeds N]    N: of the campaigns with both stages; 2
 """
+import argparse
 import json
 import math
 import os
+import random
 import sys
 import tempfile
 
@@ -24,11 +26,11 @@ NAMES = ("F", "I", "O", "S", "II", "OO", "SS", "IO", "IS", "OS")
 class Run:
     """One campaign from arming to its end."""
 
-    def __init__(self, programs, campaign, truth=None, timeout_s=120, **tables):
+    def __init__(self, programs, campaign, truth=None, timeout_s=120, seed=3, **tables):
         with tempfile.TemporaryDirectory() as folder:
             rig = r.Rig(programs, "seqpacket", "rig", folder)
             try:
-                rig.start_plant("--seed", "3", "--truth", rig.truth_file(truth or {}))
+                rig.start_plant("--seed", str(seed), "--truth", rig.truth_file(truth or {}))
                 rig.configure(campaign, **tables)
                 rig.start_daemon()
                 rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
@@ -112,6 +114,27 @@ def both_ways(checks, programs):
     checks.check(abs(zeros["scale_z_ppm"] - 1e6 * scale) <= 5 * zeros["scale_z_sigma_ppm"] <= 100,
                  "the scale of z comes out beside it", zeros)
     checks.check(zeros["repeated_at_end"] and not zeros.get("mark"), "nothing has moved at the end", zeros)
+
+
+def seeds(checks, programs, count):
+    """Whatever the slews end at, campaigns with both stages finish, and the zeros are as sure as they say."""
+    squares = 0
+    for seed in range(1, count + 1):
+        draw = random.Random(seed)
+        zero_g = [draw.uniform(-0.005, 0.005) for _ in range(3)]
+        slew_error_deg = (0.02, 0.2)[seed % 2]
+        run = Run(programs, {**LEVELLING, "zeroing": True, "positions_deg": [[0, 0, 0]], "dwell_s": 5.0},
+                  {"platform": {"slew_error_deg": slew_error_deg}, "accelerometer": {"zero_g": zero_g}}, seed=seed)
+        if not run.ended(checks, "finished", f"seed {seed}, slews off by {slew_error_deg} deg: finished"):
+            continue
+        zeros = run.last["campaign"]["zeros"]
+        checks.check(not zeros.get("mark"), f"seed {seed}: not marked", zeros)
+        squares += sum(((z - 1e3 * b) / s) ** 2 for z, b, s in
+                       zip(zeros["zero_mg"][:2], zero_g[:2], zeros["sigma_mg"][:2]))
+    # chi-square of 2 per campaign, 99.9 % point (Wilson and Hilferty); the stillness of the platform is a bound
+    n = 2 * count
+    limit = n * (1 - 2 / (9 * n) + 3.09 * math.sqrt(2 / (9 * n))) ** 3
+    checks.check(squares <= limit, f"zeros of {count} campaigns within their sigma", f"{squares:.1f}, limit {limit:.1f}")
 
 
 def vertical(position):
@@ -228,11 +251,16 @@ def coefficients(programs):
 
 
 def main():
-    programs = r.programs_from_command_line(__doc__)
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("programs")
+    options.add_argument("--seeds", type=int, default=2)
+    given = options.parse_args()
+    programs = given.programs
     checks = r.Checks()
     levelling(checks, programs)
     zero_failures(checks, programs)
     both_ways(checks, programs)
+    seeds(checks, programs, given.seeds)
     effect(checks, programs, coefficients(programs))
     return checks.end()
 

@@ -46,10 +46,13 @@ void Increments::advance(std::int64_t end_us, const Motion& motion, const Platfo
                          std::span<const double> a1) {
     made_.clear();
     const std::int64_t begin_us = end_us - kSpanUs;
+    // Angles are given within a turn: where one passes half a turn, it goes on and not all the way
+    // back.
+    Vec3 moved = motion.to - motion.from;
+    for (double& angle : moved) angle = std::remainder(angle, 2 * std::numbers::pi);
     const double step_s = 1e-6 * kSpanUs / static_cast<double>(a1.size() - 1);
     const auto at = [&](std::int64_t us) {
-        return motion.from +
-               (static_cast<double>(us - begin_us) / kSpanUs) * (motion.to - motion.from);
+        return motion.from + (static_cast<double>(us - begin_us) / kSpanUs) * moved;
     };
     std::int64_t from = begin_us;
     while (from < end_us) {
@@ -88,7 +91,10 @@ void Increments::make(const Vec3& from, const Vec3& to, const PlatformModel& pla
     const double sine = std::sqrt(dot(turn, turn));
     if (sine > 1e-9) turn = (std::asin(std::min(1.0, sine)) / sine) * turn;
 
-    const Vec3 up = platform.up_at(0.5 * (from + to));
+    Vec3 middle = to - from;
+    for (double& angle : middle) angle = 0.5 * std::remainder(angle, 2 * std::numbers::pi);
+    middle = from + middle;
+    const Vec3 up = platform.up_at(middle);
     const double a1 = shaken_s / kIncrement;
     const Vec3 drift = platform.gyro_drift(up, a1);
     const Vec3 velocity =

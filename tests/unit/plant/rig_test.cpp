@@ -195,6 +195,13 @@ TEST(Rig, IncrementsAreThoseOfTheEarthTheDriftTheSlewAndGravity) {
         EXPECT_NEAR(turned.turn_arcsec[2] - 20 * rate[2], -90 * 3600, 0.05);
         // AND the vertical accelerometer saw gravity only
         EXPECT_NEAR(turned.velocity_mps[2], 20 * 9.80665 * 1.002, 0.01);
+        // AND on over half a turn, where the angle begins anew: its inner gimbal beside level, too
+        rig.slew_to({90, 0.3, 170}, GimbalMode::calibrate);
+        run_for(rig, 20);
+        rig.slew_to({90, 0.3, -170}, GimbalMode::calibrate);
+        const Increment over = sum_of_increments(rig, 10);
+        EXPECT_NEAR(over.turn_arcsec[2] - 10 * rate[2], -20 * 3600 * std::cos(0.3 / 57.3), 2);
+        EXPECT_NEAR(over.velocity_mps[2], 10 * 9.80665 * 1.002, 0.01);
         // AND released it says nothing
         rig.release();
         rig.advance();
