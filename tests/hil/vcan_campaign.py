@@ -214,16 +214,19 @@ def dies_safely(checks, rig):
 
 
 def with_pymodbus(checks, programs, folder):
-    """The daemon's Modbus side against an independent implementation."""
+    """The daemon's Modbus side against an independent implementation, which drives the table of the simulated rig."""
     os.makedirs(folder)
     rig = r.Rig(programs, BUS, "real", folder)
     rig.modbus_port = 1502
     rig.configure(SHORT, **r.PATIENT)
-    played = r.Child("shaker", [os.path.join(os.path.dirname(os.path.abspath(__file__)), "pymodbus_shaker.py"),
-                                str(rig.modbus_port)], folder)
-    platform = r.Rig(programs, BUS, "real", folder)  # its own shaker stays at rest
+    platform = r.Rig(programs, BUS, "real", folder)
+    fifo = os.path.join(folder, "control")
+    os.mkfifo(fifo)
+    played = None
     try:
-        platform.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
+        platform.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45", "--control", fifo)
+        played = r.Child("shaker", [os.path.join(os.path.dirname(os.path.abspath(__file__)), "pymodbus_shaker.py"),
+                                    str(rig.modbus_port), "--table", fifo], folder)
         rig.start_daemon()
         rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
         run_up(checks, rig, "pymodbus plays the shaker: it reaches its level")
@@ -240,8 +243,9 @@ def with_pymodbus(checks, programs, folder):
         checks.check(all(s["watchdog_s"] > 0 for s in running), "pymodbus saw a watchdog time-out", said[-5:])
     finally:
         rig.stop()
+        if played is not None:
+            played.end(timeout=5)
         platform.stop()
-        played.end(timeout=5)
 
 
 def sane_log(checks, rig):

@@ -4,17 +4,32 @@
 
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
+#include <optional>
 
 namespace vibrig::plant {
 namespace {
 
-constexpr const char* kHelp = "fault SPEC, clear [NAME], estop open, estop close, status, help";
+constexpr const char* kHelp =
+    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, status, help";
 
 std::string_view trimmed(std::string_view text) {
     const auto begin = text.find_first_not_of(" \t\r");
     if (begin == std::string_view::npos) return {};
     return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+// None: the table is the controller's own.
+std::optional<double> table_g(std::string_view text) {
+    if (text == "own") return std::nullopt;
+    double g = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), g);
+    if (error != std::errc{} || end != text.data() + text.size() || !(g >= 0 && g <= 100)) {
+        throw PlantError("table: found \"" + std::string(text) +
+                         "\", expected own or an amplitude from 0 to 100 g");
+    }
+    return g;
 }
 
 }  // namespace
@@ -38,6 +53,10 @@ std::string Control::execute(std::string_view line) {
         if (word == "estop" && (rest == "open" || rest == "close")) {
             rig_.emergency_stop_by_hand = rest == "open";
             return "ok estop " + std::string(rest);
+        }
+        if (word == "table") {
+            rig_.rig.shaker().drive_from_outside(table_g(rest));
+            return "ok table " + std::string(rest);
         }
         if (word == "status") {
             std::array<char, 160> status{};

@@ -8,7 +8,8 @@
 namespace vibrig::plant {
 
 /// Lines by which a person or a test works the rig while it runs:
-///   fault SPEC | clear [NAME] | estop open | estop close | status | help
+///   fault SPEC | clear [NAME] | estop open | estop close | table G | table own | status |
+///   help
 class Control {
   public:
     explicit Control(SharedRig& rig) : rig_(rig) {}

@@ -193,11 +193,13 @@ void add_run_command(CLI::App& app, int& exit_code) {
     command->add_option("--dbc", o->dbc, "messages of the bus; default: the built-in rig.dbc");
     command->add_option("--ready-file", o->ready_file,
                         "write addresses here (JSON) once both servers listen");
-    command->footer(fault_help() +
-                    "Commands: fault SPEC, clear [NAME], estop open, estop close, status, help\n"
-                    "Example:\n  vibrig-plant run --can seqpacket:/tmp/rig.sock --modbus "
-                    "tcp:127.0.0.1:0 --seed 7 "
-                    "--fault lose=0.01@100..200 --fault stuck:outer@300..301");
+    command->footer(
+        fault_help() +
+        "Commands: fault SPEC, clear [NAME], estop open, estop close, table G, table own, "
+        "status, help\n"
+        "Example:\n  vibrig-plant run --can seqpacket:/tmp/rig.sock --modbus "
+        "tcp:127.0.0.1:0 --seed 7 "
+        "--fault lose=0.01@100..200 --fault stuck:outer@300..301");
     command->callback([o, &exit_code] {
         run(*o);
         exit_code = 0;

@@ -35,6 +35,7 @@ double ShakerController::set_point_g() const noexcept { return value(holding_, k
 double ShakerController::ramp_s() const noexcept { return value(holding_, kMap.ramp_time); }
 
 double ShakerController::amplitude_g() const noexcept {
+    if (outside_g_) return emergency_stop_open_ ? 0 : *outside_g_;
     if (lies_.dead_table) return 0;
     const double unit = lies_.unit_rms ? std::numbers::sqrt2 : 1;
     return lies_.amplitude_scaled * unit * std::max(drive_g_, held_g_);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "tests/plant/shaker_lies.hpp"
@@ -34,6 +35,9 @@ class ShakerController {
     [[nodiscard]] std::array<std::uint16_t, kInput> input() const noexcept;
 
     void open_emergency_stop(bool open) noexcept;
+    /// The table does this, whatever the controller drives: another controller has it. None: its
+    /// own again.
+    void drive_from_outside(std::optional<double> table_g) noexcept { outside_g_ = table_g; }
     /// From now on.
     void lie(const ShakerLies& lies) noexcept;
     /// Time goes on by dt; the table's amplitude follows its ramp.
@@ -60,6 +64,7 @@ class ShakerController {
     std::uint16_t faults_ = 0;
     bool emergency_stop_open_ = false;
     ShakerLies lies_;
+    std::optional<double> outside_g_;
     double drive_g_ = 0;  ///< what the controller believes the table does
     double target_g_ = 0;
     double slope_g_per_s_ = 0;  ///< positive
