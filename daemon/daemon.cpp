@@ -81,6 +81,7 @@ Daemon::Daemon(configuration::Loaded loaded)
       pre_trip_(make_pre_trip()),
       stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign),
                   control_waiter_.get()),
+      rest_(configuration_.campaign.rest, configuration_.assembler.sample_period),
       acquisition_(
           io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
           {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_,
@@ -88,7 +89,8 @@ Daemon::Daemon(configuration::Loaded loaded)
            recorder_ ? &recorder_->samples() : nullptr, pre_trip_ ? &pre_trip_->samples() : nullptr,
            in_real_time()
                ? &estimator_stage_.time_by(clock_, configuration_.assembler.sample_period)
-               : nullptr}),
+               : nullptr,
+           &rest_}),
       gimbal_(dbc_, configuration_.gimbal, sending_port()),
       torquer_(configuration_.campaign.levelling
                    ? std::make_unique<drivers::Torquer>(dbc_, configuration_.campaign.level.torquer,

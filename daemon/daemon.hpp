@@ -158,6 +158,7 @@ class Daemon final : public StatusSource {
     std::unique_ptr<record::SentTap> sent_tap_;
     std::unique_ptr<record::PreTrip> pre_trip_;  ///< null: results are kept nowhere
     rt::StageFeed stage_feed_;
+    rt::RestMonitor rest_;
     rt::Acquisition acquisition_;
     drivers::Gimbal gimbal_;
     std::unique_ptr<drivers::Torquer> torquer_;  ///< null: no levelling

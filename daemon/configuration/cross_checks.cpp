@@ -78,9 +78,20 @@ void CrossCheck::for_daemon() {
     doors();
     broker();
     adaptive();
+    rest();
     set_points_fit();
     limits();
     frequency();
+}
+
+void CrossCheck::rest() {
+    if (!sound({"shaker.rest_g", "noise.accelerometer_g"})) return;
+    const double least = 6 * c_.estimator.accelerometer_g;
+    if (c_.campaign.rest.limit_g < least) {
+        refuse({"shaker.rest_g", "noise.accelerometer_g"}, plain(c_.campaign.rest.limit_g) + " g",
+               rounded(least) + " g at least, 6 sigma of noise.accelerometer_g: noise must not " +
+                   "look like motion");
+    }
 }
 
 void CrossCheck::doors() {

@@ -56,6 +56,13 @@ void add_link_keys(std::vector<Key>& keys) {
         {{"g_peak", Unit::g_peak}, {"g_rms", Unit::g_rms}, {"mps2_peak", Unit::mps2_peak}},
         "what amplitude and measured_amplitude count in, after their scale",
         [](C& c) -> Unit& { return c.amplitude_unit; }));
+    keys.push_back(number("shaker.rest_g", "g", {1e-6, 1},
+                          "at rest: rms of the accelerometers below; 6 noise.accelerometer_g at "
+                          "least",
+                          [](C& c) -> double& { return c.campaign.rest.limit_g; }));
+    keys.push_back(number("shaker.rest_window_s", "s", {0.1, 10},
+                          "of that rms; 8 samples at least, where they come slower",
+                          [](C& c) -> double& { return c.campaign.rest.window_s; }));
 
     keys.push_back(number("shaker.limits.acceleration_g", "g", {0.001, 1000},
                           "largest peak acceleration at the table",

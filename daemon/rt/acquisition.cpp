@@ -112,6 +112,7 @@ void Acquisition::on_time(Time now) noexcept {
 }
 
 void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
+    if (to_.rest != nullptr) to_.rest->add(sample);
     to_.interlock.check(sample, assembler_.platform());
     if (to_.stages != nullptr) to_.stages->take(sample);
     batch_[batched_++] = sample;

@@ -12,6 +12,7 @@
 #include "daemon/rt/frame_record.hpp"
 #include "daemon/rt/interlock.hpp"
 #include "daemon/rt/real_time.hpp"
+#include "daemon/rt/rest_monitor.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/rt/rig_time_link.hpp"
 #include "daemon/rt/ring.hpp"
@@ -55,6 +56,7 @@ class Acquisition {
         Ring<drivers::Sample>* recorder_samples = nullptr;
         Ring<drivers::Sample>* pre_trip = nullptr;  ///< what led to a trip; null: nobody keeps it
         HandOver* to_estimator = nullptr;           ///< null: its lateness does not count
+        RestMonitor* rest = nullptr;                ///< null: nobody asks
     };
     using Event = std::function<void(drivers::PortState, const char* text)>;
 

@@ -21,6 +21,16 @@ TEST(Together, ADaemonWithoutAWatchdogRegisterIsRefused) {
     EXPECT_EQ(complaint("shaker.registers.watchdog = true", true), "");
 }
 
+TEST(Together, ALimitOfRestBelowTheNoiseIsRefused) {
+    EXPECT_THAT(
+        complaint("noise.accelerometer_g = 0.004\nshaker.rest_g = 0.02\n", true),
+        StartsWith("rig.toml:2:17: shaker.rest_g: found 0.02 g, expected 0.024 g at least"));
+    EXPECT_THAT(complaint("noise.accelerometer_g = 0.004\n", true),
+                HasSubstr("noise.accelerometer_g: found 0.02 g, expected 0.024 g at least"));
+    EXPECT_EQ(complaint("noise.accelerometer_g = 0.003\n", true), "");
+    EXPECT_EQ(complaint("noise.accelerometer_g = 0.004\n", false), "");
+}
+
 TEST(Together, TheRigsClockNeedsASimulatedBusAndALoopbackShaker) {
     const std::string rig = "clock.source = \"rig\"\n";
     const std::string seqpacket = "can.port = \"seqpacket\"\ncan.path = \"@rig\"\n";

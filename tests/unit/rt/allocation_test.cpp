@@ -67,9 +67,10 @@ TEST(RealTimeThreads, AllocateNothingAfterStartUp) {
     Ring<FrameRecord> recorder_frames(1024);  // nobody takes: what does not fit is dropped
     Ring<drivers::Sample> recorder_samples(1024);
     Ring<drivers::Sample> pre_trip(1024);
+    RestMonitor rest({}, settings.sample_period);
     Acquisition acquisition(io, *port, dbc, settings, clock, nullptr,
                             {ring, *estimator_waiter, *control, interlock, &stages,
-                             &recorder_frames, &recorder_samples, &pre_trip});
+                             &recorder_frames, &recorder_samples, &pre_trip, nullptr, &rest});
     acquisition.start([](drivers::PortState, const char*) {});
     DwellOrder order;
     // Long enough for the test, short enough for blocks of a second.
