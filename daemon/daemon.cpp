@@ -204,7 +204,8 @@ std::vector<std::string> Daemon::check_plan(const configuration::Configuration& 
     return estimator::plan_warnings(estimator::report_plan(
         configuration.estimator,
         estimator::campaign_plan(configuration.estimator, campaign.positions_deg, campaign.table_g,
-                                 campaign.dwell_s)));
+                                 campaign.dwell_s),
+        drivers::to_seconds(configuration.assembler.sample_period)));
 }
 
 Daemon::~Daemon() {

@@ -1,7 +1,9 @@
 #include "estimator/crlb.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "estimator/drift_filter.hpp"
 #include "estimator/linear_algebra.hpp"
@@ -57,6 +59,10 @@ Covariance information_in_prior_units(const Settings& settings,
 }  // namespace
 
 double rate_variance(const Settings& settings, double duration_s, double period_s) {
+    if (!(period_s > 0) || !std::isfinite(period_s)) {
+        throw SettingsError("sample period: found " + std::to_string(period_s) +
+                            " s, expected more than 0");
+    }
     const FilterNoise noise = FilterNoise::of(settings);
     // Angle and rate: the first sample gives the angle, the rate starts without a prior worth the
     // name.
@@ -130,6 +136,15 @@ Covariance planned_covariance(const Settings& settings, const std::vector<Planne
         Covariance::Identity();
     return scale.asDiagonal() * linear_algebra::covariance_inverse(information) *
            scale.asDiagonal();
+}
+
+double median_interval(std::vector<double>& times_s) {
+    if (times_s.size() < 2) return 0;
+    for (std::size_t i = 0; i + 1 < times_s.size(); ++i) times_s[i] = times_s[i + 1] - times_s[i];
+    times_s.pop_back();
+    const auto middle = times_s.begin() + static_cast<std::ptrdiff_t>(times_s.size() / 2);
+    std::nth_element(times_s.begin(), middle, times_s.end());
+    return *middle;
 }
 
 }  // namespace vibrig::estimator

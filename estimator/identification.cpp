@@ -169,6 +169,14 @@ StepResult Identification::Impl::accept(const Reading& reading) noexcept {
 /// The level of the buffered readings first, then the filter over all of them.
 StepResult Identification::Impl::replay() noexcept {
     period_s_ = buffer_.period(period_s_);
+    if (!(period_s_ > 0)) {  // a single reading, before any other: no level to be had from it
+        record_.rejected += static_cast<std::uint32_t>(buffer_.readings().size());
+        buffer_.clear();
+        primed_ = false;
+        StepResult nothing;
+        nothing.outcome = StepOutcome::bad_force;
+        return nothing;
+    }
     level_.begin(period_s_);
     Eigen::Vector3d angles = Eigen::Vector3d::Zero();
     const bool vertical_known = buffer_.median_angles(angles);

@@ -95,7 +95,7 @@ struct Identification::Impl {
     bool in_dwell_ = false;
     bool primed_ = false;  ///< the level of this stretch is known
     double last_time_s_ = 0, stretch_begin_s_ = 0;
-    double period_s_ = 0.025;
+    double period_s_ = 0;  ///< of the newest stretch with two readings or more; 0: none yet
     int bad_times_in_a_row_ = 0;
     std::array<double, 3> innovation_arcsec_{};
 };

@@ -16,10 +16,10 @@ struct PlanReport {
     std::string obstacle;  ///< why the two-step route cannot work: then nothing is determined
 };
 
-/// Throws SettingsError. Two vibration levels are told apart as in the result of a run.
+/// `period_s`: between samples. Throws SettingsError. Two vibration levels are told apart as in the
+/// result of a run.
 [[nodiscard]] PlanReport report_plan(const Settings& settings,
-                                     const std::vector<PlannedDwell>& plan,
-                                     double period_s = 0.025);
+                                     const std::vector<PlannedDwell>& plan, double period_s);
 
 /// The plan of a campaign: every position, encoder angles in deg, at every level at the table.
 [[nodiscard]] std::vector<PlannedDwell> campaign_plan(

@@ -22,9 +22,7 @@ VibrationLevel::VibrationLevel(double window_s, double noise_g, double nominal_h
       noise_g_(noise_g),
       nominal_hz_(nominal_hz),
       ring_(static_cast<std::size_t>(window_s * kHighestRate_hz)),
-      valid_(std::make_unique<bool[]>(ring_.size())) {
-    begin(period_s_);
-}
+      valid_(std::make_unique<bool[]>(ring_.size())) {}
 
 void VibrationLevel::begin(double period_s) noexcept {
     period_s_ = period_s;

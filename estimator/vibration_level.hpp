@@ -66,7 +66,7 @@ class VibrationLevel {
     [[nodiscard]] double kappa_of(const HannMeans& means) const noexcept;
 
     double window_s_, noise_g_, nominal_hz_;
-    double period_s_ = 0.025;
+    double period_s_ = 0;  ///< begin() knows it
     std::vector<double> ring_;
     std::unique_ptr<bool[]> valid_;
     std::size_t next_ = 0, filled_ = 0;

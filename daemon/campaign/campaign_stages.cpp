@@ -39,11 +39,11 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
         if (settings.levelling) {
             const drivers::Torquer torquer(dbc, settings.level.torquer, port);
             limit = torquer.limit();
-            const LevellingStage stage(settings.level, settings.rig, limit);
+            const LevellingStage stage(settings.level, settings.rig, settings.sample_s, limit);
             if (auto why = stage.refusal(); !why.empty()) return why;
         }
         if (settings.zeroing) {
-            const ZeroingStage stage(settings.zero, settings.rig);
+            const ZeroingStage stage(settings.zero, settings.rig, settings.sample_s);
             if (auto why = stage.refusal(); !why.empty()) return why;
         }
         const rt::StageFeed feed(dbc, stage_feed_settings(settings), nullptr);
@@ -58,15 +58,16 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
 StageTimes stage_times(const Settings& settings) {
     StageTimes times;
     if (settings.levelling) {
-        const LevellingStage stage(settings.level, settings.rig,
+        const LevellingStage stage(settings.level, settings.rig, settings.sample_s,
                                    settings.level.torquer_limit_deg_h);
         times.levelling_s = stage.expected_s();
     }
     if (settings.zeroing) {
         // The gimbals go half a turn at most to where each way begins, and are levelled there.
         const double before_s = 180 / settings.zero.slew_deg_per_s + times.levelling_s;
-        times.closing_s = ZeroingStage(settings.zero, settings.rig).expected_s() +
-                          (settings.zero.both_ways ? 2 : 1) * before_s;
+        times.closing_s =
+            ZeroingStage(settings.zero, settings.rig, settings.sample_s).expected_s() +
+            (settings.zero.both_ways ? 2 : 1) * before_s;
     }
     return times;
 }
@@ -85,10 +86,10 @@ void Campaign::make_stages() {
     loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
     if (settings_.levelling && ports_.torquer != nullptr && ports_.feed != nullptr) {
         level_ = std::make_shared<LevellingStage>(settings_.level, settings_.rig,
-                                                  ports_.torquer->limit());
+                                                  settings_.sample_s, ports_.torquer->limit());
     }
     if (settings_.zeroing && ports_.feed != nullptr)
-        zero_ = std::make_shared<ZeroingStage>(settings_.zero, settings_.rig);
+        zero_ = std::make_shared<ZeroingStage>(settings_.zero, settings_.rig, settings_.sample_s);
 }
 
 std::string Campaign::platform_lacks(Time now) const {

@@ -15,7 +15,7 @@ namespace {
 constexpr double kSmallAngle = 5 * level::kPi / 180;
 
 level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Settings& rig,
-                                double torquer_limit_deg_h) {
+                                double sample_s, double torquer_limit_deg_h) {
     level::LevellerSettings loop;
     loop.earth.gravity_mps2 = rig.gravity_mps2;
     loop.fast = level::design({s.settling_s, s.residual, s.damping}, loop.earth).gains;
@@ -24,7 +24,7 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
         loop.slow = level::design({s.slow_settling_s, s.residual, s.damping}, loop.earth).gains;
     }
     loop.ramp_s = s.slow_ramp_s;
-    loop.period_s = s.block * s.sample_s;
+    loop.period_s = s.block * sample_s;
     loop.window_s = s.window_s;
     loop.tolerance_rad = s.tolerance_arcmin * level::kArcmin;
     loop.torquer_limit = std::min(s.torquer_limit_deg_h, torquer_limit_deg_h) * level::kDegPerHour;
@@ -37,11 +37,11 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
 }  // namespace
 
 LevellingStage::LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
-                               double torquer_limit_deg_h)
+                               double sample_s, double torquer_limit_deg_h)
     : settings_(settings),
       rig_(rig),
       frame_(rig),
-      loop_(loop_of(settings, rig, torquer_limit_deg_h)),
+      loop_(loop_of(settings, rig, sample_s, torquer_limit_deg_h)),
       leveller_(loop_) {}
 
 std::string LevellingStage::refusal() const {

@@ -17,7 +17,7 @@ class LevellingStage {
   public:
     /// Throws estimator::levelling::DesignError.
     LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
-                   double torquer_limit_deg_h);
+                   double sample_s, double torquer_limit_deg_h);
 
     /// Which key of [levelling] cannot work with the noise, what was found and expected; empty:
     /// none.

@@ -31,8 +31,7 @@ struct LevellingSettings {
     double window_s = 10;           ///< of the means that the verdict rests on
     double tolerance_arcmin = 0.2;  ///< of both observables
     double torquer_limit_deg_h = 3000;
-    std::uint32_t block = 4;  ///< samples per step of the loop, about 0.1 s
-    double sample_s = 0.025;
+    std::uint32_t block = 4;     ///< samples per step of the loop, about 0.1 s
     double slow_settling_s = 0;  ///< of the gains to go over to once settled; 0: stay fast
     double slow_ramp_s = 60;     ///< that it takes to go over
     drivers::TorquerSettings torquer;
@@ -69,6 +68,7 @@ struct LoopCheckSettings {
 
 /// What the campaign does; amplitudes are peak at the table.
 struct Settings {
+    double sample_s = 0;  ///< between two samples, as configured; nothing works without it
     std::string name = "campaign";
     std::vector<std::array<double, 3>> positions_deg = kTable1Positions;
     std::vector<double> table_g{9.0, 7.0};  ///< one run each

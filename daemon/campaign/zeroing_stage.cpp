@@ -37,16 +37,17 @@ zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
     s.noise.reference_is_bound = true;
     s.noise.angle_random_walk =
         std::max(settings_.angle_random_walk, rig_.gyro_random_walk_deg_per_rt_h);
-    // The samples' noise at 40 a second as a density.
-    s.noise.velocity_random_walk = std::max(2e-5, rig_.accelerometer_g * std::sqrt(0.025));
+    // The noise of one sample as a density.
+    s.noise.velocity_random_walk = std::max(2e-5, rig_.accelerometer_g * std::sqrt(sample_s_));
     // All the drift that the gyros may have is a bias here.
     s.initial.gyro_bias_deg_h = std::hypot(rig_.prior_bias, rig_.prior_linear);
     s.target_mg = settings_.target_mg;
     return s;
 }
 
-ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig)
-    : settings_(settings), rig_(rig), frame_(rig) {
+ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig,
+                           double sample_s)
+    : settings_(settings), rig_(rig), sample_s_(sample_s), frame_(rig) {
     static_cast<void>(frame_.azimuth_vertical_deg(0, false));
     const auto s = plan(false);
     zeros::check_observable(s.plan, s.site);

@@ -18,11 +18,14 @@ namespace vibrig::campaign {
 class ZeroingStage {
   public:
     /// Throws estimator::SettingsError or estimator::zeros::ZeroError if the plan cannot work.
-    ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig);
+    /// `sample_s`: between two samples, for which rig.accelerometer_g holds.
+    ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig, double sample_s);
 
     /// Which key of [zeroing] cannot work with these figures, what was found and expected; empty:
     /// none. Runs a simulated unit.
     [[nodiscard]] std::string refusal() const;
+    /// What the filter is told of the unit, the slews and the noise.
+    [[nodiscard]] estimator::zeros::CalibrationSettings plan(bool down) const;
     void reset() { first_.reset(), present_ = {}; }  ///< a new campaign
     void begin();
     /// Encoder angles to slew to, deg; after the last one of the plan there and back again.
@@ -57,10 +60,10 @@ class ZeroingStage {
         Vector zero_mg{}, filter_sigma_mg{};
     };
     void start_run(bool down);
-    [[nodiscard]] estimator::zeros::CalibrationSettings plan(bool down) const;
 
     ZeroingSettings settings_;
     estimator::Settings rig_;
+    double sample_s_;
     RigFrame frame_;
     std::optional<estimator::zeros::Calibration> calibration_;
     std::optional<estimator::zeros::CalibrationResult> up_result_;

@@ -171,9 +171,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     c.shaker.registers.measured_amplitude.scale *= factor;
     c.campaign.frequency_hz = c.estimator.frequency_hz;
     c.campaign.rig = c.estimator;
-    c.campaign.level.sample_s = drivers::to_seconds(c.assembler.sample_period);
+    c.campaign.sample_s = drivers::to_seconds(c.assembler.sample_period);
     c.campaign.level.block =
-        static_cast<std::uint32_t>(std::max(1.0, std::round(0.1 / c.campaign.level.sample_s)));
+        static_cast<std::uint32_t>(std::max(1.0, std::round(0.1 / c.campaign.sample_s)));
 
     resolve(c.campaign.plan, std::filesystem::path(name).parent_path());
     if (!c.campaign.plan.empty()) {

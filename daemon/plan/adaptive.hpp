@@ -20,7 +20,7 @@ struct AdaptiveSettings {
     double levelling_s = 0;          ///< before each dwell
     double closing_s = 0;            ///< after the last dwell, within the limit, too
     double time_limit_s = 0;         ///< 0: none
-    double period_s = 0.025;         ///< between samples
+    double period_s = 0;             ///< between samples; required
 };
 
 /// Chooses a campaign's dwells one by one from the filter's own covariance: the cheapest plan that

@@ -24,6 +24,16 @@ constexpr std::size_t kLags = 40;
 constexpr std::size_t kThinned = 600;
 constexpr double kBlock_s = 1.0;
 
+/// Between the samples of the first dwell that has any, s; 0: there is none.
+double period_of(const Campaign& campaign, const std::vector<RecordedDwell>& dwells) {
+    const auto dwell = std::ranges::find_if(dwells, [](const auto& d) { return d.count > 1; });
+    if (dwell == dwells.end()) return 0;
+    std::vector<double> times_s;
+    for (std::size_t i = dwell->first; i < dwell->first + dwell->count; ++i)
+        times_s.push_back(drivers::to_seconds(campaign.samples[i].time - dwell->order->from));
+    return estimator::median_interval(times_s);
+}
+
 /// Means of the good angles of a dwell, second by second; raw encoder angles, not wrapped.
 std::vector<estimator::AngleBlock> blocks_of(const Campaign& campaign, const RecordedDwell& dwell) {
     std::vector<estimator::AngleBlock> blocks;
@@ -291,8 +301,9 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
         plan.push_back(planned);
     }
     out.expected_sigma.fill(std::numeric_limits<double>::infinity());
-    if (!plan.empty()) {
-        out.expected_sigma = estimator::predicted_sigma(settings, plan, out.coefficients.value);
+    if (const double period_s = period_of(campaign, dwells); !plan.empty() && period_s > 0) {
+        out.expected_sigma =
+            estimator::predicted_sigma(settings, plan, out.coefficients.value, period_s);
     }
     progress(1);
     return out;

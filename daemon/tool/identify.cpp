@@ -77,6 +77,7 @@ class SeenDwell {
     void add(const estimator::Measurement& measurement) {
         if (!begin_s_) begin_s_ = measurement.time_s;
         end_s_ = measurement.time_s;
+        if (times_s_.size() < kTimesEnough) times_s_.push_back(end_s_);
         std::array<double, 3> angle_deg{};
         double all = 0;
         for (std::size_t i = 0; i < 3; ++i) {
@@ -111,8 +112,14 @@ class SeenDwell {
         return estimator::PlannedDwell{angles_deg_, kappa, duration_s, 1};
     }
 
+    /// Between its samples, s; 0: not known. Once.
+    [[nodiscard]] double period_s() { return estimator::median_interval(times_s_); }
+
   private:
+    static constexpr std::size_t kTimesEnough = 1001;
+
     const estimator::Settings& settings_;
+    std::vector<double> times_s_;
     std::optional<double> begin_s_;
     double end_s_ = 0;
     std::array<double, 3> angles_deg_{};
@@ -128,17 +135,19 @@ int run_of(const record::RecordedDwell& dwell) { return dwell.order->run; }
 template <typename Dwells, typename Show>
 void tell_before(const Dwells& dwells, const estimator::Settings& settings, const Show& show) {
     std::vector<estimator::PlannedDwell> plan;
+    double period_s = 0;
     for (const auto& dwell : dwells) {
         SeenDwell seen(settings);
         show(dwell, seen);
+        if (!(period_s > 0)) period_s = seen.period_s();
         if (auto one = seen.planned()) {
             one->run = run_of(dwell);
             plan.push_back(*one);
         }
     }
-    if (plan.empty()) return;
+    if (plan.empty() || !(period_s > 0)) return;
     for (const std::string& line :
-         estimator::plan_warnings(estimator::report_plan(settings, plan))) {
+         estimator::plan_warnings(estimator::report_plan(settings, plan, period_s))) {
         std::cerr << "before the run: " << line << '\n';
     }
 }

@@ -21,6 +21,7 @@ using estimator::kParameters;
 using estimator::Method;
 
 constexpr std::array<double, 4> kTable_g{9, 7, 0, 2};
+constexpr double kPeriod_s = 0.025;                ///< of the paper's samples
 constexpr std::size_t kSamplesBetweenNotes = 400;  ///< 10 s
 
 struct Plan {
@@ -109,7 +110,7 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Converge
         estimator::Estimate joint, two_step;
         followers[kJoint1].identification.estimate(joint);
         followers[kTwoStep1].identification.estimate(two_step);
-        convergence->minutes.push_back(static_cast<double>(samples) * 0.025 / 60);
+        convergence->minutes.push_back(static_cast<double>(samples) * kPeriod_s / 60);
         convergence->joint.push_back(joint.value);
         convergence->two_step.push_back(two_step.value);
     };
@@ -142,7 +143,7 @@ Coefficients bound_of(const Study& study, const std::array<double, 2>& levels) {
             plan.push_back({{p[0], p[1], p[2]}, 1 + a0 * a0 / 2, 100});
         }
     }
-    return estimator::predicted_sigma({}, plan, truth());
+    return estimator::predicted_sigma({}, plan, truth(), kPeriod_s);
 }
 
 }  // namespace

@@ -43,6 +43,8 @@ drivers::ReceivedFrame frame_of(const proto::Dbc& dbc, const char* message,
     return received;
 }
 
+constexpr double kSample_s = 0.025;
+
 /// A platform in position (0, 0, 0) that obeys gimbal and torque commands: the vertical in its axes
 /// goes round against it, u' = u x w.
 struct StagesTest : testing::Test, drivers::CanPort {
@@ -60,6 +62,8 @@ struct StagesTest : testing::Test, drivers::CanPort {
     std::size_t reported = 0;
     rt::Guard guard = rt::Guard::idle;
     Time now = kSecond;
+
+    StagesTest() { settings.sample_s = kSample_s; }
 
     std::array<double, 3> up{0.005, 1, -0.003}, torque{}, drift{10, 3, -6};  // deg/h
     std::array<double, 3> encoder_deg{}, target_deg{};                       // last commanded
@@ -129,7 +133,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
     }
 
     void tick() {
-        constexpr double kTick = 0.025;
+        constexpr double kTick = kSample_s;
         now += 25 * kMillisecond;
         slewed_s += kTick;
         if (!slews) {
@@ -401,7 +405,7 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     errors.scale = {2e-4, 2e-4, 2e-4};
     errors.azimuth_deg = 0;
     ZeroingSettings settings;
-    ZeroingStage one_way(settings, rig);
+    ZeroingStage one_way(settings, rig, kSample_s);
     one_way.begin();
     EXPECT_FALSE(one_way.another());
     feed_run(one_way, frame, errors, false, 11);
@@ -413,7 +417,7 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x scale error"));
     // WHEN both runs are made
     settings.both_ways = true;
-    ZeroingStage stage(settings, rig);
+    ZeroingStage stage(settings, rig, kSample_s);
     EXPECT_EQ(stage.expected_s(), 2 * one_way.expected_s());
     stage.begin();
     ASSERT_TRUE(stage.another());
@@ -437,12 +441,22 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_NEAR(stage.level_sigma({90, 0, 0}), 1e-3 * found.sigma_mg[2], 1e-9);
     EXPECT_GT(one_way.level_sigma({90, 0, 0}), 1e-4);
     // WHEN the second run fails, THEN nothing is taken over
-    ZeroingStage spoilt(settings, rig);
+    ZeroingStage spoilt(settings, rig, kSample_s);
     spoilt.begin();
     feed_run(spoilt, frame, errors, false, 11);
     spoilt.begin_other_way();
     EXPECT_THAT(spoilt.finish(false), HasSubstr("no increments"));
     EXPECT_FALSE(spoilt.status().known);
+}
+
+TEST(ZeroingStage, TakesTheNoiseOfOneSampleAsADensityAtItsOwnRate) {
+    estimator::Settings rig = rig_of_the_unit();
+    rig.accelerometer_g = 1e-3;
+    for (const double rate_hz : {40.0, 100.0, 1000.0}) {
+        // white noise of sigma per sample has the density sigma sqrt(period)
+        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan(false).noise.velocity_random_walk,
+                         1e-3 / std::sqrt(rate_hz));
+    }
 }
 
 TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
@@ -451,7 +465,7 @@ TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     const RigFrame frame(rig);
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, false))[2], 1, 1e-12);
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, true))[2], -1, 1e-12);
-    ZeroingStage stage({}, rig);
+    ZeroingStage stage({}, rig, kSample_s);
     feed_unit(stage, frame, 5, 1);
     ASSERT_EQ(stage.finish(false), "");
     const Vector found = stage.raw_zero_g();
@@ -472,7 +486,7 @@ TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     EXPECT_NEAR(stage.status().zero_mg[0], 5, 0.05);
     // AND an `up` that the gimbals cannot bring to the azimuth axis is refused
     rig.up = {0, 1};
-    EXPECT_THROW(ZeroingStage({}, rig), estimator::SettingsError);
+    EXPECT_THROW(ZeroingStage({}, rig, kSample_s), estimator::SettingsError);
 }
 
 TEST(StageFeed, PairsIncrementsByTheirCounterAndAccountsForEveryFrame) {

@@ -11,6 +11,7 @@ namespace vibrig::estimator::testing {
 namespace {
 
 constexpr std::uint64_t kCrossSeed = 60;
+constexpr double kPlanPeriod_s = 0.025;
 
 bool told(const Result& result, const std::string& words) {
     return std::any_of(result.warnings.begin(), result.warnings.end(),
@@ -77,8 +78,9 @@ std::vector<std::array<double, 3>> positions(std::size_t count) {
 TEST(PlanReport, TwoLevelsOverTable1DetermineEverythingAsAccuratelyAsTheBound) {
     const Settings settings;
     const auto plan = campaign_plan(settings, positions(14), {9, 7}, 100);
-    const PlanReport report = report_plan(settings, plan);
-    const auto bound = predicted_sigma(settings, plan, std::array<double, kParameters>{});
+    const PlanReport report = report_plan(settings, plan, kPlanPeriod_s);
+    const auto bound =
+        predicted_sigma(settings, plan, std::array<double, kParameters>{}, kPlanPeriod_s);
     EXPECT_TRUE(plan_warnings(report).empty());
     for (std::size_t i = 0; i < kParameters; ++i) {
         EXPECT_TRUE(report.observable[i]) << parameter_names()[i];
@@ -91,7 +93,7 @@ TEST(PlanReport, OneLevelIsToldByNameWithTheCombinationBeforeAndAfterTheRun) {
     Settings settings;
     settings.transmission = 2.0 / 3.0;
     const PlanReport report =
-        report_plan(settings, campaign_plan(settings, positions(14), {9, 9}, 20));
+        report_plan(settings, campaign_plan(settings, positions(14), {9, 9}, 20), kPlanPeriod_s);
     for (std::size_t i = 0; i < kParameters; ++i) {
         const std::size_t place = i % 10;
         EXPECT_EQ(report.observable[i], place != 0 && (place < 4 || place > 6));
@@ -120,7 +122,8 @@ TEST(PlanReport, WhatTheTwoStepRouteCannotDoIsToldBeforeAndAfterTheRun) {
     settings.method = Method::two_step;
     settings.transmission = 2.0 / 3.0;
     EXPECT_TRUE(
-        plan_warnings(report_plan(settings, campaign_plan(settings, positions(14), {9, 7}, 20)))
+        plan_warnings(report_plan(settings, campaign_plan(settings, positions(14), {9, 7}, 20),
+                                  kPlanPeriod_s))
             .empty());
     // GIVEN two equal levels, three levels, and one
     struct Case {
@@ -130,8 +133,8 @@ TEST(PlanReport, WhatTheTwoStepRouteCannotDoIsToldBeforeAndAfterTheRun) {
     for (const Case& c : {Case{{9, 9}, "found kappa 19"}, Case{{9, 7, 5}, "found more than two"},
                           Case{{9}, "found 1 with good dwells"}}) {
         SCOPED_TRACE(c.found);
-        const PlanReport report =
-            report_plan(settings, campaign_plan(settings, positions(14), c.table_g, 20));
+        const PlanReport report = report_plan(
+            settings, campaign_plan(settings, positions(14), c.table_g, 20), kPlanPeriod_s);
         const std::vector<std::string> lines = plan_warnings(report);
         // THEN all 30 are named before the run, with the reason
         EXPECT_EQ(std::count(report.observable.begin(), report.observable.end(), true), 0);
@@ -151,13 +154,13 @@ TEST(PlanReport, TooFewPositionsOrAnUnsuitableVerticalAreTold) {
         return std::count(report.observable.begin(), report.observable.end(), false);
     };
     const PlanReport few =
-        report_plan(settings, campaign_plan(settings, positions(3), {9, 0}, 100));
+        report_plan(settings, campaign_plan(settings, positions(3), {9, 0}, 100), kPlanPeriod_s);
     EXPECT_GT(undetermined(few), 0);
     EXPECT_FALSE(plan_warnings(few).empty());
     // Table 1 with x up turns about the vertical or in one plane only.
     settings.up = {0, 1};
     const PlanReport lying =
-        report_plan(settings, campaign_plan(settings, positions(14), {9, 0}, 100));
+        report_plan(settings, campaign_plan(settings, positions(14), {9, 0}, 100), kPlanPeriod_s);
     EXPECT_GT(undetermined(lying), 0);
     EXPECT_FALSE(lying.combinations.empty() && plan_warnings(lying).size() < 2);
 }

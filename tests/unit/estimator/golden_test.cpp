@@ -131,7 +131,7 @@ TEST(CramerRao, TableOfPlansIsReproduced) {
     const std::array<std::array<double, 2>, 3> plans{{{6, 14.0 / 3}, {6, 0}, {0, 4.0 / 3}}};
     for (std::size_t p = 0; p < plans.size(); ++p) {
         const auto sigma =
-            predicted_sigma(Settings{}, both_runs(plans[p][0], plans[p][1]), kTable2);
+            predicted_sigma(Settings{}, both_runs(plans[p][0], plans[p][1]), kTable2, 0.025);
         for (const Row& row : table) {
             for (std::size_t gyro = 0; gyro < 3; ++gyro) {
                 for (std::size_t name = 0; name < kParameters; ++name) {
@@ -146,7 +146,7 @@ TEST(CramerRao, TableOfPlansIsReproduced) {
 
 TEST(CramerRao, OneLevelLeavesTheSquaresUndetermined) {
     const auto sigma =
-        predicted_sigma(Settings{}, both_runs(6, 6), std::array<double, kParameters>{});
+        predicted_sigma(Settings{}, both_runs(6, 6), std::array<double, kParameters>{}, 0.025);
     for (std::size_t i = 0; i < kParameters; ++i) {
         const std::size_t place = i % 10;
         const bool undetermined = place == 0 || (place >= 4 && place <= 6);

@@ -37,13 +37,14 @@ struct Statistics {
     }
 };
 
-Statistics run(std::uint64_t seeds, double duration_s, std::size_t gyro_average = 1) {
+Statistics run(std::uint64_t seeds, double duration_s, std::size_t gyro_average = 1,
+               double period_s = SimulatedDwell{}.period_s) {
     Statistics s;
     std::vector<PlannedDwell> plan;
     for (const double a0 : kLevels) {
         for (const auto& p : kTable1) plan.push_back({p, 1 + a0 * a0 / 2, duration_s});
     }
-    const std::array<double, kParameters> bound = predicted_sigma({}, plan, kTable2);
+    const std::array<double, kParameters> bound = predicted_sigma({}, plan, kTable2, period_s);
     const auto n = static_cast<double>(seeds);
     for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + seeds; ++seed) {
         Identification identification{Settings{}};
@@ -51,6 +52,7 @@ Statistics run(std::uint64_t seeds, double duration_s, std::size_t gyro_average 
         rig.gyro_average = gyro_average;
         SimulatedDwell dwell;
         dwell.duration_s = duration_s;
+        dwell.period_s = period_s;
         rig.campaign(identification, kLevels, dwell);
         const Result result = identification.result();
         Eigen::Matrix<double, kParameters, 1> sigma, error;
@@ -98,6 +100,18 @@ TEST(Statistics, AHundredCampaignsReachTheCramerRaoBound) {
         // 99.9 % chi-square band of each
         EXPECT_LT(s.mean_square[i], chi_square_quantile(s.seeds, 3.29)) << parameter_names()[i];
         EXPECT_GT(s.mean_square[i], chi_square_quantile(s.seeds, -3.29)) << parameter_names()[i];
+    }
+}
+
+TEST(Statistics, ErrorsAndSigmaAreRightAtAnySampleRate) {
+    SCOPED_TRACE("seeds from " + std::to_string(kFirstSeed));
+    for (const double period_s : {0.01, 0.001}) {
+        SCOPED_TRACE("sample period " + std::to_string(period_s) + " s");
+        // GIVEN samples at 100 Hz and at 1 kHz, each with the noise that the settings state
+        const Statistics s = run(20, period_s < 0.005 ? 5 : 20, 1, period_s);
+        // THEN the result's sigma is that of the plan at this rate, and the errors are as large
+        expect_consistent(s, 3.29);
+        EXPECT_LT(s.rms() * s.rms(), chi_square_quantile(30 * s.seeds, 3.29));
     }
 }
 

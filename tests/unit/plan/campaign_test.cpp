@@ -19,7 +19,7 @@ namespace {
 using estimator::Identification;
 using estimator::kParameters;
 
-constexpr double kDwell = 100;
+constexpr double kDwell = 100, kPeriod_s = 0.025;
 
 /// The simulated rig, one dwell at a time, each with noise of its own.
 class SimulatedRig {
@@ -103,7 +103,7 @@ TEST(PlannedCampaign, PredictedStandardErrorsAreThoseOfTheFilter) {
     std::vector<PlannedRun> runs;
     for (std::size_t i = 0; i < counts.size(); ++i)
         runs.insert(runs.end(), counts[i], candidates[i]);
-    const Forecast expected = forecast(settings, runs, kDwell, 0.025);
+    const Forecast expected = forecast(settings, runs, kDwell, kPeriod_s);
     ASSERT_TRUE(expected.identifies_all);
 
     // WHEN it is run on the simulated rig
@@ -126,7 +126,7 @@ TEST(PlannedCampaign, OneLevelIsRefusedWithNamesAndRemedy) {
     const estimator::Settings settings;
     auto runs = fourteen_positions();
     runs.resize(14);
-    const Forecast one = forecast(settings, runs, kDwell, 0.025);
+    const Forecast one = forecast(settings, runs, kDwell, kPeriod_s);
     EXPECT_FALSE(one.identifies_all);
     EXPECT_EQ(one.rank, 9U);
     for (const char* words : {"D_Fx", "D_OOz", "cheapest remedy: add (", "at 0 g"})
@@ -135,7 +135,7 @@ TEST(PlannedCampaign, OneLevelIsRefusedWithNamesAndRemedy) {
     for (const PlannedRun& run : fourteen_positions()) {
         if (run.table_g == 9) runs.push_back({run.position_deg, 5.9, 5.9 / 0.6667, 1});
     }
-    const Forecast close = forecast(settings, runs, kDwell, 0.025);
+    const Forecast close = forecast(settings, runs, kDwell, kPeriod_s);
     EXPECT_TRUE(close.identifies_all);
     EXPECT_NE(close.warning.find("would halve"), std::string::npos) << close.warning;
 }
@@ -146,16 +146,17 @@ TEST(PlannedCampaign, TheForecastIsTheSameHoweverTheEncodersCount) {
     rig.encoder_sign = {-1, 1, -1};
     rig.encoder_zero_deg = {30, -2, 200};
     auto runs = fourteen_positions();
-    const Forecast plain = forecast({}, runs, kDwell, 0.025);
+    const Forecast plain = forecast({}, runs, kDwell, kPeriod_s);
     for (PlannedRun& run : runs) run.position_deg = estimator::encoder_deg(rig, run.position_deg);
     // THEN what its encoders have to show gives the same standard errors, and what they would have
     // to show elsewhere does not
-    const Forecast there = forecast(rig, runs, kDwell, 0.025);
+    const Forecast there = forecast(rig, runs, kDwell, kPeriod_s);
     for (std::size_t i = 0; i < kParameters; ++i)
         EXPECT_NEAR(there.sigma[i] / plain.sigma[i], 1, 1e-6) << estimator::parameter_names()[i];
-    EXPECT_FALSE(forecast({}, runs, kDwell, 0.025).sigma == plain.sigma);
+    EXPECT_FALSE(forecast({}, runs, kDwell, kPeriod_s).sigma == plain.sigma);
     // AND an adaptive campaign expects as many dwells
     AdaptiveSettings adaptive;
+    adaptive.period_s = kPeriod_s;
     adaptive.table_g = {9, 0};
     adaptive.target = {0.006, 0.005, 0.0005};
     EXPECT_EQ(AdaptivePlan(rig, adaptive).outlook().left,
@@ -165,6 +166,7 @@ TEST(PlannedCampaign, TheForecastIsTheSameHoweverTheEncodersCount) {
 TEST(AdaptivePlan, SaysWhetherTargetsOrTimeEndIt) {
     const estimator::Settings settings;
     AdaptiveSettings adaptive;
+    adaptive.period_s = kPeriod_s;
     adaptive.table_g = {9, 0};
     adaptive.target = {0.006, 0.005, 0.0005};
     adaptive.time_limit_s = 3000;
@@ -194,6 +196,7 @@ TEST(AdaptivePlan, EndsBeforeItsTimeLimitWithLevellingAndWhatComesAfterTheLastDw
     // GIVEN dwells that are levelled before, and 400 s of zeroing after the last
     const estimator::Settings settings;
     AdaptiveSettings adaptive;
+    adaptive.period_s = kPeriod_s;
     adaptive.table_g = {9, 0};
     adaptive.target = {0.006, 0.005, 0.0005};
     adaptive.time_limit_s = 3000;
@@ -223,8 +226,9 @@ TEST(AdaptivePlanSeeds, ReachesTheAccuracyOfTheFourteenPositionsInHalfTheShakerT
     const estimator::Settings settings;
     // GIVEN targets at what the 14 positions at 9 and 7 g are expected to reach: the largest bias
     // and linear, the root mean square of the quadratic standard errors
-    const Forecast fourteen = forecast(settings, fourteen_positions(), kDwell, 0.025);
+    const Forecast fourteen = forecast(settings, fourteen_positions(), kDwell, kPeriod_s);
     AdaptiveSettings adaptive;
+    adaptive.period_s = kPeriod_s;
     adaptive.table_g = {9, 0};
     double squares = 0;
     for (std::size_t i = 0; i < kParameters; ++i) {
