@@ -19,13 +19,16 @@ KINDS = {"bias": ("F",), "linear": ("I", "O", "S"), "quadratic": ("II", "OO", "S
 class Run:
     """One campaign from arming to its end; `arm` alone if the daemon does not arm it."""
 
-    def __init__(self, programs, campaign, folder, timeout_s=150, **tables):
+    def __init__(self, programs, campaign, folder, timeout_s=150, truth=None, **tables):
         rig = r.Rig(programs, "seqpacket", "rig", folder)
         try:
-            rig.start_plant("--seed", "2")
+            rig.start_plant("--seed", "2", *(["--truth", rig.truth_file(truth)] if truth else []))
             rig.configure({"name": "planned", **campaign}, **tables)
             rig.start_daemon()
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            self.plan = json.loads(subprocess.run(
+                ["curl", "-s", "--unix-socket", rig.socket, "http://localhost/api/v1/plan"], capture_output=True, text=True,
+                timeout=30).stdout or "{}")
             self.arm = rig.tool("arm", "--by", "tester")
             self.last = rig.status()
             if self.arm.returncode == 0:
@@ -110,6 +113,25 @@ def restarted(checks, programs, folder):
         rig.stop()
 
 
+def at_other_rates(checks, programs, folder):
+    """The rig samples at 100 Hz and at 1 kHz: what is promised before, and kept, is right there as it is at 40 Hz."""
+    for rate, campaign in ((100, {"dwell_s": 10.0, "zeroing": True}), (1000, {"dwell_s": 3.0})):
+        text = f"at {rate} samples a second"
+        with tempfile.TemporaryDirectory() as place:
+            run = Run(programs, {"table_g": [9.0, 0.0], **campaign}, place, 300, {"platform": {"sample_rate_hz": rate}},
+                      can={"sample_rate_hz": float(rate)})
+        if not run.finished(checks, f"a campaign {text} finishes"):
+            continue
+        promised = {c["name"]: c["sigma"] for c in run.plan.get("expected", [])}
+        worst = max((abs(run.sigma()[name] / sigma - 1) for name, sigma in promised.items()), default=9)
+        checks.check(len(promised) == 30 and worst <= 0.10, f"{text} sigma is what was promised before, within 10 %",
+                     f"{100 * worst:.1f} %")
+        if campaign.get("zeroing"):
+            zeros = run.last["campaign"]["zeros"]
+            ratio = max(abs(z) / s for z, s in zip(zeros["zero_mg"], zeros["sigma_mg"]))
+            checks.check(ratio < 4, f"{text} the zeros, which are none, are found within 4 sigma", zeros)
+
+
 def refused(checks, programs, folder):
     path = os.path.join(folder, "one.toml")
     for what, more in (("one level only", "table_g = [9.0]"), ("a plan file with one level", "plan = \"one.csv\"")):
@@ -135,7 +157,7 @@ def refused(checks, programs, folder):
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (from_a_file, adaptively, restarted, refused):
+    for part in (from_a_file, adaptively, restarted, at_other_rates, refused):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

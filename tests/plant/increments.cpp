@@ -9,7 +9,6 @@ namespace {
 
 constexpr std::int64_t kIncrementUs = 10'000;
 constexpr double kIncrement = 1e-6 * kIncrementUs;
-constexpr std::int64_t kSpanUs = 25'000;
 constexpr double kArcsecOfRad = 180 * 3600 / std::numbers::pi;
 // Counts of the frames, see rig.dbc. The instrument counts pulses: what is left of one stays in it.
 constexpr double kTurnCount = 0.002;     ///< arcsec
@@ -31,8 +30,9 @@ std::array<Vec3, 3> attitude(const Vec3& angles) {
 
 }  // namespace
 
-Increments::Increments(const Truth& truth)
+Increments::Increments(const Truth& truth, std::int64_t tick_us)
     : truth_(truth),
+      tick_us_(tick_us),
       platform_to_raw_(inverse(truth.matrix)),
       gyro_noise_(truth.seed, 5),
       accelerometer_noise_(truth.seed, 6) {}
@@ -45,14 +45,15 @@ void Increments::stop() noexcept {
 void Increments::advance(std::int64_t end_us, const Motion& motion, const PlatformModel& platform,
                          std::span<const double> a1) {
     made_.clear();
-    const std::int64_t begin_us = end_us - kSpanUs;
+    const std::int64_t begin_us = end_us - tick_us_;
     // Angles are given within a turn: where one passes half a turn, it goes on and not all the way
     // back.
     Vec3 moved = motion.to - motion.from;
     for (double& angle : moved) angle = std::remainder(angle, 2 * std::numbers::pi);
-    const double step_s = 1e-6 * kSpanUs / static_cast<double>(a1.size() - 1);
+    const double step_s = 1e-6 * static_cast<double>(tick_us_) / static_cast<double>(a1.size() - 1);
     const auto at = [&](std::int64_t us) {
-        return motion.from + (static_cast<double>(us - begin_us) / kSpanUs) * moved;
+        return motion.from +
+               (static_cast<double>(us - begin_us) / static_cast<double>(tick_us_)) * moved;
     };
     std::int64_t from = begin_us;
     while (from < end_us) {
@@ -60,7 +61,7 @@ void Increments::advance(std::int64_t end_us, const Motion& motion, const Platfo
         const std::int64_t to = std::min(boundary, end_us);
         const auto index = [&](std::int64_t us) {
             return static_cast<std::size_t>((us - begin_us) *
-                                            static_cast<std::int64_t>(a1.size() - 1) / kSpanUs);
+                                            static_cast<std::int64_t>(a1.size() - 1) / tick_us_);
         };
         for (std::size_t i = index(from); i < index(to); ++i)
             shaken_s_ += 0.5 * step_s * (a1[i] + a1[i + 1]);
@@ -101,9 +102,9 @@ void Increments::make(const Vec3& from, const Vec3& to, const PlatformModel& pla
         (truth_.gravity_mps2 * (kIncrement + shaken_s)) * (platform_to_raw_ * up) +
         (truth_.gravity_mps2 * kIncrement) * truth_.zero_g;
     const double random_walk = 60 * truth_.gyro_random_walk_deg_per_rt_h * std::sqrt(kIncrement);
-    // Same density as the samples' noise, which is one value per 25 ms.
-    const double noise = truth_.accelerometer_g * truth_.gravity_mps2 * std::sqrt(1e-6 * kSpanUs) *
-                         std::sqrt(kIncrement);
+    // Same density as the samples' noise, which is one value per tick.
+    const double noise = truth_.accelerometer_g * truth_.gravity_mps2 *
+                         std::sqrt(1e-6 * static_cast<double>(tick_us_)) * std::sqrt(kIncrement);
     Increment increment;
     increment.count = count_++;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -20,7 +20,8 @@ struct Increment {
 /// exact rotations of the platform against inertial space, not an error model.
 class Increments {
   public:
-    explicit Increments(const Truth& truth);
+    /// Ticks of `tick_us` each.
+    Increments(const Truth& truth, std::int64_t tick_us);
 
     struct Motion {
         Vec3 from{}, to{};  ///< gimbal angles at both ends of the tick, rad; straight between them
@@ -36,6 +37,7 @@ class Increments {
     void make(const Vec3& from, const Vec3& to, const PlatformModel& platform, double shaken_s);
 
     Truth truth_;
+    std::int64_t tick_us_;
     Mat3 platform_to_raw_;
     Random gyro_noise_;
     Random accelerometer_noise_;

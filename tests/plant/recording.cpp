@@ -130,8 +130,8 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
     Rig rig(truth);
     std::uint64_t samples = 0;
     std::size_t dwell = 0;
-    const auto ticks =
-        static_cast<std::int64_t>(std::llround(plan.dwell_s * 1e6 / static_cast<double>(kTickUs)));
+    const auto ticks = static_cast<std::int64_t>(
+        std::llround(plan.dwell_s * 1e6 / static_cast<double>(rig.tick_us())));
     for (std::size_t run = 0; run < plan.table_g.size(); ++run) {
         for (std::size_t position = 0; position < plan.positions_deg.size(); ++position) {
             prepare(rig, plan, plan.positions_deg[position], plan.table_g[run]);
@@ -154,7 +154,7 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
         const Readings& r = s.readings;
         std::array<char, 200> row{};
         const int length =
-            std::snprintf(row.data(), row.size(), "%.3f,%zu,%zu,%.7f,%.7f,%.7f,%.7f,%.7f,%.7f\n",
+            std::snprintf(row.data(), row.size(), "%.6f,%zu,%zu,%.7f,%.7f,%.7f,%.7f,%.7f,%.7f\n",
                           s.time_s, s.run, s.position, r.encoder_deg[0], r.encoder_deg[1],
                           r.encoder_deg[2], r.raw_g[0], r.raw_g[1], r.raw_g[2]);
         out.write(row.data(), length);

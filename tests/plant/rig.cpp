@@ -1,12 +1,13 @@
 #include "tests/plant/rig.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 namespace vibrig::plant {
 namespace {
 
-constexpr double kTick = 1e-6 * kTickUs;
 constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr double kNowhereDeg = 0.02;  // two counts of the command
 
@@ -14,21 +15,28 @@ constexpr double kNowhereDeg = 0.02;  // two counts of the command
 
 Rig::Rig(const Truth& truth)
     : truth_(truth),
+      tick_us_(std::llround(1e6 / truth.sample_rate_hz)),
+      tick_s_(1e-6 * static_cast<double>(tick_us_)),
+      steps_(static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
       gimbals_(truth.slew_deg_per_s),
-      isolator_(truth.transmission, truth.frequency_hz, truth.damping, kTick / (2 * kSteps)),
+      isolator_(truth.transmission, truth.frequency_hz, truth.damping,
+                tick_s_ / static_cast<double>(2 * steps_)),
       shaker_(truth.limit_g, truth.limit_mm),
       sensors_(truth, truth.seed),
-      increments_(truth),
+      increments_(truth, tick_us_),
       gyro_noise_(truth.seed, 0),
-      slew_noise_(truth.seed, 7) {
+      slew_noise_(truth.seed, 7),
+      a1_(2 * steps_ + 1) {
     shaker_.lie(truth.shaker_lies);
     read();
 }
 
-bool Rig::ready() const noexcept { return kTick * static_cast<double>(tick_) >= truth_.warm_up_s; }
+bool Rig::ready() const noexcept {
+    return tick_s_ * static_cast<double>(tick_) >= truth_.warm_up_s;
+}
 bool Rig::gyros_at_speed() const noexcept {
-    return kTick * static_cast<double>(tick_) >= 0.5 * truth_.warm_up_s;
+    return tick_s_ * static_cast<double>(tick_) >= 0.5 * truth_.warm_up_s;
 }
 
 Vec3 Rig::encoder_deg() const noexcept {
@@ -72,7 +80,7 @@ void Rig::advance() {
 
 void Rig::vibrate() {
     const double begin = shaker_.amplitude_g();
-    shaker_.advance(kTick);
+    shaker_.advance(tick_s_);
     const double end = shaker_.amplitude_g();
     if (shaker_.frequency_hz() != frequency_hz_) {
         frequency_hz_ = shaker_.frequency_hz();
@@ -80,11 +88,11 @@ void Rig::vibrate() {
     }
     still_ = begin == 0 && end == 0 && isolator_.at_rest();
     if (still_) {
-        a1_.fill(0);
+        std::ranges::fill(a1_, 0.0);
         return;
     }
     a1_[0] = isolator_.platform_g();
-    const double slope = (end - begin) / (2 * kSteps);
+    const double slope = (end - begin) / static_cast<double>(2 * steps_);
     for (std::size_t i = 1; i < a1_.size(); ++i) {
         isolator_.advance(begin + slope * (static_cast<double>(i) - 0.5));
         a1_[i] = isolator_.platform_g();
@@ -95,22 +103,22 @@ void Rig::move() {
     // White rate noise: over a tick its integral is a random walk of N deg per root hour, 60 N
     // arcsec per root second.
     const double rate_sigma =
-        60 * gyro_noise_times_ * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(kTick);
+        60 * gyro_noise_times_ * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(tick_s_);
     const Vec3 noise{gyro_noise_.normal(), gyro_noise_.normal(), gyro_noise_.normal()};
     if (gimbals_.mode() == GimbalMode::free_drift) {
         Vec3 extra = rate_sigma * noise;
         for (std::size_t i = 0; i < 3; ++i) extra[i] += truth_.torquer_scale[i] * torque_[i];
         if (still_) {
             const std::array<double, 3> rest{};
-            platform_.advance(kTick, rest, extra);
+            platform_.advance(tick_s_, rest, extra);
         } else {
-            platform_.advance(kTick / kSteps, a1_, extra);
+            platform_.advance(tick_s_ / static_cast<double>(steps_), a1_, extra);
         }
         return;
     }
     Vec3 encoder = encoder_deg();
     if (!gimbals_.slewing()) return;
-    if (gimbals_.advance(kTick, encoder)) isolator_.kick(truth_.slew_kick_g);
+    if (gimbals_.advance(tick_s_, encoder)) isolator_.kick(truth_.slew_kick_g);
     Vec3 angles{};
     for (std::size_t i = 0; i < 3; ++i) {
         angles[i] = truth_.encoder_sign[i] *
@@ -123,7 +131,7 @@ void Rig::read() {
     const double a1 = isolator_.platform_g();
     const Vec3 force = (1 + a1) * platform_.up_in_platform();
     readings_ = sensors_.read(encoder_deg(), force, isolator_.table_g(shaker_.amplitude_g()),
-                              kTick * static_cast<double>(tick_));
+                              tick_s_ * static_cast<double>(tick_));
 }
 
 }  // namespace vibrig::plant

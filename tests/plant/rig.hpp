@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <vector>
 
 #include "tests/plant/gimbals.hpp"
 #include "tests/plant/increments.hpp"
@@ -11,8 +11,6 @@
 #include "tests/plant/shaker_controller.hpp"
 
 namespace vibrig::plant {
-
-inline constexpr std::int64_t kTickUs = 25'000;  ///< 40 samples per second
 
 /// The whole rig: platform in its gimbals on isolators on a shaker. Knows no bus and no wall clock;
 /// deterministic for a seed. One thread at a time.
@@ -31,7 +29,9 @@ class Rig {
     /// Time goes on by one tick, then the instruments are read.
     void advance();
 
-    [[nodiscard]] std::int64_t time_us() const noexcept { return tick_ * kTickUs; }
+    [[nodiscard]] std::int64_t time_us() const noexcept { return tick_ * tick_us_; }
+    /// Between two samples.
+    [[nodiscard]] std::int64_t tick_us() const noexcept { return tick_us_; }
     [[nodiscard]] std::int64_t tick() const noexcept { return tick_; }
     [[nodiscard]] const Readings& readings() const noexcept { return readings_; }
     /// Of the tick just past; in mode calibrate only.
@@ -49,14 +49,15 @@ class Rig {
     [[nodiscard]] double platform_vibration_g() const noexcept { return isolator_.platform_g(); }
 
   private:
-    static constexpr int kSteps = 25;  ///< Runge-Kutta steps per tick, 1 ms
-
     void vibrate();
     void move();
     void read();
     [[nodiscard]] Vec3 encoder_deg() const noexcept;
 
     Truth truth_;
+    std::int64_t tick_us_;
+    double tick_s_;
+    std::size_t steps_;  ///< Runge-Kutta steps per tick, of 1 ms or a little less
     PlatformModel platform_;
     Gimbals gimbals_;
     Isolator isolator_;
@@ -70,8 +71,8 @@ class Rig {
     Vec3 commanded_deg_{};  ///< of the last slew, and its error
     Vec3 slew_error_deg_{};
     double frequency_hz_ = 0;  ///< the isolator is set to
-    std::array<double, 2 * kSteps + 1> a1_{};
-    bool still_ = true;  ///< no vibration in this tick
+    std::vector<double> a1_;   ///< at every half step of the tick
+    bool still_ = true;        ///< no vibration in this tick
     std::int64_t tick_ = 0;
     Readings readings_;
 };

@@ -168,8 +168,9 @@ void add_run_command(CLI::App& app, int& exit_code) {
         ->add_option("--modbus", o->modbus, "tcp:ADDRESS:PORT (port 0: any free one) or rtu:DEVICE")
         ->capture_default_str();
     command
-        ->add_option("--clock", o->clock,
-                     "rig: lockstep with the daemon; real: 40 samples a second")
+        ->add_option(
+            "--clock", o->clock,
+            "rig: lockstep with the daemon; real: as many samples a second as the truth says")
         ->check(CLI::IsMember({"rig", "real"}))
         ->capture_default_str();
     command->add_option("--speed", o->speed, "with --clock rig: at most so many times real time")

@@ -47,10 +47,12 @@ void Simulation::run() {
     }
     for (std::int64_t tick = 0;; ++tick) {
         if (speed > 0 &&
-            !wait_until(start + std::llround(1e3 * static_cast<double>(tick * kTickUs) / speed)))
+            !wait_until(
+                start +
+                std::llround(1e3 * static_cast<double>(tick * shared_.rig.tick_us()) / speed)))
             return;
         if (settings_.duration_s &&
-            1e-6 * static_cast<double>(tick * kTickUs) > *settings_.duration_s)
+            1e-6 * static_cast<double>(tick * shared_.rig.tick_us()) > *settings_.duration_s)
             return;
         if (tick > 0) {
             const std::scoped_lock lock(shared_.mutex);

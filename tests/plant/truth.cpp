@@ -33,6 +33,7 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
     field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);
     field("platform", "increment_sign", t.increment_sign, -1, 1);
+    field("platform", "sample_rate_hz", t.sample_rate_hz, 1.0, 1000.0);
     field("platform", "warm_up_s", t.warm_up_s, 0.0, 1e6);
     field("platform", "start_temperature_c", t.start_temperature_c, -60.0, 150.0);
     field("platform", "steady_temperature_c", t.steady_temperature_c, -60.0, 150.0);

@@ -56,6 +56,7 @@ struct Truth {
     /// Rate of the platform over the rate commanded to the torquers; -1: wired the wrong way round.
     Vec3 torquer_scale{1, 1, 1};
     std::array<int, 3> increment_sign{1, 1, 1};  ///< of the gyros' angle increments
+    double sample_rate_hz = 40;                  ///< of all instruments, in whole microseconds
     double warm_up_s = 30;                       ///< until the platform reports ready
     double start_temperature_c = 25;
     double steady_temperature_c = 45;

@@ -327,7 +327,8 @@ TEST(Plan, AugmentationMeetsTargetsWithFewRuns) {
     for (const double level : {0.0, 6.0}) {
         for (const Vec3& u : cube_directions()) {
             const auto p = position_for(settings, u, {});
-            experiments.push_back({rate_rows(settings, {*p, kappa_of(level), 100}, {}), 1.0});
+            experiments.push_back(
+                {rate_rows(settings, {*p, kappa_of(level), 100}, {}, 0.025), 1.0});
         }
     }
     std::vector<double> prior, target;
