@@ -27,8 +27,9 @@ void expect_honest_zeros(std::uint64_t seeds, double slew_error_deg) {
         truth.seed = seed;
         truth.slew_error_deg = slew_error_deg;
         for (double& zero : truth.zero_g) zero = within(generator);
-        LevellingStage levelling({}, {}, 3000);
-        ZeroingStage zeroing({}, {});
+        const double sample_s = 1 / truth.sample_rate_hz;
+        LevellingStage levelling({}, {}, sample_s, 3000);
+        ZeroingStage zeroing({}, {}, sample_s);
         RigAtRest rig(truth);
         zeroing.begin();
         ASSERT_EQ(rig.zero(zeroing, &levelling), "");
