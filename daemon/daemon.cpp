@@ -53,9 +53,10 @@ drivers::ShakerSettings shaker_settings(const configuration::Configuration& conf
 
 }  // namespace
 
-Daemon::Daemon(configuration::Loaded loaded)
+Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
     : loaded_(std::move(loaded)),
       configuration_(loaded_.configuration),
+      log_queue_(log_queue),
       memory_lock_(lock_memory()),
       rig_clock_(configuration_.clock == configuration::Configuration::ClockKind::rig
                      ? std::make_unique<rt::RigClock>()
@@ -399,6 +400,7 @@ void Daemon::control_loop() {
         if (journal_) tell_journal();
         if (recorder_) tell_recorder();
         watch_onlookers();
+        tell_log();
         interlock_.filter(excitation_.load() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
@@ -482,6 +484,10 @@ void Daemon::check_balance(Time now) {
               a.assembler.wrong_length);
     equal("samples offered", a.samples_offered, a.assembler.samples);
     equal("samples taken", e.taken, e.in_dwell + e.idle);
+    if (log_queue_ != nullptr) {
+        const auto lines = log_queue_->counts();
+        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
+    }
     if (!found.empty() && imbalance_.empty())
         log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
     imbalance_ = found;
@@ -530,6 +536,10 @@ StatusData Daemon::status() const {
     if (journal_) status.journal = journal_->status();
     if (recorder_) status.recorder = recorder_->status();
     if (publisher_) status.mqtt = publisher_->status();
+    if (log_queue_ != nullptr) {
+        const auto lines = log_queue_->counts();
+        status.log = {lines.taken, lines.written, lines.dropped, lines.waiting, lines.blocked};
+    }
     return status;
 }
 

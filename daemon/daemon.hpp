@@ -15,6 +15,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/fleet/publisher.hpp"
 #include "daemon/journal/journal.hpp"
+#include "daemon/log/log_queue.hpp"
 #include "daemon/noise/noise_monitor.hpp"
 #include "daemon/plan/aside.hpp"
 #include "daemon/record/pre_trip.hpp"
@@ -44,7 +45,8 @@ struct RtEvent {
 class Daemon final : public StatusSource {
   public:
     /// Throws ConfigurationError, BindingError, CanError, ShakerError, std::system_error.
-    explicit Daemon(configuration::Loaded loaded);
+    /// `log_queue`: where its words go, to be watched; null: nobody asks.
+    explicit Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue = nullptr);
     /// Throws DbcError or BindingError when the configured messages cannot be bound; opens nothing.
     static void check_bindings(const configuration::Configuration& configuration);
     /// What the campaign's positions and levels would leave undetermined; empty if nothing.
@@ -92,6 +94,7 @@ class Daemon final : public StatusSource {
     void take_commands(drivers::Time now);
     void on_port_state(drivers::PortState state, const char* text) noexcept;
     void log(Severity severity, const std::string& source, const std::string& text);
+    void tell_log();
     /// Accepted if it was for an alarm; a trip is the campaign's.
     CommandReply acknowledge_alarm(const CommandRequest& request);
     /// Why there is nothing of the name it gives; empty: there is, or it gives none.
@@ -129,6 +132,7 @@ class Daemon final : public StatusSource {
 
     configuration::Loaded loaded_;
     const configuration::Configuration& configuration_;
+    const log::LogQueue* const log_queue_;
     const rt::MemoryLock memory_lock_;  ///< before any thread
     std::unique_ptr<rt::RigClock> rig_clock_;
     std::unique_ptr<rt::RealClock> real_clock_;
@@ -185,6 +189,7 @@ class Daemon final : public StatusSource {
     std::unique_ptr<journal::Journal> journal_;  ///< null: none is kept
     bool journal_was_running_ = true;            ///< control thread
     bool recorder_was_stuck_ = false;            ///< control thread
+    bool log_was_blocked_ = false;               ///< control thread
     mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
     std::deque<WaitingCommand> commands_;
     StatusData campaign_status_;

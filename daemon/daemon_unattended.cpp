@@ -226,6 +226,16 @@ void Daemon::watch_onlookers() {
                          served != 0 && rt::wall_clock() - served > kServerPatience);
 }
 
+void Daemon::tell_log() {
+    if (log_queue_ == nullptr) return;
+    const auto lines = log_queue_->counts();
+    if (std::exchange(log_was_blocked_, lines.blocked) == lines.blocked) return;
+    log(Severity::warning, "log",
+        lines.blocked ? "nobody takes its lines: a stopped terminal, a full pipe or a dead disk; "
+                        "events and journal go on without it"
+                      : fmt::format("goes on; {} lines lost so far", lines.dropped));
+}
+
 void Daemon::tell_journal() {
     const auto status = journal_->status();
     if (std::exchange(journal_was_running_, status.running) == status.running) return;

@@ -81,6 +81,12 @@ struct MqttStatus {
     std::uint64_t left_out = 0;  ///< times the broker was too slow to be told
 };
 
+/// Lines of the log on their way to stderr or the file; taken = written + dropped + waiting.
+struct LogStatus {
+    std::uint64_t taken = 0, written = 0, dropped = 0, waiting = 0;
+    bool blocked = false;  ///< whoever reads it does not
+};
+
 /// What the threads that a sample passes have of real time.
 struct RealTimeStatus {
     struct Thread {
@@ -228,6 +234,7 @@ struct StatusData {
     RecorderStatus recorder;
     RealTimeStatus real_time;
     MqttStatus mqtt;
+    LogStatus log;
     bool stop_pending = false;  ///< a stop is ordered and not read back as done
 
     drivers::PortState can = drivers::PortState::absent;

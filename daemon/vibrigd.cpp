@@ -1,10 +1,10 @@
 #include <pthread.h>
-#include <spdlog/sinks/basic_file_sink.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <iostream>
@@ -12,23 +12,13 @@
 
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/daemon.hpp"
+#include "daemon/log/log_sink.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
 #include "daemon/watchdog.hpp"
 #include "estimator/instruction_set.hpp"
 
 namespace {
-
-void set_up_log(const vibrig::configuration::Configuration& configuration) {
-    if (!configuration.log_file.empty()) {
-        spdlog::set_default_logger(spdlog::basic_logger_mt("vibrigd", configuration.log_file));
-    } else {
-        spdlog::set_default_logger(spdlog::stderr_color_mt("vibrigd"));
-    }
-    spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v", spdlog::pattern_time_type::utc);
-    spdlog::set_level(spdlog::level::from_str(configuration.log_level));
-    spdlog::flush_on(spdlog::level::info);
-}
 
 vibrig::serve::ServerSettings settings_of(const vibrig::configuration::Configuration& c) {
     vibrig::serve::ServerSettings settings{
@@ -99,11 +89,28 @@ int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, const s
     }
 }
 
-int run(vibrig::configuration::Loaded loaded, const sigset_t& signals, const std::string& path) {
+/// Nobody logs after this. Whoever does not read the log does not keep the daemon from ending.
+class LogEnd {
+  public:
+    explicit LogEnd(vibrig::log::LogQueue& queue) : queue_(queue) {}
+    ~LogEnd() {
+        constexpr auto kPatience = std::chrono::seconds(2);
+        queue_.end(kPatience);
+        spdlog::shutdown();
+    }
+    LogEnd(const LogEnd&) = delete;
+    LogEnd& operator=(const LogEnd&) = delete;
+
+  private:
+    vibrig::log::LogQueue& queue_;
+};
+
+int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
+        const sigset_t& signals, const std::string& path) {
     const vibrig::ServiceManager manager;
     const auto socket = loaded.configuration.socket;
     const auto server_settings = settings_of(loaded.configuration);
-    vibrig::Daemon daemon(std::move(loaded));
+    vibrig::Daemon daemon(std::move(loaded), &log);
     // Before anything moves: it refuses to run beside another vibrigd.
     vibrig::serve::StatusServer server(daemon, server_settings);
     daemon.start();
@@ -190,11 +197,16 @@ int main(int argc, char** argv) {
             insist(forecast);
             return 0;
         }
-        set_up_log(loaded.configuration);
+        const auto& file = loaded.configuration.log_file;
+        const int descriptor = file.empty() ? STDERR_FILENO : vibrig::log::open_log_file(file);
+        vibrig::log::LogQueue log(descriptor);
+        const LogEnd at_the_end(log);
+        vibrig::log::log_through(log, loaded.configuration.log_level,
+                                 vibrig::log::shows_colours(descriptor));
         const auto forecast = vibrig::forecast_campaign(loaded.configuration);
         spdlog::info("campaign \"{}\": {}", loaded.configuration.campaign.name, forecast.words);
         insist(forecast);
-        return run(std::move(loaded), signals, path);
+        return run(std::move(loaded), log, signals, path);
     } catch (const std::exception& error) {
         std::cerr << "vibrigd: " << error.what() << '\n';
         return 2;

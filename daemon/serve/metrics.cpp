@@ -285,6 +285,11 @@ std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) 
     families.counter("vibrig_journal_entries_total", "Entries of the journal.",
                      {{{{"outcome", "written"}}, status.journal.written},
                       {{{"outcome", "dropped"}}, status.journal.dropped}});
+    families.counter("vibrig_log_lines_total", "Lines of the log.",
+                     {{{{"outcome", "written"}}, status.log.written},
+                      {{{"outcome", "dropped"}}, status.log.dropped}});
+    families.gauge("vibrig_log_blocked", "1 while nobody takes the log's lines.",
+                   yes(status.log.blocked));
     if (!status.mqtt.broker.empty()) {
         families.gauge("vibrig_mqtt_up", "1 while the broker is connected.",
                        yes(status.mqtt.connected));

@@ -80,6 +80,14 @@ void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
     out.set_left_out(mqtt.left_out);
 }
 
+void fill(v1::Log& out, const LogStatus& log) {
+    out.set_taken(log.taken);
+    out.set_written(log.written);
+    out.set_dropped(log.dropped);
+    out.set_waiting(log.waiting);
+    out.set_blocked(log.blocked);
+}
+
 void fill(v1::Recorder& out, const RecorderStatus& recorder) {
     out.set_folder(mend_utf8(recorder.folder));
     out.set_file(mend_utf8(recorder.file));
@@ -428,6 +436,7 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_recorder(), status.recorder);
     fill(*out.mutable_noise(), status.noise);
     fill(*out.mutable_mqtt(), status.mqtt);
+    fill(*out.mutable_log(), status.log);
     fill(*out.mutable_frame(), status.frame);
     fill(*out.mutable_real_time(), status.real_time);
     v1::Latency& latency = *out.mutable_acquisition_latency();

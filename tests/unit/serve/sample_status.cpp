@@ -85,6 +85,7 @@ StatusData full_status() {
         "out of band", "Ada", "transmission", {{"transmission", "1", 0.5, 0.6, 0.7, true}}};
     s.latency.add(150'000);
     s.mqtt = {"broker.lab:8883", true, "no route to host", 101, 102, 103, 104};
+    s.log = {121, 122, 123, 124, true};
     s.real_time = {
         {{"acquisition", 60, "0-1", 111, 112, 113, 1.5}, {"estimator", 0, "1", 114, 115, 116, 2.5}},
         true,
