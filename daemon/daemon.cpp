@@ -15,6 +15,7 @@
 #include "daemon/serve/one_line.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/version.hpp"
+#include "drivers/signal_binding.hpp"
 #include "estimator/plan_report.hpp"
 
 namespace vibrig {
@@ -51,6 +52,24 @@ drivers::ShakerSettings shaker_settings(const configuration::Configuration& conf
     return settings;
 }
 
+rt::AmplitudeWitness::Settings witness_settings(const configuration::Configuration& configuration,
+                                                const proto::Dbc& dbc) {
+    const auto& rig = configuration.estimator;
+    const auto& names = configuration.assembler.bindings;
+    const auto count = [&dbc](const std::string& name) {
+        const auto bound = drivers::bind_signal(dbc, "can.signals", name);
+        // A floating-point number has no counts.
+        const bool counts = bound && bound.signal->type == proto::ValueType::integer;
+        return counts ? std::abs(bound.signal->scale) : 0;
+    };
+    return {rig.frequency_hz,
+            configuration.assembler.sample_period,
+            rig.accelerometer_zero_g,
+            rig.accelerometer_matrix,
+            {count(names.accel_x), count(names.accel_y), count(names.accel_z),
+             count(names.table_accel)}};
+}
+
 }  // namespace
 
 Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
@@ -70,7 +89,8 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
       estimator_waiter_(clock_.make_waiter()),
       interlock_(*shaker_, *control_waiter_,
                  {configuration_.campaign.max_acceleration_g, configuration_.gimbal.status_deadline,
-                  configuration_.interlock}),
+                  configuration_.interlock, witness_settings(configuration_, dbc_),
+                  configuration_.estimator.transmission}),
       identification_(configuration_.estimator),
       estimator_stage_(estimator_ring_, *estimator_waiter_, *control_waiter_, identification_),
       noise_monitor_(
@@ -101,7 +121,9 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
       plan_(plan_data(configuration_)),
       campaign_(
           configuration_.campaign,
-          {gimbal_, *shaker_, [this] { return acquisition_.view().platform; },
+          {gimbal_,
+           *shaker_,
+           [this] { return acquisition_.view().platform; },
            [this](const rt::DwellOrder& order) {
                const bool taken = estimator_stage_.order(order);
                if (taken && !order.cancel) ++dwells_with_estimator_;
@@ -150,11 +172,14 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                const std::lock_guard lock(mutex_);
                result_ = std::move(result);
            },
-           torquer_.get(), &stage_feed_,
+           torquer_.get(),
+           &stage_feed_,
            [this](const LevelDrift& drift) { noise_monitor_.levelled(drift); },
            [this](const std::string& by, const std::string& out_of_band) {
                if (journal_) journal_->loop_checked(by, out_of_band);
-           }}),
+           },
+           [this](const rt::Ramp& ramp) { interlock_.ramp(ramp); },
+           [this](double measured) { interlock_.transmission(measured); }}),
       publisher_(
           configuration_.mqtt.host.empty()
               ? nullptr

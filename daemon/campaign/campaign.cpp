@@ -7,6 +7,7 @@
 
 #include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
@@ -80,6 +81,7 @@ std::string Campaign::not_fit_to_excite() const {
 void Campaign::enter(State state, Time now) {
     state_ = state;
     if (state == State::ramping) excited_deg_ = here().stop.position_deg;
+    if (state == State::ramping || state == State::checking) asked_g_ = 0;  // from rest
     if (ports_.commanded) {
         ports_.commanded(state == State::settling ? table_g() : 0, excited_deg_);
     }
@@ -111,9 +113,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             armed_under_ = ports_.shaker.stops();
             reason_.clear();
             enter(State::armed, now);
-            return accept(fmt::format(
-                "armed up to {:g} g at the table",
-                *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_)));
+            return accept(fmt::format("armed up to {:g} g at the table", highest_level()));
         case Kind::start:
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
@@ -311,8 +311,7 @@ Time Campaign::ramp(Time now) {
     }
     if (!requested_) {
         may_move_ = true;
-        requested_ = ports_.shaker.request({settings_.frequency_hz, table_g(), settings_.ramp_s},
-                                           armed_under_);
+        requested_ = ask_level(table_g(), now);
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
     }
@@ -410,6 +409,26 @@ void Campaign::stop_shaker() {
     ++armed_under_;
 }
 
+double Campaign::highest_level() const {
+    if (state_ == State::checking) return settings_.loop.table_g;
+    return *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_);
+}
+
+bool Campaign::ask_level(double table_g, Time now) {
+    if (!ports_.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s}, armed_under_))
+        return false;
+    tell_ramp(table_g, now);
+    return true;
+}
+
+void Campaign::tell_ramp(double table_g, Time now) {
+    const double start_g = std::exchange(asked_g_, table_g);
+    if (!ports_.ramping) return;
+    const RigFrame frame(settings_.rig);
+    ports_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
+                    state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
+}
+
 /// Ramps down; true once rest is read back.
 bool Campaign::come_to_rest(Time now) {
     const auto reading = ports_.shaker.reading();
@@ -419,10 +438,10 @@ bool Campaign::come_to_rest(Time now) {
         return true;
     }
     if (!requested_ && !ports_.shaker.stop_pending()) {
-        requested_ =
-            ports_.shaker.request({settings_.frequency_hz, 0, settings_.ramp_s}, armed_under_);
+        requested_ = ask_level(0, now);
         if (!requested_) {  // no ramp to be had: the hard way
             stop_sent_ = true;
+            tell_ramp(0, now);
             stop_shaker();
         }
     }

@@ -78,6 +78,10 @@ struct Ports {
     std::function<void(const LevelDrift&)> levelled = {};
     /// A loop check has its verdict; empty: all in band.
     std::function<void(const std::string& by, const std::string& out_of_band)> loop_checked = {};
+    /// The table is told this, as it is told.
+    std::function<void(const rt::Ramp&)> ramping = {};
+    /// Platform over table as a loop check in band has measured it.
+    std::function<void(double)> transmission = {};
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -159,6 +163,11 @@ class Campaign {
     void end(CampaignState state, const std::string& why, drivers::Time now);
     void leave_dwell();
     void stop_shaker();
+    /// Asks the shaker for a level; whoever watches it knows what it was asked.
+    [[nodiscard]] bool ask_level(double table_g, drivers::Time now);
+    void tell_ramp(double table_g, drivers::Time now);
+    /// That the arming is for, peak at the table.
+    [[nodiscard]] double highest_level() const;
     void begin(drivers::Time now);
     void conclude(drivers::Time now);
     void finish(drivers::Time now);
@@ -215,6 +224,7 @@ class Campaign {
     bool shutting_down_ = false;
     bool stop_sent_ = false;  ///< within rest(): the ramp down took too long
     bool requested_ = false;  ///< within ramp() and rest(): the set-point was accepted
+    double asked_g_ = 0;      ///< of the shaker, last
     bool may_move_ = false;   ///< a level was asked for and rest has not been read back since
     bool dwell_ordered_ = false;
     bool dwell_done_ = false;

@@ -87,6 +87,8 @@ Time Campaign::check_loop(Time now) {
     } else if (check_ == Check::measure && since >= from_seconds(settings_.loop.measure_s)) {
         loop_->finish(reading.measured_g);
         if (ports_.loop_checked) ports_.loop_checked(armed_by_, loop_->out_of_band());
+        if (ports_.transmission && loop_->out_of_band().empty())
+            ports_.transmission(loop_->transmission());
         go_on_to(Check::rest, now);
     } else if (check_ == Check::rest && come_to_rest(now)) {
         conclude_loop_check(now);
@@ -97,8 +99,7 @@ Time Campaign::check_loop(Time now) {
 void Campaign::ramp_for_check(Time now) {
     if (!requested_) {
         may_move_ = true;
-        requested_ = ports_.shaker.request(
-            {settings_.frequency_hz, settings_.loop.table_g, settings_.ramp_s}, armed_under_);
+        requested_ = ask_level(settings_.loop.table_g, now);
         if (!requested_) abort("the shaker takes no set-point", now);
     } else if (!ports_.shaker.busy() &&
                vibrating_as_commanded(ports_.shaker.reading(), settings_.loop.table_g)) {

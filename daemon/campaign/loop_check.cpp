@@ -5,12 +5,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "daemon/rt/amplitude_witness.hpp"
+
 namespace vibrig::campaign {
 
 namespace {
 constexpr double kGravityTolerance = 0.05;  // of 1 g, at rest
 constexpr double kStill = 0.05;             // g, at rest
-constexpr double kMostBad = 0.1;            // of the samples
+constexpr double kDecibel = rt::AmplitudeWitness::kDecibel;
+constexpr double kMostBad = 0.1;  // of the samples
 }  // namespace
 
 LoopCheck::LoopCheck(const LoopCheckSettings& settings, const estimator::Settings& rig)
@@ -84,11 +87,18 @@ void LoopCheck::row(const char* name, const char* unit, double value, double low
 
 void LoopCheck::finish(double shaker_g) {
     const auto found = estimator::loop_response(readings_, rig_.frequency_hz);
-    const double table_g = found.table_known ? found.table_g : shaker_g;
-    const double tolerance = settings_.transmission_tolerance * rig_.transmission;
+    const double commanded_g = settings_.table_g;
+    const double table_g = found.table_known ? found.table_g : commanded_g;
+    const double tolerance = settings_.transmission_tolerance;
     out_of_band_.clear();
-    row("transmission", "", table_g > 0 ? found.platform_g / table_g : 0,
-        rig_.transmission - tolerance, rig_.transmission + tolerance);
+    transmission_ = table_g > 0 ? found.platform_g / table_g : 0;
+    row("transmission", "", transmission_, rig_.transmission * (1 - tolerance),
+        rig_.transmission * (1 + tolerance));
+    row("controller over command", "", shaker_g / commanded_g, 1 / kDecibel, kDecibel);
+    if (found.table_known)
+        row("table over command", "", found.table_g / commanded_g, 1 / kDecibel, kDecibel);
+    row("platform over command", "", found.platform_g / (rig_.transmission * commanded_g),
+        (1 - tolerance) / kDecibel, (1 + tolerance) * kDecibel);
     row("frequency", "Hz", found.frequency_hz, rig_.frequency_hz - settings_.frequency_tolerance_hz,
         rig_.frequency_hz + settings_.frequency_tolerance_hz);
     row("distortion", "", found.distortion, 0, settings_.distortion);

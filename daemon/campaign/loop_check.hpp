@@ -25,7 +25,8 @@ class LoopCheck {
     [[nodiscard]] std::string look(std::array<double, 3>& position_deg) const;
     /// From now on what counts.
     void measure() { readings_.clear(); }
-    /// Judges it, `shaker_g` being what the controller says of the table.
+    /// Judges it, `shaker_g` being what the controller says of the table: that is held against the
+    /// command as the accelerometers are, and is no witness of them.
     void finish(double shaker_g);
     void conclude();  ///< the table is at rest again: it is over
     void not_completed(const std::string& why);
@@ -37,6 +38,8 @@ class LoopCheck {
     /// Why no campaign is armed; empty: as far as this goes it may be.
     [[nodiscard]] std::string refusal() const;
     [[nodiscard]] const LoopCheckStatus& status() const { return status_; }
+    /// Platform over table as measured; over the command where the table has no accelerometer.
+    [[nodiscard]] double transmission() const { return transmission_; }
     /// The shaker's limit that the level exceeds; empty: none.
     [[nodiscard]] static std::string beyond_limits(const Settings& settings);
 
@@ -50,6 +53,7 @@ class LoopCheck {
     Vector angle_rad_{};
     std::size_t bad_ = 0;  ///< samples without good force or angles
     bool passed_ = false;
+    double transmission_ = 0;
     std::string out_of_band_;  ///< of the newest that was completed
     LoopCheckStatus status_;
 };

@@ -43,7 +43,9 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
       control_(control),
       table_g_(limits.table_g),
       platform_age_(limits.platform_age),
-      rules_(std::move(limits.rules)) {
+      rules_(std::move(limits.rules)),
+      transmission_(limits.transmission),
+      witness_(limits.witness) {
     std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
     if (rules_.size() > kMostRules) rules_.resize(kMostRules);
     mismatches_ = shaker_.counters().read_back_mismatches;
@@ -56,8 +58,9 @@ void Interlock::command(double table_g, const std::array<double, 3>& position_de
     commanded_g_.store(table_g);
 }
 
-void Interlock::trip(Trip cause, std::size_t row, double value) noexcept {
-    const Tripped mine{cause, static_cast<std::uint8_t>(row), ++trips_, static_cast<float>(value)};
+void Interlock::trip(Trip cause, std::size_t row, double value, std::uint8_t channel) noexcept {
+    const Tripped mine{cause, static_cast<std::uint8_t>(row), channel, ++trips_,
+                       static_cast<float>(value)};
     Tripped other = tripped_.load();
     do {
         if (other) return;  // the first cause stays
@@ -82,7 +85,17 @@ void Interlock::judge(By by, Trip trip, double value, Time now) noexcept {
     }
 }
 
-void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time now) noexcept {
+void Interlock::judge(Trip trip, const AmplitudeWitness::Verdict::Finding& finding,
+                      Time now) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition != trip) continue;
+        judge_row(By::sample, i, finding.wrong, finding.value_g, now,
+                  static_cast<std::uint8_t>(finding.channel));
+    }
+}
+
+void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time now,
+                          std::uint8_t channel) noexcept {
     State& state = states_[row];
     std::atomic<Time>& since = state.since[static_cast<std::size_t>(by)];
     const Rule& rule = rules_[row];
@@ -97,7 +110,7 @@ void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time
     if (now - since.load() < drivers::from_seconds(rule.dwell_s)) return;
     if (rule.reaction == Reaction::abort && !tripped_.load()) {
         if (by == By::sample && arrived_ != 0) stop_asked_.store(arrived_);
-        trip(rule.condition, row, value);
+        trip(rule.condition, row, value, channel);
     }
     if (!state.raised.load()) {
         state.value.store(value);
@@ -124,10 +137,11 @@ void Interlock::check(const drivers::Sample& sample,
     if (guard == Guard::excitation) {
         judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
         judge(By::sample, Trip::platform_fault, platform.fault, now);
-        if (sample.of(Channel::table_accel) == drivers::Quality::good) {
-            judge(By::sample, Trip::over_amplitude, !(std::abs(sample.table_accel) <= table_g_),
-                  now);
-        }
+        check_witnesses(sample);
+        const bool told = sample.of(Channel::table_accel) == drivers::Quality::good;
+        judge(By::sample, Trip::over_amplitude,
+              verdict_.over_limit.wrong || (told && !(std::abs(sample.table_accel) <= table_g_)),
+              now);
         check_motion(sample);
         if (const double nis = nis_.load(); nis != 0)
             judge(By::sample, Trip::filter_divergence, nis, now);
@@ -137,6 +151,22 @@ void Interlock::check(const drivers::Sample& sample,
         judge(By::sample, Trip::disk, free_mb, now);
     judge(By::sample, Trip::recording, recording_degraded_.load(), now);
     judge(By::sample, Trip::server, server_stuck_.load(), now);
+}
+
+void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
+    const std::uint64_t before = told_.number;
+    static_cast<void>(ramp_.try_read(told_));
+    if (told_.number != before) controller_began_ = 0;
+    const Time now = std::max(sample.time, now_);
+    if (controller_began_ == 0 && !shaker_.busy() && !shaker_.stop_pending())
+        controller_began_ = std::max(now, told_.begin);
+    if (!witness_.add(sample)) return;
+    verdict_ = witness_.verdict(
+        {told_, controller_began_, now, commanded_g_.load() > 0, transmission_.load(), table_g_});
+    for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(verdict_.seen_g[i]);
+    judge(Trip::stuck, verdict_.stuck, sample.time);
+    judge(Trip::over_armed, verdict_.over_armed, sample.time);
+    judge(Trip::amplitude_witness, verdict_.off_command, sample.time);
 }
 
 void Interlock::check_motion(const drivers::Sample& sample) noexcept {
@@ -162,14 +192,19 @@ Guard Interlock::follow_guard() noexcept {
     const Guard guard = guard_.load();
     if (guard == Guard::excitation && sampled_under_ != Guard::excitation) {
         motion_.begin();
+        witness_.begin();
+        verdict_ = {};
         loss_ = {};
     }
     if (guard < sampled_under_) forget(By::sample, guard);
+    if (guard < Guard::excitation && sampled_under_ == Guard::excitation)
+        for (auto& seen : seen_g_) seen.store(-1);
     sampled_under_ = guard;
     return guard;
 }
 
 void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) noexcept {
+    now_ = now;
     const Guard guard = follow_guard();
     if (guard == Guard::excitation) {
         bool stale = false;
@@ -220,12 +255,27 @@ void Interlock::stop_written() noexcept {
 
 std::string Interlock::text_of(const Tripped& tripped) const {
     const Condition& condition = condition_of(tripped.cause);
+    std::array<char, 96> words{};
+    const auto channel = static_cast<Channel>(tripped.channel);
+    const auto value = static_cast<double>(tripped.value);
+    if (tripped.cause == Trip::stuck && tripped.channel < drivers::kChannels) {
+        std::snprintf(words.data(), words.size(), ": %s, %.3g g expected",
+                      drivers::name_of(channel), value);
+        return std::string(condition.text) + words.data();
+    }
+    if (tripped.channel < drivers::kChannels) {
+        const Ramp ramp = ramp_.read();
+        const bool armed = tripped.cause == Trip::over_armed;
+        std::snprintf(words.data(), words.size(), ": %s %.3g g at the table, %.3g g %s",
+                      channel == Channel::table_accel ? "table accelerometer" : "platform", value,
+                      armed ? ramp.armed_g : ramp.target_g, armed ? "armed" : "commanded");
+        return std::string(condition.text) + words.data();
+    }
     if (!condition.has_limit() || tripped.row >= rules_.size() ||
         rules_[tripped.row].condition != tripped.cause)
         return condition.text;
-    std::array<char, 96> words{};
-    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s",
-                  static_cast<double>(tripped.value), rules_[tripped.row].limit, condition.unit);
+    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s", value,
+                  rules_[tripped.row].limit, condition.unit);
     return std::string(condition.text) + words.data();
 }
 

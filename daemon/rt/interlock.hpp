@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/rt/amplitude_witness.hpp"
 #include "daemon/rt/interlock_motion.hpp"
 #include "daemon/rt/interlock_table.hpp"
+#include "daemon/rt/snapshot.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/sample.hpp"
 #include "drivers/shaker.hpp"
@@ -20,8 +22,9 @@ namespace vibrig::rt {
 struct Tripped {
     Trip cause = Trip::none;
     std::uint8_t row = 0;
-    std::uint16_t number = 0;  ///< of this trip, so that the same one again is another
-    float value = 0;           ///< as judged to be wrong
+    std::uint8_t channel = drivers::kChannels;  ///< drivers::Channel that told; kChannels: none
+    std::uint8_t number = 0;  ///< of this trip, so that the same one again is another
+    float value = 0;          ///< as judged to be wrong
     [[nodiscard]] explicit operator bool() const noexcept { return cause != Trip::none; }
     bool operator==(const Tripped& other) const noexcept {
         return cause == other.cause && row == other.row && number == other.number;
@@ -59,6 +62,8 @@ class Interlock {
         double table_g = 12.0;                                     ///< largest table acceleration
         drivers::Time platform_age = 500 * drivers::kMillisecond;  ///< of the platform's status
         std::vector<Rule> rules = default_interlock();             ///< kMostRules at most
+        AmplitudeWitness::Settings witness = {};
+        double transmission = 1;  ///< platform over table, until it is measured
     };
     /// One row as it stands now.
     struct RowState {
@@ -73,6 +78,17 @@ class Interlock {
     /// Control thread: what the table is to do (0: nothing yet, or ramping) and where the gimbals
     /// are to be, deg as the encoders count.
     void command(double table_g, const std::array<double, 3>& position_deg) noexcept;
+    /// Control thread: what the table is told, as it is told.
+    void ramp(Ramp ramp) noexcept {
+        ramp.number = ++ramps_;
+        ramp_.publish(ramp);
+    }
+    /// Control thread: platform over table, as the loop check has measured it.
+    void transmission(double measured) noexcept { transmission_.store(measured); }
+    /// Platform and table as the accelerometers show them, g peak at the table; negative: unknown.
+    [[nodiscard]] std::array<double, 2> seen_g() const noexcept {
+        return {seen_g_[0].load(), seen_g_[1].load()};
+    }
     /// Control thread, slowly: innovations of the filter (0: none yet), free space.
     void filter(double nis_per_dof) noexcept { nis_.store(nis_per_dof); }
     void disk_free(double megabytes) noexcept { disk_free_mb_.store(megabytes); }
@@ -93,7 +109,7 @@ class Interlock {
     /// Acquisition thread: the CAN port is no longer running.
     void lost_bus() noexcept;
     /// Any thread. The first cause stays.
-    void trip(Trip cause) noexcept { trip(cause, 0, 0); }
+    void trip(Trip cause) noexcept { trip(cause, 0, 0, drivers::kChannels); }
     /// Shaker thread: a stop was written and confirmed.
     void stop_written() noexcept;
 
@@ -129,9 +145,13 @@ class Interlock {
     [[nodiscard]] bool at_least(Guard level) const noexcept { return guard_.load() >= level; }
     void judge(By by, Trip trip, bool wrong, drivers::Time now) noexcept;
     void judge(By by, Trip trip, double value, drivers::Time now) noexcept;
-    void judge_row(By by, std::size_t row, bool wrong, double value, drivers::Time now) noexcept;
+    void judge(Trip trip, const AmplitudeWitness::Verdict::Finding& finding,
+               drivers::Time now) noexcept;
+    void judge_row(By by, std::size_t row, bool wrong, double value, drivers::Time now,
+                   std::uint8_t channel = drivers::kChannels) noexcept;
     void forget(By by, Guard above) noexcept;
-    void trip(Trip cause, std::size_t row, double value) noexcept;
+    void trip(Trip cause, std::size_t row, double value, std::uint8_t channel) noexcept;
+    void check_witnesses(const drivers::Sample& sample) noexcept;
     Guard follow_guard() noexcept;
     void check_motion(const drivers::Sample& sample) noexcept;
 
@@ -143,7 +163,7 @@ class Interlock {
     std::array<State, kMostRules> states_;
     std::atomic<Guard> guard_{Guard::idle};
     std::atomic<Tripped> tripped_{Tripped{}};
-    std::atomic<std::uint16_t> trips_{0};
+    std::atomic<std::uint8_t> trips_{0};
     std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
     std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
     std::array<std::atomic<double>, 3> position_rad_{};
@@ -151,8 +171,18 @@ class Interlock {
     std::atomic<drivers::Time> stop_asked_{0};  ///< arrival of the frames that tripped; 0: none
     ReactionHistogram reactions_;
 
+    Snapshot<Ramp> ramp_;
+    std::uint64_t ramps_ = 0;  ///< control thread
+    std::atomic<double> transmission_;
+    std::array<std::atomic<double>, 2> seen_g_{-1, -1};
+
     // Acquisition thread.
     drivers::Time arrived_ = 0;
+    drivers::Time now_ = 0;  ///< when silence was last looked for
+    AmplitudeWitness witness_;
+    AmplitudeWitness::Verdict verdict_;  ///< the newest
+    Ramp told_;
+    drivers::Time controller_began_ = 0;
     Guard sampled_under_ = Guard::idle;
     MotionMonitor motion_;
     LossMonitor loss_;

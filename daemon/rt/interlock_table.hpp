@@ -31,9 +31,12 @@ enum class Trip : std::uint8_t {
     shaker_lost,
     disk,
     recording,
-    server
+    server,
+    amplitude_witness,
+    over_armed,
+    stuck
 };
-inline constexpr std::size_t kTrips = 22;
+inline constexpr std::size_t kTrips = 25;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -92,6 +95,11 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::disk, "disk", "free space for results", Guard::idle, false, "MB", 1, 1e7, true},
     {Trip::recording, "recording_degraded", "the disk refuses, or what is to be recorded waits"},
     {Trip::server, "server_stuck", "the status server makes no progress"},
+    {Trip::amplitude_witness, "amplitude_witness",
+     "an accelerometer disagrees with the commanded amplitude", Guard::excitation, true},
+    {Trip::over_armed, "over_armed_level", "amplitude above the armed level", Guard::excitation,
+     true},
+    {Trip::stuck, "stuck", "an accelerometer does not move that should", Guard::excitation, true},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];

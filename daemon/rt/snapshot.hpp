@@ -32,18 +32,22 @@ class Snapshot {
 
     /// Any thread. Tries again while the writer is at work.
     [[nodiscard]] T read() const noexcept {
-        Words words{};
-        for (;;) {
-            const std::uint64_t before = sequence_.load(std::memory_order_acquire);
-            for (std::size_t i = 0; i < kWords; ++i)
-                words[i] = words_[i].load(std::memory_order_acquire);
-            if (before % 2 == 0 && sequence_.load(std::memory_order_relaxed) == before) break;
-            // A writer that was put aside half-way: no spinning, on one CPU it would never go on.
-            std::this_thread::yield();
-        }
         T value;
-        std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));
+        // A writer that was put aside half-way: no spinning, on one CPU it would never go on.
+        while (!try_read(value)) std::this_thread::yield();
         return value;
+    }
+
+    /// For a thread that may not wait for the writer, which has less priority: false, and `value`
+    /// as it was, while the writer is at work.
+    [[nodiscard]] bool try_read(T& value) const noexcept {
+        Words words{};
+        const std::uint64_t before = sequence_.load(std::memory_order_acquire);
+        for (std::size_t i = 0; i < kWords; ++i)
+            words[i] = words_[i].load(std::memory_order_acquire);
+        if (before % 2 != 0 || sequence_.load(std::memory_order_relaxed) != before) return false;
+        std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));
+        return true;
     }
 
   private:

@@ -24,7 +24,7 @@ class FakeShaker final : public drivers::Shaker {
     }
     [[nodiscard]] std::uint64_t stops() const noexcept override { return stops_asked; }
     [[nodiscard]] bool stop_pending() const noexcept override { return stop_waits; }
-    [[nodiscard]] bool busy() const noexcept override { return false; }
+    [[nodiscard]] bool busy() const noexcept override { return writing; }
     [[nodiscard]] drivers::ShakerReading reading() const noexcept override { return now; }
     [[nodiscard]] drivers::ShakerCounters counters() const noexcept override { return counts; }
     [[nodiscard]] drivers::LinkState state() const noexcept override {
@@ -50,7 +50,7 @@ class FakeShaker final : public drivers::Shaker {
     std::vector<drivers::ShakerSetPoint> requests;
     std::atomic<std::uint64_t> stops_asked{0};
     std::atomic<bool> stop_waits{false};
-    bool refuse = false;
+    bool refuse = false, writing = false;
 };
 
 }  // namespace vibrig

@@ -43,13 +43,27 @@ struct Rig {
     explicit Rig(std::vector<Rule> rules) {
         interlock = std::make_unique<Interlock>(
             shaker, *control,
-            Interlock::Limits{kTable_g, 500 * drivers::kMillisecond, std::move(rules)});
+            Interlock::Limits{kTable_g,
+                              500 * drivers::kMillisecond,
+                              std::move(rules),
+                              {.frequency_hz = 15.3, .count_g = {1e-4, 1e-4, 1e-4, 1e-4}}});
         sample.quality.fill(drivers::Quality::good);
         sample.force = {0, 1, 0};
         platform.loop_closed = true;
         shaker.now.valid = true;
         shaker.now.measured_g = kCommanded_g;
         interlock->command(kCommanded_g, {0, 0, 0});
+        interlock->ramp({.start_g = kCommanded_g,
+                         .target_g = kCommanded_g,
+                         .armed_g = kCommanded_g,
+                         .raw_up = {0, 1, 0}});
+    }
+
+    /// At 15.3 Hz: table, and platform along y.
+    void vibrate(double table_g, double platform_g) {
+        const double a = std::sin(2 * std::numbers::pi * 15.3 * seconds());
+        sample.table_accel = table_g * a;
+        sample.force = {0, 1 + platform_g * a, 0};
     }
 
     [[nodiscard]] double seconds() const { return drivers::to_seconds(count * test::kPeriod); }
@@ -183,6 +197,16 @@ const Case kCases[] = {
     {"recording_degraded", Trip::recording, 0,
      [](Rig& rig, bool beyond) { rig.interlock->onlookers(beyond, false); }, Guard::idle,
      Guard::idle},
+    {"amplitude_witness", Trip::amplitude_witness, 0,
+     [](Rig& rig, bool beyond) { rig.vibrate(kCommanded_g, beyond ? 8 : 8.1); }},
+    {"over_armed_level", Trip::over_armed, 0,
+     [](Rig& rig, bool beyond) { rig.vibrate(beyond ? 10.2 : 10, kCommanded_g); }},
+    {"stuck", Trip::stuck, 0,
+     [](Rig& rig, bool beyond) {
+         const double was = rig.sample.table_accel;
+         rig.vibrate(kCommanded_g, kCommanded_g);
+         if (beyond) rig.sample.table_accel = was;
+     }},
     {"server_stuck", Trip::server, 0,
      [](Rig& rig, bool beyond) { rig.interlock->onlookers(false, beyond); }, Guard::idle,
      Guard::idle},
