@@ -22,10 +22,9 @@ double counted(double value, double& rest, double count) {
 }
 
 /// Columns: the axes of the reference frame in platform axes.
-std::array<Vec3, 3> attitude(const Vec3& angles) {
-    return {PlatformModel::to_platform(angles, {1, 0, 0}),
-            PlatformModel::to_platform(angles, {0, 1, 0}),
-            PlatformModel::to_platform(angles, {0, 0, 1})};
+std::array<Vec3, 3> attitude(const PlatformModel& platform, const Vec3& angles) {
+    return {platform.seen(angles, {1, 0, 0}), platform.seen(angles, {0, 1, 0}),
+            platform.seen(angles, {0, 0, 1})};
 }
 
 }  // namespace
@@ -43,14 +42,15 @@ void Increments::stop() noexcept {
 }
 
 void Increments::advance(std::int64_t end_us, const Motion& motion, const PlatformModel& platform,
-                         std::span<const double> a1) {
+                         std::span<const Shake> shakes) {
     made_.clear();
     const std::int64_t begin_us = end_us - tick_us_;
     // Angles are given within a turn: where one passes half a turn, it goes on and not all the way
     // back.
     Vec3 moved = motion.to - motion.from;
     for (double& angle : moved) angle = std::remainder(angle, 2 * std::numbers::pi);
-    const double step_s = 1e-6 * static_cast<double>(tick_us_) / static_cast<double>(a1.size() - 1);
+    const double step_s =
+        1e-6 * static_cast<double>(tick_us_) / static_cast<double>(shakes.size() - 1);
     const auto at = [&](std::int64_t us) {
         return motion.from +
                (static_cast<double>(us - begin_us) / static_cast<double>(tick_us_)) * moved;
@@ -60,11 +60,11 @@ void Increments::advance(std::int64_t end_us, const Motion& motion, const Platfo
         const std::int64_t boundary = (from / kIncrementUs + 1) * kIncrementUs;
         const std::int64_t to = std::min(boundary, end_us);
         const auto index = [&](std::int64_t us) {
-            return static_cast<std::size_t>((us - begin_us) *
-                                            static_cast<std::int64_t>(a1.size() - 1) / tick_us_);
+            return static_cast<std::size_t>(
+                (us - begin_us) * static_cast<std::int64_t>(shakes.size() - 1) / tick_us_);
         };
         for (std::size_t i = index(from); i < index(to); ++i)
-            shaken_s_ += 0.5 * step_s * (a1[i] + a1[i + 1]);
+            shaken_s_ += 0.5 * step_s * (shakes[i].in_phase + shakes[i + 1].in_phase);
         if (to == boundary) {
             const Vec3 angles = at(to);
             if (begun_) make(begin_, angles, platform, shaken_s_);
@@ -78,12 +78,11 @@ void Increments::advance(std::int64_t end_us, const Motion& motion, const Platfo
 
 void Increments::make(const Vec3& from, const Vec3& to, const PlatformModel& platform,
                       double shaken_s) {
-    const auto before = attitude(from);
-    auto after = attitude(to);
+    const auto before = attitude(platform, from);
+    auto after = attitude(platform, to);
     // Seen from inertial space the reference frame turns with the Earth, by an angle so small that
     // its square does not count: an axis r of it has become r + w x r.
-    const Vec3 earth =
-        (kIncrement / kArcsecOfRad) * PlatformModel::to_platform(to, platform.earth_rate());
+    const Vec3 earth = (kIncrement / kArcsecOfRad) * platform.earth_rate_in_platform(to);
     // The platform's turn takes its axes of before to those of after: half the difference of the
     // matrix (before)(after turned back)^T and its transpose.
     for (Vec3& axis : after) axis = axis - cross(earth, axis);

@@ -26,9 +26,9 @@ class Increments {
     struct Motion {
         Vec3 from{}, to{};  ///< gimbal angles at both ends of the tick, rad; straight between them
     };
-    /// The tick that ends at `end_us`; `a1` is the vibration at equal steps of it.
+    /// The tick that ends at `end_us`; `shakes` is the vibration at equal steps of it.
     void advance(std::int64_t end_us, const Motion& motion, const PlatformModel& platform,
-                 std::span<const double> a1);
+                 std::span<const Shake> shakes);
     /// Nothing is sent; the next increment begins anew.
     void stop() noexcept;
     [[nodiscard]] const std::vector<Increment>& made() const noexcept { return made_; }

@@ -46,16 +46,21 @@ std::complex<double> Isolator::transfer(double frequency_hz) const noexcept {
     return top / (s * s + top);
 }
 
-void Isolator::set_drive(double frequency_hz, double second_harmonic) noexcept {
-    harmonics_[0].relative = 1;
-    harmonics_[1].relative = second_harmonic;
-    for (std::size_t n = 0; n < 2; ++n) {
+void Isolator::set_drive(double frequency_hz, const Harmonics& harmonics) noexcept {
+    for (std::size_t n = 0; n < harmonics_.size(); ++n) {
+        harmonics_[n].relative = n == 0 ? 1 : harmonics[n - 1];
+        harmonics_[n].phasor = {1, 0};
+    }
+    retune(frequency_hz);
+}
+
+void Isolator::retune(double frequency_hz) noexcept {
+    for (std::size_t n = 0; n < harmonics_.size(); ++n) {
         Harmonic& h = harmonics_[n];
         const Complex s{0, kTwoPi * frequency_hz * static_cast<double>(n + 1)};
         // Steady answer v exp(i w t) of the state; one step adds v exp(i w step) - transition v.
         const Complex v0 = 1.0 / (s * s + 2 * damping_ * omega0_ * s + omega0_ * omega0_);
         const Complex v1 = s * v0;
-        h.phasor = {1, 0};
         h.turn = std::exp(s * step_s_);
         h.input = {v0 * h.turn - (transition_[0][0] * v0 + transition_[0][1] * v1),
                    v1 * h.turn - (transition_[1][0] * v0 + transition_[1][1] * v1)};
@@ -63,26 +68,36 @@ void Isolator::set_drive(double frequency_hz, double second_harmonic) noexcept {
 }
 
 void Isolator::advance(double amplitude_g) noexcept {
-    std::array<double, 2> next{transition_[0][0] * state_[0] + transition_[0][1] * state_[1],
-                               transition_[1][0] * state_[0] + transition_[1][1] * state_[1]};
+    const auto& t = transition_;
+    std::array<double, 2> sine{t[0][0] * state_[0] + t[0][1] * state_[1],
+                               t[1][0] * state_[0] + t[1][1] * state_[1]};
+    std::array<double, 2> cosine{t[0][0] * ahead_[0] + t[0][1] * ahead_[1],
+                                 t[1][0] * ahead_[0] + t[1][1] * ahead_[1]};
     for (Harmonic& h : harmonics_) {
         if (h.relative == 0) continue;
         const double g = amplitude_g * h.relative;
-        next[0] += g * (h.phasor.real() * h.input[0].imag() + h.phasor.imag() * h.input[0].real());
-        next[1] += g * (h.phasor.real() * h.input[1].imag() + h.phasor.imag() * h.input[1].real());
-        const double re = h.phasor.real() * h.turn.real() - h.phasor.imag() * h.turn.imag();
-        const double im = h.phasor.real() * h.turn.imag() + h.phasor.imag() * h.turn.real();
-        const double norm =
-            1.5 - 0.5 * (re * re + im * im);  // one Newton step keeps the length at 1 for ever
-        h.phasor = {re * norm, im * norm};
+        const double re = h.phasor.real();
+        const double im = h.phasor.imag();
+        for (std::size_t i = 0; i < 2; ++i) {
+            sine[i] += g * (re * h.input[i].imag() + im * h.input[i].real());
+            cosine[i] += g * (re * h.input[i].real() - im * h.input[i].imag());
+        }
+        const double next_re = re * h.turn.real() - im * h.turn.imag();
+        const double next_im = re * h.turn.imag() + im * h.turn.real();
+        // One Newton step keeps the length at 1 for ever.
+        const double norm = 1.5 - 0.5 * (next_re * next_re + next_im * next_im);
+        h.phasor = {next_re * norm, next_im * norm};
     }
-    state_ = next;
+    state_ = sine;
+    ahead_ = cosine;
 }
 
 void Isolator::kick(double g) noexcept { state_[0] += g / (omega0_ * omega0_); }
 
-double Isolator::platform_g() const noexcept {
-    return omega0_ * omega0_ * state_[0] + 2 * damping_ * omega0_ * state_[1];
+Shake Isolator::shake() const noexcept {
+    const double stiff = omega0_ * omega0_;
+    const double damp = 2 * damping_ * omega0_;
+    return {stiff * state_[0] + damp * state_[1], stiff * ahead_[0] + damp * ahead_[1]};
 }
 
 double Isolator::table_g(double amplitude_g) const noexcept {
@@ -92,7 +107,10 @@ double Isolator::table_g(double amplitude_g) const noexcept {
 }
 
 bool Isolator::at_rest() const noexcept {
-    return std::abs(state_[0]) * omega0_ * omega0_ < 1e-9 && std::abs(state_[1]) * omega0_ < 1e-9;
+    const auto small = [this](const std::array<double, 2>& s) {
+        return std::abs(s[0]) * omega0_ * omega0_ < 1e-9 && std::abs(s[1]) * omega0_ < 1e-9;
+    };
+    return small(state_) && small(ahead_);
 }
 
 }  // namespace vibrig::plant

@@ -5,6 +5,13 @@
 
 namespace vibrig::plant {
 
+/// The platform's vibration at one instant, peak g: along up, and what that will be a quarter
+/// period of each harmonic later.
+struct Shake {
+    double in_phase = 0;
+    double quadrature = 0;
+};
+
 /// Isolation pads under the platform: m X'' + k1 X' + k0 X = k1 Y' + k0 Y, driven by the table's
 /// acceleration. The acceleration of the platform answers that of the table with the same transfer
 /// function, so accelerations (g) go in and come out. For a sine of constant amplitude the
@@ -19,14 +26,19 @@ class Isolator {
     /// a0/a and phase at a frequency; Tang et al. 2009, eq. 3, and eq. 4 with its sign put right.
     [[nodiscard]] std::complex<double> transfer(double frequency_hz) const noexcept;
 
-    /// Fundamental of the table in the following steps; the second harmonic is relative to it.
-    void set_drive(double frequency_hz, double second_harmonic) noexcept;
+    /// Relative to the fundamental: second to fifth harmonic.
+    using Harmonics = std::array<double, 4>;
+    /// Fundamental and harmonics of the table in the following steps, from phase 0.
+    void set_drive(double frequency_hz, const Harmonics& harmonics) noexcept;
+    /// The frequency from now on, the phase goes on.
+    void retune(double frequency_hz) noexcept;
     /// One step under a table acceleration of this amplitude (g), constant over the step.
     void advance(double amplitude_g) noexcept;
     /// The platform gets a push: its acceleration jumps by this much and then rings down.
     void kick(double g) noexcept;
 
-    [[nodiscard]] double platform_g() const noexcept;                 ///< A1, along up
+    [[nodiscard]] double platform_g() const noexcept { return shake().in_phase; }  ///< A1, along up
+    [[nodiscard]] Shake shake() const noexcept;
     [[nodiscard]] double table_g(double amplitude_g) const noexcept;  ///< at the present phase
     [[nodiscard]] bool at_rest() const noexcept;                      ///< below 1e-9 g
 
@@ -43,8 +55,9 @@ class Isolator {
     double damping_;
     double step_s_;
     std::array<std::array<double, 2>, 2> transition_{};
-    std::array<double, 2> state_{};  ///< acceleration = omega0^2 s0 + 2 zeta omega0 s1
-    std::array<Harmonic, 2> harmonics_{};
+    /// Driven by the sines and by the cosines; acceleration = omega0^2 s0 + 2 zeta omega0 s1.
+    std::array<double, 2> state_{}, ahead_{};
+    std::array<Harmonic, 5> harmonics_{};
 };
 
 }  // namespace vibrig::plant

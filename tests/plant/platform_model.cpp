@@ -1,5 +1,6 @@
 #include "tests/plant/platform_model.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -17,22 +18,22 @@ double along(const Vec3& v, const Axis& axis) noexcept {
 }  // namespace
 
 PlatformModel::PlatformModel(const Truth& truth)
-    : coefficients_(truth.coefficients),
+    : frame_(truth),
+      shape_(truth),
+      coefficients_(truth.coefficients),
+      cubic_(truth.cubic_deg_h_g3),
       gyro_axes_(truth.gyro_axes),
       drift_sign_(truth.drift_sign) {
-    // North is the axis before `up`, east the axis after it; turning `up` over turns east over too.
-    const auto axis = static_cast<std::size_t>(truth.up.index);
-    const double sign = truth.up.sign;
-    Vec3 north{};
-    Vec3 east{};
-    up_[axis] = sign;
-    north[(axis + 2) % 3] = 1;
-    east[(axis + 1) % 3] = sign;
     const double latitude = truth.latitude_deg * kRadPerDeg;
     const double azimuth = truth.azimuth_deg * kRadPerDeg;
     earth_ =
-        kEarthRate * (std::cos(latitude) * (std::cos(azimuth) * north - std::sin(azimuth) * east) +
-                      std::sin(latitude) * up_);
+        kEarthRate *
+        (std::cos(latitude) * (std::cos(azimuth) * frame_.north - std::sin(azimuth) * frame_.east) +
+         std::sin(latitude) * frame_.up);
+    for (std::size_t i = 0; i < 2; ++i) {
+        const double angle = truth.non_orthogonality_arcsec[i] * kRadPerDeg / 3600;
+        skew_[i] = {std::sin(angle), std::cos(angle)};
+    }
 }
 
 Vec3 PlatformModel::to_platform(const Vec3& angles, const Vec3& reference) noexcept {
@@ -47,53 +48,108 @@ Vec3 PlatformModel::to_platform(const Vec3& angles, const Vec3& reference) noexc
     return {cg * inner[0] - sg * inner[1], sg * inner[0] + cg * inner[1], inner[2]};
 }
 
-Vec3 PlatformModel::gyro_drift(const Vec3& up_platform, double a1) const noexcept {
-    // Every gyro feels the specific force (1 + A1) u; nothing is averaged.
-    const double level = 1 + a1;
+Vec3 PlatformModel::seen(const Vec3& angles, const Vec3& r) const noexcept {
+    // Gimbal by gimbal as above, with what is not square between them.
+    const double ca = std::cos(angles[0]), sa = std::sin(angles[0]);
+    const double cb = std::cos(angles[1]), sb = std::sin(angles[1]);
+    const double cg = std::cos(angles[2]), sg = std::sin(angles[2]);
+    const auto& [first, second] = skew_;
+    const double y = ca * r[1] - sa * r[2];
+    const Vec3 outer{first.cosine * r[0] - first.sine * y, first.sine * r[0] + first.cosine * y,
+                     sa * r[1] + ca * r[2]};
+    const double z = cb * outer[2] - sb * outer[0];
+    const Vec3 inner{cb * outer[0] + sb * outer[2], second.cosine * outer[1] - second.sine * z,
+                     second.sine * outer[1] + second.cosine * z};
+    return {cg * inner[0] - sg * inner[1], sg * inner[0] + cg * inner[1], inner[2]};
+}
+
+Vec3 PlatformModel::drift_under(const Moments& force) const noexcept {
     Vec3 drift{};
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         const GyroCoefficients& d = coefficients_[gyro];
-        const double i = level * along(up_platform, gyro_axes_[gyro][0]);
-        const double o = level * along(up_platform, gyro_axes_[gyro][1]);
-        const double s = level * along(up_platform, gyro_axes_[gyro][2]);
-        drift[gyro] = d[kF] + i * (d[kI] + d[kII] * i + d[kIO] * o + d[kIS] * s) +
-                      o * (d[kO] + d[kOO] * o + d[kOS] * s) + s * (d[kS] + d[kSS] * s);
+        const auto& axes = gyro_axes_[gyro];
+        const auto second = [&](std::size_t a, std::size_t b) {
+            const auto [low, high] = std::minmax(axes[a].index, axes[b].index);
+            return axes[a].sign * axes[b].sign *
+                   force.second[static_cast<std::size_t>(low)][static_cast<std::size_t>(high)];
+        };
+        drift[gyro] = d[kF] + d[kIO] * second(0, 1) + d[kIS] * second(0, 2) + d[kOS] * second(1, 2);
+        for (std::size_t a = 0; a < 3; ++a) {
+            drift[gyro] += d[kI + a] * along(force.first, axes[a]) + d[kII + a] * second(a, a) +
+                           cubic_[gyro][a] * along(force.third, axes[a]);
+        }
     }
     return drift;
 }
 
-Vec3 PlatformModel::angle_rates(const Vec3& angles, double a1, const Vec3& extra) const noexcept {
-    const double ca = std::cos(angles[0]), sa = std::sin(angles[0]);
-    const double cb = std::cos(angles[1]), sb = std::sin(angles[1]);
-    const double cg = std::cos(angles[2]), sg = std::sin(angles[2]);
-    const auto seen = [&](const Vec3& r) -> Vec3 {
-        const double y = ca * r[1] - sa * r[2];
-        const double z = sa * r[1] + ca * r[2];
-        const double x = cb * r[0] + sb * z;
-        return {cg * x - sg * y, sg * x + cg * y, cb * z - sb * r[0]};
-    };
-    // The loop holds the gyro outputs at zero, so the platform turns against its drift in inertial
-    // space; relative to the Earth the Earth's own rate comes off.
-    const Vec3 rate = drift_sign_ * gyro_drift(seen(up_), a1) + extra - seen(earth_);
-    // The gimbals turn base against platform: rate = -(alpha' outer + beta' inner + gamma' azimuth
-    // axis). In platform axes the inner axis is level at (-sg, cg, 0), the outer axis leans by beta
-    // out of the level plane, (cg cb, sg cb, -sb), and the azimuth axis is z. So the part of the
-    // rate along (cg, sg, 0) is due to the outer gimbal alone, and what it leaves on z is made up
-    // by the azimuth gimbal.
-    const double alpha = -(cg * rate[0] + sg * rate[1]) / cb;
-    const double beta = sg * rate[0] - cg * rate[1];
-    const double gamma = alpha * sb - rate[2];
-    return kRadPerSecondOfDegPerHour * Vec3{alpha, beta, gamma};
+Vec3 PlatformModel::force(const Shake& shake, double gain) const noexcept {
+    const Vec3 still = seen(angles_, frame_.up + gain * shape_.acceleration(shake));
+    if (!shape_.platform_rocks()) return still;
+    return still - cross(shape_.platform_turn(shake), still);
 }
 
-void PlatformModel::advance(double step_s, std::span<const double> a1, const Vec3& extra) noexcept {
-    for (std::size_t i = 0; i + 2 < a1.size(); i += 2) {
-        const Vec3 k1 = angle_rates(angles_, a1[i], extra);
-        const Vec3 k2 = angle_rates(angles_ + (step_s / 2) * k1, a1[i + 1], extra);
-        const Vec3 k3 = angle_rates(angles_ + (step_s / 2) * k2, a1[i + 1], extra);
-        const Vec3 k4 = angle_rates(angles_ + step_s * k3, a1[i + 2], extra);
-        angles_ = angles_ + (step_s / 6) * (k1 + 2 * k2 + 2 * k3 + k4);
+Vec3 PlatformModel::rocking(const Shake& shake) const noexcept {
+    if (!shape_.platform_rocks() && !shape_.base_rocks()) return {};
+    // A base that turns one way is a platform that turns the other way, seen from the base.
+    return gimbal_turn(angles_,
+                       shape_.platform_turn(shake) - seen(angles_, shape_.base_turn(shake)));
+}
+
+Vec3 PlatformModel::gimbal_turn(const Vec3& angles, const Vec3& turn) const noexcept {
+    // The gimbals turn base against platform: turn = -(alpha outer + beta inner + gamma azimuth
+    // axis). Seen before the azimuth gimbal's turn the azimuth axis is z, the inner axis is y but
+    // for what is not square, and the outer axis leans by beta out of the level plane. So what is
+    // along x is due to the outer gimbal alone, what is left along y to the inner one, and the rest
+    // to the azimuth gimbal.
+    const double cb = std::cos(angles[1]), sb = std::sin(angles[1]);
+    const double cg = std::cos(angles[2]), sg = std::sin(angles[2]);
+    const auto& [first, second] = skew_;
+    const Vec3 outer{cb * first.cosine,
+                     second.cosine * first.sine + second.sine * sb * first.cosine,
+                     second.sine * first.sine - second.cosine * sb * first.cosine};
+    const double alpha = -(cg * turn[0] + sg * turn[1]) / outer[0];
+    const double beta = (sg * turn[0] - cg * turn[1] - alpha * outer[1]) / second.cosine;
+    const double gamma = -turn[2] - alpha * outer[2] - beta * second.sine;
+    return {alpha, beta, gamma};
+}
+
+Vec3 PlatformModel::rates_of(const Vec3& angles, const Vec3& rate) const noexcept {
+    // Relative to the Earth the Earth's own rate comes off.
+    return kRadPerSecondOfDegPerHour * gimbal_turn(angles, rate - seen(angles, earth_));
+}
+
+Vec3 PlatformModel::mean_rate(const Vec3& angles, double dt_s,
+                              std::span<const Shake> shakes) const noexcept {
+    // The loop holds the gyro outputs at zero, so the platform turns against its drift in inertial
+    // space: drift_sign. Simpson's rule over the powers of the force, of which the drift is made.
+    const Vec3 up = up_at(angles);
+    const Vec3 along_axis = seen(angles, shape_.acceleration({1, 0}));
+    const Vec3 ahead_axis = seen(angles, shape_.acceleration({0, 1}));
+    const double third = 1 / (3.0 * static_cast<double>(shakes.size() - 1));
+    Moments moments;
+    Vec3 cone{};
+    Vec3 before{};
+    for (std::size_t i = 0; i < shakes.size(); ++i) {
+        Vec3 f = up + shakes[i].in_phase * along_axis + shakes[i].quadrature * ahead_axis;
+        if (shape_.platform_rocks()) {
+            const Vec3 turn = shape_.platform_turn(shakes[i]);
+            f = f - cross(turn, f);
+            // A platform that turns to and fro about two axes at different phases creeps about the
+            // third: its gyros feel turn' - turn x turn' / 2, whose mean the loop holds.
+            if (i > 0) cone = cone + 0.5 * cross(before, turn);
+            before = turn;
+        }
+        const bool end = i == 0 || i + 1 == shakes.size();
+        moments.add(shakes.size() == 1 ? 1 : (end ? 1 : i % 2 == 1 ? 4 : 2) * third, f);
     }
+    return drift_sign_ * drift_under(moments) + (1 / (kRadPerSecondOfDegPerHour * dt_s)) * cone;
+}
+
+void PlatformModel::advance(double dt_s, std::span<const Shake> shakes,
+                            const Vec3& extra) noexcept {
+    const Vec3 middle = angles_ + (dt_s / 2) * rates_of(angles_, rate_ + extra);
+    rate_ = mean_rate(middle, dt_s, shakes);
+    angles_ = angles_ + dt_s * rates_of(middle, rate_ + extra);
 }
 
 }  // namespace vibrig::plant

@@ -18,6 +18,8 @@ void add_record_command(CLI::App& app, int& exit_code) {
         std::string positions = "table1";
         std::string truth;
         std::string write_truth;
+        std::string write_mean;
+        std::string order;
         std::string output;
         CampaignPlan plan;
         std::optional<std::uint64_t> seed;
@@ -50,6 +52,12 @@ void add_record_command(CLI::App& app, int& exit_code) {
     command->add_option("--truth", o->truth,
                         "truth file (JSON); default: Table 2 of Tang et al. 2009");
     command->add_option("--write-truth", o->write_truth, "write the truth used to this file");
+    command->add_option("--write-mean", o->write_mean,
+                        "write the truth with the coefficients' means over the recording, which an "
+                        "identification of a rig that drifts is to be judged by");
+    command->add_option("--order", o->order,
+                        "dwells in their order as POSITION.RUN,..., both from 1; default: run by "
+                        "run, each position once");
     command->add_option("--seed", o->seed, "of all noise; default: the truth file's, or 1")
         ->check(proto::whole());
     command->add_option("-o,--output", o->output, "CSV file to write, - for standard output")
@@ -62,6 +70,7 @@ void add_record_command(CLI::App& app, int& exit_code) {
         if (o->seed) truth.seed = *o->seed;
         if (!o->write_truth.empty()) write_truth(truth, o->write_truth);
         o->plan.positions_deg = read_positions(o->positions);
+        o->plan.order = parse_order(o->order);
         std::ofstream file;
         if (o->output != "-") {
             file.open(o->output, std::ios::binary);
@@ -69,14 +78,16 @@ void add_record_command(CLI::App& app, int& exit_code) {
         }
         std::ostream& out = o->output == "-" ? std::cout : file;
         const bool terminal = isatty(STDERR_FILENO) == 1;
-        const std::uint64_t samples =
-            record(truth, o->plan, out, [terminal](std::size_t done, std::size_t all) {
+        Truth mean = truth;
+        const std::uint64_t samples = record(
+            truth, o->plan, out, &mean.coefficients, [terminal](std::size_t done, std::size_t all) {
                 if (terminal)
                     std::fprintf(stderr, "\rdwell %zu of %zu%s", done, all,
                                  done == all ? "\n" : "");
             });
         out.flush();
         if (!out) throw PlantError(o->output + ": cannot be written");
+        if (!o->write_mean.empty()) write_truth(mean, o->write_mean);
         std::fprintf(stderr, "%llu samples, seed %llu\n", static_cast<unsigned long long>(samples),
                      static_cast<unsigned long long>(truth.seed));
         exit_code = 0;

@@ -1,6 +1,7 @@
 #include "tests/plant/recording.hpp"
 
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -132,34 +133,81 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
     std::size_t dwell = 0;
     const auto ticks = static_cast<std::int64_t>(
         std::llround(plan.dwell_s * 1e6 / static_cast<double>(rig.tick_us())));
-    for (std::size_t run = 0; run < plan.table_g.size(); ++run) {
-        for (std::size_t position = 0; position < plan.positions_deg.size(); ++position) {
-            prepare(rig, plan, plan.positions_deg[position], plan.table_g[run]);
-            for (std::int64_t i = 0; i < ticks; ++i) {
-                rig.advance();
-                sink({run + 1, position + 1, 1e-6 * static_cast<double>(rig.time_us()),
-                      rig.readings()});
-                ++samples;
-            }
-            if (progress) progress(++dwell, plan.table_g.size() * plan.positions_deg.size());
+    auto order = plan.order;
+    if (order.empty()) {
+        for (std::size_t run = 1; run <= plan.table_g.size(); ++run) {
+            for (std::size_t p = 1; p <= plan.positions_deg.size(); ++p) order.emplace_back(run, p);
         }
+    }
+    for (const auto& [run, position] : order) {
+        if (run < 1 || run > plan.table_g.size() || position < 1 ||
+            position > plan.positions_deg.size()) {
+            throw PlantError("order: found position " + std::to_string(position) + " in run " +
+                             std::to_string(run) + ", expected up to " +
+                             std::to_string(plan.positions_deg.size()) + " and " +
+                             std::to_string(plan.table_g.size()));
+        }
+        prepare(rig, plan, plan.positions_deg[position - 1], plan.table_g[run - 1]);
+        for (std::int64_t i = 0; i < ticks; ++i) {
+            rig.advance();
+            sink({run, position, 1e-6 * static_cast<double>(rig.time_us()), rig.readings(),
+                  rig.drift().coefficients()});
+            ++samples;
+        }
+        if (progress) progress(++dwell, order.size());
     }
     return samples;
 }
 
+std::vector<std::pair<std::size_t, std::size_t>> parse_order(const std::string& text) {
+    std::vector<std::pair<std::size_t, std::size_t>> order;
+    for (const std::string& field : split(text)) {
+        unsigned position = 0;
+        unsigned run = 0;
+        int used = 0;
+        if (std::sscanf(field.c_str(), "%4u.%4u%n", &position, &run, &used) != 2 ||
+            static_cast<std::size_t>(used) != field.size()) {
+            throw PlantError("order: found \"" + field +
+                             "\", expected POSITION.RUN, as in 9.1,11.2,5.1");
+        }
+        order.emplace_back(run, position);
+    }
+    return order;
+}
+
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
+                     std::array<GyroCoefficients, 3>* mean,
                      const std::function<void(std::size_t, std::size_t)>& progress) {
     out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
-    const auto write = [&out](const PlannedSample& s) {
-        const Readings& r = s.readings;
-        std::array<char, 200> row{};
-        const int length =
-            std::snprintf(row.data(), row.size(), "%.6f,%zu,%zu,%.7f,%.7f,%.7f,%.7f,%.7f,%.7f\n",
-                          s.time_s, s.run, s.position, r.encoder_deg[0], r.encoder_deg[1],
-                          r.encoder_deg[2], r.raw_g[0], r.raw_g[1], r.raw_g[2]);
-        out.write(row.data(), length);
+    std::array<GyroCoefficients, 3> sum{};
+    const auto write = [&](const PlannedSample& s) {
+        std::array<char, 400> row{};
+        char* at = row.data();
+        char* const end = row.data() + row.size();
+        const auto fixed = [&](double value, int digits, char mark) {
+            at = std::to_chars(at, end, value, std::chars_format::fixed, digits).ptr;
+            *at++ = mark;
+        };
+        fixed(s.time_s, 6, ',');
+        for (const std::size_t whole : {s.run, s.position}) {
+            at = std::to_chars(at, end, whole).ptr;
+            *at++ = ',';
+        }
+        for (const double angle : s.readings.encoder_deg) fixed(angle, 7, ',');
+        for (std::size_t i = 0; i < 3; ++i) fixed(s.readings.raw_g[i], 7, i < 2 ? ',' : '\n');
+        out.write(row.data(), at - row.data());
+        for (std::size_t g = 0; g < 3; ++g) {
+            for (std::size_t t = 0; t < kTerms; ++t) sum[g][t] += s.coefficients[g][t];
+        }
     };
-    return simulate(truth, plan, write, progress);
+    const std::uint64_t samples = simulate(truth, plan, write, progress);
+    if (mean != nullptr) {
+        for (std::size_t g = 0; g < 3; ++g) {
+            for (std::size_t t = 0; t < kTerms; ++t)
+                (*mean)[g][t] = sum[g][t] / static_cast<double>(samples);
+        }
+    }
+    return samples;
 }
 
 }  // namespace vibrig::plant

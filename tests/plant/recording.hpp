@@ -4,6 +4,7 @@
 #include <functional>
 #include <iosfwd>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/plant/sensors.hpp"
@@ -19,10 +20,17 @@ struct CampaignPlan {
     double dwell_s = 100;
     double ramp_s = 2;
     double settle_s = 3;  ///< after the ramp, not recorded
+    /// Dwells in their order as run and position, both from 1; empty: run by run, each position
+    /// once.
+    std::vector<std::pair<std::size_t, std::size_t>> order{};
 
     /// Table 1 of Tang et al. 2009.
     [[nodiscard]] static std::vector<Vec3> table1();
 };
+
+/// "9.1,11.2,...": position 9 in run 1, then position 11 in run 2; for CampaignPlan::order. Throws
+/// PlantError.
+[[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> parse_order(const std::string& text);
 
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg; "table1" is the built-in list. Throws
 /// PlantError naming the line.
@@ -33,6 +41,8 @@ struct PlannedSample {
     std::size_t run = 1, position = 1;  ///< from 1
     double time_s = 0;
     const Readings& readings;
+    /// In truth and at this moment, with all drift.
+    const std::array<GyroCoefficients, 3>& coefficients;
 };
 
 /// Simulates the plan, dwell by dwell, without any bus or file. Returns the number of samples.
@@ -42,8 +52,10 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
                        const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 /// Writes the recording as CSV (time_s, run, position, alpha_deg ... az_g). Returns the number of
-/// samples. `progress` hears of every finished dwell.
+/// samples. `progress` hears of every finished dwell. `mean` becomes the coefficients' mean over
+/// all samples.
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
+                     std::array<GyroCoefficients, 3>* mean = nullptr,
                      const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 }  // namespace vibrig::plant

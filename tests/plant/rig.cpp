@@ -1,7 +1,6 @@
 #include "tests/plant/rig.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -17,17 +16,19 @@ Rig::Rig(const Truth& truth)
     : truth_(truth),
       tick_us_(std::llround(1e6 / truth.sample_rate_hz)),
       tick_s_(1e-6 * static_cast<double>(tick_us_)),
-      steps_(static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
+      passing_s_(tick_s_ / (1 + truth.time_base)),
+      steps_(2 * static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
       gimbals_(truth.slew_deg_per_s),
       isolator_(truth.transmission, truth.frequency_hz, truth.damping,
-                tick_s_ / static_cast<double>(2 * steps_)),
+                passing_s_ / static_cast<double>(steps_)),
       shaker_(truth.limit_g, truth.limit_mm),
       sensors_(truth, truth.seed),
       increments_(truth, tick_us_),
+      drift_(truth),
       gyro_noise_(truth.seed, 0),
       slew_noise_(truth.seed, 7),
-      a1_(2 * steps_ + 1) {
+      shakes_(steps_ + 1) {
     shaker_.lie(truth.shaker_lies);
     read();
 }
@@ -65,60 +66,81 @@ void Rig::slew_to(const Vec3& encoder_deg, GimbalMode mode) {
     gimbals_.slew_to(encoder_deg + slew_error_deg_, mode);
 }
 
+void Rig::release() noexcept {
+    if (gimbals_.mode() != GimbalMode::free_drift) drift_.begin_dwell();
+    gimbals_.release();
+}
+
 void Rig::advance() {
     ++tick_;
+    drift_.advance(passing_s_);
+    if (!drift_.constant()) platform_.set_coefficients(drift_.coefficients());
     vibrate();
     const Vec3 before = platform_.angles();
     move();
     if (gimbals_.mode() == GimbalMode::calibrate) {
-        increments_.advance(time_us(), {before, platform_.angles()}, platform_, a1_);
+        increments_.advance(time_us(), {before, platform_.angles()}, platform_, shakes_);
     } else {
         increments_.stop();
     }
     read();
 }
 
+double Rig::table_g() const noexcept {
+    return shaker_.amplitude_g() * (1 + truth_.amplitude_drift_per_h * shaking_s_ / 3600);
+}
+
 void Rig::vibrate() {
-    const double begin = shaker_.amplitude_g();
+    const double begin = table_g();
     shaker_.advance(tick_s_);
-    const double end = shaker_.amplitude_g();
+    shaking_s_ = shaker_.at_rest() ? 0 : shaking_s_ + passing_s_;
+    const double end = table_g();
     if (shaker_.frequency_hz() != frequency_hz_) {
         frequency_hz_ = shaker_.frequency_hz();
-        isolator_.set_drive(frequency_hz_, truth_.second_harmonic);
+        isolator_.set_drive(frequency_hz_, {truth_.second_harmonic, truth_.third_harmonic,
+                                            truth_.fourth_harmonic, truth_.fifth_harmonic});
     }
+    if (truth_.frequency_drift_hz_per_h != 0)
+        isolator_.retune(frequency_hz_ + truth_.frequency_drift_hz_per_h * shaking_s_ / 3600);
     still_ = begin == 0 && end == 0 && isolator_.at_rest();
     if (still_) {
-        std::ranges::fill(a1_, 0.0);
+        std::ranges::fill(shakes_, Shake{});
         return;
     }
-    a1_[0] = isolator_.platform_g();
-    const double slope = (end - begin) / static_cast<double>(2 * steps_);
-    for (std::size_t i = 1; i < a1_.size(); ++i) {
+    shakes_[0] = isolator_.shake();
+    const double slope = (end - begin) / static_cast<double>(steps_);
+    for (std::size_t i = 1; i < shakes_.size(); ++i) {
         isolator_.advance(begin + slope * (static_cast<double>(i) - 0.5));
-        a1_[i] = isolator_.platform_g();
+        shakes_[i] = isolator_.shake();
     }
+}
+
+Shake Rig::shake_before(double seconds) const noexcept {
+    const double back = seconds / passing_s_ * static_cast<double>(steps_);
+    const std::size_t last = shakes_.size() - 1;
+    const std::size_t whole = std::min(static_cast<std::size_t>(back), last - 1);
+    const double part = back - static_cast<double>(whole);
+    const Shake& late = shakes_[last - whole];
+    const Shake& early = shakes_[last - whole - 1];
+    return {late.in_phase + part * (early.in_phase - late.in_phase),
+            late.quadrature + part * (early.quadrature - late.quadrature)};
 }
 
 void Rig::move() {
     // White rate noise: over a tick its integral is a random walk of N deg per root hour, 60 N
     // arcsec per root second.
     const double rate_sigma =
-        60 * gyro_noise_times_ * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(tick_s_);
+        60 * gyro_noise_times_ * truth_.gyro_random_walk_deg_per_rt_h / std::sqrt(passing_s_);
     const Vec3 noise{gyro_noise_.normal(), gyro_noise_.normal(), gyro_noise_.normal()};
     if (gimbals_.mode() == GimbalMode::free_drift) {
         Vec3 extra = rate_sigma * noise;
         for (std::size_t i = 0; i < 3; ++i) extra[i] += truth_.torquer_scale[i] * torque_[i];
-        if (still_) {
-            const std::array<double, 3> rest{};
-            platform_.advance(tick_s_, rest, extra);
-        } else {
-            platform_.advance(tick_s_ / static_cast<double>(steps_), a1_, extra);
-        }
+        platform_.advance(passing_s_, std::span(shakes_).first(still_ ? 1 : shakes_.size()), extra);
         return;
     }
     Vec3 encoder = encoder_deg();
     if (!gimbals_.slewing()) return;
-    if (gimbals_.advance(tick_s_, encoder)) isolator_.kick(truth_.slew_kick_g);
+    if (gimbals_.advance(passing_s_, encoder)) isolator_.kick(truth_.slew_kick_g);
     Vec3 angles{};
     for (std::size_t i = 0; i < 3; ++i) {
         angles[i] = truth_.encoder_sign[i] *
@@ -128,10 +150,14 @@ void Rig::move() {
 }
 
 void Rig::read() {
-    const double a1 = isolator_.platform_g();
-    const Vec3 force = (1 + a1) * platform_.up_in_platform();
-    readings_ = sensors_.read(encoder_deg(), force, isolator_.table_g(shaker_.amplitude_g()),
-                              tick_s_ * static_cast<double>(tick_));
+    const Shake now = isolator_.shake();
+    Vec3 encoder = encoder_deg();
+    const Vec3 rocking = platform_.rocking(now);
+    for (std::size_t i = 0; i < 3; ++i)
+        encoder[i] += truth_.encoder_sign[i] * rocking[i] * kDegPerRad;
+    const Shake felt = truth_.latency_s > 0 ? shake_before(truth_.latency_s) : now;
+    readings_ = sensors_.read(encoder, platform_.force(felt, truth_.vibration_gain),
+                              isolator_.table_g(table_g()), tick_s_ * static_cast<double>(tick_));
 }
 
 }  // namespace vibrig::plant

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "tests/plant/drift.hpp"
 #include "tests/plant/gimbals.hpp"
 #include "tests/plant/increments.hpp"
 #include "tests/plant/isolator.hpp"
@@ -19,7 +20,7 @@ class Rig {
     explicit Rig(const Truth& truth);
 
     void slew_to(const Vec3& encoder_deg, GimbalMode mode = GimbalMode::slew);
-    void release() noexcept { gimbals_.release(); }
+    void release() noexcept;
     void torque(const Vec3& deg_per_h) noexcept { torque_ = deg_per_h; }
     /// The random walk of the gyros from now on, times that of the truth.
     void gyro_noise_times(double factor) noexcept { gyro_noise_times_ = factor; }
@@ -46,24 +47,29 @@ class Rig {
 
     // what only a simulation can know
     [[nodiscard]] const PlatformModel& platform() const noexcept { return platform_; }
+    [[nodiscard]] const Drift& drift() const noexcept { return drift_; }
     [[nodiscard]] double platform_vibration_g() const noexcept { return isolator_.platform_g(); }
 
   private:
     void vibrate();
     void move();
     void read();
+    [[nodiscard]] double table_g() const noexcept;
+    [[nodiscard]] Shake shake_before(double seconds) const noexcept;
     [[nodiscard]] Vec3 encoder_deg() const noexcept;
 
     Truth truth_;
     std::int64_t tick_us_;
-    double tick_s_;
-    std::size_t steps_;  ///< Runge-Kutta steps per tick, of 1 ms or a little less
+    double tick_s_;      ///< by the rig's clock
+    double passing_s_;   ///< really, in a tick
+    std::size_t steps_;  ///< of the vibration per tick, even, 0.5 ms or a little less
     PlatformModel platform_;
     Gimbals gimbals_;
     Isolator isolator_;
     ShakerController shaker_;
     Sensors sensors_;
     Increments increments_;
+    Drift drift_;
     Random gyro_noise_;
     double gyro_noise_times_ = 1;
     Random slew_noise_;
@@ -71,8 +77,9 @@ class Rig {
     Vec3 commanded_deg_{};  ///< of the last slew, and its error
     Vec3 slew_error_deg_{};
     double frequency_hz_ = 0;  ///< the isolator is set to
-    std::vector<double> a1_;   ///< at every half step of the tick
-    bool still_ = true;        ///< no vibration in this tick
+    double shaking_s_ = 0;     ///< since the table was last at rest
+    std::vector<Shake> shakes_;
+    bool still_ = true;  ///< no vibration in this tick
     std::int64_t tick_ = 0;
     Readings readings_;
 };

@@ -1,6 +1,7 @@
 #include "tests/plant/sensors.hpp"
 
 #include <cmath>
+#include <numbers>
 
 namespace vibrig::plant {
 
@@ -18,12 +19,31 @@ Sensors::Sensors(const Truth& truth, std::uint64_t seed)
       accelerometer_noise_(seed, 2),
       table_noise_(seed, 3) {}
 
+double Sensors::resolver_error_deg(std::size_t axis, double angle_deg) const noexcept {
+    struct Harmonic {
+        double order;
+        const Vec3& arcsec;
+        const Vec3& phase_deg;
+    };
+    double error = 0;
+    for (const Harmonic& h :
+         {Harmonic{1, truth_.harmonic_1_arcsec, truth_.harmonic_1_phase_deg},
+          Harmonic{2, truth_.harmonic_2_arcsec, truth_.harmonic_2_phase_deg},
+          Harmonic{16, truth_.harmonic_16_arcsec, truth_.harmonic_16_phase_deg}}) {
+        if (h.arcsec[axis] == 0) continue;
+        error += h.arcsec[axis] *
+                 std::cos((h.order * angle_deg + h.phase_deg[axis]) * (std::numbers::pi / 180));
+    }
+    return error / 3600;
+}
+
 Readings Sensors::read(const Vec3& angles_deg, const Vec3& force_g, double table_g, double time_s) {
     Readings readings;
     const Vec3 raw = platform_to_raw_ * force_g + truth_.zero_g;
     for (std::size_t i = 0; i < 3; ++i) {
         const double noise_deg = truth_.resolver_arcsec / 3600 * resolver_noise_.normal();
-        readings.encoder_deg[i] = quantise_angle(angles_deg[i] + noise_deg, truth_.resolver_bits);
+        readings.encoder_deg[i] = quantise_angle(
+            angles_deg[i] + resolver_error_deg(i, angles_deg[i]) + noise_deg, truth_.resolver_bits);
         readings.raw_g[i] = raw[i] + truth_.accelerometer_g * accelerometer_noise_.normal();
     }
     readings.table_g = table_g + truth_.table_accelerometer_g * table_noise_.normal();

@@ -26,6 +26,9 @@ class Sensors {
   private:
     Truth truth_;
     Mat3 platform_to_raw_;
+    /// Error of a resolver at an angle, deg.
+    [[nodiscard]] double resolver_error_deg(std::size_t axis, double angle_deg) const noexcept;
+
     Random resolver_noise_;
     Random accelerometer_noise_;
     Random table_noise_;

@@ -8,6 +8,8 @@
 #include <set>
 #include <sstream>
 
+#include "tests/plant/truth_fields.hpp"
+
 namespace vibrig::plant {
 namespace {
 
@@ -15,55 +17,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
                                                      "OO", "SS", "IO", "IS", "OS"};
-
-// The one list of keys, walked by the reader and by the writer. T is Truth or const Truth.
-template <class T, class Field>
-void for_each_field(T& t, Field&& field) {
-    field("site", "latitude_deg", t.latitude_deg, -89.0, 89.0);
-    field("site", "azimuth_deg", t.azimuth_deg, -360.0, 360.0);
-    field("site", "gravity_mps2", t.gravity_mps2, 1.0, 30.0);
-    field("platform", "up", t.up, 0, 0);
-    field("platform", "gyro_x_axes", t.gyro_axes[0], 0, 0);
-    field("platform", "gyro_y_axes", t.gyro_axes[1], 0, 0);
-    field("platform", "gyro_z_axes", t.gyro_axes[2], 0, 0);
-    field("platform", "drift_sign", t.drift_sign, -1, 1);
-    field("platform", "encoder_sign", t.encoder_sign, -1, 1);
-    field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
-    field("platform", "slew_deg_per_s", t.slew_deg_per_s, 0.01, 360.0);
-    field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
-    field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);
-    field("platform", "increment_sign", t.increment_sign, -1, 1);
-    field("platform", "sample_rate_hz", t.sample_rate_hz, 1.0, 1000.0);
-    field("platform", "warm_up_s", t.warm_up_s, 0.0, 1e6);
-    field("platform", "start_temperature_c", t.start_temperature_c, -60.0, 150.0);
-    field("platform", "steady_temperature_c", t.steady_temperature_c, -60.0, 150.0);
-    field("platform", "thermal_time_constant_s", t.thermal_time_constant_s, 1e-3, 1e6);
-    field("accelerometer", "zero_g", t.zero_g, -1.0, 1.0);
-    field("accelerometer", "matrix", t.matrix, -2.0, 2.0);
-    field("noise", "resolver_arcsec", t.resolver_arcsec, 0.0, 1e5);
-    field("noise", "resolver_bits", t.resolver_bits, 8, 24);
-    field("noise", "gyro_random_walk_deg_per_rt_h", t.gyro_random_walk_deg_per_rt_h, 0.0, 10.0);
-    field("noise", "accelerometer_g", t.accelerometer_g, 0.0, 1.0);
-    field("noise", "table_accelerometer_g", t.table_accelerometer_g, 0.0, 1.0);
-    field("isolator", "transmission", t.transmission, 0.05, 2.0);
-    field("isolator", "frequency_hz", t.frequency_hz, 0.5, 200.0);
-    field("isolator", "damping", t.damping, 0.01, 0.95);
-    field("isolator", "slew_kick_g", t.slew_kick_g, 0.0, 1.0);
-    field("shaker", "second_harmonic", t.second_harmonic, 0.0, 0.5);
-    field("shaker", "limit_g", t.limit_g, 0.1, 100.0);
-    field("shaker", "limit_mm", t.limit_mm, 0.1, 1000.0);
-    field("shaker", "ack_without_stop", t.shaker_lies.ack_without_stop, 0, 0);
-    field("shaker", "timeout_ignored", t.shaker_lies.timeout_ignored, 0, 0);
-    field("shaker", "timeout_scaled", t.shaker_lies.timeout_scaled, 0.0, 1000.0);
-    field("shaker", "amplitude_scaled", t.shaker_lies.amplitude_scaled, 0.0, 1000.0);
-    field("shaker", "readback_echo", t.shaker_lies.readback_echo, 0, 0);
-    field("shaker", "stuck_contactor", t.shaker_lies.stuck_contactor, 0, 0);
-    field("shaker", "slow_ramp", t.shaker_lies.slow_ramp, 1.0, 1000.0);
-    field("shaker", "unit_rms", t.shaker_lies.unit_rms, 0, 0);
-    field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
-    field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
-    field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
-}
 
 std::string text_of(const Json& json) {
     std::string text = json.dump();
@@ -106,13 +59,14 @@ struct Reader {
         if (!json.is_boolean()) fail(key, "found " + text_of(json) + ", expected true or false");
         out = json.get<bool>();
     }
-    void value(const std::string& key, const Json& json, std::optional<std::uint16_t>& out, int low,
-               int high) const {
+    template <class T, class Low>
+    void value(const std::string& key, const Json& json, std::optional<T>& out, Low low,
+               Low high) const {
         out.reset();
         if (json.is_null()) return;
-        int whole = 0;
-        value(key, json, whole, low, high);
-        out = static_cast<std::uint16_t>(whole);
+        std::conditional_t<std::is_floating_point_v<T>, double, int> number = 0;
+        value(key, json, number, low, high);
+        out = static_cast<T>(number);
     }
     void value(const std::string& key, const Json& json, Axis& out, int, int) const {
         const std::string text = json.is_string() ? json.get<std::string>() : std::string();
@@ -122,13 +76,14 @@ struct Reader {
         }
         out = {text[1] - 'x', text[0] == '+' ? 1 : -1};
     }
-    template <class T, class Low>
-    void value(const std::string& key, const Json& json, std::array<T, 3>& out, Low low,
+    template <class T, std::size_t N, class Low>
+    void value(const std::string& key, const Json& json, std::array<T, N>& out, Low low,
                Low high) const {
-        if (!json.is_array() || json.size() != 3) {
-            fail(key, "found " + text_of(json) + ", expected a list of three");
+        if (!json.is_array() || json.size() != N) {
+            fail(key,
+                 "found " + text_of(json) + ", expected a list of " + (N == 2 ? "two" : "three"));
         }
-        for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t i = 0; i < N; ++i) {
             value(key + "[" + std::to_string(i) + "]", json[i], out[i], low, high);
         }
     }
@@ -149,12 +104,15 @@ struct Writer {
     static Json json(double v) { return v; }
     static Json json(int v) { return v; }
     static Json json(bool v) { return v; }
-    static Json json(const std::optional<std::uint16_t>& v) { return v ? Json(*v) : Json(nullptr); }
+    template <class T>
+    static Json json(const std::optional<T>& v) {
+        return v ? Json(*v) : Json(nullptr);
+    }
     static Json json(const Axis& axis) {
         return std::string(axis.sign > 0 ? "+" : "-") + static_cast<char>('x' + axis.index);
     }
-    template <class T>
-    static Json json(const std::array<T, 3>& list) {
+    template <class T, std::size_t N>
+    static Json json(const std::array<T, N>& list) {
         Json out = Json::array();
         for (const T& entry : list) out.push_back(json(entry));
         return out;
@@ -214,6 +172,11 @@ void check(const Truth& truth, const std::string& file) {
                              "_axes: an axis is used twice, expected each of x, y, z once");
         }
     }
+    if (truth.latency_s * truth.sample_rate_hz > 1) {
+        throw PlantError(file + ": accelerometer.latency_s: found " +
+                         std::to_string(truth.latency_s) +
+                         ", expected at most the period of platform.sample_rate_hz");
+    }
     if (std::abs(determinant(truth.matrix)) < 0.1) {
         throw PlantError(file +
                          ": accelerometer.matrix: singular, expected three independent axes");
@@ -267,8 +230,7 @@ Truth parse_truth(std::string_view text, const std::string& file) {
         if (known == reader.known.end()) {
             throw PlantError(file + ": " + section +
                              ": unknown key, expected coefficients, site, platform, accelerometer, "
-                             "noise, isolator, "
-                             "shaker or seed");
+                             "resolver, drift, noise, isolator, shaker or seed");
         }
         for (const auto& [key, value] : group.items()) {
             if (!known->second.contains(key)) {

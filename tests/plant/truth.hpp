@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -41,6 +42,7 @@ struct Truth {
     double latitude_deg = 45.75;
     double azimuth_deg = 0;  ///< of the rig's north axis, from true north towards east
     double gravity_mps2 = 9.80665;
+    double time_base = 0;  ///< the rig's clock gains by this share: time stamps are too far apart
 
     // platform
     Axis up{1, 1};  ///< platform axis that points up at zero gimbal angles
@@ -57,7 +59,13 @@ struct Truth {
     Vec3 torquer_scale{1, 1, 1};
     std::array<int, 3> increment_sign{1, 1, 1};  ///< of the gyros' angle increments
     double sample_rate_hz = 40;                  ///< of all instruments, in whole microseconds
-    double warm_up_s = 30;                       ///< until the platform reports ready
+    /// Between outer and inner, inner and azimuth axis at zero angles: a turn about the azimuth
+    /// axis before the inner one, one about the outer axis after it.
+    std::array<double, 2> non_orthogonality_arcsec{};
+    /// The loop lets the platform turn with the vibration, per g of it at the platform: about
+    /// platform x, y, z, in phase and a quarter period ahead. Gyros and accelerometers feel it.
+    Vec3 platform_rocking_arcsec_g{}, platform_rocking_quadrature_arcsec_g{};
+    double warm_up_s = 30;  ///< until the platform reports ready
     double start_temperature_c = 25;
     double steady_temperature_c = 45;
     double thermal_time_constant_s = 20;
@@ -65,6 +73,29 @@ struct Truth {
     // accelerometer: platform force = matrix * (raw - zero)
     Vec3 zero_g{0, 0, 0};
     Mat3 matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    double vibration_gain = 1;  ///< for what vibrates, over that for gravity
+    double latency_s = 0;       ///< the force shown is this much older; a sample's period at most
+
+    // resolver: amplitudes and phases of errors per turn, outer, inner, azimuth:
+    // error = amplitude cos(order * encoder angle + phase)
+    Vec3 harmonic_1_arcsec{}, harmonic_1_phase_deg{};
+    Vec3 harmonic_2_arcsec{}, harmonic_2_phase_deg{};
+    Vec3 harmonic_16_arcsec{}, harmonic_16_phase_deg{};
+
+    // drift: what becomes of the coefficients; gyros x, y, z. Time runs from switching on; a dwell
+    // begins when the platform is let go
+    Vec3 bias_step_deg_h{};
+    Mat3 unbalance_step_deg_h_g{};          ///< rows gyros, columns D_I, D_O, D_S
+    std::optional<double> step_at_s{};      ///< none: never
+    std::optional<int> step_after_dwell{};  ///< from the next one on
+    Vec3 bias_ramp_deg_h_h{};               ///< from zero at switching on
+    Mat3 unbalance_ramp_deg_h_g_h{};
+    Vec3 bias_ramp_in_dwell_deg_h{};  ///< per 100 s, from zero at the beginning of each dwell
+    double bias_walk_deg_h_rt_h = 0;  ///< each gyro by itself, from zero at switching on
+    double bias_scatter_deg_h = 0;    ///< 1 sigma, drawn for each dwell
+    double bias_markov_deg_h = 0;     ///< 1 sigma, first order
+    double bias_markov_s = 300;       ///< its time constant
+    Mat3 cubic_deg_h_g3{};            ///< rows gyros, columns I^3, O^3, S^3
 
     // noise, 1 sigma per sample
     double resolver_arcsec = 5;
@@ -78,11 +109,22 @@ struct Truth {
     double frequency_hz = 15;
     double damping = 0.2;       ///< fraction of critical
     double slew_kick_g = 0.02;  ///< the platform rocks on its mounts by this much when a slew ends
+    /// Horizontal vibration of the platform over the vertical one: north, east; with sign.
+    std::array<double, 2> cross_axis{}, cross_axis_quadrature{};  ///< in phase; a quarter ahead
+    /// What carries the outer gimbal turns with the vibration, per g at the platform, about north,
+    /// up, east. Only the resolvers see it.
+    Vec3 base_rocking_arcsec_g{}, base_rocking_quadrature_arcsec_g{};
 
     // shaker
     double second_harmonic = 0;  ///< of the table's acceleration, relative to the fundamental
-    double limit_g = 20;         ///< largest set-point accepted
-    double limit_mm = 25;        ///< peak displacement that trips the limit switch
+    double third_harmonic = 0;
+    double fourth_harmonic = 0;
+    double fifth_harmonic = 0;
+    std::array<double, 2> tilt_deg{};     ///< of the vibration from the vertical: to north, east
+    double amplitude_drift_per_h = 0;     ///< relative, since the table was last started
+    double frequency_drift_hz_per_h = 0;  ///< likewise
+    double limit_g = 20;                  ///< largest set-point accepted
+    double limit_mm = 25;                 ///< peak displacement that trips the limit switch
     ShakerLies shaker_lies;
 
     std::uint64_t seed = 1;

@@ -34,7 +34,7 @@ std::complex<double> measured(Isolator& isolator, double frequency, double step,
 TEST(Isolator, TransmitsTwoThirdsWithTheCorrectedPhase) {
     // GIVEN pads with zeta 0.2 that transmit 2/3 at 15 Hz
     Isolator isolator(2.0 / 3, 15, 0.2, 0.5e-3);
-    isolator.set_drive(15, 0);
+    isolator.set_drive(15, {});
     // WHEN the table vibrates at 15 Hz
     const std::complex<double> t = measured(isolator, 15, 0.5e-3);
     // THEN amplitude and phase are those of eq. 3 and the corrected eq. 4 (mass 1, k2 = 0)
@@ -56,8 +56,8 @@ TEST(Isolator, StepLengthDoesNotMatterForASteadySine) {
     // GIVEN two step lengths WHEN both run to the same time, transient included
     Isolator coarse(0.65, 15, 0.1, 2e-3);
     Isolator fine(0.65, 15, 0.1, 0.25e-3);
-    coarse.set_drive(15, 0.05);
-    fine.set_drive(15, 0.05);
+    coarse.set_drive(15, {0.05});
+    fine.set_drive(15, {0.05});
     for (int i = 1; i <= 200; ++i) {
         coarse.advance(9);
         for (int j = 0; j < 8; ++j) fine.advance(9);
@@ -68,7 +68,7 @@ TEST(Isolator, StepLengthDoesNotMatterForASteadySine) {
 
 TEST(Isolator, SecondHarmonicPassesWithItsOwnTransmission) {
     Isolator isolator(2.0 / 3, 15, 0.2, 0.5e-3);
-    isolator.set_drive(15, 0.05);
+    isolator.set_drive(15, {0.05});
     const std::complex<double> t = measured(isolator, 15, 0.5e-3, 2);
     EXPECT_NEAR(std::abs(t - isolator.transfer(30)), 0, 1e-9);
     EXPECT_LT(std::abs(t), 0.4);

@@ -102,12 +102,13 @@ TEST(PlatformModel, ExplicitVibrationStaysWithinTheErrorOfTheAveragedModel) {
     PlatformModel explicit_model{Truth{}};
     const Vec3 start{30 * kDeg, 10 * kDeg, -20 * kDeg};
     explicit_model.set_angles(start);
-    std::vector<double> a1(2 * 1000 + 1);
-    for (int second = 0; second < 100; ++second) {
-        for (std::size_t i = 0; i < a1.size(); ++i) {
-            a1[i] = 6 * std::sin(2 * std::numbers::pi * 15 * 0.5e-3 * static_cast<double>(i));
+    std::vector<Shake> shakes(51);
+    for (int tick = 0; tick < 4000; ++tick) {
+        for (std::size_t i = 0; i < shakes.size(); ++i) {
+            const double time = 0.025 * tick + 0.5e-3 * static_cast<double>(i);
+            shakes[i].in_phase = 6 * std::sin(2 * std::numbers::pi * 15 * time);
         }
-        explicit_model.advance(1e-3, a1, {});
+        explicit_model.advance(0.025, shakes, {});
     }
     // WHEN the mean rate is integrated over the same time
     Vec3 averaged = start;

@@ -29,6 +29,9 @@ TEST(Truth, SurvivesWritingAndReading) {
     truth.matrix[0][1] = 2.4e-4;
     truth.seed = 0xffffffffffffffffULL;
     truth.shaker_lies.stuck_contactor = true;
+    truth.step_at_s = 1e3;
+    truth.cross_axis = {0.05, -0.1};
+    truth.cubic_deg_h_g3[2] = {1e-3, 2e-3, 3e-3};
     truth.shaker_lies.timeout_register = 0;
     const std::string json = to_json(truth);
     EXPECT_EQ(to_json(parse_truth(json, "truth.json")), json);
@@ -76,6 +79,11 @@ TEST(Truth, NamesTheKeyOfBadInput) {
     expect(replaced(good, "\"drift_sign\": -1", "\"drift_sign\": 0"), "expected -1 or 1");
     expect(replaced(good, "\"transmission\":", "\"transmission\": \"a lot\", \"x\":"),
            "isolator.transmission");
+    expect(replaced(good, "\"step_at_s\": null", "\"step_at_s\": \"soon\""),
+           "drift.step_at_s: found \"soon\", expected a number from 0");
+    expect(replaced(good, "\"step_after_dwell\": null", "\"step_after_dwell\": 1.5"),
+           "drift.step_after_dwell: found 1.5, expected a whole number");
+    expect(replaced(good, "\"cross_axis\": [", "\"cross_axis\": [0, "), "expected a list of two");
     expect(replaced(good, "\"dead_table\": false", "\"dead_table\": 1"),
            "shaker.dead_table: found 1, expected true or false");
     expect(replaced(good, "\"timeout_register\": null", "\"timeout_register\": -1"),

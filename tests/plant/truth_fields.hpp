@@ -1,0 +1,92 @@
+#pragma once
+
+#include "tests/plant/truth.hpp"
+
+namespace vibrig::plant {
+
+// The one list of keys, walked by the reader and by the writer. T is Truth or const Truth.
+template <class T, class Field>
+void for_each_field(T& t, Field&& field) {
+    field("site", "latitude_deg", t.latitude_deg, -89.0, 89.0);
+    field("site", "azimuth_deg", t.azimuth_deg, -360.0, 360.0);
+    field("site", "gravity_mps2", t.gravity_mps2, 1.0, 30.0);
+    field("site", "time_base", t.time_base, -0.1, 0.1);
+    field("platform", "up", t.up, 0, 0);
+    field("platform", "gyro_x_axes", t.gyro_axes[0], 0, 0);
+    field("platform", "gyro_y_axes", t.gyro_axes[1], 0, 0);
+    field("platform", "gyro_z_axes", t.gyro_axes[2], 0, 0);
+    field("platform", "drift_sign", t.drift_sign, -1, 1);
+    field("platform", "encoder_sign", t.encoder_sign, -1, 1);
+    field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
+    field("platform", "slew_deg_per_s", t.slew_deg_per_s, 0.01, 360.0);
+    field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
+    field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);
+    field("platform", "increment_sign", t.increment_sign, -1, 1);
+    field("platform", "sample_rate_hz", t.sample_rate_hz, 1.0, 1000.0);
+    field("platform", "non_orthogonality_arcsec", t.non_orthogonality_arcsec, -36e3, 36e3);
+    field("platform", "rocking_arcsec_g", t.platform_rocking_arcsec_g, -1e3, 1e3);
+    field("platform", "rocking_quadrature_arcsec_g", t.platform_rocking_quadrature_arcsec_g, -1e3,
+          1e3);
+    field("platform", "warm_up_s", t.warm_up_s, 0.0, 1e6);
+    field("platform", "start_temperature_c", t.start_temperature_c, -60.0, 150.0);
+    field("platform", "steady_temperature_c", t.steady_temperature_c, -60.0, 150.0);
+    field("platform", "thermal_time_constant_s", t.thermal_time_constant_s, 1e-3, 1e6);
+    field("accelerometer", "zero_g", t.zero_g, -1.0, 1.0);
+    field("accelerometer", "matrix", t.matrix, -2.0, 2.0);
+    field("accelerometer", "vibration_gain", t.vibration_gain, 0.0, 10.0);
+    field("accelerometer", "latency_s", t.latency_s, 0.0, 0.025);
+    field("resolver", "harmonic_1_arcsec", t.harmonic_1_arcsec, -36e3, 36e3);
+    field("resolver", "harmonic_1_phase_deg", t.harmonic_1_phase_deg, -360.0, 360.0);
+    field("resolver", "harmonic_2_arcsec", t.harmonic_2_arcsec, -36e3, 36e3);
+    field("resolver", "harmonic_2_phase_deg", t.harmonic_2_phase_deg, -360.0, 360.0);
+    field("resolver", "harmonic_16_arcsec", t.harmonic_16_arcsec, -36e3, 36e3);
+    field("resolver", "harmonic_16_phase_deg", t.harmonic_16_phase_deg, -360.0, 360.0);
+    field("drift", "bias_step_deg_h", t.bias_step_deg_h, -1e3, 1e3);
+    field("drift", "unbalance_step_deg_h_g", t.unbalance_step_deg_h_g, -1e3, 1e3);
+    field("drift", "step_at_s", t.step_at_s, 0.0, 1e9);
+    field("drift", "step_after_dwell", t.step_after_dwell, 0, 1'000'000);
+    field("drift", "bias_ramp_deg_h_h", t.bias_ramp_deg_h_h, -1e3, 1e3);
+    field("drift", "unbalance_ramp_deg_h_g_h", t.unbalance_ramp_deg_h_g_h, -1e3, 1e3);
+    field("drift", "bias_ramp_in_dwell_deg_h", t.bias_ramp_in_dwell_deg_h, -1e3, 1e3);
+    field("drift", "bias_walk_deg_h_rt_h", t.bias_walk_deg_h_rt_h, 0.0, 1e3);
+    field("drift", "bias_scatter_deg_h", t.bias_scatter_deg_h, 0.0, 1e3);
+    field("drift", "bias_markov_deg_h", t.bias_markov_deg_h, 0.0, 1e3);
+    field("drift", "bias_markov_s", t.bias_markov_s, 1e-3, 1e9);
+    field("drift", "cubic_deg_h_g3", t.cubic_deg_h_g3, -1e3, 1e3);
+    field("noise", "resolver_arcsec", t.resolver_arcsec, 0.0, 1e5);
+    field("noise", "resolver_bits", t.resolver_bits, 8, 24);
+    field("noise", "gyro_random_walk_deg_per_rt_h", t.gyro_random_walk_deg_per_rt_h, 0.0, 10.0);
+    field("noise", "accelerometer_g", t.accelerometer_g, 0.0, 1.0);
+    field("noise", "table_accelerometer_g", t.table_accelerometer_g, 0.0, 1.0);
+    field("isolator", "transmission", t.transmission, 0.05, 2.0);
+    field("isolator", "frequency_hz", t.frequency_hz, 0.5, 200.0);
+    field("isolator", "damping", t.damping, 0.01, 0.95);
+    field("isolator", "slew_kick_g", t.slew_kick_g, 0.0, 1.0);
+    field("isolator", "cross_axis", t.cross_axis, -1.0, 1.0);
+    field("isolator", "cross_axis_quadrature", t.cross_axis_quadrature, -1.0, 1.0);
+    field("isolator", "base_rocking_arcsec_g", t.base_rocking_arcsec_g, -1e3, 1e3);
+    field("isolator", "base_rocking_quadrature_arcsec_g", t.base_rocking_quadrature_arcsec_g, -1e3,
+          1e3);
+    field("shaker", "second_harmonic", t.second_harmonic, 0.0, 0.5);
+    field("shaker", "third_harmonic", t.third_harmonic, 0.0, 0.5);
+    field("shaker", "fourth_harmonic", t.fourth_harmonic, 0.0, 0.5);
+    field("shaker", "fifth_harmonic", t.fifth_harmonic, 0.0, 0.5);
+    field("shaker", "tilt_deg", t.tilt_deg, -45.0, 45.0);
+    field("shaker", "amplitude_drift_per_h", t.amplitude_drift_per_h, -100.0, 100.0);
+    field("shaker", "frequency_drift_hz_per_h", t.frequency_drift_hz_per_h, -1e3, 1e3);
+    field("shaker", "limit_g", t.limit_g, 0.1, 100.0);
+    field("shaker", "limit_mm", t.limit_mm, 0.1, 1000.0);
+    field("shaker", "ack_without_stop", t.shaker_lies.ack_without_stop, 0, 0);
+    field("shaker", "timeout_ignored", t.shaker_lies.timeout_ignored, 0, 0);
+    field("shaker", "timeout_scaled", t.shaker_lies.timeout_scaled, 0.0, 1000.0);
+    field("shaker", "amplitude_scaled", t.shaker_lies.amplitude_scaled, 0.0, 1000.0);
+    field("shaker", "readback_echo", t.shaker_lies.readback_echo, 0, 0);
+    field("shaker", "stuck_contactor", t.shaker_lies.stuck_contactor, 0, 0);
+    field("shaker", "slow_ramp", t.shaker_lies.slow_ramp, 1.0, 1000.0);
+    field("shaker", "unit_rms", t.shaker_lies.unit_rms, 0, 0);
+    field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
+    field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
+    field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
+}
+
+}  // namespace vibrig::plant
