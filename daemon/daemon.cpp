@@ -179,7 +179,9 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                if (journal_) journal_->loop_checked(by, out_of_band);
            },
            [this](const rt::Ramp& ramp) { interlock_.ramp(ramp); },
-           [this](double measured) { interlock_.transmission(measured); }}),
+           [this](double measured) { interlock_.transmission(measured); },
+           [this](Time now) { return rest_.rest(now); },
+           [this](bool disobeyed) { interlock_.stop_disobeyed(disobeyed); }}),
       publisher_(
           configuration_.mqtt.host.empty()
               ? nullptr
@@ -288,7 +290,10 @@ bool Daemon::wait_for_end(double wall_seconds) {
 }
 
 double Daemon::longest_end_s() const {
-    return configuration_.campaign.ramp_s + configuration_.campaign.stop_timeout_s +
+    const auto& campaign = configuration_.campaign;
+    // The ramp down and its grace, then the stop and its verdict.
+    return campaign.ramp_s + 2 * campaign.stop.deadline_s +
+           campaign.stop.pads.from_s(campaign.max_acceleration_g) +
            3 * drivers::to_seconds(configuration_.shaker.watchdog_period);
 }
 
@@ -338,7 +343,7 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
 
 bool Daemon::may_feed() const noexcept {
     const auto reading = shaker_->reading();
-    if (reading.running && !excitation_.load()) return false;
+    if (campaign_.stopping() || (reading.running && !excitation_.load())) return false;
     const Time now = clock_.now();
     const Time oldest = std::min(
         {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
@@ -403,7 +408,7 @@ void Daemon::take_done_dwells() {
 
 void Daemon::control_loop() {
     rt::Tripped handled;
-    bool stop_was_pending = false;
+    bool done = false;
     while (!give_up_.load()) {
         const Time now = clock_.now();
         control_beat_.store(now);
@@ -432,20 +437,18 @@ void Daemon::control_loop() {
         take_done_dwells();
         const Time next = campaign_.step(now);
         take_done_dwells();
-        const bool stop_pending = shaker_->stop_pending();
-        if (stop_was_pending && !stop_pending) log(Severity::info, "shaker", "stop confirmed");
-        stop_was_pending = stop_pending;
         check_balance(now);
         {
             const std::lock_guard lock(mutex_);
             campaign_.fill(campaign_status_, now);
             campaign_status_.noise = noise_monitor_.status();
-            if (campaign_.done()) break;
+            done = campaign_.done(now);
+            if (done) break;
         }
         control_waiter_->wait_until(std::min(next, now + drivers::kSecond / 2));
     }
     const std::lock_guard lock(mutex_);
-    ended_ = campaign_.done();
+    ended_ = done;
     ended_changed_.notify_all();
     for (auto& waiting : commands_) waiting.reply.set_value({false, "the daemon is shutting down"});
     commands_.clear();
@@ -535,7 +538,7 @@ StatusData Daemon::status() const {
     status.shaker = shaker_->reading();
     status.shaker_link = shaker_->state();
     status.shaker_counters = shaker_->counters();
-    status.stop_pending = shaker_->stop_pending();
+    status.stop_pending = campaign_.stopping();
     status.can = port_->state();
     status.can_counters = port_->counters();
     status.assembler = acquired.assembler;

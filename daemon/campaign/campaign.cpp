@@ -52,7 +52,9 @@ rt::Guard guard_in(State state) {
 }  // namespace
 
 Campaign::Campaign(const Settings& settings, Ports ports)
-    : settings_(settings), ports_(std::move(ports)) {
+    : settings_(settings),
+      ports_(std::move(ports)),
+      stop_(ports_.shaker, ports_.rest, settings_.stop) {
     plan_stops();
     make_stages();
 }
@@ -63,18 +65,21 @@ bool Campaign::active() const {
            state_ == State::zeroing || state_ == State::levelling || state_ == State::paused;
 }
 
-bool Campaign::done() const {
-    return shutting_down_ && !active() && !(may_move_ && ports_.shaker.stop_pending());
-}
+bool Campaign::done(Time now) const { return shutting_down_ && !active() && !stop_.unsettled(now); }
 
-std::string Campaign::not_fit_to_excite() const {
+std::string Campaign::not_fit_to_excite(Time now) const {
     const auto reading = ports_.shaker.reading();
     if (ports_.shaker.stop_pending()) return "a stop of the shaker is pending";
+    if (stop_.stopping()) {
+        const auto why = stop_.what_moves(now);
+        return "stopping: rest is not measured yet" + (why.empty() ? why : ": " + why);
+    }
     if (!reading.valid) return "no valid read-back from the shaker";
     if (reading.emergency_stop_open) return "the emergency-stop chain is open";
     if (reading.fault != 0 || reading.state == drivers::kShakerFault)
         return fmt::format("shaker fault {:#06x}", reading.fault);
     if (!reading.at_rest()) return "the shaker is not at rest";
+    if (stop_.rest(now).moving()) return "not at rest: " + stop_.what_moves(now);
     return {};
 }
 
@@ -108,7 +113,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (state_ == State::tripped)
                 return refuse("tripped (" + reason_ + "): acknowledge it first");
             if (const auto why = loop_->refusal(); !why.empty()) return refuse(why);
-            if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
+            if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             armed_under_ = ports_.shaker.stops();
             reason_.clear();
@@ -116,7 +121,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             return accept(fmt::format("armed up to {:g} g at the table", highest_level()));
         case Kind::start:
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
-            if (const auto why = not_fit_to_excite(); !why.empty()) return refuse(why);
+            if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
             if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
             offer_.clear();
             offered_stops_.clear();
@@ -133,9 +138,11 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             pause_asked_ = false;
             return accept("resumed");
         case Kind::abort:
-            ports_.shaker.stop_now();
-            if (active() || state_ == State::armed || state_ == State::checking)
+            if (active() || state_ == State::armed || state_ == State::checking) {
                 abort("aborted by " + request.by, now);
+            } else {
+                order_stop("stopped by " + request.by);
+            }
             return accept("stop sent");
         case Kind::acknowledge: {
             // One acknowledgement is for both: the controller latches its faults, too, and forgets
@@ -143,6 +150,9 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             const auto shaker = ports_.shaker.reading();
             const bool latched = shaker.valid && shaker.fault != 0 && !active();
             std::string what;
+            if (stop_.disobeyed() && stop_.stopping())
+                return refuse("a stop was not obeyed, not at rest yet: " + stop_.what_moves(now) +
+                              ": press the emergency stop");
             if (latched) {
                 if (shaker.emergency_stop_open)
                     return refuse("the emergency-stop chain is open: close it first");
@@ -155,7 +165,11 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             } else if (!latched) {
                 return refuse("nothing to acknowledge");
             }
-            if (latched) stop_shaker();
+            stop_.acknowledge();
+            if (latched) {
+                stopped_by_ = "acknowledged by " + request.by;
+                stop_shaker();
+            }
             return accept("acknowledged: " + what);
         }
         case Kind::selftest:
@@ -192,11 +206,7 @@ Time Campaign::step(Time now) {
 }
 
 Time Campaign::step_once(Time now) {
-    if (const auto reading = ports_.shaker.reading();
-        guard_in(state_) != rt::Guard::excitation && reading.time > entered_ && reading.at_rest() &&
-        !ports_.shaker.stop_pending()) {
-        may_move_ = false;
-    }
+    watch_stop(now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
         !ports_.shaker.reading().valid) {
@@ -310,7 +320,6 @@ Time Campaign::ramp(Time now) {
         return now;
     }
     if (!requested_) {
-        may_move_ = true;
         requested_ = ask_level(table_g(), now);
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
@@ -415,6 +424,7 @@ double Campaign::highest_level() const {
 }
 
 bool Campaign::ask_level(double table_g, Time now) {
+    stop_.excited(table_g);
     if (!ports_.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s}, armed_under_))
         return false;
     tell_ramp(table_g, now);
@@ -429,27 +439,55 @@ void Campaign::tell_ramp(double table_g, Time now) {
                     state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
 }
 
-/// Ramps down; true once rest is read back.
+void Campaign::order_stop(const std::string& by) {
+    stopped_by_ = by;
+    ports_.shaker.stop_now();
+}
+
+void Campaign::watch_stop(Time now) {
+    switch (stop_.update(now)) {
+        case StopMonitor::News::none:
+            return;
+        case StopMonitor::News::confirmed:
+            if (ports_.disobeyed) ports_.disobeyed(false);
+            return ports_.event(Severity::info,
+                                fmt::format("stop confirmed: rest measured {:.2f} s after the "
+                                            "order ({})",
+                                            stop_.took_s(), stopped_by_));
+        case StopMonitor::News::disobeyed: {
+            const auto what =
+                fmt::format("stop not obeyed within {:.1f} s ({}): {}: press the emergency stop",
+                            stop_.took_s(), stopped_by_, stop_.what_moves(now));
+            ports_.event(Severity::trip, what);
+            if (state_ == State::tripped) reason_ += "; " + what;
+            if (ports_.disobeyed) ports_.disobeyed(true);
+        }
+    }
+}
+
+/// Ramps down; true once rest is measured.
 bool Campaign::come_to_rest(Time now) {
     const auto reading = ports_.shaker.reading();
-    if (!ports_.shaker.busy() && !ports_.shaker.stop_pending() && reading.at_rest() &&
-        reading.time > entered_) {
-        may_move_ = false;
+    if (!ports_.shaker.busy() && !stop_.stopping() && reading.at_rest() &&
+        reading.time > entered_ && stop_.rest(now).measured_since(entered_)) {
+        stop_.at_rest();
         return true;
     }
-    if (!requested_ && !ports_.shaker.stop_pending()) {
+    if (!requested_ && !stop_.stopping()) {
         requested_ = ask_level(0, now);
         if (!requested_) {  // no ramp to be had: the hard way
             stop_sent_ = true;
             tell_ramp(0, now);
+            stopped_by_ = "no ramp down was to be had";
             stop_shaker();
         }
     }
-    if (!stop_sent_ && now - entered_ > from_seconds(settings_.ramp_s + settings_.stop_timeout_s)) {
+    if (!stop_sent_ &&
+        now - entered_ > from_seconds(settings_.ramp_s + settings_.stop.deadline_s)) {
         stop_sent_ = true;
         if (shutting_down_) {
             ports_.event(Severity::alarm, "shaker did not come to rest in time: stop ordered");
-            ports_.shaker.stop_now();
+            order_stop("the ramp down took too long");
         } else {
             abort("the shaker did not come to rest in time", now);
         }
@@ -484,7 +522,7 @@ void Campaign::leave_dwell() {
 }
 
 void Campaign::abort(const std::string& why, Time now) {
-    ports_.shaker.stop_now();
+    order_stop(why);
     end(State::aborted, why, now);
 }
 
@@ -524,7 +562,7 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
 
 void Campaign::on_trip(const std::string& cause, Time now) {
     // Once more: whoever tripped has stopped it already, and a second stop costs one write.
-    ports_.shaker.stop_now();
+    order_stop("interlock: " + cause);
     end(State::tripped, cause, now);
 }
 
@@ -536,7 +574,7 @@ void Campaign::shut_down(Time now) {
     leave_dwell();
     leave_stage();
     if (state_ == State::slewing) ports_.gimbal.release(now);
-    if (!may_move_) return end(State::aborted, "the daemon is shutting down", now);
+    if (!stop_.excited()) return end(State::aborted, "the daemon is shutting down", now);
     ports_.event(Severity::warning, "shutting down: ramping the shaker down");
     enter(State::resting, now);
 }

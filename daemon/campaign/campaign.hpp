@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/campaign/settings.hpp"
+#include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/interlock.hpp"
 #include "daemon/rt/stage_feed.hpp"
@@ -82,6 +83,10 @@ struct Ports {
     std::function<void(const rt::Ramp&)> ramping = {};
     /// Platform over table as a loop check in band has measured it.
     std::function<void(double)> transmission = {};
+    /// What the accelerometers measure; none: nothing is ever at rest.
+    StopMonitor::Rest rest = {};
+    /// A stop was not obeyed in its time; or was, and all is at rest.
+    std::function<void(bool)> disobeyed = {};
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -107,7 +112,12 @@ class Campaign {
     void on_trip(const std::string& cause, drivers::Time now);
     /// Ramps down and ends; step() goes on until done() is true.
     void shut_down(drivers::Time now);
-    [[nodiscard]] bool done() const;
+    /// After shut_down(): ended, and nothing moves.
+    [[nodiscard]] bool done(drivers::Time now) const;
+    /// Any thread: a stop is ordered and rest not measured since. Nobody feeds the watchdog then.
+    [[nodiscard]] bool stopping() const noexcept { return stop_.stopping(); }
+    /// What is not at rest, or cannot be told to be; empty: nothing.
+    [[nodiscard]] std::string what_moves(drivers::Time now) const { return stop_.what_moves(now); }
     void fill(StatusData& status, drivers::Time now) const;
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
@@ -168,12 +178,14 @@ class Campaign {
     void tell_ramp(double table_g, drivers::Time now);
     /// That the arming is for, peak at the table.
     [[nodiscard]] double highest_level() const;
+    void order_stop(const std::string& by);
+    void watch_stop(drivers::Time now);
     void begin(drivers::Time now);
     void conclude(drivers::Time now);
     void finish(drivers::Time now);
     CommandReply resume_interrupted(const CommandRequest& request, drivers::Time now);
     [[nodiscard]] std::string resume_offer() const;
-    [[nodiscard]] std::string not_fit_to_excite() const;
+    [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
                                               double table_g) const;
@@ -208,6 +220,7 @@ class Campaign {
     Settings settings_;
     StageTimes times_;
     Ports ports_;
+    StopMonitor stop_;
     CampaignState state_ = CampaignState::idle;
     drivers::Time entered_ = 0;  ///< when state_ began
     drivers::Time started_ = 0;  ///< when the campaign began
@@ -225,7 +238,7 @@ class Campaign {
     bool stop_sent_ = false;  ///< within rest(): the ramp down took too long
     bool requested_ = false;  ///< within ramp() and rest(): the set-point was accepted
     double asked_g_ = 0;      ///< of the shaker, last
-    bool may_move_ = false;   ///< a level was asked for and rest has not been read back since
+    std::string stopped_by_ = "the start of the daemon";  ///< whose stop was the last
     bool dwell_ordered_ = false;
     bool dwell_done_ = false;
     drivers::Time dwell_from_ = 0;

@@ -28,7 +28,7 @@ std::string Campaign::not_fit_to_check(Time now) const {
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (state_ == State::armed) return "armed for a campaign: abort that first";
     if (ports_.feed == nullptr) return "no samples to look at";
-    if (auto why = not_fit_to_excite(); !why.empty()) return why;
+    if (auto why = not_fit_to_excite(now); !why.empty()) return why;
     if (auto why = platform_lacks(now); !why.empty()) return why;
     if (torquing()) return "the platform is torqued, expected free drift";
     return LoopCheck::beyond_limits(settings_);
@@ -98,7 +98,6 @@ Time Campaign::check_loop(Time now) {
 
 void Campaign::ramp_for_check(Time now) {
     if (!requested_) {
-        may_move_ = true;
         requested_ = ask_level(settings_.loop.table_g, now);
         if (!requested_) abort("the shaker takes no set-point", now);
     } else if (!ports_.shaker.busy() &&

@@ -77,7 +77,7 @@ Campaign::Choice Campaign::choose_next(Time now) {
 }
 CommandReply Campaign::resume_interrupted(const CommandRequest& request, Time now) {
     if (state_ != State::armed) return {false, "not armed: a named person arms it first"};
-    if (const auto why = not_fit_to_excite(); !why.empty()) return {false, why};
+    if (const auto why = not_fit_to_excite(now); !why.empty()) return {false, why};
     if (!ports_.estimator_free()) return {false, "the last dwell is still being closed"};
     if (ports_.resume_gate) {
         if (const auto why = ports_.resume_gate(); !why.empty())

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/rt/rest_monitor.hpp"
 #include "drivers/torquer.hpp"
 #include "estimator/identification.hpp"
@@ -95,8 +96,8 @@ struct Settings {
     double temperature_window_s = 60.0;
     double temperature_band_c = 0.5;    ///< largest spread within the window
     double amplitude_tolerance = 0.05;  ///< relative; measured against commanded after the ramp
-    double stop_timeout_s = 10.0;       ///< from stop to rest
     rt::RestSettings rest;
+    StopSettings stop;
     // limits of the shaker, checked at the frequency in force
     double max_acceleration_g = 12.0;
     double max_velocity_mps = 1.5;

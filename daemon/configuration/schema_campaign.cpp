@@ -163,8 +163,6 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(number("campaign.amplitude_tolerance", "", {0.001, 1},
                           "measured against commanded amplitude after the ramp, relative",
                           [](C& c) -> double& { return c.campaign.amplitude_tolerance; }));
-    keys.push_back(number("campaign.stop_timeout_s", "s", {0.1, 600}, "from stop to rest",
-                          [](C& c) -> double& { return c.campaign.stop_timeout_s; }));
     keys.push_back(number("campaign.resonance_hz", "Hz", {0, 2000},
                           "of the isolators; 0: from frequency and transmission",
                           [](C& c) -> double& { return c.campaign.resonance_hz; }));

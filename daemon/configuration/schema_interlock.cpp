@@ -142,8 +142,9 @@ class InterlockRow {
                    expected_number({condition.low, condition.high}, condition.unit));
         }
         if (const auto* node = table_.get("dwell_s")) {
-            const bool edge =
-                rule.condition == rt::Trip::can_lost || rule.condition == rt::Trip::read_back;
+            const bool edge = rule.condition == rt::Trip::can_lost ||
+                              rule.condition == rt::Trip::read_back ||
+                              rule.condition == rt::Trip::stop_disobeyed;
             const double longest = edge ? 0 : condition.fixed ? kLongestFixedDwell_s : 3600;
             if (const auto value =
                     read_number(*node, key_ + ".dwell_s", {0, longest}, "s", problems_)) {

@@ -56,6 +56,11 @@ void add_link_keys(std::vector<Key>& keys) {
         {{"g_peak", Unit::g_peak}, {"g_rms", Unit::g_rms}, {"mps2_peak", Unit::mps2_peak}},
         "what amplitude and measured_amplitude count in, after their scale",
         [](C& c) -> Unit& { return c.amplitude_unit; }));
+    keys.push_back(number("shaker.stop_deadline_s", "s",
+                          {safety::kLeastStopDeadline_s, safety::kMostStopDeadline_s},
+                          "from the order to stop to rest measured at table and controller; the "
+                          "platform rings down longer",
+                          [](C& c) -> double& { return c.campaign.stop.deadline_s; }));
     keys.push_back(number("shaker.rest_g", "g", {1e-6, 1},
                           "at rest: rms of the accelerometers below; 6 noise.accelerometer_g at "
                           "least",

@@ -108,6 +108,10 @@ class Interlock {
     void check(const drivers::ShakerReading& reading) noexcept;
     /// Acquisition thread: the CAN port is no longer running.
     void lost_bus() noexcept;
+    /// Control thread, which alone judges this one: its row is raised whatever tripped before.
+    void stop_disobeyed(bool disobeyed) noexcept {
+        judge(By::read_back, Trip::stop_disobeyed, disobeyed, wall_clock());
+    }
     /// Any thread. The first cause stays.
     void trip(Trip cause) noexcept { trip(cause, 0, 0, drivers::kChannels); }
     /// Shaker thread: a stop was written and confirmed.

@@ -34,9 +34,11 @@ enum class Trip : std::uint8_t {
     server,
     amplitude_witness,
     over_armed,
-    stuck
+    stuck,
+    stop_disobeyed,
+    watchdog_changed
 };
-inline constexpr std::size_t kTrips = 25;
+inline constexpr std::size_t kTrips = 27;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -100,6 +102,10 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::over_armed, "over_armed_level", "amplitude above the armed level", Guard::excitation,
      true},
     {Trip::stuck, "stuck", "an accelerometer does not move that should", Guard::excitation, true},
+    {Trip::stop_disobeyed, "stop_disobeyed",
+     "a stop was not obeyed in its time: press the emergency stop", Guard::idle, true},
+    {Trip::watchdog_changed, "watchdog_changed",
+     "the controller's watchdog timeout is not what was written", Guard::armed, true},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];

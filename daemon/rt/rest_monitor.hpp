@@ -6,13 +6,15 @@
 
 #include "daemon/rt/snapshot.hpp"
 #include "drivers/sample.hpp"
+#include "proto/safety.hpp"
 
 namespace vibrig::rt {
 
 /// When a body counts as at rest.
 struct RestSettings {
-    double limit_g = 0.02;  ///< rms below; at least 6 sigma of the accelerometers' noise
-    double window_s = 0.5;  ///< of the rms; 8 samples at least, where they come slower
+    /// rms below; at least 6 sigma of the accelerometers' noise
+    double limit_g = safety::kRest_g;
+    double window_s = safety::kRestWindow_s;  ///< of the rms; 8 samples at least, where they come slower
 };
 
 enum class RestVerdict : std::uint8_t {

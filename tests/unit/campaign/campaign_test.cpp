@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "tests/unit/campaign/fake_accelerometers.hpp"
 #include "tests/unit/rt/fake_shaker.hpp"
 
 namespace vibrig::campaign {
@@ -47,39 +48,43 @@ struct CampaignTest : testing::Test {
     std::string gate;
     bool complete = false;
     bool slewed_while_moving = false;
+    FakeAccelerometers accelerometers;
+    bool disobeyed = false;
     double slew_started_at = -1;
     std::size_t frames_seen = 0;
     Time now = kSecond;
     std::unique_ptr<Campaign> campaign;
 
     void make() {
-        campaign = std::make_unique<Campaign>(
-            settings, Ports{gimbal,
-                            shaker,
-                            [this] { return platform; },
-                            [this](const rt::DwellOrder& o) {
-                                orders.push_back(o);
-                                return true;
-                            },
-                            [this](rt::Guard g) { guard = g; },
-                            [] { return true; },
-                            [] {},
-                            [this](bool c) {
-                                ++ends;
-                                complete = c;
-                            },
-                            [this](Severity, const std::string& text) { events.push_back(text); },
-                            [this](const std::array<double, 3>& here, double elapsed_s) {
-                                return think(here, elapsed_s);
-                            },
-                            {},
-                            [this](const estimator::DwellInfo&, const estimator::DwellSummary&,
-                                   const StopDone& stop) {
-                                ++positions_done;
-                                stops_done.push_back(stop);
-                            },
-                            [this] { return gate; },
-                            {}});
+        Ports ports{gimbal,
+                    shaker,
+                    [this] { return platform; },
+                    [this](const rt::DwellOrder& o) {
+                        orders.push_back(o);
+                        return true;
+                    },
+                    [this](rt::Guard g) { guard = g; },
+                    [] { return true; },
+                    [] {},
+                    [this](bool c) {
+                        ++ends;
+                        complete = c;
+                    },
+                    [this](Severity, const std::string& text) { events.push_back(text); },
+                    [this](const std::array<double, 3>& here, double elapsed_s) {
+                        return think(here, elapsed_s);
+                    },
+                    {},
+                    [this](const estimator::DwellInfo&, const estimator::DwellSummary&,
+                           const StopDone& stop) {
+                        ++positions_done;
+                        stops_done.push_back(stop);
+                    },
+                    [this] { return gate; },
+                    {}};
+        ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
+        ports.disobeyed = [this](bool now_so) { disobeyed = disobeyed || now_so; };
+        campaign = std::make_unique<Campaign>(settings, ports);
     }
 
     CampaignTest() {
@@ -131,7 +136,9 @@ struct CampaignTest : testing::Test {
             platform.slewing = false;
             platform.in_position = true;
         }
-        shaker.obey(now);
+        if (shaker_obeys) shaker.obey(now);
+        shaker.now.time = now;
+        accelerometers.run_to(now, shaker.now.measured_g);
         if (!orders.empty() && !orders.back().cancel && now > orders.back().to &&
             reported != orders.size()) {
             reported = orders.size();
@@ -143,6 +150,7 @@ struct CampaignTest : testing::Test {
         }
         campaign->step(now);
     }
+    bool shaker_obeys = true;
     std::size_t reported = 0;
     std::size_t flagged_order = 0;
     std::vector<Stop> stops_to_choose;
@@ -386,9 +394,9 @@ TEST_F(CampaignTest, ShutsDownByRampingToRestFirst) {
     ASSERT_TRUE(command(Kind::start).accepted);
     ASSERT_TRUE(run_until(CampaignState::recording, 60));
     campaign->shut_down(now);
-    EXPECT_FALSE(campaign->done());
+    EXPECT_FALSE(campaign->done(now));
     ASSERT_TRUE(run_until(CampaignState::aborted, 20));
-    EXPECT_TRUE(campaign->done());
+    EXPECT_TRUE(campaign->done(now));
     EXPECT_TRUE(shaker.now.at_rest());
     EXPECT_EQ(shaker.stops_asked, 0U) << "ramped down, not cut";
     EXPECT_FALSE(command(Kind::arm).accepted);

@@ -8,6 +8,7 @@
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 #include "estimator/zeros/simulation.hpp"
+#include "tests/unit/campaign/fake_accelerometers.hpp"
 #include "tests/unit/rt/fake_shaker.hpp"
 
 namespace vibrig::campaign {
@@ -61,6 +62,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
     std::vector<std::string> events;
     std::size_t reported = 0;
     rt::Guard guard = rt::Guard::idle;
+    FakeAccelerometers accelerometers;
     Time now = kSecond;
 
     StagesTest() { settings.sample_s = kSample_s; }
@@ -119,6 +121,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
                     [](bool) {},
                     [this](Severity, const std::string& text) { events.push_back(text); }};
         ports.torquer = &torquer;
+        ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
         ports.feed = feed.get();
         ports.levelled = [this](const LevelDrift& found) { drifts.push_back(found); };
         campaign = std::make_unique<Campaign>(settings, ports);
@@ -157,6 +160,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
         for (std::size_t i = 0; i < 3; ++i) sample.angle[i] = kRadPerDeg * encoder_deg[i];
         if (!silent) feed->take(sample);
         shaker.obey(now);
+        accelerometers.run_to(now, shaker.now.measured_g);
         if (orders.size() > reported && !orders.back().cancel && now > orders.back().to) {
             reported = orders.size();
             estimator::DwellSummary summary;

@@ -109,7 +109,6 @@ TEST(Sections, CampaignKeysReachTheCampaign) {
         temperature_window_s = 5
         temperature_band_c = 0.2
         amplitude_tolerance = 0.02
-        stop_timeout_s = 4
         results = "out"
         [shaker.limits]
         acceleration_g = 6
@@ -122,7 +121,6 @@ TEST(Sections, CampaignKeysReachTheCampaign) {
     EXPECT_EQ(c.campaign.frequency_hz, 17) << "copied from [vibration]";
     EXPECT_EQ(c.campaign.dwell_s, 20);
     EXPECT_EQ(c.campaign.ramp_s, 1.5);
-    EXPECT_EQ(c.campaign.stop_timeout_s, 4);
     EXPECT_EQ(c.campaign.max_acceleration_g, 6);
     EXPECT_EQ(c.campaign.max_velocity_mps, 0.7);
     EXPECT_EQ(c.campaign.max_displacement_mm, 8);
