@@ -221,6 +221,7 @@ std::size_t CanPortBase::take(std::size_t count) {
 
     std::size_t frames = 0;
     std::size_t errors = 0;
+    bool heard = false;  ///< a frame, after the last that said bus off: nobody is cut off then
     for (std::size_t i = 0; i + trailing_empty < count; ++i) {
         const ReceiveBatch::Packet packet = batch_.packet(i);
         if (packet.overflows) count_overflows(*packet.overflows);
@@ -237,9 +238,11 @@ std::size_t CanPortBase::take(std::size_t count) {
             ++counted_.own;
         } else if ((received.frame.can_id & CAN_ERR_FLAG) != 0) {
             ++counted_.error_frames;
+            if ((received.frame.can_id & CAN_ERR_BUSOFF) != 0) heard = false;
             errors_[errors++] = received;
         } else {
             ++counted_.delivered;
+            heard = true;
             ++frames;
         }
     }
@@ -252,7 +255,9 @@ std::size_t CanPortBase::take(std::size_t count) {
         if (on_error_) on_error_(errors_[i]);
     }
     if (frames > 0 && pending_->generation == generation) {
-        if (state() == PortState::degraded) enter(PortState::running, 0, "running again");
+        if (heard && controller_.load() == ControllerState::bus_off)
+            controller_.store(ControllerState::active);
+        if (heard && state() == PortState::degraded) enter(PortState::running, 0, "running again");
         if (on_frames_) on_frames_(std::span(frames_).first(frames));
     }
     return trailing_empty;

@@ -213,6 +213,24 @@ TEST_P(CanPortSuite, HandsErrorFramesToTheErrorHandlerOnly) {
     expect_counters_close();
 }
 
+TEST_P(CanPortSuite, OneFrameThatLooksLikeBusOffDoesNotStay) {
+    start();
+    // WHEN a frame says bus off, and then the bus goes on as before
+    ASSERT_TRUE(bus_->send(classic_packet(make_frame(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 0))));
+    ASSERT_TRUE(run_until([&] { return errors_.size() == 1; }));
+    ASSERT_TRUE(bus_->send(classic_packet(make_frame(0x10, 5))));
+    ASSERT_TRUE(run_until([&] { return frames_.size() == 1; }));
+    // THEN so does the state: who is cut off hears nothing
+    EXPECT_EQ(port_->counters().controller, drivers::ControllerState::active);
+    EXPECT_EQ(port_->state(), PortState::running);
+    // WHEN bus off comes last of what is read at once THEN it stands
+    for (const auto id : {canid_t{0x10}, canid_t{CAN_ERR_FLAG | CAN_ERR_BUSOFF}})
+        ASSERT_TRUE(bus_->send(classic_packet(make_frame(id, 6))));
+    ASSERT_TRUE(run_until([&] { return errors_.size() == 2 && frames_.size() == 2; }));
+    EXPECT_EQ(port_->counters().controller, drivers::ControllerState::bus_off);
+    EXPECT_EQ(port_->state(), PortState::degraded);
+}
+
 TEST_P(CanPortSuite, AllocatesNothingPerBatchOnceStarted) {
     // GIVEN a port that has received before
     start();
