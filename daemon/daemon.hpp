@@ -60,6 +60,8 @@ class Daemon final : public StatusSource {
     void shut_down() noexcept;
     /// After shut_down(): true once everything is at rest, false when `wall_seconds` have passed.
     [[nodiscard]] bool wait_for_end(double wall_seconds);
+    /// After shut_down(): what is not at rest, or what nobody can tell of.
+    [[nodiscard]] std::string what_moves() const { return campaign_.what_moves(clock_.now()); }
     /// Longest orderly end: ramp, stop, watchdog.
     [[nodiscard]] double longest_end_s() const;
     /// Ends the threads, orderly or not.

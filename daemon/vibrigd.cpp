@@ -13,6 +13,7 @@
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/log/log_sink.hpp"
+#include "daemon/rig_lock.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
 #include "daemon/watchdog.hpp"
@@ -60,8 +61,8 @@ void check_again(const std::string& path) {
 
 /// Feeds the service manager's watchdog while every stage makes progress; returns the signal that
 /// ends the daemon.
-int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, const sigset_t& signals,
-          const std::string& path) {
+int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig::RigLock& lock,
+          const sigset_t& signals, const std::string& path) {
     std::string told, stuck;
     for (;;) {
         const double period_s = manager.period_s() > 0 ? std::min(1.0, manager.period_s()) : 1.0;
@@ -69,6 +70,7 @@ int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, const s
         wait.tv_sec = static_cast<time_t>(period_s);
         wait.tv_nsec = static_cast<long>((period_s - static_cast<double>(wait.tv_sec)) * 1e9);
         const int signal = ::sigtimedwait(&signals, nullptr, &wait);
+        lock.answer();
         if (signal == SIGHUP) {
             manager.reloading();
             check_again(path);
@@ -108,6 +110,8 @@ class LogEnd {
 int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
         const sigset_t& signals, const std::string& path) {
     const vibrig::ServiceManager manager;
+    // Before anything is opened, and long before anything is told to stop.
+    vibrig::RigLock lock(loaded.configuration, path);
     const auto socket = loaded.configuration.socket;
     const auto server_settings = settings_of(loaded.configuration);
     vibrig::Daemon daemon(std::move(loaded), &log);
@@ -120,7 +124,7 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
     if (const auto remote = server.remote_address(); !remote.empty())
         spdlog::info("remote, with certificates: {}", remote);
     manager.ready(words_of(daemon.status()));
-    const int signal = watch(daemon, manager, signals, path);
+    const int signal = watch(daemon, manager, lock, signals, path);
     manager.stopping();
     spdlog::info("{}: stopping", ::strsignal(signal));
     daemon.shut_down();
@@ -130,11 +134,16 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
     const timespec at_once{};
     for (double left = daemon.longest_end_s(); left > 0 && !orderly; left -= 0.1) {
         orderly = daemon.wait_for_end(0.1);
+        lock.answer();
         if (::sigtimedwait(&signals, nullptr, &at_once) > 0) break;
     }
+    const std::string moving = orderly ? std::string() : daemon.what_moves();
     daemon.join();
     if (!orderly) {
-        spdlog::error("ended without the shaker read back at rest: its watchdog stops it");
+        spdlog::error(
+            "ended without rest measured ({}): its watchdog stops it if it works; if the table "
+            "moves on, press the emergency stop",
+            moving);
         return 1;
     }
     spdlog::info("stopped cleanly");
