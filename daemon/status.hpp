@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/rt/frame_latency.hpp"
+#include "daemon/rt/rest_monitor.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
 #include "drivers/sample.hpp"
@@ -191,6 +192,14 @@ struct FrameStatus {
     std::array<std::array<double, 3>, 3> accelerometer_matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 };
 
+/// Rest as it is measured, and what became of the last stop.
+struct RestStatus {
+    const char* state = "unknown";  ///< at rest, moving, unknown, stopping, stop not obeyed
+    rt::Rest witnesses;
+    bool disobeyed = false;  ///< latched until acknowledged at rest
+    std::string what;        ///< while stopping: what moves, or what nobody can tell of
+};
+
 /// The newest loop check.
 struct LoopCheckStatus {
     struct Row {
@@ -235,7 +244,8 @@ struct StatusData {
     RealTimeStatus real_time;
     MqttStatus mqtt;
     LogStatus log;
-    bool stop_pending = false;  ///< a stop is ordered and not read back as done
+    bool stop_pending = false;  ///< a stop is ordered and rest not measured since
+    RestStatus rest;
 
     drivers::PortState can = drivers::PortState::absent;
     drivers::CanPortCounters can_counters;

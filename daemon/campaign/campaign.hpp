@@ -162,6 +162,7 @@ class Campaign {
     [[nodiscard]] bool take_motion(rt::Motion& motion, drivers::Time now);
     [[nodiscard]] bool torquing() const;
     void fill_stages(StatusData& status) const;
+    void fill_rest(StatusData& status, drivers::Time now) const;
     drivers::Time ramp(drivers::Time now);
     drivers::Time record(drivers::Time now);
     drivers::Time rest(drivers::Time now);

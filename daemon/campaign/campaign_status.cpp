@@ -29,6 +29,7 @@ void Campaign::fill(StatusData& status, Time now) const {
         status.position_deg = here().stop.position_deg;
     }
     fill_stages(status);
+    fill_rest(status, now);
     double done = static_cast<double>(positions_done_);
     if (state_ == State::recording && dwell_to_ > dwell_from_) {
         done += std::clamp(
@@ -52,6 +53,18 @@ void Campaign::fill(StatusData& status, Time now) const {
             check_ == Check::look || check_ == Check::rest ? 0 : settings_.loop.table_g;
         status.command_frequency_hz = settings_.frequency_hz;
     }
+}
+
+void Campaign::fill_rest(StatusData& status, Time now) const {
+    RestStatus& rest = status.rest;
+    rest.witnesses = stop_.rest(now);
+    rest.disobeyed = stop_.disobeyed();
+    rest.what = stop_.stopping() ? stop_.what_moves(now) : std::string();
+    rest.state = rest.disobeyed              ? "stop not obeyed"
+                 : stop_.stopping()          ? "stopping"
+                 : rest.witnesses.moving()   ? "moving"
+                 : rest.witnesses.measured() ? "at rest"
+                                             : "unknown";
 }
 
 void Campaign::qualify(estimator::Result& result) const {

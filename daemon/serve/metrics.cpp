@@ -123,8 +123,16 @@ void add_shaker(Families& to, const StatusData& s) {
         to.gauge("vibrig_emergency_stop_open", "1 while the emergency-stop chain is open.",
                  yes(s.shaker.emergency_stop_open));
     }
-    to.gauge("vibrig_shaker_stop_pending", "1: a stop is ordered and not read back as done.",
+    to.gauge("vibrig_shaker_stop_pending", "1: a stop is ordered and rest not measured since.",
              yes(s.stop_pending));
+    to.gauge("vibrig_shaker_stop_disobeyed",
+             "1: a stop was not obeyed in its time: the emergency stop is to be pressed.",
+             yes(s.rest.disobeyed));
+    const auto& [platform, table] = s.rest.witnesses;
+    to.gauge("vibrig_rest_rms_meters_per_second_squared",
+             "Of the accelerometers, less the mean; 0 while unknown.",
+             {{{{"body", "platform"}}, platform.rms_g * kGravity},
+              {{{"body", "table"}}, table.rms_g * kGravity}});
     to.counter("vibrig_shaker_requests_total", "Modbus requests by how they ended.",
                {{{{"result", "reply"}}, n.replies},
                 {{{"result", "timeout"}}, n.timeouts},

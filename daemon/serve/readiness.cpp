@@ -51,6 +51,18 @@ Readiness readiness(const StatusData& status) {
         !status.shaker.valid                ? "no reading"
         : status.shaker.emergency_stop_open ? "open"
                                             : "closed");
+    add("rest", !status.stop_pending && !status.rest.disobeyed,
+        std::string(status.rest.state) +
+            (status.rest.disobeyed ? ", press the emergency stop" : "") +
+            (status.rest.what.empty() ? "" : ": " + status.rest.what));
+    const bool timeout_known = status.shaker.watchdog != drivers::WatchdogTimeout::unread;
+    add("watchdog", status.shaker.valid && status.shaker.watchdog == drivers::WatchdogTimeout::kept,
+        !status.shaker.valid || !timeout_known
+            ? "timeout not read"
+            : "timeout reads " + seconds(status.shaker.watchdog_timeout_s) +
+                  (status.shaker.watchdog == drivers::WatchdogTimeout::kept
+                       ? ""
+                       : ", not what was written"));
     std::string bad;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         const auto quality = status.sample.quality[c];

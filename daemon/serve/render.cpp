@@ -119,6 +119,12 @@ std::string shaker_line(const v1::Status& status) {
     text += ", link " + v1::Link::State_Name(shaker.link());
     if (shaker.fault() != 0) text += format(", fault bits 0x%04x", shaker.fault());
     if (shaker.emergency_stop_open()) text += ", EMERGENCY STOP OPEN";
+    if (shaker.rest() == "stop not obeyed") {
+        text += ", STOP NOT OBEYED, PRESS THE EMERGENCY STOP: " + shaker.not_at_rest();
+    } else if (!shaker.rest().empty()) {
+        text += ", " + shaker.rest() +
+                (shaker.not_at_rest().empty() ? "" : ": " + shaker.not_at_rest());
+    }
     return text;
 }
 

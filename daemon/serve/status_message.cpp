@@ -132,6 +132,18 @@ void fill(v1::Shaker& out, const StatusData& status) {
     out.set_wrong_replies(counters.wrong_replies);
     out.set_lost(counters.lost);
     out.set_stop_pending(status.stop_pending);
+    out.set_rest(status.rest.state);
+    out.set_not_at_rest(status.rest.what);
+    const auto known = [](const rt::RestWitness& witness) {
+        return witness.verdict == rt::RestVerdict::moving ||
+               witness.verdict == rt::RestVerdict::still;
+    };
+    if (const auto& platform = status.rest.witnesses.platform; known(platform))
+        set(out, &v1::Shaker::set_platform_rms_g, platform.rms_g);
+    if (const auto& table = status.rest.witnesses.table; known(table))
+        set(out, &v1::Shaker::set_table_rms_g, table.rms_g);
+    if (reading.valid && reading.watchdog != drivers::WatchdogTimeout::unread)
+        set(out, &v1::Shaker::set_watchdog_timeout_s, reading.watchdog_timeout_s);
 }
 
 void fill(v1::Interlock& out, const InterlockStatus& status) {

@@ -201,6 +201,7 @@
     const dropped = number(s.can.kernel_dropped) + number(s.estimator_ring.dropped);
     table('links', [
       ['CAN', s.can.link, s.can.link !== 'running'], ['shaker', s.shaker.link, s.shaker.link !== 'running'],
+      ['rest', (s.shaker.rest || 'unknown') + (s.shaker.rest === 'stop not obeyed' ? ': PRESS THE EMERGENCY STOP' : ''), s.shaker.stop_pending || s.shaker.rest === 'stop not obeyed'],
       ['emergency stop', s.shaker.emergency_stop_open === undefined ? 'not read' : s.shaker.emergency_stop_open ? 'OPEN' : 'closed', s.shaker.emergency_stop_open !== false],
       ['journal', s.journal.path ? (s.journal.running ? 'writes' : 'WAITS: ' + s.journal.note) : 'none', s.journal.path && !s.journal.running],
       ['samples', a.samples], ['dropped', String(dropped), dropped > 0], ['gaps, incomplete', `${a.gaps}, ${a.incomplete}`, number(a.gaps) > 0],
