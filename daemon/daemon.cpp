@@ -48,6 +48,7 @@ drivers::ShakerSettings shaker_settings(const configuration::Configuration& conf
     if (configuration.clock == configuration::Configuration::ClockKind::rig) {
         // The rig's time stands still meanwhile: a busy machine is slower, not different.
         settings.response_timeout = std::max(settings.response_timeout, 10 * drivers::kSecond);
+        settings.stop_ramp_timeout = settings.response_timeout;
     }
     return settings;
 }

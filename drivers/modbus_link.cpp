@@ -90,9 +90,7 @@ ModbusLink::ModbusLink(const ShakerSettings& settings) : settings_(settings) {
                           std::to_string(settings.unit));
     }
     modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
-    modbus_set_response_timeout(
-        context_.get(), static_cast<std::uint32_t>(settings.response_timeout / kSecond),
-        static_cast<std::uint32_t>(settings.response_timeout % kSecond / kMicrosecond));
+    respond_within(settings_.response_timeout);
     // Zero: the response timeout covers the whole reply. Any other value would start again with
     // every byte.
     modbus_set_byte_timeout(context_.get(), 0, 0);
@@ -109,6 +107,11 @@ ModbusLink::~ModbusLink() {
     close();
     ::close(cutter_);
     ::close(inert_);
+}
+
+void ModbusLink::respond_within(Time timeout) noexcept {
+    modbus_set_response_timeout(context_.get(), static_cast<std::uint32_t>(timeout / kSecond),
+                                static_cast<std::uint32_t>(timeout % kSecond / kMicrosecond));
 }
 
 void ModbusLink::arm_cutter(int socket) noexcept {

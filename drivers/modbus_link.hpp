@@ -59,6 +59,9 @@ class ModbusLink {
     [[nodiscard]] Reply read_coil(std::uint16_t address, bool& on) noexcept;
     [[nodiscard]] Reply write_coil(std::uint16_t address, bool on) noexcept;
 
+    /// Response timeout from the next request on.
+    void respond_within(Time timeout) noexcept;
+
     /// Ends a TCP request in flight, which then returns lost. Any thread; never blocks. On a serial
     /// line nothing may be sent while a device may still be answering, so there it does nothing:
     /// the response timeout ends the request.

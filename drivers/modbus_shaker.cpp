@@ -13,6 +13,8 @@ namespace {
 // tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
 // left shaking is to see it told one thing. 100 ms, and as much again for the way there.
 constexpr Time kStopAlone = 200 * kMillisecond;
+// Between two looks at the watchdog's timeout; a second at most, with the request itself.
+constexpr Time kTimeoutLook = 500 * kMillisecond;
 
 /// A period after `due` if this round was in time; one that came early, or so late that a period
 /// was missed, starts anew.
@@ -128,17 +130,20 @@ void ModbusShaker::run() noexcept {
 void ModbusShaker::work(Time now) {
     drop_void_set_point();
     const bool stop = stop_pending();
-    if (!stop) stop_tried_ = connect_tried_for_stop_ = false;
+    if (!stop) stop_tried_ = connect_tried_for_stop_ = ramp_tried_ = false;
     if (!link_.connected()) {
         if (now >= next_attempt_ || (stop && !connect_tried_for_stop_)) return try_connect(now);
         return sleep_until(next_attempt_);
     }
     if (stop && (!stop_tried_ || now >= next_stop_)) return write_stop(now);
     if (watchdog_due(now)) return serve_watchdog(now);
+    if (now >= next_look_ && !timeout_due_) return look_at_timeout(now);
     // Before the poll, which a slow line may have due all the time; it ends with one of its own.
     if (!stop && orders_.waiting() && now >= stop_alone_until_) return write_set_point();
     if (now >= next_poll_) return poll(now);
-    sleep_until(std::min(next_poll_, stop ? next_stop_ : next_feed_));
+    Time next = std::min(next_poll_, stop ? next_stop_ : next_feed_);
+    if (!timeout_due_) next = std::min(next, next_look_);
+    sleep_until(next);
 }
 
 void ModbusShaker::try_connect(Time now) {
@@ -158,12 +163,13 @@ void ModbusShaker::try_connect(Time now) {
     const bool again = std::exchange(was_connected_, true);
     if (again) ++counts_.reconnects;
     polled_ = poll_refused_ = feed_refused_ = false;
-    stop_tried_ = false;
+    stop_tried_ = joint_refused_ = false;
+    timeout_seen_ = WatchdogTimeout::unread;
     timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
     // A lost reply must not cost the device a feed that it still waits for.
     const bool starved = again && now - last_feed_ > watchdog_timeout();
     stop_alone_until_ = stop_pending() || starved ? now + kStopAlone : now;
-    next_stop_ = next_poll_ = now;
+    next_stop_ = next_poll_ = next_look_ = now;
     next_feed_ = stop_alone_until_;
 }
 
@@ -262,14 +268,46 @@ ModbusShaker::Written ModbusShaker::verify(const char* role, const proto::Regist
     return Written::otherwise;
 }
 
+/// Ramp 0 and run 0: down as fast as the controller's own soft stop. In one request where they lie
+/// side by side; else the ramp gets one short try, and then run 0 goes out whatever came back.
+Reply ModbusShaker::order_stop(std::span<const std::uint16_t> run) {
+    const proto::ShakerRegisters& map = settings_.registers;
+    Words ramp_words = present(map.ramp_time);
+    const auto ramp = std::span(ramp_words).first(map.ramp_time.words());
+    static_cast<void>(proto::encode(map.ramp_time, 0, ramp));  // fits every type
+    const bool ramp_first = map.ramp_time.address + ramp.size() == map.run.address;
+    const bool run_first = map.run.address + run.size() == map.ramp_time.address;
+    if ((ramp_first || run_first) && !joint_refused_) {
+        std::array<std::uint16_t, 4> words{};
+        const auto second = std::ranges::copy(ramp_first ? ramp : run, words.begin()).out;
+        std::ranges::copy(ramp_first ? run : ramp, second);
+        const Reply reply = transact([&] {
+            return link_.write(ramp_first ? map.ramp_time.address : map.run.address,
+                               std::span(words).first(ramp.size() + run.size()));
+        });
+        if (reply.kind != ReplyKind::exception) return reply;
+        joint_refused_ = true;
+    }
+    if (!std::exchange(ramp_tried_, true)) {
+        link_.respond_within(std::min(settings_.stop_ramp_timeout, settings_.response_timeout));
+        const Reply reply = write(map.ramp_time, ramp);
+        link_.respond_within(settings_.response_timeout);
+        if (!link_.connected()) {
+            next_attempt_ = clock_.now();  // run 0 is next, on a link without a late reply
+            return reply;
+        }
+    }
+    return write(map.run, run);
+}
+
 void ModbusShaker::write_stop(Time now) {
     stop_tried_ = true;
     next_stop_ = now + settings_.backoff_min;
     const proto::Register& run = settings_.registers.run;
     Words words = present(run);
     const auto raw = std::span(words).first(run.words());
-    static_cast<void>(proto::encode(run, 0, raw));  // fits every type
-    const Reply reply = write(run, raw);
+    static_cast<void>(proto::encode(run, 0, raw));
+    const Reply reply = order_stop(raw);
     if (reply.kind == ReplyKind::exception) {
         write_failed_ = true;
         settle("stop refused: " + reply.text());
@@ -281,6 +319,8 @@ void ModbusShaker::write_stop(Time now) {
     orders_.stop_done();
     drop_void_set_point();
     write_failed_ = false;
+    // Whoever changed the watchdog's timeout: after a stop it is what we say.
+    timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
     next_poll_ = clock_.now();
     next_feed_ = std::max(next_poll_, stop_alone_until_);
     settle("stopped");
@@ -351,18 +391,10 @@ bool ModbusShaker::watchdog_due(Time now) const noexcept {
 
 void ModbusShaker::serve_watchdog(Time now) {
     next_feed_ = following(next_feed_, settings_.watchdog_period, now);
+    if (timeout_due_) write_timeout();
+    if (timeout_due_ || !link_.connected()) return;
     const proto::ShakerRegisters& map = settings_.registers;
     Words words{};
-    if (timeout_due_) {
-        const proto::Register& reg = map.watchdog_timeout;
-        const auto raw = std::span(words).first(reg.words());
-        static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), raw));
-        const Reply reply = write(reg, raw);
-        feed_refused_ = reply.kind == ReplyKind::exception;
-        if (feed_refused_) settle("watchdog timeout refused: " + reply.text());
-        if (!reply.ok()) return;
-        timeout_due_ = false;
-    }
     if (!may_feed_ || !may_feed_()) return;
     feed_ = static_cast<std::uint16_t>((feed_ + 1) & 0x7fff);
     const auto raw = std::span(words).first(map.watchdog->words());
@@ -374,6 +406,42 @@ void ModbusShaker::serve_watchdog(Time now) {
         last_feed_ = now;
     }
     if (link_.connected()) settle("watchdog feed " + reply.text());
+}
+
+void ModbusShaker::write_timeout() {
+    const proto::Register& reg = settings_.registers.watchdog_timeout;
+    Words words{};
+    const auto raw = std::span(words).first(reg.words());
+    static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), raw));
+    const Reply reply = write(reg, raw);
+    feed_refused_ = reply.kind == ReplyKind::exception;
+    if (feed_refused_) settle("watchdog timeout refused: " + reply.text());
+    if (!reply.ok()) return;
+    timeout_due_ = false;
+    next_look_ = clock_.now();
+}
+
+void ModbusShaker::look_at_timeout(Time now) {
+    next_look_ = now + kTimeoutLook;
+    const proto::Register& reg = settings_.registers.watchdog_timeout;
+    Words words{}, written{};
+    const auto raw = std::span(words).first(reg.words());
+    const auto ours = std::span(written).first(reg.words());
+    const Reply reply = read(reg, raw);
+    if (!reply.ok() && reply.kind != ReplyKind::exception) return;
+    static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), ours));
+    timeout_read_s_ = reply.ok() ? proto::decode(reg, raw) : 0;
+    const bool good =
+        reg.access == proto::Access::read
+            ? timeout_read_s_ > 0 && timeout_read_s_ <= to_seconds(kLongestWatchdogTimeout)
+            : reply.ok() && same_raw(reg, ours, raw);
+    const auto seen = good ? WatchdogTimeout::kept : WatchdogTimeout::changed;
+    if (std::exchange(timeout_seen_, seen) != seen) next_poll_ = now;  // to be told at once
+    settle(good ? "read back"
+           : reply.ok()
+               ? "watchdog timeout reads back as " + std::to_string(timeout_read_s_) +
+                     " s, expected " + std::to_string(to_seconds(watchdog_timeout())) + " s"
+               : "watchdog timeout cannot be read back: " + reply.text());
 }
 
 void ModbusShaker::poll(Time now) {
@@ -390,13 +458,18 @@ void ModbusShaker::poll(Time now) {
     polled_ = true;
     poll_refused_ = false;
     backoff_ = settings_.backoff_min;
-    latest_.store(image_.reading(now));
+    ShakerReading reading = image_.reading(now);
+    reading.watchdog = timeout_seen_;
+    reading.watchdog_timeout_s = timeout_read_s_;
+    latest_.store(reading);
     settle("read back");
     if (on_reading_) on_reading_();
 }
 
 void ModbusShaker::settle(const std::string& why) {
-    if (poll_refused_ || feed_refused_ || write_failed_) return set_state(LinkState::degraded, why);
+    if (poll_refused_ || feed_refused_ || write_failed_ ||
+        timeout_seen_ == WatchdogTimeout::changed)
+        return set_state(LinkState::degraded, why);
     if (polled_) set_state(LinkState::running, why);
 }
 

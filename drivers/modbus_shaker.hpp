@@ -74,11 +74,14 @@ class ModbusShaker final : public Shaker {
                                  std::span<const std::uint16_t> words);
 
     void write_stop(Time now);
+    [[nodiscard]] Reply order_stop(std::span<const std::uint16_t> run);
     void write_set_point();
     [[nodiscard]] bool write_steps(const ShakerSetPoint& set_point);
     void drop_void_set_point() noexcept;
     [[nodiscard]] bool watchdog_due(Time now) const noexcept;
     void serve_watchdog(Time now);
+    void write_timeout();
+    void look_at_timeout(Time now);
     /// After so long without a feed the device stops.
     [[nodiscard]] Time watchdog_timeout() const noexcept { return 3 * settings_.watchdog_period; }
     void poll(Time now);
@@ -113,10 +116,14 @@ class ModbusShaker final : public Shaker {
     bool poll_refused_ = false, feed_refused_ = false;
     bool write_failed_ = false;  ///< until a stop is read back as done
     bool stop_tried_ = false, connect_tried_for_stop_ = false;
-    bool timeout_due_ = false;  ///< the watchdog's timeout is to be written
+    bool ramp_tried_ = false;     ///< of the stop at hand
+    bool joint_refused_ = false;  ///< the device takes one register at a time
+    bool timeout_due_ = false;    ///< the watchdog's timeout is to be written
+    WatchdogTimeout timeout_seen_ = WatchdogTimeout::unread;
+    double timeout_read_s_ = 0;
     std::uint16_t feed_ = 0;
     Time backoff_ = 0;
-    Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0;
+    Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0, next_look_ = 0;
     Time last_feed_ = 0, stop_alone_until_ = 0;
 };
 

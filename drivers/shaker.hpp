@@ -29,8 +29,15 @@ struct ShakerSettings {
     Time watchdog_period = 500 * kMillisecond;   ///< feed
     Time backoff_min = 100 * kMillisecond;       ///< reconnect, doubled up to backoff_max
     Time backoff_max = 5 * kSecond;
+    /// Of a stop, where ramp time and run are not written in one request: what the ramp may cost.
+    Time stop_ramp_timeout = 100 * kMillisecond;
     proto::ShakerRegisters registers;  ///< the register map of the configuration
 };
+
+/// Longest timeout of the controller's watchdog that is any use, and longest feed period: three of
+/// them are the timeout.
+inline constexpr Time kLongestWatchdogTimeout = 3 * kSecond;
+inline constexpr Time kLongestWatchdogPeriod = kLongestWatchdogTimeout / 3;
 
 /// What is asked of the shaker. Frequency may only change while the amplitude is zero (checked by
 /// the campaign).
@@ -44,6 +51,13 @@ struct ShakerSetPoint {
 inline constexpr std::uint16_t kShakerRunning = 2;
 inline constexpr std::uint16_t kShakerFault = 4;
 
+/// The register that says after how long without a feed the controller stops.
+enum class WatchdogTimeout : std::uint8_t {
+    unread,   ///< not looked at since the link was made
+    kept,     ///< what was written; of a register that is only read: short enough
+    changed,  ///< another value, or none to be had
+};
+
 /// The newest read-back. Nothing of it is valid while `valid` is false.
 struct ShakerReading {
     Time time = 0;
@@ -56,6 +70,8 @@ struct ShakerReading {
     std::uint16_t fault = 0;
     bool running = false;  ///< the run register read back
     bool emergency_stop_open = false;
+    WatchdogTimeout watchdog = WatchdogTimeout::unread;
+    double watchdog_timeout_s = 0;  ///< as read
     [[nodiscard]] bool still() const { return valid && measured_g < 0.05; }
     [[nodiscard]] bool at_rest() const { return still() && !running && state == 0; }
 };

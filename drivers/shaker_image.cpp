@@ -119,7 +119,7 @@ void check_registers(const ShakerSettings& settings) {
         throw ShakerError(
             "shaker.registers.watchdog.type: must be a number that counts up, got bits");
     }
-    check_role("watchdog_timeout", map.watchdog_timeout, false, false);
+    check_role("watchdog_timeout", map.watchdog_timeout, true, false);
     check_role("state", map.state, true, false);
     check_role("fault", map.fault, true, false);
     check_role("emergency_stop", map.emergency_stop, true, false);

@@ -78,6 +78,11 @@ std::string Campaign::not_fit_to_excite(Time now) const {
     if (reading.emergency_stop_open) return "the emergency-stop chain is open";
     if (reading.fault != 0 || reading.state == drivers::kShakerFault)
         return fmt::format("shaker fault {:#06x}", reading.fault);
+    if (reading.watchdog == drivers::WatchdogTimeout::changed)
+        return fmt::format("the controller's watchdog timeout reads {:g} s, not what was written",
+                           reading.watchdog_timeout_s);
+    if (reading.watchdog == drivers::WatchdogTimeout::unread)
+        return "the controller's watchdog timeout has not been read back yet";
     if (!reading.at_rest()) return "the shaker is not at rest";
     if (stop_.rest(now).moving()) return "not at rest: " + stop_.what_moves(now);
     return {};
@@ -148,7 +153,9 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             // One acknowledgement is for both: the controller latches its faults, too, and forgets
             // them when it is told to stop at rest.
             const auto shaker = ports_.shaker.reading();
-            const bool latched = shaker.valid && shaker.fault != 0 && !active();
+            const bool changed =
+                shaker.valid && shaker.watchdog == drivers::WatchdogTimeout::changed;
+            const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
             std::string what;
             if (stop_.disobeyed() && stop_.stopping())
                 return refuse("a stop was not obeyed, not at rest yet: " + stop_.what_moves(now) +
@@ -157,7 +164,10 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
                 if (shaker.emergency_stop_open)
                     return refuse("the emergency-stop chain is open: close it first");
                 if (!shaker.still()) return refuse("the table is not at rest yet");
-                what = fmt::format("shaker fault {:#06x}", shaker.fault);
+                // The stop writes the timeout again, too.
+                what = shaker.fault != 0
+                           ? fmt::format("shaker fault {:#06x}", shaker.fault)
+                           : fmt::format("watchdog timeout of {:g} s", shaker.watchdog_timeout_s);
             }
             if (state_ == State::tripped) {
                 what = std::exchange(reason_, {}) + (latched ? "; " + what : "");

@@ -60,6 +60,20 @@ void CrossCheck::for_daemon() {
         refuse({"shaker.registers.watchdog"}, "no watchdog register",
                "one that vibrigd feeds: a dead daemon must mean a stopped shaker");
     }
+    if (sound({"shaker.watchdog_period_ms"}) &&
+        c_.shaker.watchdog_period > drivers::kLongestWatchdogPeriod) {
+        const double period_s = drivers::to_seconds(c_.shaker.watchdog_period);
+        refuse({"shaker.watchdog_period_ms"},
+               plain(1e3 * period_s) + " ms, so that the table would shake on for " +
+                   plain(3 * period_s) + " s after a daemon that died",
+               "1000 ms at most: three of them are the controller's timeout, 3 s at most");
+    }
+    if (sound({"shaker.registers"}) &&
+        c_.shaker.registers.watchdog_timeout.access == proto::Access::write) {
+        refuse(
+            {"shaker.registers.watchdog_timeout.access"}, "\"write\"",
+            "\"read_write\": what the controller's watchdog waits for is read back all the time");
+    }
     const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
     if (sound({"shaker.transport", "shaker.device"}) && serial && c_.shaker.device.empty()) {
         refuse({"shaker.transport", "shaker.device"}, "\"rtu\" without shaker.device",

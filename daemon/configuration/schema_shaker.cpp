@@ -42,7 +42,8 @@ void add_link_keys(std::vector<Key>& keys) {
         "shaker.poll_period_ms", {10, 60'000}, "between read-backs",
         [](C & c) -> auto& { return c.shaker.poll_period; }));
     keys.push_back(milliseconds(
-        "shaker.watchdog_period_ms", {10, 60'000}, "between feeds of the controller's watchdog",
+        "shaker.watchdog_period_ms", {10, 60'000},
+        "between feeds of the controller's watchdog; 1000 at most, three of them are its timeout",
         [](C & c) -> auto& { return c.shaker.watchdog_period; }));
     keys.push_back(milliseconds(
         "shaker.backoff_min_ms", {10, 60'000}, "before the first reconnect, doubled each time",

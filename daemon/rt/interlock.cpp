@@ -242,6 +242,8 @@ void Interlock::check(const drivers::ShakerReading& reading) noexcept {
           reading.fault != 0 || reading.state == drivers::kShakerFault, now);
     judge(By::read_back, Trip::over_amplitude, !(reading.measured_g <= table_g_), now);
     judge(By::read_back, Trip::read_back, mismatch, now);
+    judge(By::read_back, Trip::watchdog_changed,
+          reading.watchdog == drivers::WatchdogTimeout::changed, now);
     if (const double commanded = commanded_g_.load(); commanded > 0) {
         judge(By::read_back, Trip::amplitude_off,
               std::abs(20 * std::log10(reading.measured_g / commanded)), now);

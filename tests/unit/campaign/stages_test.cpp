@@ -125,6 +125,7 @@ struct StagesTest : testing::Test, drivers::CanPort {
         ports.feed = feed.get();
         ports.levelled = [this](const LevelDrift& found) { drifts.push_back(found); };
         campaign = std::make_unique<Campaign>(settings, ports);
+        for (int i = 0; campaign->stopping() && i < 40; ++i) tick();
         ASSERT_TRUE(campaign->command({Kind::arm, "Ada", ""}, now).accepted);
         ASSERT_TRUE(campaign->command({Kind::start, "Ada", ""}, now).accepted);
     }

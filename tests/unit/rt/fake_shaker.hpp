@@ -11,6 +11,7 @@ namespace vibrig {
 /// Remembers what it was asked; the test decides what it reads back.
 class FakeShaker final : public drivers::Shaker {
   public:
+    FakeShaker() { now.watchdog = drivers::WatchdogTimeout::kept; }
     void start(std::function<bool()>, StateHandler) override {}
     [[nodiscard]] bool request(const drivers::ShakerSetPoint& set_point,
                                std::uint64_t under) noexcept override {

@@ -97,7 +97,11 @@ class Bench {
 [[nodiscard]] inline std::vector<int> addresses_written(const TestServer& server) {
     std::vector<int> addresses;
     for (const Request& write : server.writes()) {
-        if (write.address < kWatchdog) addresses.push_back(write.address);
+        if (write.writes_run()) {
+            addresses.push_back(kRun);
+        } else if (write.address != kWatchdog && write.address != kWatchdogTimeout) {
+            addresses.push_back(write.address);
+        }
     }
     return addresses;
 }

@@ -26,12 +26,19 @@ struct Request {
     std::vector<std::uint16_t> values;  ///< of a write
     int connection = 0;                 ///< counted from 1
     [[nodiscard]] bool is_write() const { return function == 6 || function == 16; }
+    /// The run register is written, alone or together with the ramp time before it.
+    [[nodiscard]] bool writes_run() const {
+        return is_write() && address <= kRunRegister && address + count > kRunRegister;
+    }
     [[nodiscard]] bool writes(int register_address) const {
-        return is_write() && address == register_address;
+        return register_address == kRunRegister
+                   ? writes_run()
+                   : is_write() && address == register_address && !writes_run();
     }
     [[nodiscard]] bool writes(int register_address, std::uint16_t value) const {
         return writes(register_address) && values.back() == value;
     }
+    static constexpr int kRunRegister = 5;
 };
 
 /// What the server does with a request.

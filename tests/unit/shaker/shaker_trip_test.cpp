@@ -1,0 +1,176 @@
+// A stop as fast as the controller can, and the timeout of its watchdog.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "test_bench.hpp"
+
+namespace vibrig::drivers::test {
+namespace {
+
+using Kind = Answer::Kind;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr ShakerSetPoint kSlow{15.0, 1.0, 60.0};
+constexpr int kElsewhere = 10;  ///< a ramp time that does not lie beside run
+
+[[nodiscard]] ShakerSettings apart(const TestServer& server) {
+    ShakerSettings settings = settings_for(server);
+    settings.registers.ramp_time.address = kElsewhere;
+    return settings;
+}
+
+[[nodiscard]] auto stop_of(Bench& bench) {
+    const auto began = steady_clock::now();
+    bench.shaker->stop_now();
+    EXPECT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    return steady_clock::now() - began;
+}
+
+TEST(ShakerTrip, RampZeroAndRunZeroAreOneWriteWhereTheyLieSideBySide) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply(kSlow));
+    ASSERT_EQ(server.holding(kRampTime), 6000);
+    server.forget();
+    stop_of(bench);
+    const auto writes = server.writes();
+    ASSERT_FALSE(writes.empty());
+    EXPECT_EQ(writes.front().address, kRampTime);
+    EXPECT_EQ(writes.front().values, (std::vector<std::uint16_t>{0, 0}));
+    EXPECT_EQ(server.holding(kRampTime), 0);
+    EXPECT_EQ(server.holding(kRun), 0);
+    // AND the next set-point brings its own ramp
+    ASSERT_TRUE(bench.apply({15.0, 1.0, 2.0}));
+    EXPECT_EQ(server.holding(kRampTime), 200);
+}
+
+TEST(ShakerTrip, APlannedEndKeepsItsRamp) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply(kSlow));
+    ASSERT_TRUE(bench.apply({15.0, 0.0, 5.0}));
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_EQ(server.holding(kRampTime), 500);
+}
+
+TEST(ShakerTrip, ADeviceThatTakesOneRegisterAtATimeGetsThemOneByOne) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply(kSlow));
+    server.script([](const Request& request) {
+        return request.writes_run() && request.count > 1 ? Answer{Kind::exception, 1, {}}
+                                                         : Answer{};
+    });
+    server.forget();
+    stop_of(bench);
+    EXPECT_EQ(server.holding(kRampTime), 0);
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_TRUE(bench.reaches(LinkState::running)) << "what was refused on the way is no fault";
+}
+
+TEST(ShakerTrip, RunZeroGoesOutWhateverBecomesOfTheRamp) {
+    for (const Answer answer : {Answer{Kind::exception, 3, {}}, Answer{Kind::ignore_write, 0, {}},
+                                Answer{Kind::close, 0, {}}, Answer{Kind::wrong_unit, 0, {}}}) {
+        TestServer server;
+        Bench bench(apart(server));
+        ASSERT_TRUE(bench.apply(kSlow));
+        server.script([answer](const Request& request) {
+            return request.writes(kElsewhere) ? answer : Answer{};
+        });
+        server.forget();
+        stop_of(bench);
+        EXPECT_EQ(server.holding(kRun), 0) << static_cast<int>(answer.kind);
+        const auto written = addresses_written(server);
+        EXPECT_EQ(std::ranges::count(written, kElsewhere), 1) << "one try";
+    }
+}
+
+TEST(ShakerTrip, ARampThatIsNotAnsweredHoldsRunZeroUpFor100MillisecondsAtMost) {
+    // GIVEN a response timeout of 5 s, and no answer to the ramp
+    TestServer server;
+    Bench bench(apart(server));
+    ASSERT_TRUE(bench.apply(kSlow));
+    server.script([](const Request& request) {
+        return request.writes(kElsewhere) ? Answer{Kind::hang, 0, {}} : Answer{};
+    });
+    const auto took = stop_of(bench);
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_GE(took, milliseconds(95));
+    EXPECT_LT(took, milliseconds(2500)) << "half the response timeout, on a busy machine";
+}
+
+TEST(ShakerTrip, WaitsTheFullResponseTimeoutForEverythingElse) {
+    // GIVEN a ramp that was not answered in its 100 ms
+    TestServer server;
+    Bench bench(apart(server));
+    ASSERT_TRUE(bench.apply(kSlow));
+    std::atomic<bool> first = true;
+    server.script([&](const Request& request) {
+        if (request.writes(kElsewhere) && first.exchange(false)) return Answer{Kind::hang, 0, {}};
+        // WHEN run is answered late THEN it is waited for
+        return request.writes_run() ? Answer{Kind::late, 0, milliseconds(300)} : Answer{};
+    });
+    stop_of(bench);
+    EXPECT_EQ(bench.shaker->counters().timeouts, 1U);
+}
+
+TEST(WatchdogTimeout, IsLookedAtAllTheTimeAndAChangeIsSeen) {
+    TestServer server;
+    ShakerSettings settings = settings_for(server);
+    settings.watchdog_period = 500 * kMillisecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.apply({15.0, 1.0, 1.0}));
+    ASSERT_TRUE(bench.eventually(
+        [&] { return bench.shaker->reading().watchdog == WatchdogTimeout::kept; }));
+    EXPECT_EQ(bench.shaker->reading().watchdog_timeout_s, 1.5);
+    // WHEN another master writes 60 s, or 0
+    for (const std::uint16_t value : {60'000, 0}) {
+        const auto began = steady_clock::now();
+        server.set_holding(kWatchdogTimeout, value);
+        ASSERT_TRUE(bench.eventually(
+            [&] { return bench.shaker->reading().watchdog == WatchdogTimeout::changed; }));
+        EXPECT_LT(steady_clock::now() - began, std::chrono::seconds(3)) << "500 ms when not busy";
+        ASSERT_TRUE(bench.eventually(
+            [&] { return bench.shaker->reading().watchdog_timeout_s == 1e-3 * value; }));
+        EXPECT_EQ(bench.shaker->state(), LinkState::degraded);
+        EXPECT_FALSE(bench.request({15.0, 1.0, 1.0}));
+        // THEN it stays so until a stop, after which it is what was written
+        EXPECT_EQ(server.holding(kWatchdogTimeout), value);
+        stop_of(bench);
+        ASSERT_TRUE(bench.eventually(
+            [&] { return bench.shaker->reading().watchdog == WatchdogTimeout::kept; }));
+        EXPECT_EQ(server.holding(kWatchdogTimeout), 1500);
+        EXPECT_TRUE(bench.reaches(LinkState::running));
+    }
+}
+
+TEST(WatchdogTimeout, ThatIsSwallowedOrScaledOnTheWayIsSeen) {
+    for (const auto kind : {Kind::ignore_write, Kind::exception}) {
+        TestServer server;
+        server.set_holding(kWatchdogTimeout, 15'000);
+        server.script([kind](const Request& request) {
+            return request.writes(kWatchdogTimeout) ? Answer{kind, 3, {}} : Answer{};
+        });
+        Bench bench(settings_for(server));
+        if (kind == Kind::exception) {
+            EXPECT_TRUE(bench.reaches(LinkState::degraded));
+            EXPECT_EQ(bench.shaker->counters().feeds, 0U);
+            continue;
+        }
+        EXPECT_TRUE(bench.eventually(
+            [&] { return bench.shaker->reading().watchdog == WatchdogTimeout::changed; }));
+    }
+}
+
+TEST(WatchdogTimeout, ARegisterThatCannotBeReadIsRefused) {
+    ShakerSettings settings;
+    settings.registers.watchdog_timeout.access = proto::Access::write;
+    RealClock clock;
+    EXPECT_THROW(static_cast<void>(make_shaker(clock, settings)), ShakerError);
+}
+
+}  // namespace
+}  // namespace vibrig::drivers::test
