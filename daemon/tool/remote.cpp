@@ -154,12 +154,21 @@ void wait_for_shaker(serve::Client& client) {
     std::cerr << kWho << "the shaker has not confirmed it yet: vibrig status\n";
 }
 
+/// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
+/// rest is measured, which takes a window. What lasts longer is the daemon's to explain.
+void wait_for_rest(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
+        std::this_thread::sleep_for(kLook);
+}
+
 int send_command(const CommandOptions& options) {
     v1::Command command;
     command.set_kind(options.kind);
     command.set_by(options.by);
     command.set_argument(options.argument);
     serve::Client client(options.at);
+    if (options.kind == v1::Command::arm) wait_for_rest(client);
     const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
     if (options.json) std::cout << reply.body << '\n';
     if (reply.status == 200) {
