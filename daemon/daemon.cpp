@@ -428,6 +428,7 @@ void Daemon::control_loop() {
         }
         tell_alarms();
         tell_controller();
+        tell_watchdog();
         if (journal_) tell_journal();
         if (recorder_) tell_recorder();
         watch_onlookers();

@@ -103,6 +103,7 @@ class Daemon final : public StatusSource {
     [[nodiscard]] std::string unknown_to_acknowledge(const CommandRequest& request) const;
     void tell_alarms();
     void tell_controller();
+    void tell_watchdog();
     void tell_journal();
     void tell_recorder();
     void watch_onlookers();
@@ -182,6 +183,7 @@ class Daemon final : public StatusSource {
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
     std::string imbalance_;  ///< as last looked at
     drivers::ControllerState controller_told_ = drivers::ControllerState::active;
+    bool watchdog_was_changed_ = false;          ///< as told
     std::array<bool, rt::kMostRules> raised_{};  ///< alarms already told of
     drivers::Time balance_checked_ = 0;
     std::atomic<drivers::Time> control_beat_{0};

@@ -218,6 +218,17 @@ void Daemon::tell_controller() {
         "can", fmt::format("the controller's error state: {}", drivers::name_of(now)));
 }
 
+void Daemon::tell_watchdog() {
+    const auto reading = shaker_->reading();
+    if (!reading.valid) return;
+    const bool changed = reading.watchdog == drivers::WatchdogTimeout::changed;
+    if (std::exchange(watchdog_was_changed_, changed) == changed) return;
+    log(changed ? Severity::alarm : Severity::info, "shaker",
+        fmt::format("the controller's watchdog timeout reads {:g} s, {}",
+                    reading.watchdog_timeout_s,
+                    changed ? "not what was written: nobody is armed" : "as written"));
+}
+
 void Daemon::serving() { serving_wall_ns_.store(rt::wall_clock()); }
 
 void Daemon::watch_onlookers() {

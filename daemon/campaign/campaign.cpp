@@ -282,7 +282,8 @@ void Campaign::start_position(Time now) {
 }
 
 Time Campaign::slew(Time now) {
-    if (!ports_.shaker.reading().at_rest()) {  // gimbals never slew on a moving shaker
+    // Gimbals never slew on a moving shaker, whoever moves it.
+    if (!ports_.shaker.reading().at_rest() || (!requested_ && stop_.rest(now).moving())) {
         if (requested_) {
             abort("the shaker left rest during a slew", now);
         } else {

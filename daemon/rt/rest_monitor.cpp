@@ -16,20 +16,6 @@ constexpr double kShare = 0.75;
 
 }  // namespace
 
-const char* name_of(RestVerdict verdict) noexcept {
-    switch (verdict) {
-        case RestVerdict::absent:
-            return "absent";
-        case RestVerdict::unknown:
-            return "unknown";
-        case RestVerdict::moving:
-            return "moving";
-        case RestVerdict::still:
-            return "still";
-    }
-    return "?";
-}
-
 RestWindow::RestWindow(Time window, Time sample_period)
     : window_(std::max(window, kFewest * sample_period)),
       sample_period_(sample_period),

@@ -23,7 +23,6 @@ enum class RestVerdict : std::uint8_t {
     moving,
     still,
 };
-[[nodiscard]] const char* name_of(RestVerdict verdict) noexcept;
 
 /// What one accelerometer says.
 struct RestWitness {

@@ -21,6 +21,20 @@ TEST(Together, ADaemonWithoutAWatchdogRegisterIsRefused) {
     EXPECT_EQ(complaint("shaker.registers.watchdog = true", true), "");
 }
 
+TEST(Together, AWatchdogThatWaitsLongerThanThreeSecondsIsRefused) {
+    EXPECT_EQ(complaint("shaker.watchdog_period_ms = 1000\n", true), "");
+    EXPECT_THAT(complaint("shaker.watchdog_period_ms = 1001\n", true),
+                AllOf(StartsWith("rig.toml:1:29: shaker.watchdog_period_ms: found 1001 ms"),
+                      HasSubstr("3.003 s after a daemon that died"), HasSubstr("1000 ms at most")));
+    EXPECT_EQ(complaint("shaker.watchdog_period_ms = 20000\n", false), "");
+}
+
+TEST(Together, AWatchdogTimeoutThatCannotBeReadBackIsRefused) {
+    EXPECT_THAT(complaint("shaker.registers.watchdog_timeout.access = \"write\"\n", true),
+                HasSubstr("shaker.registers.watchdog_timeout.access: found \"write\", expected "
+                          "\"read_write\""));
+}
+
 TEST(Together, ALimitOfRestBelowTheNoiseIsRefused) {
     EXPECT_THAT(
         complaint("noise.accelerometer_g = 0.004\nshaker.rest_g = 0.02\n", true),
