@@ -24,9 +24,6 @@ using drivers::Time;
 
 namespace {
 
-// A stage that has made no progress for this long keeps the shaker's watchdog hungry.
-constexpr Time kProgressDeadline = drivers::kSecond;
-
 template <std::size_t N>
 void copy_text(std::array<char, N>& to, const char* from) noexcept {
     std::strncpy(to.data(), from, N - 1);
@@ -290,14 +287,6 @@ bool Daemon::wait_for_end(double wall_seconds) {
                                    [this] { return ended_; });
 }
 
-double Daemon::longest_end_s() const {
-    const auto& campaign = configuration_.campaign;
-    // The ramp down and its grace, then the stop and its verdict.
-    return campaign.ramp_s + 2 * campaign.stop.deadline_s +
-           campaign.stop.pads.from_s(campaign.max_acceleration_g) +
-           3 * drivers::to_seconds(configuration_.shaker.watchdog_period);
-}
-
 void Daemon::join() {
     if (publisher_) publisher_->stop();
     give_up_.store(true);
@@ -340,15 +329,6 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
                        : severity == Severity::warning ? spdlog::level::warn
                                                        : spdlog::level::err;
     spdlog::log(level, "{}: {}", source, record.text);
-}
-
-bool Daemon::may_feed() const noexcept {
-    const auto reading = shaker_->reading();
-    if (campaign_.stopping() || (reading.running && !excitation_.load())) return false;
-    const Time now = clock_.now();
-    const Time oldest = std::min(
-        {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
-    return now - oldest <= kProgressDeadline;
 }
 
 void Daemon::take_commands(Time now) {

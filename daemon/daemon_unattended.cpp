@@ -12,6 +12,8 @@ namespace vibrig {
 using drivers::Time;
 
 namespace {
+// A stage that has made no progress for this long keeps the shaker's watchdog hungry.
+constexpr Time kProgressDeadline = drivers::kSecond;
 // A stage that makes no progress for this long, in wall time, is stuck.
 constexpr Time kPatience = 2 * drivers::kSecond;
 // The server waits for the control thread's answer to a command for 5 s.
@@ -216,6 +218,23 @@ void Daemon::tell_controller() {
         : now == ControllerState::warning ? Severity::warning
                                           : Severity::alarm,
         "can", fmt::format("the controller's error state: {}", drivers::name_of(now)));
+}
+
+double Daemon::longest_end_s() const {
+    const auto& campaign = configuration_.campaign;
+    // The ramp down and its grace, then the stop and its verdict.
+    return campaign.ramp_s + 2 * campaign.stop.deadline_s +
+           campaign.stop.pads.from_s(campaign.max_acceleration_g) +
+           3 * drivers::to_seconds(configuration_.shaker.watchdog_period);
+}
+
+bool Daemon::may_feed() const noexcept {
+    const auto reading = shaker_->reading();
+    if (campaign_.stopping() || (reading.running && !excitation_.load())) return false;
+    const Time now = clock_.now();
+    const Time oldest = std::min(
+        {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
+    return now - oldest <= kProgressDeadline;
 }
 
 void Daemon::tell_watchdog() {

@@ -62,10 +62,10 @@ void CrossCheck::for_daemon() {
     }
     if (sound({"shaker.watchdog_period_ms"}) &&
         c_.shaker.watchdog_period > drivers::kLongestWatchdogPeriod) {
-        const double period_s = drivers::to_seconds(c_.shaker.watchdog_period);
+        const double period_ms = static_cast<double>(c_.shaker.watchdog_period) / 1e6;
         refuse({"shaker.watchdog_period_ms"},
-               plain(1e3 * period_s) + " ms, so that the table would shake on for " +
-                   plain(3 * period_s) + " s after a daemon that died",
+               plain(period_ms) + " ms, so that the table would shake on for " +
+                   rounded(3e-3 * period_ms) + " s after a daemon that died",
                "1000 ms at most: three of them are the controller's timeout, 3 s at most");
     }
     if (sound({"shaker.registers"}) &&

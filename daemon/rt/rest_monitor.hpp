@@ -14,7 +14,8 @@ namespace vibrig::rt {
 struct RestSettings {
     /// rms below; at least 6 sigma of the accelerometers' noise
     double limit_g = safety::kRest_g;
-    double window_s = safety::kRestWindow_s;  ///< of the rms; 8 samples at least, where they come slower
+    double window_s =
+        safety::kRestWindow_s;  ///< of the rms; 8 samples at least, where they come slower
 };
 
 enum class RestVerdict : std::uint8_t {

@@ -207,6 +207,15 @@ const Case kCases[] = {
          rig.vibrate(kCommanded_g, kCommanded_g);
          if (beyond) rig.sample.table_accel = was;
      }},
+    {"stop_disobeyed", Trip::stop_disobeyed, 0,
+     [](Rig& rig, bool beyond) { rig.interlock->stop_disobeyed(beyond); }, Guard::idle, Guard::idle,
+     0},
+    {"watchdog_changed", Trip::watchdog_changed, 0,
+     [](Rig& rig, bool beyond) {
+         rig.shaker.now.watchdog =
+             beyond ? drivers::WatchdogTimeout::changed : drivers::WatchdogTimeout::kept;
+     },
+     Guard::armed, Guard::idle},
     {"server_stuck", Trip::server, 0,
      [](Rig& rig, bool beyond) { rig.interlock->onlookers(false, beyond); }, Guard::idle,
      Guard::idle},

@@ -114,7 +114,7 @@ TEST_P(ShakerPymodbus, UnderstandsWhatIsWritten) {
         if (!line.starts_with("write 6 ") && !line.starts_with("write 7 ")) lines.push_back(line);
     }
     EXPECT_EQ(lines, (std::vector<std::string>{"write 0 0 15000", "write 4 1250", "write 2 1 24464",
-                                               "write 5 1", "write 5 0"}));
+                                               "write 5 1", "write 4 0 0"}));
     EXPECT_TRUE(fed);
     EXPECT_TRUE(guarded);
 }
