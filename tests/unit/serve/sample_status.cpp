@@ -46,6 +46,12 @@ StatusData full_status() {
     s.zeros.mark = "zero of accelerometer x moved";
     s.zeros.message = "y has not converged";
     s.stop_pending = true;
+    s.rest = {"stopping",
+              {{rt::RestVerdict::moving, 0.25, 1, 2}, {rt::RestVerdict::moving, 0.375, 1, 2}},
+              false,
+              "table 0.375 g rms"};
+    s.shaker.watchdog = drivers::WatchdogTimeout::kept;
+    s.shaker.watchdog_timeout_s = 1.5;
     s.shaker_counters.wrong_replies = 45;
     s.shaker_counters.lost = 46;
     s.sample.time = 1'234'475'000'000;

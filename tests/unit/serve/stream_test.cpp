@@ -165,6 +165,8 @@ TEST(Readiness, NamesWhatIsNotWell) {
     well.can = drivers::PortState::running;
     well.shaker_link = drivers::LinkState::running;
     well.shaker.valid = true;
+    well.shaker.watchdog = drivers::WatchdogTimeout::kept;
+    well.rest.state = "at rest";
     well.sample.quality.fill(drivers::Quality::good);
     well.platform.time = 1;
     well.platform.ready = true;
@@ -179,6 +181,20 @@ TEST(Readiness, NamesWhatIsNotWell) {
                  [](StatusData& s) { s.shaker_link = drivers::LinkState::connecting; }},
              Row{"emergency stop: open",
                  [](StatusData& s) { s.shaker.emergency_stop_open = true; }},
+             Row{"rest: stopping: table 0.300 g rms",
+                 [](StatusData& s) {
+                     s.stop_pending = true;
+                     s.rest = {"stopping", {}, false, "table 0.300 g rms"};
+                 }},
+             Row{"rest: stop not obeyed, press the emergency stop",
+                 [](StatusData& s) {
+                     s.rest = {"stop not obeyed", {}, true, ""};
+                 }},
+             Row{"watchdog: timeout reads 60.0 s, not what was written",
+                 [](StatusData& s) {
+                     s.shaker.watchdog = drivers::WatchdogTimeout::changed;
+                     s.shaker.watchdog_timeout_s = 60;
+                 }},
              Row{"channels: inner last good 5.0 s ago",
                  [](StatusData& s) { s.channel_age_s[1] = 5; }},
              Row{"platform: not ready", [](StatusData& s) { s.platform.ready = false; }},
