@@ -28,7 +28,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 27> kDescriptions{{
+constexpr std::array<Description, 28> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -78,6 +78,8 @@ constexpr std::array<Description, 27> kDescriptions{{
      "slow-ramp=FACTOR      ramps take FACTOR times as long, stops and watchdog included"},
     {FaultKind::unit_rms, "unit-rms", Value::none, false,
      "unit-rms              amplitudes are taken and read back as rms"},
+    {FaultKind::unit_mps2, "unit-mps2", Value::none, false,
+     "unit-mps2             amplitudes are taken and read back as m/s^2 peak"},
     {FaultKind::dead_table, "dead-table", Value::none, false,
      "dead-table            the table does not move, measured amplitude 0 (but readback-echo)"},
     {FaultKind::timeout_register, "timeout-register", Value::whole, false,

@@ -37,6 +37,7 @@ ShakerLies lies_at(double time_s, ShakerLies lies, const Faults& faults) noexcep
     yes(FaultKind::stuck_contactor, lies.stuck_contactor);
     value(FaultKind::slow_ramp, lies.slow_ramp);
     yes(FaultKind::unit_rms, lies.unit_rms);
+    yes(FaultKind::unit_mps2, lies.unit_mps2);
     yes(FaultKind::dead_table, lies.dead_table);
     if (const Fault* fault = faults.active(FaultKind::timeout_register, time_s))
         lies.timeout_register = static_cast<std::uint16_t>(fault->value);

@@ -41,6 +41,7 @@ enum class FaultKind : std::uint8_t {
     stuck_contactor,
     slow_ramp,
     unit_rms,
+    unit_mps2,
     dead_table,
     timeout_register,
     latched_fault

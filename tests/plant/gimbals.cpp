@@ -22,7 +22,8 @@ bool Gimbals::advance(double dt_s, Vec3& encoder_deg) noexcept {
     for (std::size_t i = 0; i < 3; ++i) {
         const double gap = std::remainder(target_[i] - encoder_deg[i], 360.0);
         first = std::max(first, std::abs(gap));
-        const double step = std::clamp(gap, -rate_ * dt_s, rate_ * dt_s);
+        const bool stuck = stuck_ && static_cast<std::size_t>(*stuck_) == i;
+        const double step = stuck ? 0 : std::clamp(gap, -rate_ * dt_s, rate_ * dt_s);
         encoder_deg[i] += step;
         largest = std::max(largest, std::abs(gap - step));
     }

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
-#include "tests/plant/vec3.hpp"
+#include "tests/plant/truth.hpp"
 
 namespace vibrig::plant {
 
@@ -16,7 +17,8 @@ enum class GimbalMode : std::uint8_t {
 /// the platform go.
 class Gimbals {
   public:
-    explicit Gimbals(double rate_deg_per_s) : rate_(rate_deg_per_s) {}
+    explicit Gimbals(double rate_deg_per_s, std::optional<GimbalAxis> stuck = std::nullopt)
+        : rate_(rate_deg_per_s), stuck_(stuck) {}
 
     /// Target in encoder degrees, any turn of it; taken the shorter way round.
     void slew_to(const Vec3& encoder_deg, GimbalMode mode = GimbalMode::slew) noexcept;
@@ -36,6 +38,7 @@ class Gimbals {
 
   private:
     double rate_;
+    std::optional<GimbalAxis> stuck_;
     Vec3 target_{};
     GimbalMode mode_ = GimbalMode::slew;  ///< caged at switch-on
     bool moving_ = false;

@@ -15,21 +15,34 @@ double along(const Vec3& v, const Axis& axis) noexcept {
     return axis.sign * v[static_cast<std::size_t>(axis.index)];
 }
 
+/// A vector turned about a unit axis, Rodrigues.
+Vec3 turned(const Vec3& v, const Vec3& axis, double angle) noexcept {
+    const double c = std::cos(angle);
+    return c * v + std::sin(angle) * cross(axis, v) + (1 - c) * dot(axis, v) * axis;
+}
+
 }  // namespace
 
 PlatformModel::PlatformModel(const Truth& truth)
-    : frame_(truth),
-      shape_(truth),
+    : shape_(truth),
       coefficients_(truth.coefficients),
       cubic_(truth.cubic_deg_h_g3),
       gyro_axes_(truth.gyro_axes),
       drift_sign_(truth.drift_sign) {
+    // The base leans: what is level and upright is seen turned the other way, first about north.
+    const Frame base(truth);
+    const double about_north = -truth.base_tilt_deg[0] * kRadPerDeg;
+    const double about_east = -truth.base_tilt_deg[1] * kRadPerDeg;
+    const auto leaning = [&](const Vec3& v) {
+        const Vec3 once = turned(v, base.north, about_north);
+        return turned(once, base.east, about_east);
+    };
+    up_ = leaning(base.up);
     const double latitude = truth.latitude_deg * kRadPerDeg;
     const double azimuth = truth.azimuth_deg * kRadPerDeg;
-    earth_ =
-        kEarthRate *
-        (std::cos(latitude) * (std::cos(azimuth) * frame_.north - std::sin(azimuth) * frame_.east) +
-         std::sin(latitude) * frame_.up);
+    earth_ = leaning(kEarthRate * (std::cos(latitude) * (std::cos(azimuth) * base.north -
+                                                         std::sin(azimuth) * base.east) +
+                                   std::sin(latitude) * base.up));
     for (std::size_t i = 0; i < 2; ++i) {
         const double angle = truth.non_orthogonality_arcsec[i] * kRadPerDeg / 3600;
         skew_[i] = {std::sin(angle), std::cos(angle)};
@@ -83,7 +96,7 @@ Vec3 PlatformModel::drift_under(const Moments& force) const noexcept {
 }
 
 Vec3 PlatformModel::force(const Shake& shake, double gain) const noexcept {
-    const Vec3 still = seen(angles_, frame_.up + gain * shape_.acceleration(shake));
+    const Vec3 still = seen(angles_, up_ + gain * shape_.acceleration(shake));
     if (!shape_.platform_rocks()) return still;
     return still - cross(shape_.platform_turn(shake), still);
 }

@@ -26,7 +26,7 @@ class PlatformModel {
     /// The same through the gimbals of this platform.
     [[nodiscard]] Vec3 seen(const Vec3& angles, const Vec3& reference) const noexcept;
     [[nodiscard]] Vec3 up_in_platform() const noexcept { return up_at(angles_); }
-    [[nodiscard]] Vec3 up_at(const Vec3& angles) const noexcept { return seen(angles, frame_.up); }
+    [[nodiscard]] Vec3 up_at(const Vec3& angles) const noexcept { return seen(angles, up_); }
     /// Rate of the Earth in platform axes, deg/h.
     [[nodiscard]] Vec3 earth_rate_in_platform(const Vec3& angles) const noexcept {
         return seen(angles, earth_);
@@ -89,8 +89,8 @@ class PlatformModel {
 
     Vec3 angles_{};
     Vec3 rate_{};  ///< of the last step, due to drift and rocking, deg/h
-    Frame frame_;
     VibrationShape shape_;
+    Vec3 up_{};     ///< against gravity, in the reference frame
     Vec3 earth_{};  ///< in the reference frame, deg/h
     std::array<GyroCoefficients, 3> coefficients_;
     Mat3 cubic_;

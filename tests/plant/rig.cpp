@@ -19,7 +19,7 @@ Rig::Rig(const Truth& truth)
       passing_s_(tick_s_ / (1 + truth.time_base)),
       steps_(2 * static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
-      gimbals_(truth.slew_deg_per_s),
+      gimbals_(truth.slew_deg_per_s, truth.stuck_gimbal),
       isolator_(truth.transmission, truth.frequency_hz, truth.damping,
                 passing_s_ / static_cast<double>(steps_)),
       shaker_(truth.limit_g, truth.limit_mm),
@@ -49,7 +49,12 @@ Vec3 Rig::encoder_deg() const noexcept {
     return encoder;
 }
 
-void Rig::slew_to(const Vec3& encoder_deg, GimbalMode mode) {
+void Rig::slew_to(const Vec3& command_deg, GimbalMode mode) {
+    Vec3 encoder_deg{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto gimbal = static_cast<std::size_t>(truth_.command_channel[i]);
+        encoder_deg[gimbal] = command_deg[i] + truth_.command_offset_deg[gimbal];
+    }
     // A command said again is the same slew.
     const bool caged = gimbals_.mode() != GimbalMode::free_drift;
     if (encoder_deg != commanded_deg_ || !caged) {
@@ -158,6 +163,9 @@ void Rig::read() {
     const Shake felt = truth_.latency_s > 0 ? shake_before(truth_.latency_s) : now;
     readings_ = sensors_.read(encoder, platform_.force(felt, truth_.vibration_gain),
                               isolator_.table_g(table_g()), tick_s_ * static_cast<double>(tick_));
+    const Vec3 shown = readings_.encoder_deg;
+    for (std::size_t i = 0; i < 3; ++i)
+        readings_.encoder_deg[i] = shown[static_cast<std::size_t>(truth_.channel[i])];
 }
 
 }  // namespace vibrig::plant

@@ -19,7 +19,8 @@ class Rig {
   public:
     explicit Rig(const Truth& truth);
 
-    void slew_to(const Vec3& encoder_deg, GimbalMode mode = GimbalMode::slew);
+    /// As the channels of the command say.
+    void slew_to(const Vec3& command_deg, GimbalMode mode = GimbalMode::slew);
     void release() noexcept;
     void torque(const Vec3& deg_per_h) noexcept { torque_ = deg_per_h; }
     /// The random walk of the gyros from now on, times that of the truth.

@@ -46,6 +46,7 @@ Readings Sensors::read(const Vec3& angles_deg, const Vec3& force_g, double table
             angles_deg[i] + resolver_error_deg(i, angles_deg[i]) + noise_deg, truth_.resolver_bits);
         readings.raw_g[i] = raw[i] + truth_.accelerometer_g * accelerometer_noise_.normal();
     }
+    if (truth_.dead) readings.raw_g[static_cast<std::size_t>(truth_.dead->index)] = 0;
     readings.table_g = table_g + truth_.table_accelerometer_g * table_noise_.normal();
     readings.temperature_c =
         truth_.steady_temperature_c + (truth_.start_temperature_c - truth_.steady_temperature_c) *

@@ -37,7 +37,9 @@ double ShakerController::ramp_s() const noexcept { return value(holding_, kMap.r
 double ShakerController::amplitude_g() const noexcept {
     if (outside_g_) return emergency_stop_open_ ? 0 : *outside_g_;
     if (lies_.dead_table) return 0;
-    const double unit = lies_.unit_rms ? std::numbers::sqrt2 : 1;
+    const double unit = lies_.unit_rms    ? std::numbers::sqrt2
+                        : lies_.unit_mps2 ? 1 / kMetrePerSecond2
+                                          : 1;
     return lies_.amplitude_scaled * unit * std::max(drive_g_, held_g_);
 }
 

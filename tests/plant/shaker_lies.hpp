@@ -17,6 +17,7 @@ struct ShakerLies {
     bool stuck_contactor = false;
     double slow_ramp = 1;     ///< ramps take so many times their time, a stop's too
     bool unit_rms = false;    ///< amplitudes are rms, set-point and measured
+    bool unit_mps2 = false;   ///< amplitudes are m/s^2 peak
     bool dead_table = false;  ///< the table does not move; the measured amplitude is 0
     /// Another master keeps this in the watchdog's timeout register, which obeys it; ms, 0: off.
     std::optional<std::uint16_t> timeout_register{};

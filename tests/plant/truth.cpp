@@ -18,6 +18,8 @@ using Json = nlohmann::ordered_json;
 constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
                                                      "OO", "SS", "IO", "IS", "OS"};
 
+constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
+
 std::string text_of(const Json& json) {
     std::string text = json.dump();
     return text.size() > 60 ? text.substr(0, 57) + "..." : text;
@@ -59,15 +61,6 @@ struct Reader {
         if (!json.is_boolean()) fail(key, "found " + text_of(json) + ", expected true or false");
         out = json.get<bool>();
     }
-    template <class T, class Low>
-    void value(const std::string& key, const Json& json, std::optional<T>& out, Low low,
-               Low high) const {
-        out.reset();
-        if (json.is_null()) return;
-        std::conditional_t<std::is_floating_point_v<T>, double, int> number = 0;
-        value(key, json, number, low, high);
-        out = static_cast<T>(number);
-    }
     void value(const std::string& key, const Json& json, Axis& out, int, int) const {
         const std::string text = json.is_string() ? json.get<std::string>() : std::string();
         if (text.size() != 2 || (text[0] != '+' && text[0] != '-') || text[1] < 'x' ||
@@ -75,6 +68,27 @@ struct Reader {
             fail(key, "found " + text_of(json) + ", expected an axis such as \"+y\"");
         }
         out = {text[1] - 'x', text[0] == '+' ? 1 : -1};
+    }
+    void value(const std::string& key, const Json& json, GimbalAxis& out, int, int) const {
+        for (std::size_t i = 0; i < kGimbalNames.size(); ++i) {
+            if (json == kGimbalNames[i]) {
+                out = static_cast<GimbalAxis>(i);
+                return;
+            }
+        }
+        fail(key, "found " + text_of(json) + ", expected \"outer\", \"inner\" or \"azimuth\"");
+    }
+    void value(const std::string& key, const Json& json, std::uint16_t& out, int low,
+               int high) const {
+        int number = 0;
+        value(key, json, number, low, high);
+        out = static_cast<std::uint16_t>(number);
+    }
+    template <class T, class Low>
+    void value(const std::string& key, const Json& json, std::optional<T>& out, Low low,
+               Low high) const {
+        out.reset();
+        if (!json.is_null()) value(key, json, out.emplace(), low, high);
     }
     template <class T, std::size_t N, class Low>
     void value(const std::string& key, const Json& json, std::array<T, N>& out, Low low,
@@ -104,9 +118,11 @@ struct Writer {
     static Json json(double v) { return v; }
     static Json json(int v) { return v; }
     static Json json(bool v) { return v; }
+    static Json json(std::uint16_t v) { return v; }
+    static Json json(GimbalAxis v) { return kGimbalNames[static_cast<std::size_t>(v)]; }
     template <class T>
     static Json json(const std::optional<T>& v) {
-        return v ? Json(*v) : Json(nullptr);
+        return v ? json(*v) : Json(nullptr);
     }
     static Json json(const Axis& axis) {
         return std::string(axis.sign > 0 ? "+" : "-") + static_cast<char>('x' + axis.index);
@@ -172,6 +188,12 @@ void check(const Truth& truth, const std::string& file) {
                              "_axes: an axis is used twice, expected each of x, y, z once");
         }
     }
+    const auto each_once = [&](const std::array<GimbalAxis, 3>& list, const char* key) {
+        if (list[0] == list[1] || list[1] == list[2] || list[0] == list[2])
+            throw PlantError(file + ": " + key + ": a gimbal is there twice, expected each once");
+    };
+    each_once(truth.channel, "platform.channel");
+    each_once(truth.command_channel, "platform.command_channel");
     if (truth.latency_s * truth.sample_rate_hz > 1) {
         throw PlantError(file + ": accelerometer.latency_s: found " +
                          std::to_string(truth.latency_s) +

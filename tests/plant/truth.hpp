@@ -24,6 +24,8 @@ struct Axis {
     int sign = 1;
 };
 
+enum class GimbalAxis : std::uint8_t { outer, inner, azimuth };
+
 /// Positions within one gyro's ten coefficients; F fixed, I input, O output, S spin (IEEE Std 517).
 enum Term : std::size_t { kF, kI, kO, kS, kII, kOO, kSS, kIO, kIS, kOS, kTerms };
 
@@ -44,6 +46,10 @@ struct Truth {
     double gravity_mps2 = 9.80665;
     double time_base = 0;  ///< the rig's clock gains by this share: time stamps are too far apart
 
+    /// Of the base from level: turns about north and about east. The rig's own vertical, along
+    /// which it vibrates, leans with it.
+    std::array<double, 2> base_tilt_deg{};
+
     // platform
     Axis up{1, 1};  ///< platform axis that points up at zero gimbal angles
     std::array<std::array<Axis, 3>, 3> gyro_axes{
@@ -53,8 +59,13 @@ struct Truth {
     int drift_sign = -1;
     std::array<int, 3> encoder_sign{1, 1, 1};
     Vec3 encoder_zero_deg{0, 0, 0};  ///< angle = sign * (encoder - zero)
-    double slew_deg_per_s = 5;       ///< per gimbal
-    double slew_error_deg = 0;       ///< 1 sigma of where a slew ends, per gimbal
+    /// Whose angle the channels Outer, Inner, Azimuth show, and who obeys those commands.
+    std::array<GimbalAxis, 3> channel{GimbalAxis::outer, GimbalAxis::inner, GimbalAxis::azimuth};
+    std::array<GimbalAxis, 3> command_channel = channel;
+    Vec3 command_offset_deg{};                 ///< by gimbal: where it goes over where it was sent
+    std::optional<GimbalAxis> stuck_gimbal{};  ///< does not move, and is never in position
+    double slew_deg_per_s = 5;                 ///< per gimbal
+    double slew_error_deg = 0;                 ///< 1 sigma of where a slew ends, per gimbal
     /// Rate of the platform over the rate commanded to the torquers; -1: wired the wrong way round.
     Vec3 torquer_scale{1, 1, 1};
     std::array<int, 3> increment_sign{1, 1, 1};  ///< of the gyros' angle increments
@@ -73,8 +84,9 @@ struct Truth {
     // accelerometer: platform force = matrix * (raw - zero)
     Vec3 zero_g{0, 0, 0};
     Mat3 matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-    double vibration_gain = 1;  ///< for what vibrates, over that for gravity
-    double latency_s = 0;       ///< the force shown is this much older; a sample's period at most
+    std::optional<Axis> dead{};  ///< this one (its sign does not matter) shows 0 for ever
+    double vibration_gain = 1;   ///< for what vibrates, over that for gravity
+    double latency_s = 0;        ///< the force shown is this much older; a sample's period at most
 
     // resolver: amplitudes and phases of errors per turn, outer, inner, azimuth:
     // error = amplitude cos(order * encoder angle + phase)

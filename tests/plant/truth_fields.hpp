@@ -11,6 +11,7 @@ void for_each_field(T& t, Field&& field) {
     field("site", "azimuth_deg", t.azimuth_deg, -360.0, 360.0);
     field("site", "gravity_mps2", t.gravity_mps2, 1.0, 30.0);
     field("site", "time_base", t.time_base, -0.1, 0.1);
+    field("site", "base_tilt_deg", t.base_tilt_deg, -10.0, 10.0);
     field("platform", "up", t.up, 0, 0);
     field("platform", "gyro_x_axes", t.gyro_axes[0], 0, 0);
     field("platform", "gyro_y_axes", t.gyro_axes[1], 0, 0);
@@ -18,6 +19,10 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "drift_sign", t.drift_sign, -1, 1);
     field("platform", "encoder_sign", t.encoder_sign, -1, 1);
     field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
+    field("platform", "channel", t.channel, 0, 0);
+    field("platform", "command_channel", t.command_channel, 0, 0);
+    field("platform", "command_offset_deg", t.command_offset_deg, -180.0, 180.0);
+    field("platform", "stuck_gimbal", t.stuck_gimbal, 0, 0);
     field("platform", "slew_deg_per_s", t.slew_deg_per_s, 0.01, 360.0);
     field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
     field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);
@@ -33,6 +38,7 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "thermal_time_constant_s", t.thermal_time_constant_s, 1e-3, 1e6);
     field("accelerometer", "zero_g", t.zero_g, -1.0, 1.0);
     field("accelerometer", "matrix", t.matrix, -2.0, 2.0);
+    field("accelerometer", "dead", t.dead, 0, 0);
     field("accelerometer", "vibration_gain", t.vibration_gain, 0.0, 10.0);
     field("accelerometer", "latency_s", t.latency_s, 0.0, 0.025);
     field("resolver", "harmonic_1_arcsec", t.harmonic_1_arcsec, -36e3, 36e3);
@@ -84,6 +90,7 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "stuck_contactor", t.shaker_lies.stuck_contactor, 0, 0);
     field("shaker", "slow_ramp", t.shaker_lies.slow_ramp, 1.0, 1000.0);
     field("shaker", "unit_rms", t.shaker_lies.unit_rms, 0, 0);
+    field("shaker", "unit_mps2", t.shaker_lies.unit_mps2, 0, 0);
     field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
     field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
     field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);

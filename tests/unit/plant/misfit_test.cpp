@@ -365,6 +365,50 @@ TEST(Misfit, AClockThatGainsShowsSlowerDrift) {
         EXPECT_NEAR(gaining.platform().angles()[i] / right.platform().angles()[i], 1 / 1.01, 2e-5);
 }
 
+TEST(Misfit, ABaseThatLeansTurnsGravityAndEarthTogether) {
+    // GIVEN 1 deg about north: the base's up leans to the south of east, gravity in it the other
+    // way
+    Truth truth;
+    truth.base_tilt_deg = {1, 0};
+    const PlatformModel model(truth);
+    expect_near(model.up_at({}), {0, std::cos(1 * kRad), -std::sin(1 * kRad)}, 1e-12);
+    const PlatformModel level{Truth{}};
+    EXPECT_NEAR(dot(model.up_at({}), model.earth_rate()), dot(level.up_at({}), level.earth_rate()),
+                1e-12);
+    EXPECT_NEAR(model.earth_rate()[0], level.earth_rate()[0], 1e-12) << "north is the axis";
+    EXPECT_NEAR(model.earth_rate()[2], -level.earth_rate()[1] * std::sin(1 * kRad), 1e-12);
+    // AND it vibrates along its own vertical
+    expect_near(model.force({1, 0}) - model.force({0, 0}), {0, 1, 0}, 1e-12);
+}
+
+TEST(Misfit, ChannelsAndCommandsGoToTheGimbalsTheyAreWiredTo) {
+    // GIVEN channel Outer showing the azimuth gimbal, commands for Outer going to the inner one, 2
+    // deg off
+    Truth truth = quiet();
+    truth.channel = {GimbalAxis::azimuth, GimbalAxis::inner, GimbalAxis::outer};
+    truth.command_channel = {GimbalAxis::inner, GimbalAxis::outer, GimbalAxis::azimuth};
+    truth.command_offset_deg = {0, 2, 0};
+    truth.dead = Axis{1, 1};
+    Rig rig(truth);
+    rig.slew_to({10, 20, 30});
+    for (int i = 0; i < 400; ++i) rig.advance();
+    expect_near((1 / kRad) * rig.platform().angles(), {20, 12, 30}, 1e-9);
+    expect_near(rig.readings().encoder_deg, {30, 12, 20}, 1e-4);
+    EXPECT_TRUE(rig.gimbals().in_position());
+    EXPECT_EQ(rig.readings().raw_g[1], 0) << "dead";
+    EXPECT_NE(rig.readings().raw_g[0], 0);
+}
+
+TEST(Misfit, AGimbalThatIsStuckStaysAndTheOthersMove) {
+    Truth truth = quiet();
+    truth.stuck_gimbal = GimbalAxis::inner;
+    Rig rig(truth);
+    rig.slew_to({10, 20, 30});
+    for (int i = 0; i < 800; ++i) rig.advance();
+    expect_near((1 / kRad) * rig.platform().angles(), {10, 0, 30}, 1e-9);
+    EXPECT_FALSE(rig.gimbals().in_position());
+}
+
 TEST(Misfit, ALateSlowVibrationIsStillTheOneOfThePast) {
     // The largest latency is a whole tick: what the sample before showed.
     Truth truth = quiet();

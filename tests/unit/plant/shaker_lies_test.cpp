@@ -122,10 +122,13 @@ TEST(ShakerLies, AScaledTableAgreesWithItsRegistersAndDoesMore) {
     EXPECT_EQ(shaker.faults(), kFaultLimit);
 }
 
-TEST(ShakerLies, RmsForPeakIsAFactorOfRootTwo) {
+TEST(ShakerLies, OtherUnitsAreFactorsOfRootTwoAndOfGravity) {
     ShakerController shaker = shaking({.unit_rms = true});
     EXPECT_EQ(measured_g(shaker), 5);
     EXPECT_NEAR(shaker.amplitude_g(), 5 * std::numbers::sqrt2, 1e-12);
+    shaker.lie({.unit_mps2 = true});
+    EXPECT_EQ(measured_g(shaker), 5);
+    EXPECT_NEAR(shaker.amplitude_g(), 5 / 9.80665, 1e-12);
 }
 
 TEST(ShakerLies, AnEchoHidesADeadTable) {

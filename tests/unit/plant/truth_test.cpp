@@ -30,6 +30,9 @@ TEST(Truth, SurvivesWritingAndReading) {
     truth.seed = 0xffffffffffffffffULL;
     truth.shaker_lies.stuck_contactor = true;
     truth.step_at_s = 1e3;
+    truth.dead = Axis{2, 1};
+    truth.stuck_gimbal = GimbalAxis::inner;
+    truth.channel = {GimbalAxis::azimuth, GimbalAxis::outer, GimbalAxis::inner};
     truth.cross_axis = {0.05, -0.1};
     truth.cubic_deg_h_g3[2] = {1e-3, 2e-3, 3e-3};
     truth.shaker_lies.timeout_register = 0;
@@ -83,6 +86,10 @@ TEST(Truth, NamesTheKeyOfBadInput) {
            "drift.step_at_s: found \"soon\", expected a number from 0");
     expect(replaced(good, "\"step_after_dwell\": null", "\"step_after_dwell\": 1.5"),
            "drift.step_after_dwell: found 1.5, expected a whole number");
+    expect(replaced(good, "\"stuck_gimbal\": null", "\"stuck_gimbal\": \"middle\""),
+           "platform.stuck_gimbal: found \"middle\", expected \"outer\", \"inner\" or \"azimuth\"");
+    expect(replaced(good, "\"dead\": null", "\"dead\": \"x\""),
+           "accelerometer.dead: found \"x\", expected an axis");
     expect(replaced(good, "\"cross_axis\": [", "\"cross_axis\": [0, "), "expected a list of two");
     expect(replaced(good, "\"dead_table\": false", "\"dead_table\": 1"),
            "shaker.dead_table: found 1, expected true or false");
@@ -96,6 +103,10 @@ TEST(Truth, NamesTheKeyOfBadInput) {
 }
 
 TEST(Truth, RefusesAnAxisUsedTwice) {
+    Truth twice;
+    twice.channel[1] = GimbalAxis::outer;
+    EXPECT_NE(complaint(to_json(twice)).find("platform.channel: a gimbal is there twice"),
+              std::string::npos);
     Truth truth;
     truth.gyro_axes[1][0] = truth.gyro_axes[1][1];
     EXPECT_NE(complaint(to_json(truth)).find("gyro_y_axes"), std::string::npos);
