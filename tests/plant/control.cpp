@@ -12,7 +12,8 @@ namespace vibrig::plant {
 namespace {
 
 constexpr const char* kHelp =
-    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, status, help";
+    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, hold S, go, status, "
+    "help";
 
 std::string_view trimmed(std::string_view text) {
     const auto begin = text.find_first_not_of(" \t\r");
@@ -30,6 +31,16 @@ std::optional<double> table_g(std::string_view text) {
                          "\", expected own or an amplitude from 0 to 100 g");
     }
     return g;
+}
+
+double hold_s(std::string_view text) {
+    double s = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), s);
+    if (error != std::errc{} || end != text.data() + text.size() || !(s >= 0 && s <= 1e9)) {
+        throw PlantError("hold: found \"" + std::string(text) +
+                         "\", expected a time of the rig from 0 to 1e9 s");
+    }
+    return s;
 }
 
 }  // namespace
@@ -57,6 +68,14 @@ std::string Control::execute(std::string_view line) {
         if (word == "table") {
             rig_.rig.shaker().drive_from_outside(table_g(rest));
             return "ok table " + std::string(rest);
+        }
+        if (word == "hold") {
+            rig_.hold_at_s = hold_s(rest);
+            return "ok hold " + std::string(rest);
+        }
+        if (word == "go") {
+            rig_.hold_at_s.reset();
+            return "ok go";
         }
         if (word == "status") {
             std::array<char, 160> status{};

@@ -8,8 +8,9 @@
 namespace vibrig::plant {
 
 /// Lines by which a person or a test works the rig while it runs:
-///   fault SPEC | clear [NAME] | estop open | estop close | table G | table own | status |
-///   help
+///   fault SPEC | clear [NAME] | estop open | estop close | table G | table own | hold S |
+///   go |
+///   status | help
 class Control {
   public:
     explicit Control(SharedRig& rig) : rig_(rig) {}

@@ -38,6 +38,7 @@ struct Options {
     std::optional<double> warm_up_s;
     std::optional<double> start_temperature_c;
     std::optional<double> duration_s;
+    std::optional<double> hold_at_s;
 };
 
 class Descriptor {
@@ -130,6 +131,13 @@ void run(const Options& o) {
         o.dbc.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc") : proto::read_dbc(o.dbc);
     const Truth truth = truth_of(o);
     SharedRig shared(truth);
+    if (o.hold_at_s) {
+        if (!settings.lockstep)
+            throw PlantError("--hold-at: the real clock cannot be held, expected --clock rig");
+        if (o.control.empty())
+            throw PlantError("--hold-at: nobody could let it go on, expected --control");
+        shared.hold_at_s = o.hold_at_s;
+    }
     for (const std::string& spec : o.faults) shared.faults.add(parse_fault(spec, 0));
     const Descriptor commands(open_control(o.control));
     const std::unique_ptr<Bus> bus = open_bus(o.can);
@@ -187,6 +195,11 @@ void add_run_command(CLI::App& app, int& exit_code) {
         ->check(proto::finite(-60.0, 150.0));
     command->add_option("--duration", o->duration_s, "end after so many simulated seconds")
         ->check(proto::finite(0.0, 1e9));
+    command
+        ->add_option(
+            "--hold-at", o->hold_at_s,
+            "with --clock rig: its time stands still there until the command go or another hold")
+        ->check(proto::finite(0.0, 1e9));
     command->add_option("--fault", o->faults, "a fault, see below; may be given several times")
         ->allow_extra_args(false);
     command->add_option("--control", o->control,
@@ -197,7 +210,7 @@ void add_run_command(CLI::App& app, int& exit_code) {
     command->footer(
         fault_help() +
         "Commands: fault SPEC, clear [NAME], estop open, estop close, table G, table own, "
-        "status, help\n"
+        "hold S, go, status, help\n"
         "Example:\n  vibrig-plant run --can seqpacket:/tmp/rig.sock --modbus "
         "tcp:127.0.0.1:0 --seed 7 "
         "--fault lose=0.01@100..200 --fault stuck:outer@300..301");

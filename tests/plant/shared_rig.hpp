@@ -1,6 +1,7 @@
 #pragma once
 
 #include <mutex>
+#include <optional>
 
 #include "tests/plant/faults.hpp"
 #include "tests/plant/rig.hpp"
@@ -30,6 +31,8 @@ struct SharedRig {
     Rig rig;
     Faults faults;
     bool emergency_stop_by_hand = false;
+    /// In lockstep the rig's time stands there until it is released.
+    std::optional<double> hold_at_s;
 };
 
 }  // namespace vibrig::plant

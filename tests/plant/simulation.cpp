@@ -54,6 +54,7 @@ void Simulation::run() {
         if (settings_.duration_s &&
             1e-6 * static_cast<double>(tick * shared_.rig.tick_us()) > *settings_.duration_s)
             return;
+        if (!wait_while_held()) return;
         if (tick > 0) {
             const std::scoped_lock lock(shared_.mutex);
             shared_.rig.advance();
@@ -84,6 +85,17 @@ void Simulation::make_tick() {
 }
 
 void Simulation::send_tick() { bus_.send(tick_frames_, settings_.lockstep); }
+
+bool Simulation::wait_while_held() {
+    const auto held = [this] {
+        const std::scoped_lock lock(shared_.mutex);
+        return shared_.hold_at_s && shared_.now_s() >= *shared_.hold_at_s;
+    };
+    while (held()) {
+        if (wait(std::nullopt) == Wake::stop) return false;
+    }
+    return true;
+}
 
 bool Simulation::wait_for_acknowledgement() {
     std::int64_t resend_at = monotonic_ns() + settings_.resend_ns;

@@ -43,6 +43,7 @@ class Simulation {
 
     void make_tick();
     void send_tick();
+    [[nodiscard]] bool wait_while_held();
     [[nodiscard]] bool wait_for_acknowledgement();
     [[nodiscard]] bool wait_until(std::int64_t deadline_ns);
     Wake wait(std::optional<std::int64_t> deadline_ns);
