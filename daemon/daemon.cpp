@@ -179,7 +179,15 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
            [this](const rt::Ramp& ramp) { interlock_.ramp(ramp); },
            [this](double measured) { interlock_.transmission(measured); },
            [this](Time now) { return rest_.rest(now); },
-           [this](bool disobeyed) { interlock_.stop_disobeyed(disobeyed); }}),
+           [this](bool disobeyed) { interlock_.stop_disobeyed(disobeyed); },
+           [this](campaign::Proving what) {
+               starving_.store(what == campaign::Proving::watchdog);
+               interlock_.proving(what != campaign::Proving::nothing);
+           },
+           [this](const campaign::ProofRecord& record) {
+               if (journal_) journal_->proved(record.by, campaign::to_json(record));
+           },
+           utc_now}),
       publisher_(
           configuration_.mqtt.host.empty()
               ? nullptr
@@ -521,6 +529,7 @@ StatusData Daemon::status() const {
     status.shaker_link = shaker_->state();
     status.shaker_counters = shaker_->counters();
     status.stop_pending = campaign_.stopping();
+    status.simulated = configuration_.simulated();
     status.can = port_->state();
     status.can_counters = port_->counters();
     status.assembler = acquired.assembler;

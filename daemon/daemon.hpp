@@ -178,6 +178,7 @@ class Daemon final : public StatusSource {
 
     std::atomic<bool> shut_down_{false};
     std::atomic<bool> give_up_{false};
+    std::atomic<bool> starving_{false};    ///< the proof does not let the watchdog be fed
     std::atomic<bool> excitation_{false};  ///< the campaign is between ramp and rest
     int dwells_with_estimator_ = 0;        ///< ordered, not yet reported done; control thread
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;

@@ -37,6 +37,15 @@ void Daemon::open_journal() {
         campaign_.take_over_loop_check(found);
         log(Severity::warning, "journal", "the newest loop check was out of band: " + found);
     }
+    std::vector<campaign::ProofRecord> proofs;
+    for (const auto& text : journal_->recovery().proofs) {
+        if (auto record = campaign::proof_from_json(text)) {
+            proofs.push_back(std::move(*record));
+        } else {
+            log(Severity::warning, "journal", "a proof of the safe state cannot be read: left out");
+        }
+    }
+    campaign_.take_over_proofs(std::move(proofs));
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
@@ -49,7 +58,7 @@ std::string Daemon::result_configuration() const {
         if (section == "server" || section == "log" || section == "threads" ||
             section == "journal" || section == "mqtt" || section == "clock" ||
             section == "record" || section == "unit" || section == "instrument" ||
-            section == "selftest" || value.key == "campaign.results")
+            section == "selftest" || section == "commission" || value.key == "campaign.results")
             continue;
         text += value.key + " = " + value.value + "\n";
     }
@@ -230,7 +239,8 @@ double Daemon::longest_end_s() const {
 
 bool Daemon::may_feed() const noexcept {
     const auto reading = shaker_->reading();
-    if (campaign_.stopping() || (reading.running && !excitation_.load())) return false;
+    if (starving_.load() || campaign_.stopping() || (reading.running && !excitation_.load()))
+        return false;
     const Time now = clock_.now();
     const Time oldest = std::min(
         {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});

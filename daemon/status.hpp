@@ -214,6 +214,30 @@ struct LoopCheckStatus {
     std::vector<Row> rows;
 };
 
+/// The newest proof of the safe state, and whether it lets a campaign be armed.
+struct ProofStatus {
+    struct Row {
+        std::string name, unit;
+        double value = 0, low = 0, high = 0;
+        bool passed = false;
+    };
+    bool demanded = false;
+    std::string refusal;  ///< why no campaign is armed; empty: as far as this goes it may be
+    std::string advice;   ///< what should be proved before long
+    std::string by;       ///< of the newest, passed or not; empty: there is none
+    std::int64_t utc_ns = 0;
+    bool passed = false;
+    std::string message;
+    std::vector<Row> rows;
+    std::string asks;  ///< what a person is to do now
+    struct Past {
+        std::int64_t utc_ns = 0;
+        bool passed = false;
+        double stop_s = 0, watchdog_s = 0;  ///< to rest; 0: not measured
+    };
+    std::vector<Past> history;  ///< oldest first
+};
+
 /// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
 /// not in real-time threads.
 struct StatusData {
@@ -266,6 +290,8 @@ struct StatusData {
     LevellingStatus levelling;
     ZeroStatus zeros;
     LoopCheckStatus loop_check;
+    ProofStatus proof;
+    bool simulated = false;  ///< the rig is a program
 };
 
 enum class Severity : std::uint8_t { info, warning, alarm, trip };

@@ -9,6 +9,9 @@
 namespace vibrig::drivers {
 namespace {
 
+// A register resolves 1 mHz.
+constexpr double kSameFrequency_hz = 0.01;
+
 // The first time on a new link that is the stop's alone. A device that was cut off for long has
 // tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
 // left shaking is to see it told one thing. 100 ms, and as much again for the way there.
@@ -60,6 +63,11 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops)
         !encodable(map.ramp_time, set_point.ramp_s)) {
         return false;
     }
+    // Whatever the caller thinks: the frequency changes at rest only, or it passes the resonance.
+    const auto now = reading();
+    if (now.valid && (now.running || !now.still()) &&
+        std::abs(set_point.frequency_hz - now.frequency_hz) > kSameFrequency_hz)
+        return false;
     const auto ticket = orders_.ticket();
     if (ticket.stop_pending() || ticket.stops() != stops || state() != LinkState::running)
         return false;

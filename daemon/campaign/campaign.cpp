@@ -7,7 +7,6 @@
 
 #include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
-#include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
@@ -54,7 +53,8 @@ rt::Guard guard_in(State state) {
 Campaign::Campaign(const Settings& settings, Ports ports)
     : settings_(settings),
       ports_(std::move(ports)),
-      stop_(ports_.shaker, ports_.rest, settings_.stop) {
+      stop_(ports_.shaker, ports_.rest, settings_.stop),
+      proof_(settings_.proof) {
     plan_stops();
     make_stages();
 }
@@ -118,6 +118,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (state_ == State::tripped)
                 return refuse("tripped (" + reason_ + "): acknowledge it first");
             if (const auto why = loop_->refusal(); !why.empty()) return refuse(why);
+            if (const auto why = proof_.refusal(utc_ns()); !why.empty()) return refuse(why);
             if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             armed_under_ = ports_.shaker.stops();
@@ -217,6 +218,7 @@ Time Campaign::step(Time now) {
 
 Time Campaign::step_once(Time now) {
     watch_stop(now);
+    if (pressed_) await_pressed_rest(now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
         !ports_.shaker.reading().valid) {
@@ -292,6 +294,10 @@ Time Campaign::slew(Time now) {
         return now;
     }
     if (!requested_) {
+        if (const auto why = may_slew(); !why.empty()) {
+            abort(why, now);
+            return now;
+        }
         ports_.gimbal.slew_to(here().stop.position_deg, now);
         requested_ = true;
     }
@@ -423,89 +429,6 @@ Time Campaign::rest(Time now) {
     return now;
 }
 
-/// A stop of this thread's own does not end the arming.
-void Campaign::stop_shaker() {
-    ports_.shaker.stop_now();
-    ++armed_under_;
-}
-
-double Campaign::highest_level() const {
-    if (state_ == State::checking) return settings_.loop.table_g;
-    return *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_);
-}
-
-bool Campaign::ask_level(double table_g, Time now) {
-    stop_.excited(table_g);
-    if (!ports_.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s}, armed_under_))
-        return false;
-    tell_ramp(table_g, now);
-    return true;
-}
-
-void Campaign::tell_ramp(double table_g, Time now) {
-    const double start_g = std::exchange(asked_g_, table_g);
-    if (!ports_.ramping) return;
-    const RigFrame frame(settings_.rig);
-    ports_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
-                    state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
-}
-
-void Campaign::order_stop(const std::string& by) {
-    stopped_by_ = by;
-    ports_.shaker.stop_now();
-}
-
-void Campaign::watch_stop(Time now) {
-    switch (stop_.update(now)) {
-        case StopMonitor::News::none:
-            return;
-        case StopMonitor::News::confirmed:
-            if (ports_.disobeyed) ports_.disobeyed(false);
-            return ports_.event(Severity::info,
-                                fmt::format("stop confirmed: rest measured {:.2f} s after the "
-                                            "order ({})",
-                                            stop_.took_s(), stopped_by_));
-        case StopMonitor::News::disobeyed: {
-            const auto what =
-                fmt::format("stop not obeyed within {:.1f} s ({}): {}: press the emergency stop",
-                            stop_.took_s(), stopped_by_, stop_.what_moves(now));
-            ports_.event(Severity::trip, what);
-            if (state_ == State::tripped) reason_ += "; " + what;
-            if (ports_.disobeyed) ports_.disobeyed(true);
-        }
-    }
-}
-
-/// Ramps down; true once rest is measured.
-bool Campaign::come_to_rest(Time now) {
-    const auto reading = ports_.shaker.reading();
-    if (!ports_.shaker.busy() && !stop_.stopping() && reading.at_rest() &&
-        reading.time > entered_ && stop_.rest(now).measured_since(entered_)) {
-        stop_.at_rest();
-        return true;
-    }
-    if (!requested_ && !stop_.stopping()) {
-        requested_ = ask_level(0, now);
-        if (!requested_) {  // no ramp to be had: the hard way
-            stop_sent_ = true;
-            tell_ramp(0, now);
-            stopped_by_ = "no ramp down was to be had";
-            stop_shaker();
-        }
-    }
-    if (!stop_sent_ &&
-        now - entered_ > from_seconds(settings_.ramp_s + settings_.stop.deadline_s)) {
-        stop_sent_ = true;
-        if (shutting_down_) {
-            ports_.event(Severity::alarm, "shaker did not come to rest in time: stop ordered");
-            order_stop("the ramp down took too long");
-        } else {
-            abort("the shaker did not come to rest in time", now);
-        }
-    }
-    return false;
-}
-
 void Campaign::conclude(Time now) {
     if (positions_done_ == 0) {
         armed_by_.clear();
@@ -540,7 +463,15 @@ void Campaign::abort(const std::string& why, Time now) {
 void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
     const bool checking = state_ == State::checking;
-    if (checking) loop_->not_completed(why);
+    if (checking) {
+        loop_->not_completed(why);
+        pressed_ = check_ == Check::press && ports_.shaker.reading().emergency_stop_open;
+        if (pressed_) {
+            stop_times_.begin(now);
+        } else {
+            conclude_proof("not completed: " + why + suspect_unit());
+        }
+    }
     const bool slewing = state_ == State::slewing || state_ == State::zeroing;
     leave_dwell();
     leave_stage();

@@ -47,6 +47,10 @@ struct Next {
     std::string words;
 };
 
+/// A stop that is made to happen, by order or by not feeding the watchdog: the amplitude may fall
+/// as it likes, and the controller may say fault.
+enum class Proving : std::uint8_t { nothing, stop, watchdog };
+
 /// What a campaign acts on and reports to. All calls come from the control thread.
 struct Ports {
     drivers::Gimbal& gimbal;
@@ -87,6 +91,11 @@ struct Ports {
     StopMonitor::Rest rest = {};
     /// A stop was not obeyed in its time; or was, and all is at rest.
     std::function<void(bool)> disobeyed = {};
+    /// What is being proved by making it happen.
+    std::function<void(Proving)> proving = {};
+    /// A proof is over, passed or not.
+    std::function<void(const ProofRecord&)> proved = {};
+    std::function<std::int64_t()> utc_ns = {};
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -104,6 +113,8 @@ class Campaign {
     /// Before the first step(): what the newest loop check of an earlier life found out of band.
     /// No campaign is armed until another one is in band.
     void take_over_loop_check(const std::string& out_of_band);
+    /// Likewise: what earlier lives have proved of stopping.
+    void take_over_proofs(std::vector<ProofRecord> history);
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
@@ -131,7 +142,20 @@ class Campaign {
     enum class Zeroing : std::uint8_t { none, start, end };
 
     /// Within a loop check.
-    enum class Check : std::uint8_t { look, ramp, settle, measure, rest };
+    /// The last parts are the safe-state proof's.
+    enum class Check : std::uint8_t {
+        look,
+        ramp,
+        settle,
+        measure,
+        stop,        ///< by order
+        again,       ///< up to the level once more
+        watchdog,    ///< is not fed
+        clear,       ///< its fault
+        press_ramp,  ///< up to the level for
+        press,       ///< the emergency stop
+        rest
+    };
 
     /// A stop and what the estimator and people call it, from 1.
     struct NumberedStop {
@@ -153,8 +177,22 @@ class Campaign {
     CommandReply begin_loop_check(const CommandRequest& request, drivers::Time now);
     drivers::Time check_loop(drivers::Time now);
     void go_on_to(Check part, drivers::Time now);
-    void ramp_for_check(drivers::Time now);
+    void ramp_for_check(Check then, drivers::Time now);
     void conclude_loop_check(drivers::Time now);
+    void order_proved_stop(drivers::Time now);
+    void prove_stop(drivers::Time now);
+    void prove_watchdog(drivers::Time now);
+    void prove_clearing(drivers::Time now);
+    void prove_emergency_stop(drivers::Time now);
+    void prove_refusals(drivers::Time now);
+    void await_pressed_rest(drivers::Time now);
+    void keep_ring_down();
+    void conclude_proof(const std::string& why);
+    [[nodiscard]] std::string suspect_unit() const;
+    void proving(Proving what);
+    [[nodiscard]] std::int64_t utc_ns() const { return ports_.utc_ns ? ports_.utc_ns() : 0; }
+    /// Gimbals slew only at rest; why not, else empty.
+    [[nodiscard]] std::string may_slew() const;
     void make_stages();
     void begin_zeroing(bool at_end, drivers::Time now);
     void leave_stage();
@@ -238,8 +276,9 @@ class Campaign {
     bool shutting_down_ = false;
     bool stop_sent_ = false;  ///< within rest(): the ramp down took too long
     bool requested_ = false;  ///< within ramp() and rest(): the set-point was accepted
-    double asked_g_ = 0;      ///< of the shaker, last
     std::string stopped_by_ = "the start of the daemon";  ///< whose stop was the last
+    drivers::Time asked_at_ = 0;
+    double asked_g_ = 0;  ///< of the shaker, last
     bool dwell_ordered_ = false;
     bool dwell_done_ = false;
     drivers::Time dwell_from_ = 0;
@@ -259,6 +298,10 @@ class Campaign {
     std::shared_ptr<LoopCheck> loop_;
     Part part_ = Part::go;
     Check check_ = Check::look;
+    SafetyProof proof_;
+    StopTimes stop_times_;
+    bool press_wanted_ = false;  ///< the emergency stop is to be proved, too
+    bool pressed_ = false;       ///< it was, and rest is awaited
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell
     std::array<double, 3> level_angle_rad_{};  ///< encoders, while levelling

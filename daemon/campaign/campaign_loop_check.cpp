@@ -1,4 +1,4 @@
-// The loop check: a few seconds at a small level, its own arming.
+// The loop check and the safe-state proof: about a minute at a small level, its own arming.
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/campaign/campaign.hpp"
@@ -13,7 +13,7 @@ using State = CampaignState;
 
 namespace {
 constexpr Time kCheckPoll = 200 * drivers::kMillisecond;
-constexpr Time kLook = kSecond;  // at rest, before
+constexpr Time kLook = 2 * kSecond;  // at rest, before
 // How late samples may be.
 constexpr Time kCheckSilence = kSecond;
 }  // namespace
@@ -35,16 +35,23 @@ std::string Campaign::not_fit_to_check(Time now) const {
 }
 
 CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now) {
+    if (!request.argument.empty() && request.argument != "emergency_stop")
+        return {false,
+                "selftest: found \"" + request.argument + "\", expected nothing or emergency_stop"};
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
     armed_by_ = request.by;
     armed_under_ = ports_.shaker.stops();
     reason_.clear();
     loop_->begin(request.by);
+    proof_.begin(request.by, settings_.loop.table_g);
+    press_wanted_ = request.argument == "emergency_stop";
+    pressed_ = false;
     ports_.feed->order(rt::StageFeed::Mode::samples);
     last_motion_ = now;
     check_ = Check::look;
     enter(State::checking, now);
-    const std::string text = fmt::format("loop check at {:g} g", settings_.loop.table_g);
+    const std::string text =
+        fmt::format("loop check and safe-state proof at {:g} g", settings_.loop.table_g);
     ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
     return {true, text};
 }
@@ -54,7 +61,10 @@ void Campaign::go_on_to(Check part, Time now) {
     check_ = part;
     entered_ = now;
     requested_ = stop_sent_ = false;
-    const bool steady = part == Check::settle || part == Check::measure;
+    const bool steady = part == Check::settle || part == Check::measure || part == Check::press;
+    proving(part == Check::stop || part == Check::clear ? Proving::stop
+            : part == Check::watchdog                   ? Proving::watchdog
+                                                        : Proving::nothing);
     if (ports_.commanded) ports_.commanded(steady ? settings_.loop.table_g : 0, excited_deg_);
     ports_.guard(rt::Guard::excitation);
 }
@@ -68,7 +78,8 @@ Time Campaign::check_loop(Time now) {
         abort("samples ceased", now);
     } else if (auto why = platform_lacks(now); !why.empty()) {
         abort(why, now);
-    } else if ((check_ == Check::settle || check_ == Check::measure) &&
+    } else if ((check_ == Check::settle || check_ == Check::measure || check_ == Check::press) &&
+               !reading.emergency_stop_open &&
                !vibrating_as_commanded(reading, settings_.loop.table_g)) {
         abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                           reading.state, reading.measured_g, settings_.loop.table_g),
@@ -76,33 +87,50 @@ Time Campaign::check_loop(Time now) {
     } else if (check_ == Check::look && since >= kLook) {
         if (const auto still = loop_->look(excited_deg_); !still.empty()) {
             abort(still, now);
+        } else if (!stop_.rest(now).measured()) {
+            abort("not at rest: " + stop_.what_moves(now), now);
         } else {
             go_on_to(Check::ramp, now);
         }
     } else if (check_ == Check::ramp) {
-        ramp_for_check(now);
+        ramp_for_check(Check::settle, now);
+    } else if (check_ == Check::again) {
+        ramp_for_check(Check::watchdog, now);
+    } else if (check_ == Check::press_ramp) {
+        ramp_for_check(Check::press, now);
     } else if (check_ == Check::settle && since >= from_seconds(settings_.settle_s)) {
         loop_->measure();
         go_on_to(Check::measure, now);
+        prove_refusals(now);
     } else if (check_ == Check::measure && since >= from_seconds(settings_.loop.measure_s)) {
         loop_->finish(reading.measured_g);
         if (ports_.loop_checked) ports_.loop_checked(armed_by_, loop_->out_of_band());
         if (ports_.transmission && loop_->out_of_band().empty())
             ports_.transmission(loop_->transmission());
-        go_on_to(Check::rest, now);
+        proof_.row("loop check in band", loop_->out_of_band().empty());
+        order_proved_stop(now);
+    } else if (check_ == Check::stop) {
+        prove_stop(now);
+    } else if (check_ == Check::watchdog) {
+        prove_watchdog(now);
+    } else if (check_ == Check::clear) {
+        prove_clearing(now);
+    } else if (check_ == Check::press) {
+        prove_emergency_stop(now);
     } else if (check_ == Check::rest && come_to_rest(now)) {
         conclude_loop_check(now);
     }
     return now + kCheckPoll;
 }
 
-void Campaign::ramp_for_check(Time now) {
+/// Up to the level, then on to `then`.
+void Campaign::ramp_for_check(Check then, Time now) {
     if (!requested_) {
         requested_ = ask_level(settings_.loop.table_g, now);
         if (!requested_) abort("the shaker takes no set-point", now);
     } else if (!ports_.shaker.busy() &&
                vibrating_as_commanded(ports_.shaker.reading(), settings_.loop.table_g)) {
-        go_on_to(Check::settle, now);
+        go_on_to(then, now);
     } else if (now - entered_ > from_seconds(settings_.ramp_s) + kRampGrace) {
         abort(fmt::format("shaker: measured {:.3f} g, expected {:g} g",
                           ports_.shaker.reading().measured_g, settings_.loop.table_g),
@@ -113,6 +141,7 @@ void Campaign::ramp_for_check(Time now) {
 void Campaign::conclude_loop_check(Time now) {
     leave_stage();
     loop_->conclude();
+    conclude_proof({});
     armed_by_.clear();
     enter(State::idle, now);
     const auto& found = loop_->status();

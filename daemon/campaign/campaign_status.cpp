@@ -29,6 +29,10 @@ void Campaign::fill(StatusData& status, Time now) const {
         status.position_deg = here().stop.position_deg;
     }
     fill_stages(status);
+    proof_.fill(status.proof, utc_ns());
+    status.proof.asks = state_ == State::checking && check_ == Check::press && requested_
+                            ? "press the emergency stop now"
+                            : "";
     fill_rest(status, now);
     double done = static_cast<double>(positions_done_);
     if (state_ == State::recording && dwell_to_ > dwell_from_) {

@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -76,6 +78,59 @@ std::string LoopCheck::look(std::array<double, 3>& position_deg) const {
     return {};
 }
 
+std::span<const estimator::LoopReading> LoopCheck::readings_since(drivers::Time time) const {
+    const auto first = std::ranges::lower_bound(readings_, drivers::to_seconds(time), {},
+                                                &estimator::LoopReading::time_s);
+    return {first, readings_.end()};
+}
+
+std::string unit_of_ratio(double ratio) {
+    struct Unit {
+        double ratio;
+        const char* words;
+    };
+    // The controller counts in what is named first, the configuration in what is named second.
+    static constexpr std::array<Unit, 6> kUnits{{
+        {std::numbers::sqrt2, "g rms for g peak? (shaker.amplitude_unit)"},
+        {1 / std::numbers::sqrt2, "g peak for g rms? (shaker.amplitude_unit)"},
+        {9.80665, "g for m/s2? (shaker.amplitude_unit)"},
+        {1 / 9.80665, "m/s2 for g? (shaker.amplitude_unit)"},
+        {0.5, "peak to peak for peak? (scale of shaker.registers.amplitude)"},
+        {2, "peak for peak to peak? (scale of shaker.registers.amplitude)"},
+    }};
+    constexpr double kNear = 0.12;
+    for (const Unit& unit : kUnits) {
+        if (ratio > 0 && std::abs(std::log(ratio / unit.ratio)) < kNear) return unit.words;
+    }
+    return {};
+}
+
+double LoopCheck::over_command(drivers::Time asked, double ramp_s) const {
+    // The slope of the amplitude, from the energy of two halves of what came: neither the phase nor
+    // when the controller began need be known.
+    const double from_s = drivers::to_seconds(asked) + 0.3 * ramp_s;
+    const auto first =
+        std::ranges::lower_bound(readings_, from_s, {}, &estimator::LoopReading::time_s);
+    const auto count = static_cast<std::size_t>(readings_.end() - first);
+    constexpr std::size_t kFewest = 16;
+    if (count < kFewest) return 0;
+    const auto amplitude = [&](std::size_t begin, std::size_t end) {
+        double square = 0;
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto& reading = first[static_cast<std::ptrdiff_t>(i)];
+            const auto& f = reading.force_g;
+            const double along = std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) - 1;
+            const double value = reading.table_good ? reading.table_g : along / rig_.transmission;
+            square += value * value;
+        }
+        return std::sqrt(2 * square / static_cast<double>(end - begin));
+    };
+    const std::size_t half = count / 2;
+    const double apart_s = first[static_cast<std::ptrdiff_t>(half)].time_s - first->time_s;
+    const double slope = (amplitude(half, 2 * half) - amplitude(0, half)) / apart_s;
+    return slope * ramp_s / settings_.table_g;
+}
+
 void LoopCheck::row(const char* name, const char* unit, double value, double low, double high) {
     const bool passed = value >= low && value <= high;
     status_.rows.push_back({name, unit, value, low, high, passed});
@@ -110,6 +165,9 @@ void LoopCheck::finish(double shaker_g) {
             settings_.phase_deg - settings_.phase_tolerance_deg,
             settings_.phase_deg + settings_.phase_tolerance_deg);
     }
+    if (const auto unit = unit_of_ratio(found.platform_g / (rig_.transmission * commanded_g));
+        !unit.empty() && !out_of_band_.empty())
+        out_of_band_ += "; " + unit;
     passed_ = out_of_band_.empty();
 }
 

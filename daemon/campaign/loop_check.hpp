@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,9 @@
 #include "estimator/loop_response.hpp"
 
 namespace vibrig::campaign {
+
+/// Which unit the controller may have been given for another, by table over command; empty: none.
+[[nodiscard]] std::string unit_of_ratio(double ratio);
 
 /// The newest loop check: collects samples at rest and at the small level, and says what is out of
 /// band. Control thread only.
@@ -25,6 +29,11 @@ class LoopCheck {
     [[nodiscard]] std::string look(std::array<double, 3>& position_deg) const;
     /// From now on what counts.
     void measure() { readings_.clear(); }
+    /// While the level is still coming up, linearly over `ramp_s` from when it was asked for: table
+    /// (platform over the transmission, where it has no accelerometer) over command; 0: unknown.
+    [[nodiscard]] double over_command(drivers::Time asked, double ramp_s) const;
+    /// Of those that count, what is not older.
+    [[nodiscard]] std::span<const estimator::LoopReading> readings_since(drivers::Time time) const;
     /// Judges it, `shaker_g` being what the controller says of the table: that is held against the
     /// command as the accelerometers are, and is no witness of them.
     void finish(double shaker_g);

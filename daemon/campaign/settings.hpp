@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/campaign/safety_proof.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/rt/rest_monitor.hpp"
 #include "drivers/torquer.hpp"
@@ -98,6 +99,8 @@ struct Settings {
     double amplitude_tolerance = 0.05;  ///< relative; measured against commanded after the ramp
     rt::RestSettings rest;
     StopSettings stop;
+    ProofSettings proof;
+    double watchdog_timeout_s = 1.5;  ///< that the controller is told
     // limits of the shaker, checked at the frequency in force
     double max_acceleration_g = 12.0;
     double max_velocity_mps = 1.5;

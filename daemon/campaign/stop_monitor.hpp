@@ -44,6 +44,8 @@ class StopMonitor {
     /// A level was asked for, peak at the table: from now on silence is no rest.
     void excited(double table_g) noexcept { level_g_ = std::max(level_g_, table_g); }
     [[nodiscard]] bool excited() const noexcept { return level_g_ > 0; }
+    /// As the newest proof has measured them.
+    void pads(const PadRingDown& pads) noexcept { settings_.pads = pads; }
     /// After a planned ramp down, with rest measured.
     void at_rest() noexcept { level_g_ = 0; }
     [[nodiscard]] rt::Rest rest(drivers::Time now) const { return rest_ ? rest_(now) : rt::Rest{}; }

@@ -1,6 +1,7 @@
 #include "daemon/configuration/configuration.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -8,6 +9,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <string_view>
 
 #include "daemon/configuration/cross_checks.hpp"
 #include "daemon/configuration/nearest.hpp"
@@ -155,6 +157,26 @@ void take_plan(Configuration& c) {
     }
 }
 
+/// What a proof of the safe state stands on: "key=value\n" each, sorted.
+std::string covered_by_proof(const std::vector<EffectiveValue>& effective) {
+    static constexpr std::array<std::string_view, 8> kSections{
+        "accelerometer", "can",      "clock",  "interlock",
+        "platform",      "selftest", "shaker", "vibration"};
+    std::vector<std::string> lines;
+    for (const EffectiveValue& value : effective) {
+        const auto section = std::string_view(value.key).substr(0, value.key.find_first_of(".["));
+        // How long a proof is valid is no part of what it shows.
+        if (value.key == "selftest.proof_valid_h" || value.key == "selftest.emergency_stop_days")
+            continue;
+        if (std::ranges::find(kSections, section) != kSections.end())
+            lines.push_back(value.key + "=" + value.value + "\n");
+    }
+    std::ranges::sort(lines);
+    std::string text;
+    for (const auto& line : lines) text += line;
+    return text;
+}
+
 }  // namespace
 
 Loaded parse(const std::string& text, const std::string& name, bool daemon) {
@@ -171,6 +193,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     c.shaker.registers.measured_amplitude.scale *= factor;
     c.campaign.frequency_hz = c.estimator.frequency_hz;
     c.campaign.rig = c.estimator;
+    c.campaign.proof.demanded = c.proofs_demanded();
+    c.campaign.proof.keys = covered_by_proof(loaded.effective);
+    c.campaign.watchdog_timeout_s = 3 * drivers::to_seconds(c.shaker.watchdog_period);
     c.campaign.sample_s = drivers::to_seconds(c.assembler.sample_period);
     c.campaign.level.block =
         static_cast<std::uint32_t>(std::max(1.0, std::round(0.1 / c.campaign.sample_s)));

@@ -42,7 +42,15 @@ struct Configuration {
         mps2_peak
     } amplitude_unit = AmplitudeUnit::g_peak;
     enum class ClockKind : std::uint8_t { real, rig } clock = ClockKind::real;  ///< [clock] source
-    std::string socket = "/run/vibrig/vibrigd.sock";                            ///< [server] socket
+    /// [commission]: what is demanded before a rig may shake
+    struct Commission {
+        bool simulated = false;  ///< a simulated rig on the real clock
+        bool enforce = false;    ///< a simulated rig is held to what a real one is held to
+    } commission;
+    /// Nothing that could hurt anybody: the rig is a program.
+    [[nodiscard]] bool simulated() const { return clock == ClockKind::rig || commission.simulated; }
+    [[nodiscard]] bool proofs_demanded() const { return !simulated() || commission.enforce; }
+    std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
     /// [server]: who may command at the socket, and where else is listened; empty: all, nowhere
     struct Server {
         std::string operator_group, status_socket, page, remote;

@@ -56,6 +56,7 @@ void CrossCheck::everywhere() {
 
 void CrossCheck::for_daemon() {
     rig_clock();
+    simulated_rig();
     if (!c_.shaker.registers.watchdog) {
         refuse({"shaker.registers.watchdog"}, "no watchdog register",
                "one that vibrigd feeds: a dead daemon must mean a stopped shaker");
@@ -181,6 +182,20 @@ void CrossCheck::bus() {
                plain(drivers::to_seconds(c_.assembler.stale_deadline) * 1e3) + " ms",
                "more than one sample period, " +
                    rounded(drivers::to_seconds(c_.assembler.sample_period) * 1e3) + " ms");
+    }
+}
+
+void CrossCheck::simulated_rig() {
+    if (!c_.commission.simulated || !sound({"commission.simulated"})) return;
+    // A switch that takes a demand away must not be set on a rig that can hurt: vcan alone is no
+    // proof, since gateways use it; a controller on this machine is a program.
+    const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
+    const bool here =
+        serial ? starts_with(c_.shaker.device, "/dev/pts/") : loopback(c_.shaker.host);
+    if (sound({"shaker.host", "shaker.transport", "shaker.device"}) && !here) {
+        refuse({"commission.simulated"},
+               "true with the shaker on " + (serial ? c_.shaker.device : c_.shaker.host),
+               "shaker.host on loopback, or shaker.device below /dev/pts/");
     }
 }
 

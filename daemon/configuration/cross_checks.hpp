@@ -31,6 +31,7 @@ class CrossCheck {
     void rest();
     void adaptive();
     void rig_clock();
+    void simulated_rig();
     void registers();
     void writable_registers_apart();
     void set_points_fit();

@@ -94,6 +94,12 @@ void add_loop_check_keys(std::vector<Key>& keys) {
     loop("phase_deg", "deg", {-180, 180}, "platform after table; needs a table accelerometer",
          &S::phase_deg);
     loop("phase_tolerance_deg", "deg", {1, 180}, "about phase_deg", &S::phase_tolerance_deg);
+    keys.push_back(number("selftest.proof_valid_h", "h", {1, 8760},
+                          "a proof that everything stops allows arming for so long",
+                          [](C& c) -> double& { return c.campaign.proof.valid_h; }));
+    keys.push_back(number("selftest.emergency_stop_days", "days", {1, 3660},
+                          "after so long a proof of the emergency stop's button is asked for",
+                          [](C& c) -> double& { return c.campaign.proof.emergency_stop_days; }));
     keys.push_back(boolean("selftest.required",
                            "a campaign is armed only after a loop check in band since the start",
                            [](C& c) -> bool& { return c.campaign.loop.required; }));

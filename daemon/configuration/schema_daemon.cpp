@@ -76,6 +76,13 @@ void add_daemon_keys(std::vector<Key>& keys) {
     keys.push_back(choice<C::ClockKind>(
         "clock.source", {{"real", C::ClockKind::real}, {"rig", C::ClockKind::rig}},
         "rig: the simulated rig owns the time", [](C & c) -> auto& { return c.clock; }));
+    keys.push_back(boolean("commission.simulated",
+                           "the rig is simulated although the clock is real; Modbus on this "
+                           "machine only",
+                           [](C& c) -> bool& { return c.commission.simulated; }));
+    keys.push_back(boolean("commission.enforce",
+                           "a simulated rig, too, is armed only with what a real one needs",
+                           [](C& c) -> bool& { return c.commission.enforce; }));
     keys.push_back(text(
         "server.socket", "absolute or \"@name\"", "Unix socket of the status server", socket_rule,
         [](C & c) -> auto& { return c.socket; }));

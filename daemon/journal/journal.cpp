@@ -40,6 +40,12 @@ CREATE TABLE IF NOT EXISTS loop_check (id INTEGER PRIMARY KEY, utc_ns INTEGER NO
     person TEXT NOT NULL, out_of_band TEXT NOT NULL);
 )";
 
+constexpr const char* kProofTable = R"(
+CREATE TABLE IF NOT EXISTS proof (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
+    person TEXT NOT NULL, record TEXT NOT NULL);
+)";
+constexpr std::size_t kProofsKept = 200;  // read back at the start
+
 std::int64_t utc_now() {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
                std::chrono::system_clock::now().time_since_epoch())
@@ -125,6 +131,7 @@ void Journal::open() {
 
 void Journal::recover() {
     recover_loop_check();
+    recover_proofs();
     const auto found = database_->ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
         "ORDER BY id DESC LIMIT 1");
@@ -146,6 +153,14 @@ void Journal::recover_loop_check() {
     const auto newest =
         database_->ask("SELECT out_of_band FROM loop_check ORDER BY id DESC LIMIT 1");
     if (!newest.empty()) recovery_.out_of_band = newest.front().texts.at(0);
+}
+
+void Journal::recover_proofs() {
+    if (database_->ask("SELECT name FROM sqlite_master WHERE name = 'proof'").empty()) return;
+    const auto rows = database_->ask(
+        fmt::format("SELECT record FROM proof ORDER BY id DESC LIMIT {}", kProofsKept).c_str());
+    for (auto row = rows.rbegin(); row != rows.rend(); ++row)
+        recovery_.proofs.push_back(row->texts.at(0));
 }
 
 void Journal::recover_dwells(Unfinished& campaign) {
@@ -218,6 +233,9 @@ void Journal::campaign_ended(const std::string& state, const std::string& reason
 }
 void Journal::loop_checked(const std::string& by, const std::string& out_of_band) {
     put(LoopChecked{by, out_of_band, utc_now()});
+}
+void Journal::proved(const std::string& by, const std::string& record) {
+    put(Proved{by, record, utc_now()});
 }
 void Journal::event(const EventRecord& event) { put(event); }
 void Journal::command(const CommandRequest& request, const CommandReply& reply,
@@ -359,6 +377,12 @@ void Journal::write_one(const LoopChecked& checked) {
     database_->run(
         "INSERT INTO loop_check (utc_ns, person, out_of_band) VALUES (?, ?, ?)",
         {checked.utc_ns, std::string_view(checked.by), std::string_view(checked.out_of_band)});
+}
+
+void Journal::write_one(const Proved& proved) {
+    database_->execute(kProofTable);
+    database_->run("INSERT INTO proof (utc_ns, person, record) VALUES (?, ?, ?)",
+                   {proved.utc_ns, std::string_view(proved.by), std::string_view(proved.record)});
 }
 
 }  // namespace vibrig::journal

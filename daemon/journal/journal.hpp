@@ -34,8 +34,9 @@ struct Recovery {
     std::optional<Unfinished> campaign;
     /// Why what was there is not used: a cold start, in words. Empty: nothing was refused.
     std::vector<std::string> refused;
-    std::string assumed;      ///< of what an older version did not keep; empty: nothing
-    std::string out_of_band;  ///< what the newest loop check found so; empty: nothing
+    std::string assumed;              ///< of what an older version did not keep; empty: nothing
+    std::string out_of_band;          ///< what the newest loop check found so; empty: nothing
+    std::vector<std::string> proofs;  ///< of the safe state, as they were kept, oldest first
 };
 
 /// What happened, on disk: campaigns, positions done with what the filter was fed, results, events
@@ -65,6 +66,8 @@ class Journal {
                         const std::string& result_json);
     /// A loop check was completed; `out_of_band` is empty if all was in its band.
     void loop_checked(const std::string& by, const std::string& out_of_band);
+    /// A proof of the safe state is over; `record` is kept as it is.
+    void proved(const std::string& by, const std::string& record);
     void event(const EventRecord& event);
     void command(const CommandRequest& request, const CommandReply& reply, std::int64_t utc_ns);
 
@@ -97,11 +100,16 @@ class Journal {
         std::string by, out_of_band;
         std::int64_t utc_ns = 0;
     };
-    using Entry = std::variant<Begun, Done, Ended, EventRecord, Commanded, LoopChecked>;
+    struct Proved {
+        std::string by, record;
+        std::int64_t utc_ns = 0;
+    };
+    using Entry = std::variant<Proved, Begun, Done, Ended, EventRecord, Commanded, LoopChecked>;
 
     void open();
     void recover();
     void recover_loop_check();
+    void recover_proofs();
     void recover_dwells(Unfinished& campaign);
     void put(Entry entry);
     void loop();
@@ -113,6 +121,7 @@ class Journal {
     void write_one(const EventRecord& event);
     void write_one(const Commanded& commanded);
     void write_one(const LoopChecked& checked);
+    void write_one(const Proved& proved);
 
     const std::string path_;
     const std::uint64_t configuration_hash_;

@@ -164,8 +164,9 @@ void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
     verdict_ = witness_.verdict(
         {told_, controller_began_, now, commanded_g_.load() > 0, transmission_.load(), table_g_});
     for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(verdict_.seen_g[i]);
-    judge(Trip::stuck, verdict_.stuck, sample.time);
     judge(Trip::over_armed, verdict_.over_armed, sample.time);
+    if (proving_.load()) return;
+    judge(Trip::stuck, verdict_.stuck, sample.time);
     judge(Trip::amplitude_witness, verdict_.off_command, sample.time);
 }
 
@@ -239,7 +240,7 @@ void Interlock::check(const drivers::ShakerReading& reading) noexcept {
     if (guard < Guard::armed) return;
     judge(By::read_back, Trip::emergency_stop, reading.emergency_stop_open, now);
     judge(By::read_back, Trip::shaker_fault,
-          reading.fault != 0 || reading.state == drivers::kShakerFault, now);
+          !proving_.load() && (reading.fault != 0 || reading.state == drivers::kShakerFault), now);
     judge(By::read_back, Trip::over_amplitude, !(reading.measured_g <= table_g_), now);
     judge(By::read_back, Trip::read_back, mismatch, now);
     judge(By::read_back, Trip::watchdog_changed,

@@ -83,6 +83,9 @@ class Interlock {
         ramp.number = ++ramps_;
         ramp_.publish(ramp);
     }
+    /// Control thread: a stop is proved by making it happen. The amplitude may fall as it likes
+    /// then, and the controller may say fault once nobody feeds its watchdog; nothing may rise.
+    void proving(bool stop) noexcept { proving_.store(stop); }
     /// Control thread: platform over table, as the loop check has measured it.
     void transmission(double measured) noexcept { transmission_.store(measured); }
     /// Platform and table as the accelerometers show them, g peak at the table; negative: unknown.
@@ -169,6 +172,7 @@ class Interlock {
     std::atomic<Tripped> tripped_{Tripped{}};
     std::atomic<std::uint8_t> trips_{0};
     std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
+    std::atomic<bool> proving_{false};
     std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
     std::array<std::atomic<double>, 3> position_rad_{};
     std::atomic<bool> position_known_{false};

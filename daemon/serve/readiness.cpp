@@ -86,6 +86,10 @@ Readiness readiness(const StatusData& status) {
         verdict.empty()                     ? "none yet"
         : status.loop_check.message.empty() ? verdict
                                             : verdict + ": " + status.loop_check.message);
+    add("safe-state proof", status.proof.refusal.empty(),
+        !status.proof.refusal.empty() ? status.proof.refusal
+        : !status.proof.by.empty()    ? "proved by " + status.proof.by
+                                      : "none, none is demanded of a simulated rig");
     const auto& journal = status.journal;
     add("journal", journal.path.empty() || journal.running,
         journal.path.empty() ? "none is kept"

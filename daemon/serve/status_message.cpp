@@ -390,6 +390,33 @@ void fill(v1::LoopCheck& out, const LoopCheckStatus& check) {
     }
 }
 
+void fill(v1::Proof& out, const ProofStatus& proof) {
+    out.set_demanded(proof.demanded);
+    out.set_refusal(mend_utf8(proof.refusal));
+    out.set_advice(proof.advice);
+    out.set_by(mend_utf8(proof.by));
+    out.set_utc_ns(proof.utc_ns);
+    out.set_passed(proof.passed);
+    out.set_message(mend_utf8(proof.message));
+    out.set_asks(proof.asks);
+    for (const auto& row : proof.rows) {
+        v1::LoopCheck::Row& to = *out.add_rows();
+        to.set_name(mend_utf8(row.name));
+        to.set_unit(mend_utf8(row.unit));
+        set(to, &v1::LoopCheck::Row::set_value, row.value);
+        set(to, &v1::LoopCheck::Row::set_low, row.low);
+        set(to, &v1::LoopCheck::Row::set_high, row.high);
+        to.set_passed(row.passed);
+    }
+    for (const auto& past : proof.history) {
+        v1::Proof::Past& to = *out.add_history();
+        to.set_utc_ns(past.utc_ns);
+        to.set_passed(past.passed);
+        to.set_stop_s(past.stop_s);
+        to.set_watchdog_s(past.watchdog_s);
+    }
+}
+
 void fill(v1::Campaign& out, const StatusData& status) {
     out.set_name(mend_utf8(status.campaign_name));
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
@@ -424,6 +451,8 @@ void fill(v1::Status& out, const StatusData& status) {
     out.set_uptime_s(drivers::to_seconds(status.uptime));
     fill(*out.mutable_campaign(), status);
     fill(*out.mutable_loop_check(), status.loop_check);
+    fill(*out.mutable_proof(), status.proof);
+    out.set_simulated(status.simulated);
     fill(*out.mutable_shaker(), status);
     fill(*out.mutable_can(), status);
     fill(*out.mutable_assembler(), status.assembler);

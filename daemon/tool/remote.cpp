@@ -41,7 +41,7 @@ struct CommandOptions {
 struct TestOptions {
     serve::Address at;
     std::string by;
-    bool json = false;
+    bool json = false, emergency_stop = false;
 };
 
 constexpr int kRefused = 409;
@@ -98,19 +98,34 @@ int show_status(const StatusOptions& options) {
     return 0;
 }
 
-/// Waits for the end of a loop check; its rows.
-void show_loop_check(serve::Client& client) {
-    constexpr auto kLook = std::chrono::milliseconds(300);
-    v1::LoopCheck check;
-    do {
-        std::this_thread::sleep_for(kLook);
-        check = ask_status(client).loop_check();
-    } while (check.verdict() == "running");
-    for (const auto& row : check.rows()) {
+void show_rows(const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& rows) {
+    for (const auto& row : rows) {
         std::cout << (row.passed() ? "  ok    " : "  NOT   ") << row.name() << ": " << row.value()
                   << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low()
                   << " to " << row.high() << '\n';
     }
+}
+
+/// Waits for the end of loop check and safe-state proof; their rows. `before`: time of the proof
+/// that there was.
+void show_loop_check(serve::Client& client, std::int64_t before) {
+    constexpr auto kLook = std::chrono::milliseconds(300);
+    constexpr int kLooks = 100;  // after the check, for the proof's last rows
+    v1::Status status;
+    std::string asked;
+    int looks = 0;
+    do {
+        std::this_thread::sleep_for(kLook);
+        status = ask_status(client);
+        if (status.proof().asks() != asked) {
+            asked = status.proof().asks();
+            if (!asked.empty()) std::cout << ">>> " << asked << std::endl;
+        }
+        if (status.loop_check().verdict() != "running") ++looks;
+    } while (looks == 0 || (status.proof().utc_ns() == before && looks < kLooks));
+    show_rows(status.loop_check().rows());
+    show_rows(status.proof().rows());
+    if (!status.proof().passed()) std::cout << "not proved: " << status.proof().message() << '\n';
 }
 
 int self_test(const TestOptions& options) {
@@ -119,12 +134,14 @@ int self_test(const TestOptions& options) {
         v1::Command command;
         command.set_kind(v1::Command::selftest);
         command.set_by(options.by);
+        if (options.emergency_stop) command.set_argument("emergency_stop");
+        const std::int64_t before = ask_status(client).proof().utc_ns();
         const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
         if (begun.status != 200) {
             std::cerr << kWho << problem_of(begun) << '\n';
             return begun.status == kRefused ? kNo : kBadInput;
         }
-        show_loop_check(client);
+        show_loop_check(client, before);
     }
     const serve::Reply reply = client.get("/api/v1/selftest");
     v1::Readiness found;
@@ -266,14 +283,21 @@ void add_remote(CLI::App& app, int& exit_code) {
     CLI::App& testing = *app.add_subcommand(
         "selftest", "What is looked at before a campaign; exit code 1 unless all is well");
     auto test_options = std::make_shared<TestOptions>();
-    testing.add_option("--by", test_options->by,
-                       "Who orders a loop check first: the shaker moves for some seconds at "
-                       "selftest.table_g, then the bands of [selftest] are looked at");
+    testing.add_option(
+        "--by", test_options->by,
+        "Who orders a loop check and a proof of the safe state first, about a minute "
+        "at selftest.table_g: the bands of [selftest], then whether the table stops "
+        "by order and when nobody feeds its watchdog");
+    testing
+        .add_flag("--emergency-stop", test_options->emergency_stop,
+                  "Ask for the emergency stop at the end, too; it trips as ever")
+        ->needs("--by");
     add_socket(testing, test_options->at);
     testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
     testing.footer(
         "Example: vibrig selftest\n"
-        "With a loop check, which vibrig abort ends at any moment: vibrig selftest --by 'Ada "
+        "With loop check and proof, which vibrig abort ends at any moment: vibrig selftest --by "
+        "'Ada "
         "Lovelace' && vibrig arm --by 'Ada Lovelace'");
     testing.callback([test_options, &exit_code] {
         exit_code = guarded([&] { return self_test(*test_options); }, kWho);

@@ -157,6 +157,8 @@ class Rig:
         everything = {"campaign": {"results": self.results, **campaign}, "can": can,
                       "clock": {"source": self.clock}, "server": {"socket": self.socket},
                       "shaker": {"host": "127.0.0.1", "port": self.modbus_port}}
+        if self.clock == "real":
+            everything["commission"] = {"simulated": True}
         for table, keys in tables.items():
             everything.setdefault(table, {}).update(keys)
         with open(self.configuration, "w", encoding="utf-8") as file:

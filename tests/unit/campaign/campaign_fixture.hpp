@@ -89,6 +89,7 @@ struct CampaignTest : testing::Test {
 
     CampaignTest() {
         settings.sample_s = 0.025;
+        settings.proof.demanded = false;
         settings.positions_deg = {{0, 0, 0}, {0, 0, 90}};
         settings.table_g = {9, 0};
         settings.dwell_s = 10;

@@ -65,7 +65,10 @@ struct StagesTest : testing::Test, drivers::CanPort {
     FakeAccelerometers accelerometers;
     Time now = kSecond;
 
-    StagesTest() { settings.sample_s = kSample_s; }
+    StagesTest() {
+        settings.sample_s = kSample_s;
+        settings.proof.demanded = false;
+    }
 
     std::array<double, 3> up{0.005, 1, -0.003}, torque{}, drift{10, 3, -6};  // deg/h
     std::array<double, 3> encoder_deg{}, target_deg{};                       // last commanded

@@ -1,0 +1,204 @@
+// The safe-state proof: after the loop check at a small level the table is stopped by order, then
+// by starving its watchdog, and if a person presses it by the emergency stop; each is timed by
+// those who can tell, never by the controller's word alone.
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/safety_proof.hpp"
+#include "estimator/ring_down.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::from_seconds;
+using drivers::Time;
+using drivers::to_seconds;
+
+namespace {
+// How long a person has to press the emergency stop.
+constexpr Time kPress = 60 * drivers::kSecond;
+}  // namespace
+
+void StopTimes::begin(Time now) {
+    *this = {};
+    from_ = now;
+}
+
+void StopTimes::look(const drivers::ShakerReading& reading, const rt::Rest& rest) {
+    if (!controller_s && reading.valid && reading.time > from_ && !reading.running &&
+        reading.still())
+        controller_s = to_seconds(reading.time - from_);
+    const auto stands = [this](const rt::RestWitness& witness, std::optional<double>& time_s) {
+        if (!time_s && witness.verdict == rt::RestVerdict::still && witness.from >= from_)
+            time_s = to_seconds(witness.from - from_);
+    };
+    stands(rest.table, table_s);
+    stands(rest.platform, platform_s);
+    table_known = table_known || rest.table.verdict != rt::RestVerdict::absent;
+}
+
+std::string Campaign::may_slew() const {
+    const auto reading = ports_.shaker.reading();
+    if (!reading.at_rest() || stop_.stopping())
+        return fmt::format(
+            "gimbals slew at rest only: the shaker is in state {}, measured {:.3f} g",
+            reading.state, reading.measured_g);
+    return {};
+}
+
+/// From the table's last motion on: what the pads do by themselves.
+void Campaign::keep_ring_down() {
+    const double from_s = stop_times_.table_stood_s();
+    const auto found =
+        estimator::ring_down(loop_->readings_since(stop_times_.from() + from_seconds(from_s)),
+                             6 * settings_.rig.accelerometer_g);
+    auto& record = proof_.record();
+    record.pads = {settings_.loop.table_g, stop_times_.platform_s.value_or(0) - from_s,
+                   found.rate_per_s};
+    record.pads_hz = found.frequency_hz;
+    record.pads_damping = found.damping;
+}
+
+void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
+    proof_.take_over(std::move(history));
+    stop_.pads(proof_.pads());
+}
+
+void Campaign::order_proved_stop(Time now) {
+    stopped_by_ = "the proof";
+    go_on_to(Check::stop, now);
+    loop_->measure();
+    stop_times_.begin(now);
+    stop_shaker();
+}
+
+/// Rest by order: when all who can tell have said so, or the stop monitor has given up.
+void Campaign::prove_stop(Time now) {
+    stop_times_.look(ports_.shaker.reading(), stop_.rest(now));
+    if (stop_.disobeyed()) return abort("a stop was not obeyed in its time", now);
+    if (const auto reading = ports_.shaker.reading();
+        reading.valid && reading.time > stop_times_.from() && reading.fault != 0) {
+        return abort(fmt::format("the order to stop was not obeyed: the controller has stopped by "
+                                 "itself with fault {:#06x}, its watchdog is not fed meanwhile",
+                                 reading.fault),
+                     now);
+    }
+    if (stop_.stopping()) return;
+    const double deadline_s = settings_.stop.deadline_s;
+    proof_.row("stop, controller", "s", stop_times_.controller_s.value_or(1e3), 0, deadline_s);
+    if (stop_times_.table_known)
+        proof_.row("stop, table", "s", stop_times_.table_s.value_or(1e3), 0, deadline_s);
+    proof_.row("stop, platform", "s", stop_times_.platform_s.value_or(1e3), 0,
+               deadline_s + PadRingDown{}.from_s(settings_.loop.table_g));
+    keep_ring_down();
+    if (!loop_->out_of_band().empty()) return go_on_to(Check::rest, now);  // no more of this
+    go_on_to(Check::again, now);
+}
+
+/// What the amplitude has to do with the command where the check ended before it was steady.
+std::string Campaign::suspect_unit() const {
+    if (check_ != Check::ramp || asked_at_ == 0) return {};
+    const double ratio = loop_->over_command(asked_at_, settings_.ramp_s);
+    const auto suspect = unit_of_ratio(ratio);
+    return suspect.empty() ? "" : fmt::format("; {:.2f} times the command: {}", ratio, suspect);
+}
+
+void Campaign::proving(Proving what) {
+    if (ports_.proving) ports_.proving(what);
+}
+
+/// The one fault that is made on purpose: the watchdog is not fed.
+void Campaign::prove_watchdog(Time now) {
+    if (!std::exchange(requested_, true)) {
+        ports_.event(Severity::warning,
+                     fmt::format("proof: the watchdog is not fed now; the table has to stop by "
+                                 "itself within {:g} s",
+                                 settings_.watchdog_timeout_s + settings_.stop.deadline_s));
+        stop_times_.begin(now);
+    }
+    const auto reading = ports_.shaker.reading();
+    const auto rest = stop_.rest(now);
+    stop_times_.look(reading, rest);
+    const double waited_s = to_seconds(now - stop_times_.from());
+    const double longest_s = settings_.watchdog_timeout_s + stop_.longest_s(settings_.loop.table_g);
+    if (rest.measured_since(stop_times_.from()) && reading.state == drivers::kShakerFault) {
+        // Fed at most one period before; what stops much earlier was stopped by something else.
+        proof_.row("watchdog, rest", "s",
+                   stop_times_.table_s.value_or(stop_times_.platform_s.value_or(1e3)),
+                   0.5 * settings_.watchdog_timeout_s,
+                   stop_times_.table_known
+                       ? settings_.watchdog_timeout_s + settings_.stop.deadline_s
+                       : longest_s);
+        proof_.row("watchdog, the controller says fault", true);
+        stopped_by_ = "the proof, to clear the watchdog's fault";
+        go_on_to(Check::clear, now);
+        stop_shaker();
+    } else if (waited_s > longest_s) {
+        const bool still = rest.measured_since(stop_times_.from());
+        proof_.row("watchdog, rest", "s", still ? waited_s : 1e3, 0, longest_s);
+        proof_.row("watchdog, the controller says fault", reading.state == drivers::kShakerFault);
+        abort(still
+                  ? "the watchdog was not fed, the table stands, but the controller says no fault"
+                  : "the watchdog was not fed and the table did not stop: " + stop_.what_moves(now),
+              now);
+    }
+}
+
+void Campaign::prove_clearing(Time now) {
+    const auto reading = ports_.shaker.reading();
+    const bool cleared =
+        !stop_.stopping() && reading.time > entered_ && reading.at_rest() && reading.fault == 0;
+    if (!cleared && now - entered_ <= from_seconds(2 * stop_.longest_s(settings_.loop.table_g)))
+        return;
+    proof_.row("watchdog, fault acknowledged", cleared);
+    go_on_to(cleared && press_wanted_ ? Check::press_ramp : Check::rest, now);
+}
+
+/// The hard-wired stop. Its opening trips as ever; on_trip() finds it here.
+void Campaign::prove_emergency_stop(Time now) {
+    if (!std::exchange(requested_, true))
+        ports_.event(Severity::warning, fmt::format("proof: press the emergency stop now, within "
+                                                    "{:.0f} s",
+                                                    to_seconds(kPress)));
+    if (now - entered_ > kPress) abort("nobody pressed the emergency stop", now);
+}
+
+/// After the trip: those who can tell, and the button's own latch.
+void Campaign::await_pressed_rest(Time now) {
+    stop_times_.look(ports_.shaker.reading(), stop_.rest(now));
+    if (stop_.stopping() && !stop_.disobeyed()) return;
+    pressed_ = false;
+    const double limit_s = stop_.longest_s(settings_.loop.table_g);
+    proof_.row("emergency stop, rest", "s", stop_times_.platform_s.value_or(1e3), 0, limit_s);
+    proof_.row("emergency stop, latched", state_ == CampaignState::tripped);
+    proof_.record().emergency_stop = true;
+    conclude_proof({});
+}
+
+/// Every order that must not be followed while the table moves, tried.
+void Campaign::prove_refusals(Time now) {
+    const auto tried = command({CommandRequest::Kind::arm, proof_.record().by, ""}, now);
+    proof_.row("arming is refused while it moves", !tried.accepted);
+    proof_.row("a slew is refused while it moves", !may_slew().empty());
+    const bool taken = ports_.shaker.request(
+        {settings_.frequency_hz + 1, settings_.loop.table_g, settings_.ramp_s}, armed_under_);
+    proof_.row("another frequency is refused while it moves", !taken);
+}
+
+void Campaign::conclude_proof(const std::string& why) {
+    proving(Proving::nothing);
+    const auto& record = proof_.conclude(utc_ns(), why);
+    if (record.passed) stop_.pads(record.pads);
+    for (const auto& row : record.rows) {
+        ports_.event(
+            row.passed() ? Severity::info : Severity::alarm,
+            fmt::format("proof: {} {:.4g}{}{}, expected {:.4g} to {:.4g}", row.name, row.value,
+                        row.unit.empty() ? "" : " ", row.unit, row.low, row.high));
+    }
+    ports_.event(record.passed ? Severity::info : Severity::alarm,
+                 record.passed ? "the safe state is proved"
+                               : "the safe state is not proved: " + record.message);
+    if (ports_.proved) ports_.proved(record);
+}
+
+}  // namespace vibrig::campaign

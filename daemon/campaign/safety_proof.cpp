@@ -1,0 +1,225 @@
+#include "daemon/campaign/safety_proof.hpp"
+
+#include <openssl/evp.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace vibrig::campaign {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::int64_t kHour_ns = 3'600'000'000'000;
+constexpr std::size_t kMostChanges = 3;  // named; the rest is counted
+
+std::map<std::string, std::string> lines_of(const std::string& keys) {
+    std::map<std::string, std::string> found;
+    std::istringstream in(keys);
+    for (std::string line; std::getline(in, line);) {
+        const auto equal = line.find('=');
+        if (equal != std::string::npos) found[line.substr(0, equal)] = line.substr(equal + 1);
+    }
+    return found;
+}
+
+/// "shaker.port is 503, was proved with 502; ..."
+std::string changes(const std::string& then, const std::string& now) {
+    const auto before = lines_of(then), after = lines_of(now);
+    std::vector<std::string> found;
+    for (const auto& [key, value] : after) {
+        const auto it = before.find(key);
+        if (it == before.end()) {
+            found.push_back(fmt::format("{} is {}, was not known then", key, value));
+        } else if (it->second != value) {
+            found.push_back(fmt::format("{} is {}, was proved with {}", key, value, it->second));
+        }
+    }
+    for (const auto& [key, value] : before) {
+        if (!after.contains(key)) found.push_back(fmt::format("{} is gone, was {}", key, value));
+    }
+    std::string text;
+    for (std::size_t i = 0; i < std::min(found.size(), kMostChanges); ++i)
+        text += (i == 0 ? "" : "; ") + found[i];
+    if (found.size() > kMostChanges)
+        text += fmt::format("; and {} more", found.size() - kMostChanges);
+    return text;
+}
+
+constexpr const char* kRemedy = ": prove it anew (vibrig selftest --by NAME)";
+
+}  // namespace
+
+std::string sha256(const std::string& text) {
+    std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+    unsigned int length = 0;
+    if (EVP_Digest(text.data(), text.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1)
+        return {};
+    std::string hex;
+    for (unsigned int i = 0; i < length; ++i) hex += fmt::format("{:02x}", digest[i]);
+    return hex;
+}
+
+std::string to_json(const ProofRecord& r) {
+    Json rows = Json::array();
+    for (const ProofRow& row : r.rows) {
+        rows.push_back({{"name", row.name},
+                        {"unit", row.unit},
+                        {"value", row.value},
+                        {"low", row.low},
+                        {"high", row.high},
+                        {"passed", row.passed()}});
+    }
+    return Json{{"by", r.by},
+                {"utc_ns", r.utc_ns},
+                {"table_g", r.table_g},
+                {"passed", r.passed},
+                {"emergency_stop", r.emergency_stop},
+                {"message", r.message},
+                {"rows", rows},
+                {"pads",
+                 {{"level_g", r.pads.level_g},
+                  {"time_s", r.pads.time_s},
+                  {"rate_per_s", r.pads.rate_per_s},
+                  {"frequency_hz", r.pads_hz},
+                  {"damping", r.pads_damping}}},
+                {"keys", r.keys},
+                {"keys_sha256", r.keys_sha256}}
+        .dump();
+}
+
+std::optional<ProofRecord> proof_from_json(const std::string& text) {
+    try {
+        const Json json = Json::parse(text);
+        ProofRecord r;
+        r.by = json.at("by");
+        r.utc_ns = json.at("utc_ns");
+        r.table_g = json.at("table_g");
+        r.passed = json.at("passed");
+        r.emergency_stop = json.at("emergency_stop");
+        r.message = json.at("message");
+        for (const Json& row : json.at("rows"))
+            r.rows.push_back(
+                {row.at("name"), row.at("unit"), row.at("value"), row.at("low"), row.at("high")});
+        const Json& pads = json.at("pads");
+        r.pads = {pads.at("level_g"), pads.at("time_s"), pads.at("rate_per_s")};
+        r.pads_hz = pads.at("frequency_hz");
+        r.pads_damping = pads.at("damping");
+        r.keys = json.at("keys");
+        r.keys_sha256 = json.at("keys_sha256");
+        return r;
+    } catch (const nlohmann::json::exception&) {
+        return std::nullopt;
+    }
+}
+
+SafetyProof::SafetyProof(ProofSettings settings)
+    : settings_(std::move(settings)), keys_sha256_(sha256(settings_.keys)) {}
+
+void SafetyProof::take_over(std::vector<ProofRecord> history) { history_ = std::move(history); }
+
+void SafetyProof::begin(const std::string& by, double table_g) {
+    record_ = {};
+    record_.by = by;
+    record_.table_g = table_g;
+    record_.keys = settings_.keys;
+    record_.keys_sha256 = keys_sha256_;
+}
+
+void SafetyProof::row(std::string name, std::string unit, double value, double low, double high) {
+    record_.rows.push_back({std::move(name), std::move(unit), value, low, high});
+}
+
+const ProofRecord& SafetyProof::conclude(std::int64_t utc_ns, const std::string& why) {
+    record_.utc_ns = utc_ns;
+    record_.message = why;
+    for (const ProofRow& row : record_.rows) {
+        if (row.passed()) continue;
+        record_.message += fmt::format("{}{} {:.4g}{}{}, expected {:.4g} to {:.4g}",
+                                       record_.message.empty() ? "" : "; ", row.name, row.value,
+                                       row.unit.empty() ? "" : " ", row.unit, row.low, row.high);
+    }
+    record_.passed = record_.message.empty();
+    history_.push_back(record_);
+    return history_.back();
+}
+
+const ProofRecord* SafetyProof::newest_passed() const {
+    const auto found =
+        std::find_if(history_.rbegin(), history_.rend(), [](const auto& r) { return r.passed; });
+    return found == history_.rend() ? nullptr : &*found;
+}
+
+std::string SafetyProof::refusal(std::int64_t utc_ns) const {
+    if (!settings_.demanded) return {};
+    const std::string what = "the safe state is not proved: ";
+    if (history_.empty()) return what + "there is no proof" + kRemedy;
+    // The last word counts: one that failed is not made good by an older one that passed.
+    const ProofRecord& newest = history_.back();
+    if (!newest.passed) return what + "the newest proof failed: " + newest.message + kRemedy;
+    const double age_h = static_cast<double>(utc_ns - newest.utc_ns) / kHour_ns;
+    if (age_h < 0)
+        return what + fmt::format("the newest proof is {:.1f} h in the future: is the clock right?",
+                                  -age_h);
+    if (age_h > settings_.valid_h)
+        return what +
+               fmt::format("it is {:.1f} h old, valid for {:g} h (selftest.proof_valid_h)", age_h,
+                           settings_.valid_h) +
+               kRemedy;
+    if (newest.keys_sha256 != keys_sha256_)
+        return what + "since then " + changes(newest.keys, settings_.keys) + kRemedy;
+    return {};
+}
+
+std::string SafetyProof::advice(std::int64_t utc_ns) const {
+    const auto pressed = std::find_if(history_.rbegin(), history_.rend(),
+                                      [](const auto& r) { return r.passed && r.emergency_stop; });
+    const double days = pressed == history_.rend()
+                            ? 0
+                            : static_cast<double>(utc_ns - pressed->utc_ns) / (24 * kHour_ns);
+    if (pressed != history_.rend() && days <= settings_.emergency_stop_days) return {};
+    return (pressed == history_.rend()
+                ? std::string("the emergency stop has never been proved")
+                : fmt::format("the emergency stop was proved {:.0f} days ago", days)) +
+           ": vibrig selftest --by NAME --emergency-stop";
+}
+
+void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
+    constexpr std::size_t kShown = 50;
+    status.demanded = settings_.demanded;
+    status.refusal = refusal(utc_ns);
+    status.advice = advice(utc_ns);
+    if (history_.empty()) return;
+    const ProofRecord& newest = history_.back();
+    if (status.utc_ns == newest.utc_ns && !status.history.empty()) return;  // told already
+    status.by = newest.by;
+    status.utc_ns = newest.utc_ns;
+    status.passed = newest.passed;
+    status.message = newest.message;
+    status.rows.clear();
+    for (const ProofRow& row : newest.rows)
+        status.rows.push_back({row.name, row.unit, row.value, row.low, row.high, row.passed()});
+    status.history.clear();
+    const auto of = [](const ProofRecord& record, std::string_view name) {
+        const auto row = std::ranges::find(record.rows, name, &ProofRow::name);
+        return row == record.rows.end() ? 0 : row->value;
+    };
+    for (std::size_t i = history_.size() - std::min(history_.size(), kShown); i < history_.size();
+         ++i) {
+        status.history.push_back({history_[i].utc_ns, history_[i].passed,
+                                  of(history_[i], "stop, platform"),
+                                  of(history_[i], "watchdog, rest")});
+    }
+}
+
+PadRingDown SafetyProof::pads() const {
+    const ProofRecord* newest = newest_passed();
+    return newest == nullptr ? PadRingDown{} : newest->pads;
+}
+
+}  // namespace vibrig::campaign

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/stop_monitor.hpp"
+#include "daemon/rt/rest_monitor.hpp"
+#include "daemon/status.hpp"
+#include "drivers/shaker.hpp"
+
+namespace vibrig::campaign {
+
+struct ProofSettings {
+    bool demanded = true;  ///< without one no campaign is armed
+    double valid_h = 168;
+    double emergency_stop_days = 365;  ///< after so long its button is asked for
+    /// What the proof covers, "key=value\n" each, sorted, values as --check prints them.
+    std::string keys;
+};
+
+/// One thing that a proof measured.
+struct ProofRow {
+    std::string name, unit;
+    double value = 0, low = 0, high = 0;
+    [[nodiscard]] bool passed() const { return value >= low && value <= high; }
+};
+
+/// One proof, as the journal keeps it.
+struct ProofRecord {
+    std::string by;
+    std::int64_t utc_ns = 0;
+    double table_g = 0;  ///< peak, at the table
+    bool passed = false;
+    bool emergency_stop = false;  ///< its button was pressed, and the rig obeyed
+    std::string message;          ///< why it did not pass
+    std::vector<ProofRow> rows;
+    PadRingDown pads;
+    double pads_hz = 0, pads_damping = 0;
+    std::string keys, keys_sha256;  ///< as in ProofSettings
+};
+
+/// As the journal and people's tools keep it.
+[[nodiscard]] std::string to_json(const ProofRecord& record);
+/// Nothing if it is no such text.
+[[nodiscard]] std::optional<ProofRecord> proof_from_json(const std::string& text);
+
+/// When each who can tell first said that a stop was done, s after the order; empty: not yet.
+class StopTimes {
+  public:
+    void begin(drivers::Time now);
+    void look(const drivers::ShakerReading& reading, const rt::Rest& rest);
+    [[nodiscard]] drivers::Time from() const { return from_; }
+    /// When the table stood: by its accelerometer, or without one by the controller's word.
+    [[nodiscard]] double table_stood_s() const {
+        return table_s.value_or(controller_s.value_or(0));
+    }
+
+    std::optional<double> controller_s, table_s, platform_s;
+    bool table_known = false;  ///< it has an accelerometer
+
+  private:
+    drivers::Time from_ = 0;
+};
+
+/// What has been proved of stopping: every record that there is, and the one in the making. Control
+/// thread only.
+class SafetyProof {
+  public:
+    explicit SafetyProof(ProofSettings settings);
+
+    /// Oldest first, of earlier lives.
+    void take_over(std::vector<ProofRecord> history);
+    void begin(const std::string& by, double table_g);
+    void row(std::string name, std::string unit, double value, double low, double high);
+    /// A step that either is so or is not.
+    void row(std::string name, bool so) { row(std::move(name), "", so ? 1 : 0, 1, 1); }
+    [[nodiscard]] ProofRecord& record() { return record_; }
+    [[nodiscard]] const ProofRecord& record() const { return record_; }
+    /// The making is over; `why` it was not completed, else empty. Returns the record.
+    const ProofRecord& conclude(std::int64_t utc_ns, const std::string& why);
+
+    /// Why no campaign is armed; empty: as far as this goes it may be.
+    [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
+    /// What is to be told although nothing is refused: a button that nobody pressed for long.
+    [[nodiscard]] std::string advice(std::int64_t utc_ns) const;
+    void fill(ProofStatus& status, std::int64_t utc_ns) const;
+    [[nodiscard]] const std::vector<ProofRecord>& history() const { return history_; }
+    /// Of the newest that passed; a documented allowance without one.
+    [[nodiscard]] PadRingDown pads() const;
+
+  private:
+    [[nodiscard]] const ProofRecord* newest_passed() const;
+
+    ProofSettings settings_;
+    std::string keys_sha256_;
+    std::vector<ProofRecord> history_;
+    ProofRecord record_;
+};
+
+/// Hexadecimal SHA-256.
+[[nodiscard]] std::string sha256(const std::string& text);
+
+}  // namespace vibrig::campaign

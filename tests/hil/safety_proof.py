@@ -1,0 +1,176 @@
+#!/usr/bin/python3
+"""The safe-state proof, on the seqpacket bus and the rig's clock, with the simulated rig held to what a real one is held
+to: no campaign is armed without one, an honest controller passes, each lying one is found out, and what is proved is kept.
+
+usage: safety_proof.py PROGRAMS
+"""
+import json
+import math
+import os
+import sqlite3
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+CAMPAIGN = {"name": "proved", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0], "dwell_s": 10.0}
+TIMEOUT_S, DEADLINE_S, RING_DOWN_S = 1.5, 3.0, 3.0   # defaults: watchdog, stop, allowance for the pads
+# Truth of the shaker's controller, and a word that the proof's message has to have.
+LIES = [
+    ("ack_without_stop", True, "not obeyed"),
+    ("stuck_contactor", True, "not obeyed"),
+    ("timeout_ignored", True, "watchdog"),
+    ("timeout_scaled", 10.0, "watchdog"),
+    ("amplitude_scaled", 2.5, "amplitude"),
+    ("unit_rms", True, "g rms for g peak"),
+    ("readback_echo", True, None),      # alone it hides nothing that moves: found with a dead table
+    ("slow_ramp", 10.0, "shaker"),
+    ("dead_table", True, "amplitude"),
+]
+
+
+def ready(status):
+    return status["can"]["link"] == "running" and status["shaker"]["link"] == "running" and \
+        status["platform"].get("ready") and status["shaker"].get("state") == 0
+
+
+class Proof:
+    """A rig with a truth of its own, and a daemon that measures."""
+
+    def __init__(self, checks, programs, folder, shaker=None, **tables):
+        self.rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1)
+        self.fifo = os.path.join(folder, "control")
+        self.rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45", "--speed", "40", "--control", self.fifo,
+                             "--truth", self.rig.truth_file({"shaker": shaker or {}}))
+        self.control = open(self.fifo, "w", encoding="ascii")
+        self.rig.configure(CAMPAIGN, **{"commission": {"enforce": True}, **tables})
+        self.rig.start_daemon()
+        checks.check(ready(self.rig.wait_for(ready, 60) or {"can": {"link": ""}}), "the rig is ready", self.rig.logs())
+
+    def do(self, line):
+        print(line, file=self.control, flush=True)
+
+    def make(self, *more):
+        return self.rig.tool("selftest", "--by", "Ada", *more, timeout=120)
+
+    def proof(self):
+        return (self.rig.status() or {}).get("proof", {})
+
+    def end(self):
+        self.control.close()
+        self.rig.stop()
+
+
+def pads_of_the_rig(p):
+    """Natural frequency and damping: |T|^2 = (1 + z x) / ((1 - x)^2 + z x), x = (f/fn)^2, z = (2 damping)^2."""
+    with open(os.path.join(p.rig.folder, "truth.json"), encoding="utf-8") as file:
+        isolator = json.load(file)["isolator"]
+    z, a = 4 * isolator["damping"] ** 2, isolator["transmission"] ** 2
+    b = a * (z - 2) - z
+    return isolator["frequency_hz"] / math.sqrt((-b + math.sqrt(b * b - 4 * a * (a - 1))) / (2 * a)), isolator["damping"]
+
+
+def row(proof, name):
+    return next((x["value"] for x in proof.get("rows", []) if x["name"] == name), None)
+
+
+def honest(checks, programs, folder):
+    p = Proof(checks, programs, folder)
+    try:
+        refused = p.rig.tool("arm", "--by", "Ada")
+        checks.check(refused.returncode == 1 and "there is no proof" in refused.stderr,
+                     "nothing is armed without a proof", refused.stderr)
+        made = p.make()
+        proof = p.proof()
+        checks.check(proof.get("passed"), "an honest controller passes", made.stdout + made.stderr + p.rig.logs(60))
+        checks.check(0 <= row(proof, "stop, table") <= DEADLINE_S and
+                     0 < row(proof, "stop, platform") <= DEADLINE_S + RING_DOWN_S, "the times of the stop are kept", proof)
+        checks.check(TIMEOUT_S / 2 <= row(proof, "watchdog, rest") <= TIMEOUT_S + DEADLINE_S,
+                     "the starved watchdog stops the table within its time", proof)
+        checks.check(all(row(proof, name) == 1 for name in ("arming is refused while it moves", "a slew is refused while it moves",
+                                                            "another frequency is refused while it moves",
+                                                            "watchdog, fault acknowledged")),
+                     "what must not be done while the table moves is refused", proof)
+        checks.check("emergency stop has never" in proof.get("advice", ""), "the emergency stop is asked for", proof)
+        armed = p.rig.tool("arm", "--by", "Ada")
+        checks.equal(armed.returncode, 0, "then a campaign is armed")
+        p.rig.tool("abort", "--by", "Ada")
+        database = sqlite3.connect(f"file:{os.path.join(p.rig.results, 'journal.sqlite3')}?mode=ro", uri=True)
+        kept = [json.loads(text) for (text,) in database.execute("SELECT record FROM proof ORDER BY id")]
+        database.close()
+        checks.check(len(kept) == 1 and kept[0]["passed"] and kept[0]["by"].startswith("Ada") and "shaker." in kept[0]["keys"], "the journal keeps who, when, the times and the keys", str(kept)[:500])
+        pads = kept[0]["pads"]
+        hz, damping = pads_of_the_rig(p)
+        rate = damping * 2 * math.pi * hz
+        checks.check(abs(pads["rate_per_s"] / rate - 1) < 0.25 and abs(pads["frequency_hz"] / hz - 1) < 0.25,
+                     "and how the platform rings down", f"{pads}, expected {hz} Hz, {rate}/s")
+        # WHEN the daemon starts anew, with another key that the proof covers
+        p.rig.daemon.end()
+        p.rig.start_daemon()
+        p.rig.wait_for(ready, 60)
+        checks.equal(p.rig.tool("arm", "--by", "Ada").returncode, 0, "a proof outlives the daemon")
+        p.rig.tool("abort", "--by", "Ada")
+        p.rig.daemon.end()
+        p.rig.configure(CAMPAIGN, commission={"enforce": True}, shaker={"poll_period_ms": 150})
+        p.rig.start_daemon()
+        p.rig.wait_for(ready, 60)
+        refused = p.rig.tool("arm", "--by", "Ada")
+        checks.check(refused.returncode == 1 and "shaker.poll_period_ms is 150" in refused.stderr,
+                     "another configuration is not what was proved, and it says what changed", refused.stderr)
+    finally:
+        p.end()
+
+
+def pressed(checks, programs, folder):
+    p = Proof(checks, programs, folder)
+    try:
+        rig = p.rig
+        child = r.Child("selftest", [rig.program("vibrig"), "selftest", "--by", "Ada", "--emergency-stop", "--socket", rig.socket],
+                        folder)
+        asked = rig.wait_for(lambda s: s.get("proof", {}).get("asks"), 60)
+        checks.check(asked and "press" in asked["proof"].get("asks", ""), "a person is asked for the emergency stop", child.text())
+        p.do("estop open")
+        status = rig.wait_for(lambda s: s.get("proof", {}).get("by"), 60)
+        child.end()
+        checks.check(status and status["proof"].get("passed") and row(status["proof"], "emergency stop, latched") == 1,
+                     "pressed, it stops the table and latches", (status or {}).get("proof"))
+        p.do("estop close")
+        later = rig.wait_for(lambda s: not s["shaker"].get("emergency_stop_open"), 30)
+        checks.check(later["campaign"]["state"] == "tripped" and later["shaker"].get("measured_g", 0) == 0,
+                     "closing the chain alone starts nothing", r.state_of(later))
+    finally:
+        p.end()
+
+
+def lies(checks, programs, folder):
+    for name, value, word in LIES:
+        shaker = {name: value}
+        if name == "readback_echo":
+            shaker["dead_table"], word = True, "amplitude"
+        with tempfile.TemporaryDirectory() as place:
+            p = Proof(checks, programs, place, shaker)
+            try:
+                made = p.make()
+                proof = p.proof()
+                checks.check(made.returncode == 1 and proof.get("by") and not proof.get("passed") and
+                             (word in proof.get("message", "") or word in made.stdout),
+                             f"{name} does not pass, and the message says why",
+                             f"{proof.get('message')}\n{made.stdout}{made.stderr}\n{p.rig.logs(30)}")
+                refused = p.rig.tool("arm", "--by", "Ada")
+                checks.equal(refused.returncode, 1, f"{name}: nothing is armed")
+            finally:
+                p.end()
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    for part in (honest, pressed, lies):
+        with tempfile.TemporaryDirectory() as folder:
+            part(checks, programs, folder)
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,128 @@
+#include "daemon/campaign/safety_proof.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace vibrig::campaign {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kHour = 3'600'000'000'000;
+constexpr std::int64_t kNow = 1'800'000'000'000'000'000;
+constexpr const char* kKeys = "can.sample_rate_hz=40\nshaker.port=502\n";
+
+ProofSettings demanded(const std::string& keys = kKeys) {
+    ProofSettings settings;
+    settings.keys = keys;
+    return settings;
+}
+
+ProofRecord proved(SafetyProof& proof, std::int64_t utc_ns, double stop_s = 1.2) {
+    proof.begin("Ada", 0.5);
+    proof.row("stop, platform", "s", stop_s, 0, 6);
+    proof.row("watchdog, the controller says fault", true);
+    proof.record().pads = {0.5, 0.4, 6.0};
+    return proof.conclude(utc_ns, "");
+}
+
+TEST(SafetyProof, NothingIsArmedWithoutOne) {
+    SafetyProof proof(demanded());
+    EXPECT_THAT(proof.refusal(kNow), HasSubstr("there is no proof"));
+    EXPECT_THAT(proof.refusal(kNow), HasSubstr("vibrig selftest --by"));
+    // AND a simulated rig is not asked for one
+    ProofSettings none = demanded();
+    none.demanded = false;
+    EXPECT_EQ(SafetyProof(none).refusal(kNow), "");
+}
+
+TEST(SafetyProof, HoldsForItsTimeAndNotBeforeItWasMade) {
+    SafetyProof proof(demanded());
+    EXPECT_TRUE(proved(proof, kNow).passed);
+    EXPECT_EQ(proof.refusal(kNow), "");
+    EXPECT_EQ(proof.refusal(kNow + 168 * kHour), "");
+    EXPECT_THAT(proof.refusal(kNow + 169 * kHour), HasSubstr("169.0 h old, valid for 168 h"));
+    EXPECT_THAT(proof.refusal(kNow - kHour), HasSubstr("in the future"));
+}
+
+TEST(SafetyProof, TheNewestWordCounts) {
+    SafetyProof proof(demanded());
+    proved(proof, kNow);
+    // GIVEN a stop that took too long WHEN it was the newest
+    EXPECT_FALSE(proved(proof, kNow + kHour, 7).passed);
+    // THEN the older one that passed is worth nothing, and the row is named with its band
+    EXPECT_THAT(proof.refusal(kNow + kHour), HasSubstr("stop, platform 7 s, expected 0 to 6"));
+    // AND what was not completed proves nothing either
+    proof.begin("Ada", 0.5);
+    EXPECT_FALSE(proof.conclude(kNow + 2 * kHour, "not completed: aborted").passed);
+    EXPECT_THAT(proof.refusal(kNow + 2 * kHour), HasSubstr("not completed: aborted"));
+}
+
+TEST(SafetyProof, SaysWhatHasChangedSince) {
+    SafetyProof before(demanded());
+    const ProofRecord record = proved(before, kNow);
+    // GIVEN the same record and another configuration
+    SafetyProof after(demanded("can.sample_rate_hz=40\nshaker.port=503\nshaker.unit=1\n"));
+    after.take_over({record});
+    EXPECT_THAT(after.refusal(kNow), HasSubstr("shaker.port is 503, was proved with 502"));
+    EXPECT_THAT(after.refusal(kNow), HasSubstr("shaker.unit is 1, was not known then"));
+    SafetyProof less(demanded("can.sample_rate_hz=40\n"));
+    less.take_over({record});
+    EXPECT_THAT(less.refusal(kNow), HasSubstr("shaker.port is gone, was 502"));
+}
+
+TEST(SafetyProof, ARecordSurvivesTheJournal) {
+    SafetyProof proof(demanded());
+    const ProofRecord record = proved(proof, kNow);
+    const auto read = proof_from_json(to_json(record));
+    ASSERT_TRUE(read);
+    EXPECT_EQ(to_json(*read), to_json(record));
+    EXPECT_EQ(read->keys_sha256, sha256(kKeys));
+    // AND what is no record is none
+    for (const char* bad : {"", "{", "[]", "{\"by\":1}", "null"})
+        EXPECT_FALSE(proof_from_json(bad)) << bad;
+}
+
+TEST(SafetyProof, AsksForTheEmergencyStopOnceAYear) {
+    SafetyProof proof(demanded());
+    proved(proof, kNow);
+    EXPECT_THAT(proof.advice(kNow), HasSubstr("never been proved"));
+    proof.begin("Ada", 0.5);
+    proof.record().emergency_stop = true;
+    static_cast<void>(proof.conclude(kNow, ""));
+    EXPECT_EQ(proof.advice(kNow + 365 * 24 * kHour), "");
+    EXPECT_THAT(proof.advice(kNow + 366 * 24 * kHour), HasSubstr("366 days ago"));
+}
+
+TEST(SafetyProof, ThePadsOfTheNewestThatPassedExtrapolateToTheArmedLevel) {
+    SafetyProof proof(demanded());
+    EXPECT_EQ(proof.pads().from_s(9), safety::kRingDown_s) << "an allowance without a proof";
+    proved(proof, kNow);
+    // From 9 g it takes ln 18 decay times longer than from 0.5 g
+    EXPECT_NEAR(proof.pads().from_s(9), 0.4 + std::log(18) / 6, 1e-12);
+}
+
+TEST(StopTimes, AreThoseOfTheFirstWindowOfRestAfterTheOrder) {
+    StopTimes times;
+    const drivers::Time order = 10 * drivers::kSecond;
+    times.begin(order);
+    drivers::ShakerReading reading;
+    reading.valid = true;
+    reading.time = order - 1;  // from before: says nothing
+    rt::Rest rest;
+    rest.platform = {rt::RestVerdict::still, 0, order - drivers::kSecond, order};
+    times.look(reading, rest);
+    EXPECT_FALSE(times.controller_s || times.table_s || times.platform_s);
+    reading.time = order + drivers::kSecond;
+    rest.table = {rt::RestVerdict::still, 0, order + drivers::kSecond / 2,
+                  order + drivers::kSecond};
+    rest.platform = {rt::RestVerdict::moving, 0.1, order, order + drivers::kSecond};
+    times.look(reading, rest);
+    EXPECT_EQ(times.controller_s, 1);
+    EXPECT_EQ(times.table_s, 0.5);
+    EXPECT_FALSE(times.platform_s);
+    EXPECT_TRUE(times.table_known);
+}
+
+}  // namespace
+}  // namespace vibrig::campaign
