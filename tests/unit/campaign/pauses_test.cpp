@@ -10,6 +10,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
+#include "tests/unit/campaign/fake_accelerometers.hpp"
 #include "tests/unit/rt/fake_shaker.hpp"
 
 namespace vibrig::campaign {
@@ -43,6 +44,7 @@ struct WatchedCampaign : testing::Test {
     PromptGimbals port{platform};
     drivers::Gimbal gimbal{dbc, {}, port};
     FakeShaker shaker;
+    FakeAccelerometers accelerometers;
     std::vector<rt::DwellOrder> orders;
     std::vector<std::string> events;
     std::vector<rt::Ramp> ramps;
@@ -78,6 +80,7 @@ struct WatchedCampaign : testing::Test {
                     [](bool) {},
                     [this](Severity, const std::string& text) { events.push_back(text); }};
         ports.ramping = [this](const rt::Ramp& ramp) { ramps.push_back(ramp); };
+        ports.rest = [this](drivers::Time at) { return accelerometers.monitor.rest(at); };
         ports.unfit = [this] { return unfit; };
         if (watched) ports.second = [this] { return second(); };
         campaign = std::make_unique<Campaign>(settings, std::move(ports));
@@ -115,6 +118,7 @@ struct WatchedCampaign : testing::Test {
         now += 100 * drivers::kMillisecond;
         platform.time = platform.gimbal_time = now;
         shaker.obey(now);
+        accelerometers.run_to(now, shaker.now.measured_g);
         if (reported < orders.size() && now > orders.back().to) {
             reported = orders.size();
             estimator::DwellSummary summary;
