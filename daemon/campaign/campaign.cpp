@@ -7,7 +7,6 @@
 
 #include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
-#include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
@@ -434,27 +433,6 @@ Time Campaign::rest(Time now) {
 void Campaign::stop_shaker() {
     ports_.shaker.stop_now();
     ++armed_under_;
-}
-
-double Campaign::highest_level() const {
-    if (state_ == State::checking) return settings_.loop.table_g;
-    return *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_);
-}
-
-bool Campaign::ask_level(double table_g, Time now) {
-    stop_.excited(table_g);
-    if (!ports_.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s}, armed_under_))
-        return false;
-    tell_ramp(table_g, now);
-    return true;
-}
-
-void Campaign::tell_ramp(double table_g, Time now) {
-    const double start_g = std::exchange(asked_g_, table_g);
-    if (!ports_.ramping) return;
-    const RigFrame frame(settings_.rig);
-    ports_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
-                    state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
 }
 
 void Campaign::order_stop(const std::string& by) {

@@ -1,12 +1,17 @@
-// What is held against the encoders and the dwells so far before the table is moved again.
+// What the table is told, and what is held against encoders and dwells before it is told to move.
 #include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <utility>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/gravity_watch.hpp"
+#include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
 
+using drivers::from_seconds;
 using drivers::kSecond;
 using drivers::Time;
 using State = CampaignState;
@@ -15,6 +20,27 @@ namespace {
 // A position that does not show a still second in this time does not stand.
 constexpr Time kStillTimeout = 10 * kSecond;
 }  // namespace
+
+double Campaign::highest_level() const {
+    if (state_ == State::checking) return settings_.loop.table_g;
+    return *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_);
+}
+
+bool Campaign::ask_level(double table_g, Time now) {
+    stop_.excited(table_g);
+    if (!ports_.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s}, armed_under_))
+        return false;
+    tell_ramp(table_g, now);
+    return true;
+}
+
+void Campaign::tell_ramp(double table_g, Time now) {
+    const double start_g = std::exchange(asked_g_, table_g);
+    if (!ports_.ramping) return;
+    const RigFrame frame(settings_.rig);
+    ports_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
+                    state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
+}
 
 void Campaign::watch_gravity() {
     if (!ports_.second || !active() || state_ == State::slewing || state_ == State::zeroing) return;
