@@ -24,6 +24,9 @@ using drivers::Time;
 
 namespace {
 
+// The simulated rig's clock stands still with it: its silence is one of wall time.
+constexpr Time kSimulatedSilence = 10 * drivers::kSecond;
+
 template <std::size_t N>
 void copy_text(std::array<char, N>& to, const char* from) noexcept {
     std::strncpy(to.data(), from, N - 1);
@@ -187,7 +190,12 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
            [this](const campaign::ProofRecord& record) {
                if (journal_) journal_->proved(record.by, campaign::to_json(record));
            },
-           utc_now}),
+           utc_now,
+           [this] {
+               const auto misfit = clock_misfit();
+               return misfit.empty() ? rate_misfit() : misfit;
+           },
+           [this] { return interlock_.second(); }}),
       publisher_(
           configuration_.mqtt.host.empty()
               ? nullptr
@@ -484,33 +492,6 @@ void Daemon::write_result_file(const std::string& text, bool complete) {
     }
 }
 
-void Daemon::check_balance(Time now) {
-    if (now - balance_checked_ < drivers::kSecond) return;
-    balance_checked_ = now;
-    const auto a = acquisition_.view();
-    const auto e = estimator_stage_.view();
-    std::string found;
-    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
-        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
-    };
-    equal("frames received", a.port.received,
-          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
-    equal("frames delivered", a.port.delivered,
-          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
-    equal("frames for samples", a.assembler.received,
-          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
-              a.assembler.wrong_length);
-    equal("samples offered", a.samples_offered, a.assembler.samples);
-    equal("samples taken", e.taken, e.in_dwell + e.idle);
-    if (log_queue_ != nullptr) {
-        const auto lines = log_queue_->counts();
-        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
-    }
-    if (!found.empty() && imbalance_.empty())
-        log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
-    imbalance_ = found;
-}
-
 StatusData Daemon::status() const {
     StatusData status;
     {
@@ -546,6 +527,14 @@ StatusData Daemon::status() const {
         status.channel_age_s[c] =
             acquired.last_good[c] == 0 ? -1.0 : drivers::to_seconds(now - acquired.last_good[c]);
     }
+    status.channel_deadline_s = drivers::to_seconds(configuration_.assembler.stale_deadline);
+    status.platform_deadline_s = drivers::to_seconds(configuration_.gimbal.status_deadline);
+    status.silent = rig_clock_ && acquired.last_frames != 0 &&
+                    rt::wall_clock() - acquired.last_frames > kSimulatedSilence;
+    status.sample_rate_hz = acquired.rate.hz();
+    status.rate_misfit = rate_misfit();
+    status.clock_misfit = clock_misfit();
+    status.witness_g = interlock_.seen_g();
     status.platform = acquired.platform;
     const auto& frame = configuration_.estimator;
     status.frame = {frame.up, frame.encoder_sign, frame.encoder_zero_deg,

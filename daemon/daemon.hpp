@@ -130,6 +130,11 @@ class Daemon final : public StatusSource {
     void record_dwell(const estimator::DwellSummary& summary);
     void offer_unfinished(journal::Unfinished& campaign);
     [[nodiscard]] std::string resume_gate() const;
+    /// Why rig and daemon have no time in common; empty: they have.
+    [[nodiscard]] std::string clock_misfit() const;
+    /// Why the samples do not come at the configured rate; empty: they do.
+    [[nodiscard]] std::string rate_misfit() const;
+    void tell_clock_misfit();
     void check_balance(drivers::Time now);
     [[nodiscard]] bool may_feed() const noexcept;
 
@@ -194,6 +199,7 @@ class Daemon final : public StatusSource {
     std::unique_ptr<journal::Journal> journal_;  ///< null: none is kept
     bool journal_was_running_ = true;            ///< control thread
     bool recorder_was_stuck_ = false;            ///< control thread
+    std::string misfit_told_;                    ///< thread of stuck_stage()
     bool log_was_blocked_ = false;               ///< control thread
     mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
     std::deque<WaitingCommand> commands_;

@@ -18,6 +18,9 @@ constexpr Time kProgressDeadline = drivers::kSecond;
 constexpr Time kPatience = 2 * drivers::kSecond;
 // The server waits for the control thread's answer to a command for 5 s.
 constexpr Time kServerPatience = 7 * drivers::kSecond;
+// That make a bus alive.
+constexpr std::uint64_t kFramesWithoutTime = 20;
+constexpr double kRateTolerance = 0.01, kRateJitter_s = 0.02;
 constexpr std::size_t kManyEvents = serve::EventLog::kCapacity;
 }  // namespace
 
@@ -140,7 +143,76 @@ std::string Daemon::resume_gate() const {
     return {};
 }
 
+void Daemon::check_balance(Time now) {
+    if (now - balance_checked_ < drivers::kSecond) return;
+    balance_checked_ = now;
+    const auto a = acquisition_.view();
+    const auto e = estimator_stage_.view();
+    std::string found;
+    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
+        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
+    };
+    equal("frames received", a.port.received,
+          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
+    equal("frames delivered", a.port.delivered,
+          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
+    equal("frames for samples", a.assembler.received,
+          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
+              a.assembler.wrong_length);
+    equal("samples offered", a.samples_offered, a.assembler.samples);
+    equal("samples taken", e.taken, e.in_dwell + e.idle);
+    if (log_queue_ != nullptr) {
+        const auto lines = log_queue_->counts();
+        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
+    }
+    if (!found.empty() && imbalance_.empty())
+        log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
+    imbalance_ = found;
+}
+
+std::string Daemon::clock_misfit() const {
+    const auto view = acquisition_.view();
+    if (rig_clock_)
+        return view.rig_ticks == 0 && view.port.delivered > kFramesWithoutTime
+                   ? "clock.source is \"rig\", but no simulated rig sends its time on the bus: "
+                     "vibrig-plant --clock rig, or clock.source = \"real\""
+                   : "";
+    // Frames of that number may be anybody's on a real bus; with samples they are no matter.
+    const bool sampled =
+        view.sample.time != 0 && clock_.now() - view.sample.time <= drivers::kSecond;
+    return view.foreign_time > 0 && !sampled
+               ? "clock.source is \"real\", but a simulated rig that owns the time (RigTime on the "
+                 "bus) waits for an answer: vibrig-plant --clock real, or clock.source = \"rig\""
+               : "";
+}
+
+std::string Daemon::rate_misfit() const {
+    const auto view = acquisition_.view();
+    const bool sampled =
+        view.sample.time != 0 && clock_.now() - view.sample.time <= 2 * drivers::kSecond;
+    const auto rate = sampled ? view.rate : rt::RateMeter{};
+    const double configured = 1 / drivers::to_seconds(configuration_.assembler.sample_period);
+    const auto measured = [&rate] {
+        return rate.hz() == 0 ? std::string("no sample rate measured yet")
+                              : fmt::format("{:.4g} samples/s measured", rate.hz());
+    };
+    // The ends of what is measured may be late by so much.
+    const double tolerance = kRateTolerance + kRateJitter_s / std::max(rate.span_s(), 0.5);
+    if (rate.hz() > 0 && std::abs(rate.hz() / configured - 1) <= tolerance) return {};
+    return fmt::format("{}, can.sample_rate_hz = {:g}: expected within {:g} %", measured(),
+                       configured, 100 * kRateTolerance);
+}
+
+void Daemon::tell_clock_misfit() {
+    auto found = clock_misfit();
+    if (found == misfit_told_) return;
+    log(found.empty() ? Severity::info : Severity::alarm, "clock",
+        found.empty() ? "rig and daemon agree on the time" : found);
+    misfit_told_ = std::move(found);
+}
+
 std::string Daemon::stuck_stage() {
+    tell_clock_misfit();
     // In wall time. The simulated rig's clock may stand still, and with it all that waits on it.
     if (rig_clock_) return {};
     const auto wall = std::chrono::duration_cast<std::chrono::nanoseconds>(

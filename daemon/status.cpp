@@ -52,4 +52,52 @@ const char* name_of(Severity severity) noexcept {
     return "unknown";
 }
 
+const char* name_of(ChannelState state) noexcept {
+    switch (state) {
+        case ChannelState::good:
+            return "good";
+        case ChannelState::missing:
+            return "missing";
+        case ChannelState::flagged:
+            return "flagged";
+        case ChannelState::out_of_range:
+            return "out_of_range";
+        case ChannelState::unbound:
+            return "unbound";
+        case ChannelState::silent:
+            return "silent";
+        case ChannelState::never:
+            return "never";
+    }
+    return "?";
+}
+
+ChannelState StatusData::channel(std::size_t c) const noexcept {
+    using drivers::Quality;
+    if (sample.time == 0) return ChannelState::never;
+    if (sample.quality[c] == Quality::unbound) return ChannelState::unbound;
+    const bool ever = channel_age_s[c] >= 0;
+    if (silent || drivers::to_seconds(time - sample.time) > channel_deadline_s)
+        return ever ? ChannelState::silent : ChannelState::never;
+    switch (sample.quality[c]) {
+        case Quality::good:
+            return ChannelState::good;
+        case Quality::missing:
+            return ChannelState::missing;
+        case Quality::flagged:
+            return ChannelState::flagged;
+        case Quality::out_of_range:
+            return ChannelState::out_of_range;
+        default:
+            return ever ? ChannelState::silent : ChannelState::never;
+    }
+}
+
+ChannelState StatusData::platform_state() const noexcept {
+    if (platform.time == 0) return ChannelState::never;
+    return silent || drivers::to_seconds(time - platform.time) > platform_deadline_s
+               ? ChannelState::silent
+               : ChannelState::good;
+}
+
 }  // namespace vibrig

@@ -237,6 +237,18 @@ struct ProofStatus {
     };
     std::vector<Past> history;  ///< oldest first
 };
+/// Quality of a channel as it stands now: that of the newest sample while there is one within its
+/// deadline.
+enum class ChannelState : std::uint8_t {
+    good,
+    missing,
+    flagged,
+    out_of_range,
+    unbound,
+    silent,  ///< no value for longer than its deadline
+    never,   ///< no good value since the start, and nothing else to say of it
+};
+[[nodiscard]] const char* name_of(ChannelState state) noexcept;
 
 /// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
 /// not in real-time threads.
@@ -280,8 +292,20 @@ struct StatusData {
     rt::FrameLatency latency;                                  ///< of the acquisition, real clock
     std::uint64_t estimator_in_dwell = 0, estimator_idle = 0;  ///< popped = in a dwell + idle
     drivers::Sample sample;                                    ///< the newest
-    std::array<double, drivers::kChannels> channel_age_s{};
+    std::array<double, drivers::kChannels> channel_age_s{};    ///< negative: never good
+    double channel_deadline_s = 0.1, platform_deadline_s = 0.5;
+    bool silent = false;        ///< nothing has come for seconds, whatever clock the rig has
+    double sample_rate_hz = 0;  ///< measured; 0: not yet
+    std::string rate_misfit;    ///< why it is not the configured one
+    std::string clock_misfit;   ///< why rig and daemon have no time in common
     drivers::PlatformStatus platform;
+    /// Of the accelerometers against the command: platform and table, g peak at the table;
+    /// negative: not known.
+    std::array<double, 2> witness_g{-1, -1};
+
+    [[nodiscard]] ChannelState channel(std::size_t c) const noexcept;
+    /// good, silent or never.
+    [[nodiscard]] ChannelState platform_state() const noexcept;
     FrameStatus frame;
 
     estimator::Estimate estimate;

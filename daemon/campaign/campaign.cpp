@@ -68,6 +68,9 @@ bool Campaign::active() const {
 bool Campaign::done(Time now) const { return shutting_down_ && !active() && !stop_.unsettled(now); }
 
 std::string Campaign::not_fit_to_excite(Time now) const {
+    if (ports_.unfit) {
+        if (auto why = ports_.unfit(); !why.empty()) return why;
+    }
     const auto reading = ports_.shaker.reading();
     if (ports_.shaker.stop_pending()) return "a stop of the shaker is pending";
     if (stop_.stopping()) {
@@ -198,6 +201,7 @@ void Campaign::begin(Time now) {
     at_ = positions_done_;
     temperatures_.clear();
     pause_asked_ = false;
+    rejected_in_a_row_ = 0;
     zeroed_ = false;
     zeroing_ = Zeroing::none;
     mark_.clear();
@@ -225,6 +229,7 @@ Time Campaign::step_once(Time now) {
         abort("no valid read-back from the shaker", now);
     }
     insist_on_zero_torque(now);
+    watch_gravity();
     switch (state_) {
         case State::waiting:
             return wait_for_platform(now);
@@ -269,6 +274,7 @@ void Campaign::start_position(Time now) {
         return;
     }
     if (zero_ && !zeroed_) return begin_zeroing(false, now);
+    if (too_many_rejected(now)) return;
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);
         // At rest it is asked again.
@@ -332,6 +338,7 @@ Time Campaign::ramp(Time now) {
         abort(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)), now);
         return now;
     }
+    if (!requested_ && !gravity_holds(now)) return now + kPoll;
     if (table_g() <= kAtRestG) {
         enter(State::settling, now);
         return now;
@@ -496,6 +503,9 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
         const double sigma = zero_->level_sigma(here().stop.position_deg);
         level_variances_.emplace_back(summary.run, sigma * sigma);
     }
+    const bool rejected = summary.flagged && !summary.followed;
+    rejected_in_a_row_ = rejected ? rejected_in_a_row_ + 1 : 0;
+    if (rejected) rejected_for_ = summary.reason;
     if (summary.flagged) {
         ports_.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
                                                     summary.position, summary.reason));

@@ -23,6 +23,7 @@
 
 namespace vibrig::campaign {
 
+class GravityWatch;
 class LevellingStage;
 class LoopCheck;
 class ZeroingStage;
@@ -96,6 +97,10 @@ struct Ports {
     /// A proof is over, passed or not.
     std::function<void(const ProofRecord&)> proved = {};
     std::function<std::int64_t()> utc_ns = {};
+    /// Why what is measured is not fit to arm on; empty: it is.
+    std::function<std::string()> unfit = {};
+    /// The newest second of force and angles.
+    std::function<rt::MeanMotion()> second = {};
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -212,6 +217,12 @@ class Campaign {
     void end(CampaignState state, const std::string& why, drivers::Time now);
     void leave_dwell();
     void stop_shaker();
+    void watch_gravity();
+    /// Before a ramp: not yet, or not at all.
+    [[nodiscard]] bool gravity_holds(drivers::Time now);
+    void pause_at_rest(const std::string& why, drivers::Time now);
+    /// Two or so in a row: it pauses. True: it has.
+    [[nodiscard]] bool too_many_rejected(drivers::Time now);
     /// Asks the shaker for a level; whoever watches it knows what it was asked.
     [[nodiscard]] bool ask_level(double table_g, drivers::Time now);
     void tell_ramp(double table_g, drivers::Time now);
@@ -296,6 +307,11 @@ class Campaign {
     std::shared_ptr<LevellingStage> level_;
     std::shared_ptr<ZeroingStage> zero_;
     std::shared_ptr<LoopCheck> loop_;
+    std::shared_ptr<GravityWatch> gravity_;
+    drivers::Time second_from_ = -1;  ///< the newest second that was judged
+    bool gravity_told_ = false;
+    int rejected_in_a_row_ = 0;  ///< dwells, the newest included
+    std::string rejected_for_;
     Part part_ = Part::go;
     Check check_ = Check::look;
     SafetyProof proof_;

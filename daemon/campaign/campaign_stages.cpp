@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/gravity_watch.hpp"
 #include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
@@ -83,6 +84,8 @@ rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
 
 void Campaign::make_stages() {
     times_ = stage_times(settings_);
+    gravity_ = std::make_shared<GravityWatch>(
+        settings_.rig, GravityLimits{.refused_deg = settings_.gravity_refused_deg});
     loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
     if (settings_.levelling && ports_.torquer != nullptr && ports_.feed != nullptr) {
         level_ = std::make_shared<LevellingStage>(settings_.level, settings_.rig,

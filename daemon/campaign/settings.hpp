@@ -97,6 +97,9 @@ struct Settings {
     double temperature_window_s = 60.0;
     double temperature_band_c = 0.5;    ///< largest spread within the window
     double amplitude_tolerance = 0.05;  ///< relative; measured against commanded after the ramp
+    int rejected_in_a_row = 2;          ///< dwells, after which it pauses at rest
+    /// Gravity against encoders: beyond it nothing is ramped. A simulated rig is not commissioned.
+    double gravity_refused_deg = 0.5;
     rt::RestSettings rest;
     StopSettings stop;
     ProofSettings proof;

@@ -220,6 +220,8 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         throw ConfigurationError(problems.text(name));
     }
 
+    // A simulated rig is not commissioned.
+    if (c.simulated()) c.campaign.gravity_refused_deg = 2;
     if (c.campaign.resonance_hz <= 0) {
         c.campaign.resonance_hz =
             isolator_resonance_hz(c.estimator.frequency_hz, c.estimator.transmission);

@@ -169,6 +169,9 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(number("campaign.amplitude_tolerance", "", {0.001, 1},
                           "measured against commanded amplitude after the ramp, relative",
                           [](C& c) -> double& { return c.campaign.amplitude_tolerance; }));
+    keys.push_back(integer("campaign.rejected_in_a_row", "", 1, 1000,
+                           "rejected dwells, after which it pauses at rest and says why",
+                           [](C& c) -> int& { return c.campaign.rejected_in_a_row; }));
     keys.push_back(number("campaign.resonance_hz", "Hz", {0, 2000},
                           "of the isolators; 0: from frequency and transmission",
                           [](C& c) -> double& { return c.campaign.resonance_hz; }));

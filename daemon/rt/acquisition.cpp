@@ -60,10 +60,12 @@ void Acquisition::stop() {
 
 void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept {
     shown_.in_hand = frames.size();
-    to_.interlock.arrived(wall_clock());
+    shown_.last_frames = wall_clock();
+    to_.interlock.arrived(shown_.last_frames);
     for (const auto& frame : frames) {
         --shown_.in_hand;
         if (!rig_link_) {
+            shown_.foreign_time += frame.frame.can_id == RigTimeLink::kTimeId ? 1 : 0;
             record(frame, frame.time);
             feed(frame);
         } else if (rig_link_->is_time(frame.frame)) {
@@ -115,6 +117,7 @@ void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     if (to_.rest != nullptr) to_.rest->add(sample);
     to_.interlock.check(sample, assembler_.platform());
     if (to_.stages != nullptr) to_.stages->take(sample);
+    shown_.rate.add(sample);
     batch_[batched_++] = sample;
     if (batched_ == batch_.size()) push_batch();
 }

@@ -11,6 +11,7 @@
 #include "daemon/rt/frame_latency.hpp"
 #include "daemon/rt/frame_record.hpp"
 #include "daemon/rt/interlock.hpp"
+#include "daemon/rt/rate_meter.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/rt/rest_monitor.hpp"
 #include "daemon/rt/rig_clock.hpp"
@@ -38,7 +39,10 @@ struct AcquisitionView {
     /// On the real clock: of frames, as latency; of wake-ups for silence, after their moment.
     Lateness lateness;
     PageFaults faults;
-    drivers::Time beat = 0;  ///< when the thread last handled frames
+    RateMeter rate;
+    std::uint64_t foreign_time = 0;  ///< frames of a simulated rig's time that is not ours
+    drivers::Time last_frames = 0;   ///< wall time; 0: none yet
+    drivers::Time beat = 0;          ///< when the thread last handled frames
 };
 
 /// First stage: frames in, interlock, samples out to the rings. Everything here runs in the thread

@@ -45,6 +45,7 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
       platform_age_(limits.platform_age),
       rules_(std::move(limits.rules)),
       transmission_(limits.transmission),
+      seconds_(limits.witness.frequency_hz),
       witness_(limits.witness) {
     std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
     if (rules_.size() > kMostRules) rules_.resize(kMostRules);
@@ -134,6 +135,7 @@ void Interlock::check(const drivers::Sample& sample,
                       const drivers::PlatformStatus& platform) noexcept {
     const Time now = sample.time;
     const Guard guard = follow_guard();
+    if (seconds_.add(sample)) second_.publish(seconds_.mean());
     if (guard == Guard::excitation) {
         judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
         judge(By::sample, Trip::platform_fault, platform.fault, now);
@@ -197,6 +199,8 @@ Guard Interlock::follow_guard() noexcept {
         verdict_ = {};
         loss_ = {};
     }
+    if ((guard == Guard::excitation) != (sampled_under_ == Guard::excitation))
+        seconds_.begin(guard == Guard::excitation);
     if (guard < sampled_under_) forget(By::sample, guard);
     if (guard < Guard::excitation && sampled_under_ == Guard::excitation)
         for (auto& seen : seen_g_) seen.store(-1);

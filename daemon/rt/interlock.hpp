@@ -9,6 +9,7 @@
 #include "daemon/rt/amplitude_witness.hpp"
 #include "daemon/rt/interlock_motion.hpp"
 #include "daemon/rt/interlock_table.hpp"
+#include "daemon/rt/mean_motion.hpp"
 #include "daemon/rt/snapshot.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/sample.hpp"
@@ -92,6 +93,8 @@ class Interlock {
     [[nodiscard]] std::array<double, 2> seen_g() const noexcept {
         return {seen_g_[0].load(), seen_g_[1].load()};
     }
+    /// The newest second of force and angles.
+    [[nodiscard]] MeanMotion second() const noexcept { return second_.read(); }
     /// Control thread, slowly: innovations of the filter (0: none yet), free space.
     void filter(double nis_per_dof) noexcept { nis_.store(nis_per_dof); }
     void disk_free(double megabytes) noexcept { disk_free_mb_.store(megabytes); }
@@ -180,6 +183,7 @@ class Interlock {
     ReactionHistogram reactions_;
 
     Snapshot<Ramp> ramp_;
+    Snapshot<MeanMotion> second_;
     std::uint64_t ramps_ = 0;  ///< control thread
     std::atomic<double> transmission_;
     std::array<std::atomic<double>, 2> seen_g_{-1, -1};
@@ -187,6 +191,7 @@ class Interlock {
     // Acquisition thread.
     drivers::Time arrived_ = 0;
     drivers::Time now_ = 0;  ///< when silence was last looked for
+    MeanMotionMeter seconds_;
     AmplitudeWitness witness_;
     AmplitudeWitness::Verdict verdict_;  ///< the newest
     Ramp told_;

@@ -28,6 +28,7 @@ class RigTimeLink {
     /// the rig asks again.
     std::optional<canfd_frame> acknowledge(const Tick& tick) noexcept;
 
+    static constexpr std::uint32_t kTimeId = 16;  ///< of RigTime in rig.dbc
     static constexpr std::int64_t kLargestStepUs = 10'000'000;
 
   private:

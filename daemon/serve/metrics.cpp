@@ -17,8 +17,9 @@ using Labels = std::vector<ClientMetric::Label>;
 constexpr std::array<const char*, drivers::kChannels> kChannelLabels{
     "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
 constexpr std::array<const char*, 3> kAxisLabels{"x", "y", "z"};
-constexpr std::array<const char*, 6> kQualityLabels{"good",    "missing",      "stale",
-                                                    "flagged", "out_of_range", "unbound"};
+constexpr std::array kChannelStates{ChannelState::good,    ChannelState::missing,
+                                    ChannelState::flagged, ChannelState::out_of_range,
+                                    ChannelState::silent,  ChannelState::never};
 
 class Families {
   public:
@@ -123,6 +124,14 @@ void add_shaker(Families& to, const StatusData& s) {
         to.gauge("vibrig_emergency_stop_open", "1 while the emergency-stop chain is open.",
                  yes(s.shaker.emergency_stop_open));
     }
+    std::vector<std::pair<Labels, double>> witnesses;
+    for (std::size_t w = 0; w < s.witness_g.size(); ++w) {
+        if (s.witness_g[w] >= 0)
+            witnesses.emplace_back(Labels{{"witness", w == 0 ? "platform" : "table"}},
+                                   s.witness_g[w] * kGravity);
+    }
+    to.gauge("vibrig_witness_meters_per_second_squared",
+             "Peak acceleration at the table as an accelerometer shows it.", witnesses);
     to.gauge("vibrig_shaker_stop_pending", "1: a stop is ordered and rest not measured since.",
              yes(s.stop_pending));
     to.gauge("vibrig_shaker_stop_disobeyed",
@@ -202,18 +211,26 @@ void add_acquisition(Families& to, const StatusData& s) {
     add_real_time(to, s.real_time);
     std::vector<std::pair<Labels, double>> ages, good;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
-        if (s.sample.quality[c] == drivers::Quality::unbound) continue;
+        if (s.channel(c) == ChannelState::unbound) continue;
         const Labels channel{{"channel", kChannelLabels[c]}};
         if (s.channel_age_s[c] >= 0) ages.emplace_back(channel, s.channel_age_s[c]);
-        for (std::size_t q = 0; q < kQualityLabels.size() - 1; ++q) {
+        for (const ChannelState state : kChannelStates) {
             Labels labels = channel;
-            labels.push_back({"quality", kQualityLabels[q]});
-            good.emplace_back(labels, yes(static_cast<std::size_t>(s.sample.quality[c]) == q));
+            labels.push_back({"quality", name_of(state)});
+            good.emplace_back(labels, yes(s.channel(c) == state));
         }
     }
     to.gauge("vibrig_channel_age_seconds", "Since the newest good value.", ages);
-    to.gauge("vibrig_channel_quality", "1 for the quality of the newest sample.", good);
-    if (s.platform.time != 0) {
+    to.gauge("vibrig_channel_quality",
+             "1 for the quality as it stands now; silent: nothing within the deadline.", good);
+    if (s.sample_rate_hz > 0)
+        to.gauge("vibrig_sample_rate_hertz", "Measured over ten seconds at most.",
+                 s.sample_rate_hz);
+    to.gauge("vibrig_clock_misfit", "1 where rig and daemon have no time in common.",
+             yes(!s.clock_misfit.empty()));
+    to.gauge("vibrig_platform_silent", "1 while it has said nothing within its deadline.",
+             yes(s.platform_state() != ChannelState::good));
+    if (s.platform_state() == ChannelState::good) {
         to.gauge("vibrig_platform_ready", "1 while the platform says so.", yes(s.platform.ready));
         to.gauge("vibrig_platform_loop_closed", "1 while its loop is closed.",
                  yes(s.platform.loop_closed));

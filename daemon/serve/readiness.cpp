@@ -13,7 +13,6 @@ constexpr std::array<const char*, 5> kLinkWords{"absent", "connecting", "running
                                                 "fault"};
 constexpr std::array<const char*, drivers::kChannels> kChannelWords{
     "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
-constexpr double kOldest_s = 1;  // of a good value
 
 std::string seconds(double value) {
     std::array<char, 32> text{};
@@ -65,20 +64,28 @@ Readiness readiness(const StatusData& status) {
                        : ", not what was written"));
     std::string bad;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
-        const auto quality = status.sample.quality[c];
+        const auto state = status.channel(c);
         const double age_s = status.channel_age_s[c];
-        if (quality == drivers::Quality::unbound) continue;
-        if (quality == drivers::Quality::good && age_s >= 0 && age_s <= kOldest_s) continue;
-        bad += (bad.empty() ? "" : ", ") + std::string(kChannelWords[c]) +
-               (age_s < 0 ? " never good" : " last good " + seconds(age_s) + " ago");
+        if (state == ChannelState::unbound || state == ChannelState::good) continue;
+        bad += (bad.empty() ? "" : ", ") + std::string(kChannelWords[c]) + ' ' + name_of(state) +
+               (age_s < 0 ? "" : ", last good " + seconds(age_s) + " ago");
     }
     add("channels", bad.empty(), bad.empty() ? "all good" : bad);
+    add("clock", status.clock_misfit.empty(),
+        status.clock_misfit.empty() ? "rig and daemon agree" : status.clock_misfit);
+    std::array<char, 48> rate{};
+    std::snprintf(rate.data(), rate.size(), "%.2f samples/s", status.sample_rate_hz);
+    add("sample rate", status.rate_misfit.empty(),
+        status.rate_misfit.empty() ? rate.data() : status.rate_misfit);
     const auto& platform = status.platform;
-    add("platform", platform.time != 0 && platform.ready && !platform.fault,
+    const auto platform_state = status.platform_state();
+    add("platform", platform_state == ChannelState::good && platform.ready && !platform.fault,
         platform.time == 0 ? "no status yet"
-        : platform.fault   ? "fault"
-        : platform.ready   ? "ready"
-                           : "not ready");
+        : platform_state == ChannelState::silent
+            ? "silent for " + seconds(drivers::to_seconds(status.time - platform.time))
+        : platform.fault ? "fault"
+        : platform.ready ? "ready"
+                         : "not ready");
     add("interlock", status.interlock.tripped.empty(),
         status.interlock.tripped.empty() ? "not tripped" : "tripped: " + status.interlock.tripped);
     const std::string verdict = status.loop_check.verdict;

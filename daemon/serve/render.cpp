@@ -129,6 +129,7 @@ std::string shaker_line(const v1::Status& status) {
 }
 
 std::string platform_line(const v1::Platform& platform) {
+    if (platform.quality() == "silent") return "SILENT";
     if (!platform.has_ready()) return "no status yet";
     std::string text = platform.ready() ? "ready" : "NOT READY";
     if (!platform.loop_closed()) text += ", loop open";
@@ -295,6 +296,8 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     if (const std::string line = real_time_line(status.real_time()); !line.empty())
         lines.push_back(labelled("real time", line));
     lines.push_back(labelled("channels", channels_line(status.sample())));
+    if (!status.clock_misfit().empty())
+        lines.push_back(labelled("clock", "MISFIT: " + status.clock_misfit()));
     lines.push_back(labelled("filter", estimate_line(estimate)));
     lines.push_back(labelled("noise", noise_line(status.noise())));
     if (const v1::Mqtt& mqtt = status.mqtt(); !mqtt.broker().empty())

@@ -19,7 +19,6 @@ Wire wire_enum(Enum value) {
 static_assert(static_cast<int>(CampaignState::checking) + 1 == v1::Campaign::checking);
 static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
-static_assert(static_cast<int>(drivers::Quality::unbound) + 1 == v1::Channel::unbound);
 static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);
 
 constexpr double kDegree = 180.0 / std::numbers::pi;
@@ -144,6 +143,9 @@ void fill(v1::Shaker& out, const StatusData& status) {
         set(out, &v1::Shaker::set_table_rms_g, table.rms_g);
     if (reading.valid && reading.watchdog != drivers::WatchdogTimeout::unread)
         set(out, &v1::Shaker::set_watchdog_timeout_s, reading.watchdog_timeout_s);
+    if (status.witness_g[0] >= 0)
+        set(out, &v1::Shaker::set_platform_witness_g, status.witness_g[0]);
+    if (status.witness_g[1] >= 0) set(out, &v1::Shaker::set_table_witness_g, status.witness_g[1]);
 }
 
 void fill(v1::Interlock& out, const InterlockStatus& status) {
@@ -196,6 +198,26 @@ void fill(v1::Assembler& out, const drivers::AssemblerCounters& counters) {
     out.set_resyncs(counters.resyncs);
 }
 
+v1::Channel::Quality wire_state(ChannelState state) {
+    switch (state) {
+        case ChannelState::good:
+            return v1::Channel::good;
+        case ChannelState::missing:
+            return v1::Channel::missing;
+        case ChannelState::flagged:
+            return v1::Channel::flagged;
+        case ChannelState::out_of_range:
+            return v1::Channel::out_of_range;
+        case ChannelState::unbound:
+            return v1::Channel::unbound;
+        case ChannelState::silent:
+            return v1::Channel::silent;
+        case ChannelState::never:
+            break;
+    }
+    return v1::Channel::never;
+}
+
 double channel_value(const drivers::Sample& sample, std::size_t channel) {
     if (channel < 3) return sample.angle[channel] * kDegree;
     if (channel < 6) return sample.force[channel - 3];
@@ -207,11 +229,12 @@ void fill(v1::Sample& out, const StatusData& status) {
     out.set_time_s(drivers::to_seconds(sample.time));
     out.set_sequence(sample.sequence);
     out.set_dropped_before(sample.dropped_before);
+    if (status.sample_rate_hz > 0) set(out, &v1::Sample::set_rate_hz, status.sample_rate_hz);
     for (std::size_t i = 0; i < drivers::kChannels; ++i) {
         v1::Channel& channel = *out.add_channels();
         channel.set_name(kChannelNames[i]);
-        channel.set_quality(wire_enum<v1::Channel::Quality>(sample.quality[i]));
-        if (sample.quality[i] == drivers::Quality::good) {
+        channel.set_quality(wire_state(status.channel(i)));
+        if (status.channel(i) == ChannelState::good) {
             set(channel, &v1::Channel::set_value, channel_value(sample, i));
         }
         channel.set_unit(i < 3 ? "deg" : "g");
@@ -221,9 +244,12 @@ void fill(v1::Sample& out, const StatusData& status) {
     }
 }
 
-void fill(v1::Platform& out, const drivers::PlatformStatus& platform) {
-    if (platform.time != 0) {
-        out.set_time_s(drivers::to_seconds(platform.time));
+void fill(v1::Platform& out, const StatusData& status) {
+    const drivers::PlatformStatus& platform = status.platform;
+    const ChannelState state = status.platform_state();
+    out.set_quality(name_of(state));
+    if (platform.time != 0) out.set_time_s(drivers::to_seconds(platform.time));
+    if (state == ChannelState::good) {
         out.set_ready(platform.ready);
         out.set_loop_closed(platform.loop_closed);
         out.set_gyros_at_speed(platform.gyros_at_speed);
@@ -464,7 +490,7 @@ void fill(v1::Status& out, const StatusData& status) {
     out.mutable_assembler()->set_rig_ticks(status.rig_ticks);
     out.mutable_assembler()->set_increments(status.increment_frames);
     fill(*out.mutable_sample(), status);
-    fill(*out.mutable_platform(), status.platform);
+    fill(*out.mutable_platform(), status);
     fill(*out.mutable_estimate(), status.estimate);
     fill(*out.mutable_interlock(), status.interlock);
     v1::Journal& journal = *out.mutable_journal();

@@ -120,7 +120,7 @@
     const encoder = i => (Math.abs(deg[i] - raw[i]) > 1e-9 ? ` (encoder ${raw[i].toFixed(3)})` : '');
     table('angles', [...names.map((n, i) => [n, deg[i] === undefined ? 'not good' : fixed(deg[i], 3, '°') + encoder(i), deg[i] === undefined]),
       ['specific force', fixed(size, 3, 'g'), !good], ['off the vertical', fixed(off, 1, '°'), false],
-      ['platform', !s.platform || s.platform.ready === undefined ? 'no status' : (s.platform.ready ? 'ready' : 'not ready') + (s.platform.temperature_c === undefined ? '' : `, ${s.platform.temperature_c.toFixed(2)} °C`),
+      ['platform', !s.platform || s.platform.ready === undefined ? (s.platform && s.platform.quality === 'silent' ? 'silent' : 'no status') : (s.platform.ready ? 'ready' : 'not ready') + (s.platform.temperature_c === undefined ? '' : `, ${s.platform.temperature_c.toFixed(2)} °C`),
         !(s.platform && s.platform.ready)]]);
   }
 
@@ -190,10 +190,10 @@
     return n ? `${(l.sum_ms / n).toFixed(3)} ms, worst ${l.largest_ms.toFixed(2)} ms` : 'not on this clock';
   }
   function health(s) {
-    list('channels', (s.sample.channels || []).map(c => {
+    list('channels', (s.clock_misfit ? [['bad', 'clock', s.clock_misfit]] : []).concat((s.sample.channels || []).map(c => {
       const kind = c.quality === 'unbound' ? 'off' : c.quality !== 'good' || c.age_s > 1 ? 'bad' : c.age_s > 0.2 ? 'warn' : '';
       return [kind, c.name, `${c.quality}${c.value === undefined ? '' : ', ' + c.value.toFixed(4) + ' ' + c.unit}${c.age_s === undefined ? '' : ', ' + c.age_s.toFixed(2) + ' s'}`];
-    }));
+    })));
     const i = s.interlock;
     list('interlock', (i.rows || []).map(r => [r.raised ? (r.reaction === 'abort' ? 'bad' : 'warn') : '', r.name,
       (r.raised ? 'RAISED' + (r.value === undefined ? '' : ` ${r.value.toPrecision(3)} ${r.unit}`).trimEnd() + ', ' : '') + r.reaction + (r.limit === undefined ? '' : ` at ${r.limit} ${r.unit}`)]));

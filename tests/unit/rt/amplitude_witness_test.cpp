@@ -342,6 +342,10 @@ TEST(CleanCampaigns, AreNotStopped) {
     for (unsigned seed = 1; seed <= 20; ++seed) clean_campaign(seed, 6);
 }
 
+TEST(CleanCampaignsSoak, AreNotStopped) {
+    for (unsigned seed = 1001; seed <= 1400; ++seed) clean_campaign(seed, 28);
+}
+
 /// A pure sine at another frequency and rate, with a phase of its own.
 drivers::Sample sine(Time time, double hz, double phase, double table_g, double transmission) {
     drivers::Sample sample;

@@ -148,7 +148,7 @@ TEST(Render, NamesTheChannelsThatAreNotGood) {
     data.sample.quality[5] = drivers::Quality::out_of_range;
     data.sample.quality[6] = drivers::Quality::unbound;
     const std::string text = joined(render_summary(message_of(data), {}, 120));
-    EXPECT_TRUE(has(text, "inner STALE 0.2 s, accel_z OUT_OF_RANGE 0.6 s")) << text;
+    EXPECT_TRUE(has(text, "inner SILENT 0.2 s, accel_z OUT_OF_RANGE 0.6 s")) << text;
     EXPECT_FALSE(has(text, "table_accel")) << text;
 }
 

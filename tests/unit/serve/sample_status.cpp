@@ -60,6 +60,10 @@ StatusData full_status() {
     s.sample.angle = {3.141592653589793, 1, 2};
     s.sample.force = {0.1, 1.2, -0.3};
     s.sample.table_accel = 8.5;
+    s.channel_deadline_s = s.platform_deadline_s = 5;
+    s.sample_rate_hz = 40.01;
+    s.clock_misfit = "no time in common";
+    s.witness_g = {8.9, 9.1};
     s.channel_age_s = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7};
     s.platform = {1'234'000'000'000, true, true, true, 31.25, true,
                   1'234'100'000'000, true, true, 61};

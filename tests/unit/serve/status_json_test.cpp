@@ -137,7 +137,7 @@ TEST(StatusJson, LeavesOutWhatIsNotValid) {
     EXPECT_FALSE(status.platform().has_ready());
     EXPECT_FALSE(status.platform().has_in_position());
     EXPECT_FALSE(status.sample().channels(1).has_value());
-    EXPECT_EQ(status.sample().channels(1).quality(), v1::Channel::stale);
+    EXPECT_EQ(status.sample().channels(1).quality(), v1::Channel::silent);
     EXPECT_FALSE(status.sample().channels(3).has_value());
     EXPECT_FALSE(status.sample().channels(2).has_age_s());
     EXPECT_FALSE(status.campaign().has_progress());
@@ -167,7 +167,7 @@ TEST(StatusJson, EveryEnumValueHasItsName) {
         const std::string name = name_of(data.state);
         EXPECT_TRUE(carries(campaign_json(data), "\"state\":\"" + name + "\"")) << name;
     }
-    const char* const qualities[] = {"good",    "missing",      "stale",
+    const char* const qualities[] = {"good",    "missing",      "silent",
                                      "flagged", "out_of_range", "unbound"};
     for (std::size_t i = 0; i < 6; ++i) {
         data.sample.quality[0] = static_cast<drivers::Quality>(i);

@@ -168,7 +168,7 @@ TEST(Readiness, NamesWhatIsNotWell) {
     well.shaker.watchdog = drivers::WatchdogTimeout::kept;
     well.rest.state = "at rest";
     well.sample.quality.fill(drivers::Quality::good);
-    well.platform.time = 1;
+    well.time = well.sample.time = well.platform.time = drivers::kSecond;
     well.platform.ready = true;
     EXPECT_TRUE(readiness(well).ready()) << readiness(well).failures();
     struct Row {
@@ -195,8 +195,22 @@ TEST(Readiness, NamesWhatIsNotWell) {
                      s.shaker.watchdog = drivers::WatchdogTimeout::changed;
                      s.shaker.watchdog_timeout_s = 60;
                  }},
-             Row{"channels: inner last good 5.0 s ago",
-                 [](StatusData& s) { s.channel_age_s[1] = 5; }},
+             Row{"channels: inner silent, last good 5.0 s ago",
+                 [](StatusData& s) {
+                     s.channel_age_s[1] = 5;
+                     s.sample.quality[1] = drivers::Quality::stale;
+                 }},
+             Row{"channels: outer never, inner never",
+                 [](StatusData& s) {
+                     s.sample = {};
+                     s.channel_age_s.fill(-1);
+                 }},
+             Row{"platform: silent for 2.0 s",
+                 [](StatusData& s) { s.platform.time -= 2 * drivers::kSecond; }},
+             Row{"clock: no time in common",
+                 [](StatusData& s) { s.clock_misfit = "no time in common"; }},
+             Row{"sample rate: 80 is not 40",
+                 [](StatusData& s) { s.rate_misfit = "80 is not 40"; }},
              Row{"platform: not ready", [](StatusData& s) { s.platform.ready = false; }},
              Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
              Row{"journal: disk full",
@@ -206,6 +220,36 @@ TEST(Readiness, NamesWhatIsNotWell) {
         row.spoil(spoilt);
         EXPECT_TRUE(holds(readiness(spoilt).failures(), row.words)) << readiness(spoilt).failures();
     }
+}
+
+TEST(Silence, IsTheSameInStatusMetricsAndSelftest) {
+    // GIVEN a rig that was good and has said nothing for ten seconds
+    StatusData status = full_status();
+    status.sample.quality.fill(drivers::Quality::good);
+    EXPECT_EQ(status.channel(0), ChannelState::good);
+    status.time += 10 * drivers::kSecond;
+    // THEN none of its channels is good
+    for (std::size_t c = 0; c < drivers::kChannels; ++c) {
+        EXPECT_EQ(status.channel(c), ChannelState::silent);
+        EXPECT_EQ(message_of(status).sample().channels(static_cast<int>(c)).quality(),
+                  v1::Channel::silent);
+        EXPECT_FALSE(message_of(status).sample().channels(static_cast<int>(c)).has_value());
+    }
+    EXPECT_EQ(status.platform_state(), ChannelState::silent);
+    EXPECT_FALSE(message_of(status).platform().has_ready());
+    const auto metrics = metrics_text(status, {});
+    EXPECT_TRUE(holds(metrics, "vibrig_channel_quality{channel=\"outer\",quality=\"silent\"} 1\n"));
+    EXPECT_TRUE(holds(metrics, "vibrig_channel_quality{channel=\"outer\",quality=\"good\"} 0\n"));
+    EXPECT_TRUE(holds(metrics, "vibrig_platform_silent 1\n"));
+    EXPECT_FALSE(holds(metrics, "vibrig_platform_ready"));
+    EXPECT_TRUE(holds(readiness(status).failures(), "channels: outer silent"));
+    // AND of one that has said nothing since the start it is said
+    status.sample = {};
+    status.channel_age_s.fill(-1);
+    EXPECT_EQ(message_of(status).sample().channels(0).quality(), v1::Channel::never);
+    EXPECT_TRUE(holds(readiness(status).failures(), "channels: outer never"));
+    EXPECT_TRUE(holds(metrics_text(status, {}),
+                      "vibrig_channel_quality{channel=\"outer\",quality=\"never\"} 1\n"));
 }
 
 TEST(Metrics, CarryWhatIsValidAndAddUp) {

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/rig_frame.hpp"
+#include "daemon/rt/mean_motion.hpp"
+
+namespace vibrig::campaign {
+
+/// Of the angle between the vertical by the encoders and the mean force, and of that force's size.
+struct GravityLimits {
+    double told_deg = 0.2;
+    double refused_deg = 0.5;
+    double size = 0.02;  ///< of 1 g, at rest
+};
+
+/// Holds gravity against the encoders, second by second, and names the keys that would explain what
+/// does not fit. Control thread only.
+class GravityWatch {
+  public:
+    GravityWatch(const estimator::Settings& rig, const GravityLimits& limits);
+
+    struct Verdict {
+        bool known = false;
+        double angle_deg = 0, size_g = 1;
+        bool told = false, refused = false;
+    };
+    /// A new position: it is remembered apart from the earlier ones.
+    void next_position() noexcept { fresh_ = true; }
+    /// Only a good second; `zero_g`: raw, the configuration's and what was found since. The size
+    /// counts at rest.
+    Verdict judge(const rt::MeanMotion& second, const Vector& zero_g, bool at_rest);
+    [[nodiscard]] const Verdict& newest() const noexcept { return newest_; }
+    /// In words, with its limits.
+    [[nodiscard]] std::string words() const;
+    /// Keys of which one alone, changed, would bring all positions so far within the limits, best
+    /// first, three at most; empty: none.
+    [[nodiscard]] std::string suspects() const;
+
+  private:
+    struct Look {
+        Vector encoder_rad{}, force{};  ///< platform axes
+    };
+    [[nodiscard]] double worst_deg(const estimator::Settings& rig) const;
+
+    estimator::Settings rig_;
+    GravityLimits limits_;
+    RigFrame frame_;
+    Verdict newest_;
+    std::deque<Look> looks_;  ///< of the last positions
+    bool fresh_ = true;
+};
+
+}  // namespace vibrig::campaign
