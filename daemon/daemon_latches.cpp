@@ -99,7 +99,8 @@ void Daemon::take_over_latches() {
 /// The stop at the start makes the controller forget its faults, which is nobody's acknowledgement.
 void Daemon::judge_first_reading(Time now) {
     const auto& reading = first_reading_;
-    if (!reading.valid || (reading.fault == 0 && reading.state != drivers::kShakerFault)) return;
+    // Whether it counts as old: the rig's clock may have jumped to the rig's time meanwhile.
+    if (reading.fault == 0 && reading.state != drivers::kShakerFault) return;
     const bool emergency = reading.emergency_stop_open;
     // Of a trip that is not acknowledged yet it is a part.
     if (latches_.tripped() && !emergency) return;
