@@ -336,38 +336,6 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
     spdlog::log(level, "{}: {}", source, record.text);
 }
 
-void Daemon::take_commands(Time now) {
-    std::deque<WaitingCommand> taken;
-    {
-        const std::lock_guard lock(mutex_);
-        taken.swap(commands_);
-    }
-    finish_arming(now);
-    for (auto& waiting : taken) {
-        if (waiting.abandoned->exchange(true)) continue;
-        const auto kind = waiting.request.kind;
-        if (kind == CommandRequest::Kind::abort) give_up_arming("aborted by " + waiting.request.by);
-        if (kind == CommandRequest::Kind::arm || kind == CommandRequest::Kind::selftest) {
-            begin_arming(std::move(waiting), now);
-        } else {
-            answer(waiting, kind == CommandRequest::Kind::acknowledge
-                                ? acknowledge(waiting.request, now)
-                                : campaign_.command(waiting.request, now));
-        }
-    }
-}
-
-void Daemon::answer(WaitingCommand& waiting, const CommandReply& reply) {
-    const CommandRequest& request = waiting.request;
-    const bool started = reply.accepted && request.kind == CommandRequest::Kind::start;
-    if (journal_) {
-        journal_->command(request, reply, utc_now());
-        if (started) journal_->campaign_begun(configuration_.campaign.name, request.by);
-    }
-    if (started) record_begin(request.by, 0);
-    waiting.reply.set_value(reply);
-}
-
 /// The Identification is this thread's here: no dwell is with the estimator.
 void Daemon::take_noise(estimator::DwellSummary& dwell) {
     rt::BlockRecord block;
