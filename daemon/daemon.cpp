@@ -37,12 +37,6 @@ proto::Dbc load_dbc(const std::string& path) {
                         : proto::read_dbc(path);
 }
 
-std::int64_t utc_now() {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
-
 drivers::ShakerSettings shaker_settings(const configuration::Configuration& configuration) {
     auto settings = configuration.shaker;
     if (configuration.clock == configuration::Configuration::ClockKind::rig) {
@@ -72,6 +66,12 @@ rt::AmplitudeWitness::Settings witness_settings(const configuration::Configurati
 }
 
 }  // namespace
+
+std::int64_t utc_now() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
 
 Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
     : loaded_(std::move(loaded)),
@@ -272,7 +272,12 @@ void Daemon::start() {
     // A daemon that died may have left it running inside the watchdog's time.
     shaker_->stop_now();
     shaker_->on_reading([this] {
-        interlock_.check(shaker_->reading());
+        const auto reading = shaker_->reading();
+        if (!first_reading_known_.load()) {
+            first_reading_ = reading;
+            first_reading_known_.store(true);
+        }
+        interlock_.check(reading);
         control_waiter_->notify();
     });
     shaker_->on_stop_written([this] { interlock_.stop_written(); });
@@ -347,40 +352,6 @@ void Daemon::log(Severity severity, const std::string& source, const std::string
     spdlog::log(level, "{}: {}", source, record.text);
 }
 
-void Daemon::take_commands(Time now) {
-    std::deque<WaitingCommand> taken;
-    {
-        const std::lock_guard lock(mutex_);
-        taken.swap(commands_);
-    }
-    for (auto& waiting : taken) {
-        if (waiting.abandoned->exchange(true)) continue;
-        const rt::Tripped handled = interlock_.latched();
-        if (const auto alarm = acknowledge_alarm(waiting.request); alarm.accepted) {
-            if (journal_) journal_->command(waiting.request, alarm, utc_now());
-            waiting.reply.set_value(alarm);
-            continue;
-        }
-        std::string overdue;
-        if (waiting.request.kind == CommandRequest::Kind::arm) overdue = tell_overdue();
-        const auto unknown = unknown_to_acknowledge(waiting.request);
-        auto reply = unknown.empty() ? campaign_.command(waiting.request, now)
-                                     : CommandReply{false, unknown};
-        if (reply.accepted) reply.message += overdue;
-        if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
-            interlock_.acknowledge(handled);
-        }
-        if (journal_) {
-            journal_->command(waiting.request, reply, utc_now());
-            if (reply.accepted && waiting.request.kind == CommandRequest::Kind::start)
-                journal_->campaign_begun(configuration_.campaign.name, waiting.request.by);
-        }
-        if (reply.accepted && waiting.request.kind == CommandRequest::Kind::start)
-            record_begin(waiting.request.by, 0);
-        waiting.reply.set_value(reply);
-    }
-}
-
 /// The Identification is this thread's here: no dwell is with the estimator.
 void Daemon::take_noise(estimator::DwellSummary& dwell) {
     rt::BlockRecord block;
@@ -422,6 +393,8 @@ void Daemon::control_loop() {
             if (trip) on_trip(trip, now);
             handled = trip;
         }
+        if (first_reading_known_.load() && !std::exchange(first_reading_judged_, true))
+            judge_first_reading(now);
         tell_alarms();
         tell_controller();
         tell_watchdog();
@@ -435,16 +408,20 @@ void Daemon::control_loop() {
         take_done_dwells();
         const Time next = campaign_.step(now);
         take_done_dwells();
+        watch_arming();
         check_balance(now);
         {
             const std::lock_guard lock(mutex_);
             campaign_.fill(campaign_status_, now);
+            campaign_status_.interlock.latches = latches_.open();
             campaign_status_.noise = noise_monitor_.status();
             done = campaign_.done(now);
             if (done) break;
         }
         control_waiter_->wait_until(std::min(next, now + drivers::kSecond / 2));
     }
+    give_up_arming("the daemon is shutting down");
+    if (done) end_arming("the daemon has ended in order");
     const std::lock_guard lock(mutex_);
     ended_ = done;
     ended_changed_.notify_all();
@@ -540,7 +517,7 @@ StatusData Daemon::status() const {
     status.frame = {frame.up, frame.encoder_sign, frame.encoder_zero_deg,
                     frame.accelerometer_zero_g, frame.accelerometer_matrix};
     status.estimate = estimated.estimate;
-    status.interlock = interlock_status();
+    status.interlock = interlock_status(std::move(status.interlock.latches));
     if (journal_) status.journal = journal_->status();
     if (recorder_) status.recorder = recorder_->status();
     if (publisher_) status.mqtt = publisher_->status();

@@ -31,6 +31,8 @@
 
 namespace vibrig {
 
+[[nodiscard]] std::int64_t utc_now();
+
 /// A fixed-size event from a thread that may not format; the control thread turns it into words.
 struct RtEvent {
     Severity severity = Severity::info;
@@ -94,6 +96,19 @@ class Daemon final : public StatusSource {
     void start_threads();
     void control_loop();
     void take_commands(drivers::Time now);
+    void answer(WaitingCommand& waiting, const CommandReply& reply);
+    /// An arming is accepted once the journal has it on disk; nobody waits for that but who asked.
+    void begin_arming(WaitingCommand waiting, drivers::Time now);
+    void finish_arming(drivers::Time now);
+    void give_up_arming(const std::string& why);
+    void watch_arming();
+    void end_arming(const std::string& why);
+    [[nodiscard]] std::string not_fit_to_arm(const CommandRequest& request,
+                                             drivers::Time now) const;
+    void take_over_latches();
+    void judge_first_reading(drivers::Time now);
+    void latch(Latch latch);
+    CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void on_port_state(drivers::PortState state, const char* text) noexcept;
     void log(Severity severity, const std::string& source, const std::string& text);
     void tell_log();
@@ -107,7 +122,7 @@ class Daemon final : public StatusSource {
     void tell_journal();
     void tell_recorder();
     void watch_onlookers();
-    [[nodiscard]] InterlockStatus interlock_status() const;
+    [[nodiscard]] InterlockStatus interlock_status(std::vector<Latch> latches) const;
     [[nodiscard]] RealTimeStatus real_time_status(const rt::AcquisitionView& acquired,
                                                   const rt::EstimatorView& estimated) const;
     void take_done_dwells();
@@ -180,6 +195,20 @@ class Daemon final : public StatusSource {
     const PlanData plan_;
     campaign::Campaign campaign_;
     const std::unique_ptr<fleet::Publisher> publisher_;  ///< null: no broker
+
+    journal::Latches latches_;  ///< control thread
+    /// An arming that the journal is writing.
+    struct Arming {
+        WaitingCommand waiting;
+        std::uint64_t entry = 0;
+        drivers::Time since_wall = 0;
+    };
+    std::optional<Arming> arming_;  ///< control thread
+    std::string armed_by_;          ///< as last looked at; control thread
+    /// As the shaker's controller was before the stop at the start, which clears its faults.
+    drivers::ShakerReading first_reading_;
+    std::atomic<bool> first_reading_known_{false};
+    bool first_reading_judged_ = false;  ///< control thread
 
     std::atomic<bool> shut_down_{false};
     std::atomic<bool> give_up_{false};

@@ -49,7 +49,9 @@ void Daemon::open_journal() {
         }
     }
     campaign_.take_over_proofs(std::move(proofs));
+    take_over_latches();
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
+    journal_->on_written([this] { control_waiter_->notify(); });
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
 }
@@ -61,7 +63,8 @@ std::string Daemon::result_configuration() const {
         if (section == "server" || section == "log" || section == "threads" ||
             section == "journal" || section == "mqtt" || section == "clock" ||
             section == "record" || section == "unit" || section == "instrument" ||
-            section == "selftest" || section == "commission" || value.key == "campaign.results")
+            section == "selftest" || section == "commission" || value.key == "campaign.results" ||
+            value.key == "campaign.arming_valid_s" || value.key == "campaign.second_person")
             continue;
         text += value.key + " = " + value.value + "\n";
     }
@@ -104,17 +107,6 @@ std::unique_ptr<record::PreTrip> Daemon::make_pre_trip() {
         (std::filesystem::path(configuration_.results) / "trips").string(),
         configuration_.assembler.sample_period, [this] { return event_log_.after(0, kManyEvents); },
         [this](Severity severity, const std::string& text) { log(severity, "pre-trip", text); });
-}
-
-void Daemon::on_trip(const rt::Tripped& tripped, Time now) {
-    const std::string text = interlock_.text_of(tripped);
-    campaign_.on_trip(text, now);
-    if (!pre_trip_) return;
-    const auto utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                            std::chrono::system_clock::now().time_since_epoch())
-                            .count();
-    pre_trip_->tripped(
-        {rt::condition_of(tripped.cause).name, interlock_.name_of(tripped), text, now, utc_ns});
 }
 
 std::string Daemon::resume_gate() const {
@@ -246,28 +238,6 @@ std::string Daemon::stuck_stage() {
     return stuck;
 }
 
-CommandReply Daemon::acknowledge_alarm(const CommandRequest& request) {
-    if (request.kind != CommandRequest::Kind::acknowledge || request.by.empty() ||
-        !interlock_.acknowledge_alarm(request.argument)) {
-        return {};
-    }
-    log(Severity::info, "interlock",
-        fmt::format("alarm {} acknowledged by {}", request.argument, request.by));
-    return {true, "acknowledged: " + request.argument};
-}
-
-std::string Daemon::unknown_to_acknowledge(const CommandRequest& request) const {
-    const std::string& what = request.argument;
-    if (request.kind != CommandRequest::Kind::acknowledge || what.empty() || what == "trip" ||
-        what == "shaker")
-        return {};
-    const std::string tripped = interlock_.name_of(interlock_.latched());
-    if (what == tripped) return {};
-    return fmt::format("found \"{}\", expected {}", what,
-                       tripped.empty() ? "the name of an alarm that is raised, trip or shaker"
-                                       : tripped + " or trip");
-}
-
 void Daemon::refused(const std::string& who, const std::string& what, const std::string& why) {
     log(Severity::warning, "server", fmt::format("refused {} ({}): {}", what, who, why));
 }
@@ -355,9 +325,14 @@ void Daemon::tell_journal() {
         status.running ? "writes again" : "entries wait: " + status.note);
 }
 
-InterlockStatus Daemon::interlock_status() const {
+InterlockStatus Daemon::interlock_status(std::vector<Latch> latches) const {
     InterlockStatus status;
+    status.latches = std::move(latches);
     status.tripped = interlock_.name_of(interlock_.latched());
+    for (const Latch& latch : status.latches) {
+        if (status.tripped.empty() && latch.name != journal::kJournalLatch)
+            status.tripped = latch.name;
+    }
     for (std::size_t i = 0; i < interlock_.rows(); ++i) {
         const auto row = interlock_.row(i);
         const auto& condition = rt::condition_of(row.rule->condition);

@@ -37,6 +37,16 @@ enum class CampaignState : std::uint8_t {
 inline constexpr CampaignState kLastCampaignState = CampaignState::checking;
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
+/// Latched until named persons acknowledge it; kept over restarts.
+struct Latch {
+    std::string name;          ///< under which it is acknowledged
+    std::string cause;         ///< in words
+    std::string armed_by;      ///< by whom the shaker was armed then; empty: it was not
+    std::string first;         ///< who acknowledged first, where two persons are needed
+    bool two_persons = false;  ///< another person than these acknowledges it too
+    std::int64_t utc_ns = 0;   ///< when it latched
+};
+
 /// The interlock's table as it stands, and how long stops took.
 struct InterlockStatus {
     struct Row {
@@ -45,7 +55,8 @@ struct InterlockStatus {
         bool has_limit = false, latched = false, raised = false;
         double value = 0;  ///< as last judged to be wrong
     };
-    std::string tripped;  ///< name of the row, to be acknowledged; empty: none
+    std::string tripped;         ///< name of the row, to be acknowledged; empty: none
+    std::vector<Latch> latches;  ///< not acknowledged, of an earlier life too
     std::vector<Row> rows;
     std::vector<double> reaction_bounds_ms;  ///< upper ends of the classes but the last
     std::vector<std::uint64_t> reaction_counts;
@@ -263,6 +274,9 @@ struct StatusData {
     CampaignState state = CampaignState::idle;
     std::string reason;  ///< why it is aborted, tripped, waiting; else empty
     std::string armed_by;
+    std::string armed_for;     ///< unit, plan, highest level, duration
+    double arming_left_s = 0;  ///< until the arming expires; 0: not armed, or started
+    std::string started_by;    ///< the campaign in progress, or the last one
     std::string resume_offer;  ///< what can be resumed after a restart; empty: nothing
     int run = 0, runs = 0, position = 0, positions = 0;  ///< from 1; 0: none
     std::array<double, 3> position_deg{};

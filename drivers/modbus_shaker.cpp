@@ -311,6 +311,12 @@ Reply ModbusShaker::order_stop(std::span<const std::uint16_t> run) {
 void ModbusShaker::write_stop(Time now) {
     stop_tried_ = true;
     next_stop_ = now + settings_.backoff_min;
+    // A stop at rest may make the device forget the fault that it holds. What a process finds at
+    // its first connection is looked at before; one look, whatever comes of it.
+    if (!std::exchange(looked_, true)) {
+        poll(now);
+        if (!link_.connected()) return;
+    }
     const proto::Register& run = settings_.registers.run;
     Words words = present(run);
     const auto raw = std::span(words).first(run.words());
@@ -463,7 +469,7 @@ void ModbusShaker::poll(Time now) {
         return settle("reading " + std::to_string(range.words.size()) + " registers from " +
                       std::to_string(range.address) + ": " + reply.text());
     }
-    polled_ = true;
+    polled_ = looked_ = true;
     poll_refused_ = false;
     backoff_ = settings_.backoff_min;
     ShakerReading reading = image_.reading(now);

@@ -113,6 +113,7 @@ class ModbusShaker final : public Shaker {
     // The rest belongs to the shaker's thread.
     bool was_connected_ = false;
     bool polled_ = false;  ///< every register has been read since the link was made
+    bool looked_ = false;  ///< read once, or tried to, in this process
     bool poll_refused_ = false, feed_refused_ = false;
     bool write_failed_ = false;  ///< until a stop is read back as done
     bool stop_tried_ = false, connect_tried_for_stop_ = false;

@@ -116,27 +116,26 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
     if (shutting_down_) return refuse("the daemon is shutting down");
     switch (request.kind) {
         case Kind::arm:
-            if (active()) return refuse("a campaign is running");
-            if (state_ == State::checking) return refuse("a loop check is running");
-            if (state_ == State::tripped)
-                return refuse("tripped (" + reason_ + "): acknowledge it first");
-            if (const auto why = loop_->refusal(); !why.empty()) return refuse(why);
-            if (const auto why = proof_.refusal(utc_ns()); !why.empty()) return refuse(why);
-            if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
+            if (const auto why = not_fit_to_arm(now); !why.empty()) return refuse(why);
             armed_by_ = request.by;
             armed_under_ = ports_.shaker.stops();
+            armed_wall_ = ports_.wall();
             reason_.clear();
             enter(State::armed, now);
-            return accept(fmt::format("armed up to {:g} g at the table", highest_level()));
+            armed_for_ = arming_text(request);
+            return accept("armed for " + armed_for_);
         case Kind::start:
+            if (active()) return refuse("a campaign is running, started by " + started_by_);
+            if (state_ == State::checking) return refuse("a loop check is running");
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
             if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
             offer_.clear();
             offered_stops_.clear();
             ports_.begin();
-            begin(now);
-            return accept("campaign started");
+            begin(request.by, now);
+            return accept(started_by_ == armed_by_ ? "campaign started"
+                                                   : "campaign started, armed by " + armed_by_);
         case Kind::pause:
             if (!active()) return refuse("no campaign is running");
             pause_asked_ = true;
@@ -156,19 +155,14 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         case Kind::acknowledge: {
             // One acknowledgement is for both: the controller latches its faults, too, and forgets
             // them when it is told to stop at rest.
+            if (const auto why = not_fit_to_acknowledge(now); !why.empty()) return refuse(why);
             const auto shaker = ports_.shaker.reading();
             const bool changed =
                 shaker.valid && shaker.watchdog == drivers::WatchdogTimeout::changed;
             const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
             std::string what;
-            if (stop_.disobeyed() && stop_.stopping())
-                return refuse("a stop was not obeyed, not at rest yet: " + stop_.what_moves(now) +
-                              ": press the emergency stop");
+            // The stop writes the timeout again, too.
             if (latched) {
-                if (shaker.emergency_stop_open)
-                    return refuse("the emergency-stop chain is open: close it first");
-                if (!shaker.still()) return refuse("the table is not at rest yet");
-                // The stop writes the timeout again, too.
                 what = shaker.fault != 0
                            ? fmt::format("shaker fault {:#06x}", shaker.fault)
                            : fmt::format("watchdog timeout of {:g} s", shaker.watchdog_timeout_s);
@@ -176,8 +170,6 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (state_ == State::tripped) {
                 what = std::exchange(reason_, {}) + (latched ? "; " + what : "");
                 enter(State::idle, now);
-            } else if (!latched) {
-                return refuse("nothing to acknowledge");
             }
             stop_.acknowledge();
             if (latched) {
@@ -193,7 +185,8 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
 }
 
 /// From the position after the ones in offer_, which is empty for a new campaign.
-void Campaign::begin(Time now) {
+void Campaign::begin(const std::string& by, Time now) {
+    started_by_ = by;
     dwells_ = std::exchange(offer_, {});
     positions_done_ = positions_before_ = dwells_.size();
     plan_stops();
@@ -230,6 +223,7 @@ Time Campaign::step_once(Time now) {
     }
     insist_on_zero_torque(now);
     watch_gravity();
+    watch_arming(now);
     switch (state_) {
         case State::waiting:
             return wait_for_platform(now);

@@ -101,6 +101,8 @@ struct Ports {
     std::function<std::string()> unfit = {};
     /// The newest second of force and angles.
     std::function<rt::MeanMotion()> second = {};
+    /// CLOCK_MONOTONIC, whatever clock the rig has: an arming expires in people's time.
+    std::function<drivers::Time()> wall = rt::wall_clock;
 };
 
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
@@ -120,7 +122,16 @@ class Campaign {
     void take_over_loop_check(const std::string& out_of_band);
     /// Likewise: what earlier lives have proved of stopping.
     void take_over_proofs(std::vector<ProofRecord> history);
+    /// Before the first step(): what an earlier life has left latched, in words.
+    void take_over_trip(const std::string& causes);
     CommandReply command(const CommandRequest& request, drivers::Time now);
+    /// Why an arming or an acknowledgement would be refused now; empty: it would not, or it is
+    /// another command.
+    [[nodiscard]] std::string refusal(const CommandRequest& request, drivers::Time now) const;
+    /// What an arming is for: unit, plan, highest level, duration.
+    [[nodiscard]] std::string arming_text(const CommandRequest& request) const;
+    /// The person who has armed; empty: nobody.
+    [[nodiscard]] const std::string& armed_by() const { return armed_by_; }
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
     void on_dwell_done(const estimator::DwellSummary& summary);
@@ -230,12 +241,15 @@ class Campaign {
     [[nodiscard]] double highest_level() const;
     void order_stop(const std::string& by);
     void watch_stop(drivers::Time now);
-    void begin(drivers::Time now);
+    void begin(const std::string& by, drivers::Time now);
     void conclude(drivers::Time now);
     void finish(drivers::Time now);
     CommandReply resume_interrupted(const CommandRequest& request, drivers::Time now);
     [[nodiscard]] std::string resume_offer() const;
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
+    [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
+    [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
+    void watch_arming(drivers::Time now);
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
                                               double table_g) const;
@@ -280,6 +294,8 @@ class Campaign {
     std::vector<double> levels_;  ///< one run each, in order of appearance
     int repeats_ = 0;             ///< of the present stop, after flagged dwells
     std::string armed_by_;
+    std::string armed_for_, started_by_;
+    drivers::Time armed_wall_ = 0;  ///< when it was armed, in people's time
     std::uint64_t armed_under_ =
         0;  ///< of the shaker when it was armed, and this thread's own since
     std::string reason_;

@@ -40,6 +40,7 @@ CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now)
                 "selftest: found \"" + request.argument + "\", expected nothing or emergency_stop"};
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
     armed_by_ = request.by;
+    armed_for_ = arming_text(request);
     armed_under_ = ports_.shaker.stops();
     reason_.clear();
     loop_->begin(request.by);

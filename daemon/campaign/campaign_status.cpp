@@ -17,6 +17,13 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.state = state_;
     status.reason = reason_;
     status.armed_by = armed_by_;
+    status.started_by = started_by_;
+    status.armed_for = armed_by_.empty() ? std::string() : armed_for_;
+    status.arming_left_s =
+        state_ == State::armed
+            ? std::max(settings_.arming_valid_s - drivers::to_seconds(ports_.wall() - armed_wall_),
+                       1e-3)
+            : 0;
     status.resume_offer = resume_offer();
     status.runs = static_cast<int>(runs());
     status.positions = static_cast<int>(positions());

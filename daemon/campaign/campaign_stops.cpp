@@ -85,8 +85,9 @@ CommandReply Campaign::resume_interrupted(const CommandRequest& request, Time no
     }
     const std::string what = resume_offer();
     if (ports_.resume) ports_.resume(request.by);
-    begin(now);
-    const std::string text = "campaign resumed: " + what;
+    begin(request.by, now);
+    const std::string text =
+        "campaign resumed: " + what + (started_by_ == armed_by_ ? "" : ", armed by " + armed_by_);
     ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
     return {true, text};
 }

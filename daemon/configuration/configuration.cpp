@@ -226,6 +226,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         c.campaign.resonance_hz =
             isolator_resonance_hz(c.estimator.frequency_hz, c.estimator.transmission);
     }
+    c.campaign.unit = c.paperwork.unit_type;
+    if (!c.paperwork.unit_serial.empty())
+        c.campaign.unit += (c.campaign.unit.empty() ? "" : " ") + c.paperwork.unit_serial;
     const std::filesystem::path folder = std::filesystem::path(name).parent_path();
     resolve(c.dbc, folder);
     resolve(c.results, folder);

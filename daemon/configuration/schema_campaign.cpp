@@ -172,6 +172,13 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(integer("campaign.rejected_in_a_row", "", 1, 1000,
                            "rejected dwells, after which it pauses at rest and says why",
                            [](C& c) -> int& { return c.campaign.rejected_in_a_row; }));
+    keys.push_back(number("campaign.arming_valid_s", "s", {10, 86'400},
+                          "an arming ends after so long without a start",
+                          [](C& c) -> double& { return c.campaign.arming_valid_s; }));
+    keys.push_back(boolean("campaign.second_person",
+                           "after an emergency stop another person than who armed, or "
+                           "acknowledged first, acknowledges it too",
+                           [](C& c) -> bool& { return c.campaign.second_person; }));
     keys.push_back(number("campaign.resonance_hz", "Hz", {0, 2000},
                           "of the isolators; 0: from frequency and transmission",
                           [](C& c) -> double& { return c.campaign.resonance_hz; }));

@@ -45,6 +45,17 @@ CREATE TABLE IF NOT EXISTS proof (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NUL
     person TEXT NOT NULL, record TEXT NOT NULL);
 )";
 constexpr std::size_t kProofsKept = 200;  // read back at the start
+constexpr const char* kSafetyTable = R"(
+CREATE TABLE IF NOT EXISTS safety (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
+    what TEXT NOT NULL, name TEXT NOT NULL, person TEXT NOT NULL, text TEXT NOT NULL,
+    two_persons INTEGER NOT NULL);
+)";
+// What stands in it.
+constexpr const char* kArmed = "armed";
+constexpr const char* kDisarmed = "disarmed";
+constexpr const char* kLatched = "latched";
+constexpr const char* kFirst = "acknowledged by the first";
+constexpr const char* kOver = "acknowledged";
 
 std::int64_t utc_now() {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -132,6 +143,7 @@ void Journal::open() {
 void Journal::recover() {
     recover_loop_check();
     recover_proofs();
+    recover_safety();
     const auto found = database_->ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
         "ORDER BY id DESC LIMIT 1");
@@ -161,6 +173,38 @@ void Journal::recover_proofs() {
         fmt::format("SELECT record FROM proof ORDER BY id DESC LIMIT {}", kProofsKept).c_str());
     for (auto row = rows.rbegin(); row != rows.rend(); ++row)
         recovery_.proofs.push_back(row->texts.at(0));
+}
+
+void Journal::recover_safety() {
+    database_->execute(kSafetyTable);
+    Latches latches;
+    Safety arming;
+    for (const Row& row : database_->ask(
+             "SELECT utc_ns, what, name, person, text, two_persons FROM safety ORDER BY id")) {
+        const std::string &what = row.texts[1], &name = row.texts[2], &person = row.texts[3];
+        if (what == kArmed) {
+            arming = {kArmed, name, person, row.texts[4], false, row.numbers[0]};
+        } else if (what == kDisarmed) {
+            arming = {};
+        } else if (what == kLatched) {
+            latches.add({name, row.texts[4], person, {}, row.numbers[5] != 0, row.numbers[0]});
+        } else if (what == kFirst || what == kOver) {
+            static_cast<void>(latches.acknowledge(name, person));
+        }
+    }
+    recovery_.latches = latches.open();
+    if (*arming.what == '\0') return;
+    // Before anything else is written, and as one: killed again, the next start finds the same.
+    const Latch died{
+        kDiedArmed,
+        fmt::format("the daemon ended while armed by {}: {}", arming.person, arming.text),
+        arming.person,
+        {},
+        false,
+        utc_now()};
+    recovery_.latches.push_back(died);
+    latched(died);
+    disarmed(arming.person, "died");
 }
 
 void Journal::recover_dwells(Unfinished& campaign) {
@@ -206,15 +250,34 @@ void Journal::stop() noexcept {
     if (thread_.joinable()) thread_.join();
 }
 
-void Journal::put(Entry entry) {
+std::uint64_t Journal::put(Entry entry) {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() >= kMostWaiting) {
+    if (waiting_.size() >= kMostWaiting && !std::holds_alternative<Safety>(entry)) {
         ++status_.dropped;
-        return;
+        return 0;
     }
     waiting_.push_back(std::move(entry));
-    ++status_.taken;
     changed_.notify_all();
+    return ++status_.taken;
+}
+
+bool Journal::on_disk(std::uint64_t entry) const {
+    const std::lock_guard lock(mutex_);
+    return status_.written >= entry;
+}
+
+std::uint64_t Journal::armed(const std::string& by, const std::string& what) {
+    return put(Safety{kArmed, {}, by, what, false, utc_now()});
+}
+std::uint64_t Journal::disarmed(const std::string& by, const std::string& why) {
+    return put(Safety{kDisarmed, {}, by, why, false, utc_now()});
+}
+std::uint64_t Journal::latched(const Latch& latch) {
+    return put(
+        Safety{kLatched, latch.name, latch.armed_by, latch.cause, latch.two_persons, latch.utc_ns});
+}
+std::uint64_t Journal::acknowledged(const std::string& name, const std::string& by, bool last) {
+    return put(Safety{last ? kOver : kFirst, name, by, {}, false, utc_now()});
 }
 
 void Journal::campaign_begun(const std::string& name, const std::string& by) {
@@ -303,10 +366,13 @@ bool Journal::write(const std::deque<Entry>& entries) {
         } catch (const DatabaseError&) {  // SQLite has rolled back by itself
         }
     }
-    const std::lock_guard lock(mutex_);
-    status_.running = why.empty();
-    status_.note = why;
-    if (why.empty()) status_.written += entries.size();
+    {
+        const std::lock_guard lock(mutex_);
+        status_.running = why.empty();
+        status_.note = why;
+        if (why.empty()) status_.written += entries.size();
+    }
+    if (on_written_) on_written_();
     return why.empty();
 }
 
@@ -383,6 +449,15 @@ void Journal::write_one(const Proved& proved) {
     database_->execute(kProofTable);
     database_->run("INSERT INTO proof (utc_ns, person, record) VALUES (?, ?, ?)",
                    {proved.utc_ns, std::string_view(proved.by), std::string_view(proved.record)});
+}
+
+void Journal::write_one(const Safety& safety) {
+    database_->run(
+        "INSERT INTO safety (utc_ns, what, name, person, text, two_persons) "
+        "VALUES (?, ?, ?, ?, ?, ?)",
+        {safety.utc_ns, std::string_view(safety.what), std::string_view(safety.name),
+         std::string_view(safety.person), std::string_view(safety.text),
+         std::int64_t{safety.two_persons}});
 }
 
 }  // namespace vibrig::journal

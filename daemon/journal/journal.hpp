@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "daemon/journal/checkpoint.hpp"
+#include "daemon/journal/latches.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
 #include "daemon/status.hpp"
@@ -37,6 +38,8 @@ struct Recovery {
     std::string assumed;              ///< of what an older version did not keep; empty: nothing
     std::string out_of_band;          ///< what the newest loop check found so; empty: nothing
     std::vector<std::string> proofs;  ///< of the safe state, as they were kept, oldest first
+    /// Not acknowledged; kDiedArmed among them if an arming had no end.
+    std::vector<Latch> latches;
 };
 
 /// What happened, on disk: campaigns, positions done with what the filter was fed, results, events
@@ -53,11 +56,22 @@ class Journal {
     /// The estimator's thread pushes what it feeds to the filter.
     [[nodiscard]] rt::Ring<rt::Fed>& fed() noexcept { return fed_; }
 
+    /// Before start(): called in the journal's thread when entries are on disk.
+    void on_written(std::function<void()> wake) { on_written_ = std::move(wake); }
     void start();
     /// Writes what waits and ends the thread.
     void stop() noexcept;
 
-    // Control thread. They queue; `kMostWaiting` at most, the rest is dropped and counted.
+    /// Whether the entry of this number, and all before it, are on disk. Any thread.
+    [[nodiscard]] bool on_disk(std::uint64_t entry) const;
+
+    // Control thread. They queue; `kMostWaiting` at most, the rest is dropped and counted. Armings
+    // and latches are never dropped; what returns a number says on_disk() with it.
+    std::uint64_t armed(const std::string& by, const std::string& what);
+    std::uint64_t disarmed(const std::string& by, const std::string& why);
+    std::uint64_t latched(const Latch& latch);
+    /// `last`: with this person it is over; else it waits for a second one.
+    std::uint64_t acknowledged(const std::string& name, const std::string& by, bool last);
     void campaign_begun(const std::string& name, const std::string& by);
     void campaign_resumed(std::int64_t id, const std::string& by);
     void dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary,
@@ -104,14 +118,24 @@ class Journal {
         std::string by, record;
         std::int64_t utc_ns = 0;
     };
-    using Entry = std::variant<Proved, Begun, Done, Ended, EventRecord, Commanded, LoopChecked>;
+    /// Of the table `safety`: the arming, and what has to be acknowledged.
+    struct Safety {
+        const char* what = "";
+        std::string name, person, text;
+        bool two_persons = false;
+        std::int64_t utc_ns = 0;
+    };
+    using Entry =
+        std::variant<Proved, Begun, Done, Ended, EventRecord, Commanded, LoopChecked, Safety>;
 
     void open();
     void recover();
     void recover_loop_check();
     void recover_proofs();
+    void recover_safety();
     void recover_dwells(Unfinished& campaign);
-    void put(Entry entry);
+    /// The number of the entry; 0: dropped.
+    std::uint64_t put(Entry entry);
     void loop();
     void take_fed();
     [[nodiscard]] bool write(const std::deque<Entry>& entries);
@@ -122,10 +146,12 @@ class Journal {
     void write_one(const Commanded& commanded);
     void write_one(const LoopChecked& checked);
     void write_one(const Proved& proved);
+    void write_one(const Safety& safety);
 
     const std::string path_;
     const std::uint64_t configuration_hash_;
     std::function<void(double)> on_space_;
+    std::function<void()> on_written_;
     std::unique_ptr<Database> database_;
     Recovery recovery_;
     rt::Ring<rt::Fed> fed_{16384};

@@ -271,6 +271,14 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
         "campaign",
         campaign.name() + (campaign.armed_by().empty() ? std::string(", not armed")
                                                        : ", armed by " + campaign.armed_by())));
+    if (!campaign.armed_for().empty()) lines.push_back(labelled("armed for", campaign.armed_for()));
+    if (campaign.has_arming_left_s())
+        lines.push_back(
+            labelled("expires", number(true, campaign.arming_left_s(), "in %.0f", "s")));
+    for (const auto& latch : status.interlock().latches()) {
+        lines.push_back(labelled(
+            "latched", latch.name() + ": " + latch.cause() + ": vibrig ack " + latch.name()));
+    }
     lines.push_back(labelled(
         "table", number(campaign.has_command_table_g(), campaign.command_table_g(), "%.4f", "g") +
                      " commanded, " +

@@ -150,6 +150,15 @@ void fill(v1::Shaker& out, const StatusData& status) {
 
 void fill(v1::Interlock& out, const InterlockStatus& status) {
     out.set_tripped(status.tripped);
+    for (const Latch& latch : status.latches) {
+        v1::Interlock::Latch& to = *out.add_latches();
+        to.set_name(mend_utf8(latch.name));
+        to.set_cause(mend_utf8(latch.cause));
+        to.set_armed_by(mend_utf8(latch.armed_by));
+        to.set_two_persons(latch.two_persons);
+        to.set_first(mend_utf8(latch.first));
+        set_time(*to.mutable_utc(), latch.utc_ns);
+    }
     for (const InterlockStatus::Row& row : status.rows) {
         v1::Interlock::Row& to = *out.add_rows();
         to.set_name(mend_utf8(row.name));
@@ -448,6 +457,9 @@ void fill(v1::Campaign& out, const StatusData& status) {
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
     out.set_reason(mend_utf8(status.reason));
     out.set_armed_by(mend_utf8(status.armed_by));
+    out.set_armed_for(mend_utf8(status.armed_for));
+    if (status.arming_left_s > 0) out.set_arming_left_s(status.arming_left_s);
+    out.set_started_by(mend_utf8(status.started_by));
     out.set_resume_offer(mend_utf8(status.resume_offer));
     out.set_run(status.run);
     out.set_runs(status.runs);

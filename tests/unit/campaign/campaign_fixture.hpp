@@ -50,6 +50,7 @@ struct CampaignTest : testing::Test {
     bool slewed_while_moving = false;
     FakeAccelerometers accelerometers;
     bool disobeyed = false;
+    std::function<Time()> wall_clock;  ///< people's; none: the machine's
     double slew_started_at = -1;
     std::size_t frames_seen = 0;
     Time now = kSecond;
@@ -83,6 +84,7 @@ struct CampaignTest : testing::Test {
                     [this] { return gate; },
                     {}};
         ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
+        if (wall_clock) ports.wall = wall_clock;
         ports.disobeyed = [this](bool now_so) { disobeyed = disobeyed || now_so; };
         campaign = std::make_unique<Campaign>(settings, ports);
     }

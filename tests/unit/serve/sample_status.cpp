@@ -13,6 +13,9 @@ StatusData full_status() {
     s.state = CampaignState::recording;
     s.reason = "why not";
     s.armed_by = "Ada";
+    s.armed_for = "IMU 0042, up to 9 g at the table";
+    s.arming_left_s = 590;
+    s.started_by = "Grace";
     s.run = 1;
     s.runs = 2;
     s.position = 3;
@@ -102,6 +105,8 @@ StatusData full_status() {
         25,
         {"estimator: SCHED_FIFO 50: Operation not permitted"}};
     s.interlock.tripped = "amplitude_abort";
+    s.interlock.latches = {
+        {"emergency_stop", "chain open", "Ada", "Grace", true, 1'700'000'000'000'000'000}};
     s.interlock.rows = {{"amplitude_abort", "amplitude_off_command", "abort", "dB", 1, 0.5, true,
                          true, true, 1.25}};
     s.interlock.reaction_bounds_ms = {0.1, 1};

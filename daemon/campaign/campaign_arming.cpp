@@ -1,0 +1,96 @@
+// Who may arm and acknowledge, for what, and for how long.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/loop_check.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::Time;
+using State = CampaignState;
+
+namespace {
+
+/// "2 h 5 min", "47 min", "12 s".
+std::string duration_text(double seconds) {
+    if (seconds < 90) return fmt::format("{:.0f} s", seconds);
+    const auto minutes = static_cast<long>(std::lround(seconds / 60));
+    if (minutes < 60) return fmt::format("{} min", minutes);
+    return fmt::format("{} h {} min", minutes / 60, minutes % 60);
+}
+
+}  // namespace
+
+void Campaign::take_over_trip(const std::string& causes) {
+    state_ = State::tripped;
+    reason_ = causes;
+}
+
+std::string Campaign::not_fit_to_arm(Time now) const {
+    if (active()) return "a campaign is running";
+    if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
+    if (auto why = loop_->refusal(); !why.empty()) return why;
+    if (auto why = proof_.refusal(utc_ns()); !why.empty()) return why;
+    return not_fit_to_excite(now);
+}
+
+std::string Campaign::not_fit_to_acknowledge(Time now) const {
+    if (stop_.disobeyed() && stop_.stopping())
+        return "a stop was not obeyed, not at rest yet: " + stop_.what_moves(now) +
+               ": press the emergency stop";
+    const auto shaker = ports_.shaker.reading();
+    const bool changed = shaker.watchdog == drivers::WatchdogTimeout::changed;
+    const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
+    if (latched && shaker.emergency_stop_open)
+        return "the emergency-stop chain is open: close it first";
+    if (latched && !shaker.still()) return "the table is not at rest yet";
+    return latched || state_ == State::tripped ? "" : "nothing to acknowledge";
+}
+
+std::string Campaign::refusal(const CommandRequest& request, Time now) const {
+    using Kind = CommandRequest::Kind;
+    if (request.by.empty()) return "by: found nothing, expected the name of a person";
+    if (shutting_down_) return "the daemon is shutting down";
+    if (request.kind == Kind::arm) return not_fit_to_arm(now);
+    if (request.kind == Kind::selftest) return not_fit_to_check(now);
+    if (request.kind == Kind::acknowledge) return not_fit_to_acknowledge(now);
+    return {};
+}
+
+std::string Campaign::arming_text(const CommandRequest& request) const {
+    const std::string unit = settings_.unit.empty() ? "a unit that is not stated" : settings_.unit;
+    if (request.kind == CommandRequest::Kind::selftest)
+        return fmt::format("{}, loop check, {:g} g at the table", unit, settings_.loop.table_g);
+    const std::string plan =
+        settings_.adaptive ? std::string("positions chosen one by one")
+                           : fmt::format("{} positions{}", stops_.size(),
+                                         settings_.plan.empty() ? "" : " of " + settings_.plan);
+    const double left_s = static_cast<double>(stops_.size() - offer_.size()) * nominal_stop_s();
+    const std::string lasts = settings_.adaptive
+                                  ? settings_.time_limit_s > 0
+                                        ? "at most " + duration_text(settings_.time_limit_s)
+                                        : std::string("until its targets are met")
+                                  : "about " + duration_text(left_s + times_.closing_s);
+    return fmt::format(
+        "{}, plan \"{}\" ({}), up to {:g} g at the table, {}; to be started within {}", unit,
+        settings_.name, plan, highest_level(), lasts, duration_text(settings_.arming_valid_s));
+}
+
+/// Nobody started it: whoever armed may long have gone home.
+void Campaign::watch_arming(Time now) {
+    if (state_ != State::armed ||
+        ports_.wall() - armed_wall_ < drivers::from_seconds(settings_.arming_valid_s)) {
+        return;
+    }
+    ports_.event(
+        Severity::warning,
+        fmt::format("the arming by {} has expired: not started within {}",
+                    std::exchange(armed_by_, {}), duration_text(settings_.arming_valid_s)));
+    enter(State::idle, now);
+}
+
+}  // namespace vibrig::campaign

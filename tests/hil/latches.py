@@ -1,0 +1,201 @@
+#!/usr/bin/python3
+"""What stopped the shaker stays until named persons acknowledge it, whatever becomes of the daemon: SIGKILL at random moments
+around a trip, a disk that refuses, faults that the controller held before the daemon's start. On the seqpacket bus and the
+rig's clock.
+
+usage: latches.py PROGRAMS [--seed N]
+"""
+import os
+import random
+import resource
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+KILLS = 20
+CAMPAIGN = {"name": "latched", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0],
+            "dwell_s": 2000.0, "ramp_s": 0.5, "temperature_window_s": 0.0, "second_person": True}
+
+
+class Rig(r.Rig):
+    """With a hand on the emergency stop."""
+
+    def __init__(self, programs, folder):
+        super().__init__(programs, "seqpacket", "rig", folder, poll_s=0.03)
+        fifo = os.path.join(folder, "control")
+        os.mkfifo(fifo)
+        self.start_plant("--seed", "3", "--speed", "20", "--control", fifo)
+        self.control = open(fifo, "w", encoding="ascii")
+        self.configure(CAMPAIGN, unit={"type": "IMU-7", "serial": "0042"})
+
+    def order(self, line):
+        print(line, file=self.control, flush=True)
+
+    def start(self):
+        self.start_daemon()
+        return self.wait_for(lambda s: s["shaker"]["link"] == "running" and s["can"]["link"] == "running" and
+                             any(c["quality"] == "good" for c in s["sample"]["channels"]), 60)
+
+    def kill(self):
+        self.daemon.process.kill()
+        self.daemon.process.wait()
+
+    def latches(self):
+        status = self.status()
+        return [latch["name"] for latch in status["interlock"]["latches"]] if status else None
+
+    def acknowledge(self):
+        """By two persons; once the controller has confirmed it, arming works."""
+        return [self.tool("ack", "trip", "--by", by) for by in ("Ada", "Grace")]
+
+
+def killed_at_any_moment(checks, rig, seed):
+    """The trip is on its way from the controller to the journal while the daemon is killed: there is always a latch."""
+    chance = random.Random(seed)
+    found = {}
+    lost, armed_all_the_same, not_over = [], [], []
+    for number in range(KILLS):
+        armed = rig.tool("arm", "--by", "Ada")
+        if armed.returncode != 0:
+            checks.check(False, f"kill {number + 1}: it can be armed before", armed.stderr + rig.logs())
+            return
+        delay = chance.uniform(0, 0.04)
+        rig.order("estop open")
+        time.sleep(delay)
+        rig.kill()
+        rig.order("estop close")
+        status = rig.start()
+        names = rig.latches()
+        for name in names or []:
+            found[name] = found.get(name, 0) + 1
+        if not names or status["campaign"]["state"] != "tripped":
+            lost.append((number, delay, names))
+        refused = rig.tool("arm", "--by", "Grace")
+        if refused.returncode != 1 or "acknowledge it first" not in refused.stderr:
+            armed_all_the_same.append((number, refused.stdout, refused.stderr))
+        answers = rig.acknowledge()
+        if rig.latches() != []:
+            not_over.append((number, names, [a.stdout + a.stderr for a in answers]))
+    checks.equal(lost, [], f"{KILLS} times killed around a trip (seed {seed}): each time the next start has latched it")
+    checks.equal(armed_all_the_same, [], "none can be armed before it is acknowledged")
+    checks.equal(not_over, [], "two persons end each of them")
+    checks.note(f"latched: {found}")
+
+
+def while_shaking(checks, rig):
+    """Killed while the table shakes: the arming had no end."""
+    armed = rig.tool("arm", "--by", "Ada")
+    checks.check("IMU-7 0042" in armed.stdout and "up to 5 g" in armed.stdout, "arming names unit and level", armed.stdout)
+    started = rig.tool("start", "--by", "Grace")
+    checks.check("armed by Ada" in started.stdout, "start by another says by whom it was armed",
+                 started.stdout + started.stderr)
+    again = rig.tool("start", "--by", "Ada")
+    checks.check(again.returncode == 1 and "a campaign is running, started by Grace" in again.stderr,
+                 "a second start is told that it runs", again.stderr)
+    status = rig.wait_for_state(("recording", "aborted", "tripped"), 60)
+    checks.check(status["campaign"]["state"] == "recording", "it shakes", r.state_of(status))
+    rig.kill()
+    rig.start()
+    status = rig.wait_for(lambda s: s["campaign"]["state"] == "tripped", 10)
+    checks.check("died_armed" in (rig.latches() or []) and "while armed by Ada" in status["campaign"]["reason"],
+                 "killed while it shook: died_armed, and who had armed", str(status["campaign"]))
+    rig.wait_for(lambda s: s["shaker"].get("running") is False and s["shaker"].get("measured_g", 1) < 0.05, 30)
+    rig.kill()   # nobody has acknowledged anything
+    rig.start()
+    checks.check("died_armed" in (rig.latches() or []), "and so after another SIGKILL", str(rig.latches()))
+    rig.acknowledge()
+    checks.equal(rig.latches(), [], "acknowledged by name it is over")
+    rig.kill()
+    rig.start()
+    checks.equal((rig.latches(), rig.status()["campaign"]["state"]), ([], "idle"), "also after the next start")
+
+
+def an_orderly_end_is_one(checks, rig):
+    rig.tool("arm", "--by", "Ada")
+    checks.equal(rig.daemon.end(), 0, "SIGTERM while armed ends it in order")
+    rig.start()
+    checks.equal(rig.latches(), [], "which leaves no latch")
+
+
+def two_persons(checks, rig):
+    rig.tool("arm", "--by", "Ada")
+    rig.order("estop open")
+    rig.wait_for_state(("tripped",), 20)
+    open_ = rig.tool("ack", "trip", "--by", "Grace")
+    checks.check(open_.returncode == 1 and "close it first" in open_.stderr, "with the chain open nobody acknowledges it",
+                 open_.stdout + open_.stderr)
+    rig.order("estop close")
+    rig.wait_for(lambda s: s["shaker"].get("emergency_stop_open") is False, 20)
+    rig.tool("ack", "trip", "--by", "Ada")
+    rig.kill()   # between the two persons
+    rig.start()
+    same = rig.tool("ack", "trip", "--by", "ADA")
+    checks.check(same.returncode == 1 and "another person than Ada" in same.stderr,
+                 "who armed is not the second person, also after a restart", same.stdout + same.stderr)
+    other = rig.tool("ack", "trip", "--by", "Grace")
+    checks.check(other.returncode == 0 and rig.latches() == [], "another one is", other.stdout + other.stderr)
+
+
+def held_by_the_controller(checks, rig):
+    """The stop at the daemon's start makes the controller forget its fault."""
+    rig.order("estop open")
+    rig.wait_for(lambda s: s["shaker"].get("fault"), 20)
+    rig.order("estop close")
+    rig.wait_for(lambda s: s["shaker"].get("emergency_stop_open") is False, 20)
+    rig.daemon.end()
+    rig.start()
+    status = rig.wait_for_state(("tripped",), 10)
+    checks.check(status["campaign"]["state"] == "tripped" and "held fault" in status["campaign"]["reason"],
+                 "a fault that the controller held at the start is latched", r.state_of(status))
+    checks.check(rig.tool("arm", "--by", "Ada").returncode == 1, "and keeps it disarmed")
+    rig.acknowledge()
+    checks.check(rig.tool("arm", "--by", "Ada").returncode == 0, "until acknowledged")
+    rig.tool("abort", "--by", "Ada")
+
+
+def disk_refuses(checks, rig):
+    pid = rig.daemon.process.pid
+    was = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+    rig.tool("arm", "--by", "Ada")
+    resource.prlimit(pid, resource.RLIMIT_FSIZE, (4096, was[1]))
+    rig.order("estop open")
+    status = rig.wait_for_state(("tripped",), 20)
+    checks.check(status["campaign"]["state"] == "tripped" and rig.latches() == ["emergency_stop"],
+                 "a disk that refuses: it trips all the same", r.state_of(status))
+    rig.order("estop close")
+    rig.wait_for(lambda s: s["shaker"].get("emergency_stop_open") is False, 20)
+    rig.acknowledge()
+    begun = time.monotonic()
+    refused = rig.tool("arm", "--by", "Ada")
+    checks.check(refused.returncode == 1 and "journal has not written" in refused.stderr,
+                 "it is not armed while that cannot be written", refused.stdout + refused.stderr)
+    checks.check(time.monotonic() - begun < 5, "which is answered in time", f"{time.monotonic() - begun:.1f} s")
+    resource.prlimit(pid, resource.RLIMIT_FSIZE, was)
+    rig.wait_for(lambda s: s["journal"]["running"], 20)
+    checks.check(rig.tool("arm", "--by", "Ada").returncode == 0, "once there is room again it is")
+    rig.daemon.end()
+    rig.start()
+    checks.equal(rig.latches(), [], "and nothing of that is left over")
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    seed = int(sys.argv[sys.argv.index("--seed") + 1]) if "--seed" in sys.argv else 1
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        rig = Rig(programs, folder)
+        try:
+            rig.start()
+            killed_at_any_moment(checks, rig, seed)
+            for part in (while_shaking, an_orderly_end_is_one, two_persons, held_by_the_controller, disk_refuses):
+                part(checks, rig)
+        finally:
+            rig.stop()
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
