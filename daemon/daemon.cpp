@@ -32,11 +32,6 @@ void copy_text(std::array<char, N>& to, const char* from) noexcept {
     std::strncpy(to.data(), from, N - 1);
 }
 
-proto::Dbc load_dbc(const std::string& path) {
-    return path.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")
-                        : proto::read_dbc(path);
-}
-
 drivers::ShakerSettings shaker_settings(const configuration::Configuration& configuration) {
     auto settings = configuration.shaker;
     if (configuration.clock == configuration::Configuration::ClockKind::rig) {
@@ -226,28 +221,6 @@ std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& he
     next.left = decision->left;
     next.words = decision->words;
     return next;
-}
-
-void Daemon::check_bindings(const configuration::Configuration& configuration) {
-    const auto dbc = load_dbc(configuration.dbc);
-    const drivers::SampleAssembler assembler(dbc, configuration.assembler,
-                                             [](const drivers::Sample&) {});
-    boost::asio::io_context io;
-    const auto port = drivers::make_can_port(io, configuration.can);
-    const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port);
-    const auto why = campaign::check_stages(configuration.campaign, dbc, *port);
-    if (!why.empty()) throw configuration::ConfigurationError(why);
-}
-
-std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
-    const campaign::Settings& campaign = configuration.campaign;
-    // Of a plan file and of an adaptive campaign the forecast tells.
-    if (!campaign.stops.empty() || campaign.adaptive) return {};
-    return estimator::plan_warnings(estimator::report_plan(
-        configuration.estimator,
-        estimator::campaign_plan(configuration.estimator, campaign.positions_deg, campaign.table_g,
-                                 campaign.dwell_s),
-        drivers::to_seconds(configuration.assembler.sample_period)));
 }
 
 Daemon::~Daemon() {
@@ -474,6 +447,7 @@ StatusData Daemon::status() const {
     {
         const std::lock_guard lock(mutex_);
         status = campaign_status_;
+        status.server = server_status_;
     }
     const auto acquired = acquisition_.view();
     const auto estimated = estimator_stage_.view();
@@ -551,6 +525,13 @@ CommandReply Daemon::command(const CommandRequest& request) {
         if (ended_) return {false, "the daemon is shutting down"};
         reply = commands_.emplace_back(WaitingCommand{request, {}, abandoned}).reply.get_future();
         control_waiter_->notify();
+    }
+    // Whoever stops is told within 0.2 s that the stop is on its way, whatever holds the rest up.
+    // It is not taken back: the campaign ends when the control thread goes on.
+    constexpr auto kStopPatience = std::chrono::milliseconds(100);
+    if (request.kind == CommandRequest::Kind::abort) {
+        if (reply.wait_for(kStopPatience) == std::future_status::ready) return reply.get();
+        return {true, "the shaker is told to stop; the campaign has not ended yet"};
     }
     if (reply.wait_for(std::chrono::seconds(5)) != std::future_status::ready &&
         !abandoned->exchange(true)) {

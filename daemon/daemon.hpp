@@ -49,8 +49,11 @@ class Daemon final : public StatusSource {
     /// Throws ConfigurationError, BindingError, CanError, ShakerError, std::system_error.
     /// `log_queue`: where its words go, to be watched; null: nobody asks.
     explicit Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue = nullptr);
-    /// Throws DbcError or BindingError when the configured messages cannot be bound; opens nothing.
-    static void check_bindings(const configuration::Configuration& configuration);
+    /// Throws DbcError, or ConfigurationError that names each message that cannot be bound; opens
+    /// nothing.
+    static void check_bindings(const configuration::Loaded& loaded);
+    /// Throws ConfigurationError unless results can be kept where they are to be.
+    static void check_results(const configuration::Configuration& configuration);
     /// What the campaign's positions and levels would leave undetermined; empty if nothing.
     [[nodiscard]] static std::vector<std::string> check_plan(
         const configuration::Configuration& configuration);
@@ -80,7 +83,8 @@ class Daemon final : public StatusSource {
     CommandReply command(const CommandRequest& request) override;
     [[nodiscard]] PlanData plan() const override { return plan_; }
     void refused(const std::string& who, const std::string& what, const std::string& why) override;
-    void serving() override;
+    StatusData serving(const ServerStatus& server) override;
+    void told(Severity severity, const std::string& text) override;
 
   private:
     struct WaitingCommand {
@@ -90,6 +94,7 @@ class Daemon final : public StatusSource {
         std::shared_ptr<std::atomic<bool>> abandoned;
     };
 
+    [[nodiscard]] static proto::Dbc load_dbc(const std::string& path);
     /// False where the simulated rig owns the time: it waits, and nothing is late.
     [[nodiscard]] bool in_real_time() const noexcept;
     [[nodiscard]] rt::MemoryLock lock_memory() const;
@@ -233,6 +238,7 @@ class Daemon final : public StatusSource {
     mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
     std::deque<WaitingCommand> commands_;
     StatusData campaign_status_;
+    ServerStatus server_status_;
     estimator::Result result_;
     bool ended_ = false;
     rt::ThreadSetup acquisition_setup_, estimator_setup_;

@@ -1,5 +1,8 @@
 #include "daemon/status.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace vibrig {
 
 const char* name_of(CampaignState state) noexcept {
@@ -98,6 +101,18 @@ ChannelState StatusData::platform_state() const noexcept {
     return silent || drivers::to_seconds(time - platform.time) > platform_deadline_s
                ? ChannelState::silent
                : ChannelState::good;
+}
+
+double InterlockStatus::Row::margin() const noexcept {
+    if (!has_limit || !std::isfinite(present)) return std::numeric_limits<double>::quiet_NaN();
+    // What has to stay below zero, or above it, has no scale of its own.
+    const double left = below ? (present > 0        ? 1 - limit / present
+                                 : present >= limit ? 1.0
+                                                    : 0.0)
+                              : (limit > 0          ? 1 - present / limit
+                                 : present <= limit ? 1.0
+                                                    : 0.0);
+    return std::clamp(left, 0.0, 1.0);
 }
 
 }  // namespace vibrig

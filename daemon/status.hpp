@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -53,7 +54,11 @@ struct InterlockStatus {
         std::string name, condition, reaction, unit;
         double limit = 0, dwell_s = 0;
         bool has_limit = false, latched = false, raised = false;
-        double value = 0;  ///< as last judged to be wrong
+        double value = 0;                                           ///< as last judged to be wrong
+        double present = std::numeric_limits<double>::quiet_NaN();  ///< NaN: not watched now
+        bool below = false;  ///< it is what falls below the limit that is wrong
+        /// The part of the limit that is left: 1 far from it, 0 at it or beyond. NaN: unknown.
+        [[nodiscard]] double margin() const noexcept;
     };
     std::string tripped;         ///< name of the row, to be acknowledged; empty: none
     std::vector<Latch> latches;  ///< not acknowledged, of an earlier life too
@@ -97,6 +102,26 @@ struct MqttStatus {
 struct LogStatus {
     std::uint64_t taken = 0, written = 0, dropped = 0, waiting = 0;
     bool blocked = false;  ///< whoever reads it does not
+};
+
+/// A certificate whose end somebody has to see coming.
+struct CertificateStatus {
+    std::string whose;         ///< "server", "authority", or who is connected with it
+    std::int64_t expires = 0;  ///< s, UTC
+    bool own = false;          ///< the rig's: without it nobody gets in from outside
+};
+
+/// The ways in, and what ends with a date.
+struct ServerStatus {
+    struct Door {
+        std::string name;     ///< control, status, page, remote
+        std::string address;  ///< a path, or "https://0.0.0.0:8443/"
+        bool open = true;
+        std::string note;             ///< why it is not
+        std::uint64_t made_anew = 0;  ///< times its socket was gone
+    };
+    std::vector<Door> doors;
+    std::vector<CertificateStatus> certificates;
 };
 
 /// What the threads that a sample passes have of real time.
@@ -294,6 +319,7 @@ struct StatusData {
     RealTimeStatus real_time;
     MqttStatus mqtt;
     LogStatus log;
+    ServerStatus server;
     bool stop_pending = false;  ///< a stop is ordered and rest not measured since
     RestStatus rest;
 
@@ -387,10 +413,14 @@ class StatusSource {
     /// Final or present result; empty while there is nothing.
     [[nodiscard]] virtual estimator::Result result() const = 0;
     [[nodiscard]] virtual std::string effective_configuration() const = 0;
+    /// Takes its time, as the control thread does; but for an abort, which is answered at once.
     virtual CommandReply command(const CommandRequest& request) = 0;
     [[nodiscard]] virtual PlanData plan() const { return {}; }
-    /// The server's thread goes on; told twice a second.
-    virtual void serving() {}
+    /// The server's thread goes on, and this is how its doors are; told twice a second. The status
+    /// at that moment is for its history.
+    virtual StatusData serving(const ServerStatus& /*server*/) { return {}; }
+    /// Something that somebody has to know of the server.
+    virtual void told(Severity /*severity*/, const std::string& /*text*/) {}
     /// A command that was not let through: who wanted what, and why not.
     virtual void refused(const std::string& /*who*/, const std::string& /*what*/,
                          const std::string& /*why*/) {}

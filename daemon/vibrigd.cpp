@@ -15,6 +15,7 @@
 #include "daemon/log/log_sink.hpp"
 #include "daemon/rig_lock.hpp"
 #include "daemon/serve/status_server.hpp"
+#include "daemon/upgrade.hpp"
 #include "daemon/version.hpp"
 #include "daemon/watchdog.hpp"
 #include "estimator/instruction_set.hpp"
@@ -51,7 +52,8 @@ void insist(const vibrig::CampaignForecast& forecast) {
 void check_again(const std::string& path) {
     try {
         const auto loaded = vibrig::configuration::load(path, true);
-        vibrig::Daemon::check_bindings(loaded.configuration);
+        vibrig::Daemon::check_bindings(loaded);
+        vibrig::Daemon::check_results(loaded.configuration);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -59,11 +61,29 @@ void check_again(const std::string& path) {
     }
 }
 
+/// Whether an upgrade has asked for a restart and may have it now. Why it has to wait is told
+/// whenever that changes.
+bool starts_again(const vibrig::Daemon& daemon, std::string& waits_for) {
+    static const std::string request = vibrig::restart_request_file();
+    if (request.empty() || ::access(request.c_str(), F_OK) != 0) return false;
+    const auto why = vibrig::restart_waits_for(daemon.status());
+    if (why == waits_for && !why.empty()) return false;
+    waits_for = why;
+    if (!why.empty()) {
+        spdlog::warn("a new version is installed; the restart waits for rest: {}", why);
+        return false;
+    }
+    // One that cannot be removed would be found again after each restart.
+    if (::unlink(request.c_str()) == 0) return true;
+    spdlog::error("cannot remove {}: no restart", request);
+    return false;
+}
+
 /// Feeds the service manager's watchdog while every stage makes progress; returns the signal that
-/// ends the daemon.
+/// ends the daemon, or 0: it is to be started again.
 int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig::RigLock& lock,
           const sigset_t& signals, const std::string& path) {
-    std::string told, stuck;
+    std::string told, stuck, waits_for;
     for (;;) {
         const double period_s = manager.period_s() > 0 ? std::min(1.0, manager.period_s()) : 1.0;
         timespec wait{};
@@ -83,6 +103,7 @@ int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig:
             spdlog::error("no progress in: {}; the watchdog is not fed", now_stuck);
         stuck = now_stuck;
         if (stuck.empty()) manager.alive();
+        if (starts_again(daemon, waits_for)) return 0;
         if (auto words = stuck.empty() ? words_of(daemon.status()) : "no progress in " + stuck;
             words != told) {
             told = std::move(words);
@@ -112,6 +133,9 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
     const vibrig::ServiceManager manager;
     // Before anything is opened, and long before anything is told to stop.
     vibrig::RigLock lock(loaded.configuration, path);
+    // What an upgrade asked of the daemon before this one.
+    if (const auto request = vibrig::restart_request_file(); !request.empty())
+        ::unlink(request.c_str());
     const auto socket = loaded.configuration.socket;
     const auto server_settings = settings_of(loaded.configuration);
     vibrig::Daemon daemon(std::move(loaded), &log);
@@ -126,7 +150,7 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
     manager.ready(words_of(daemon.status()));
     const int signal = watch(daemon, manager, lock, signals, path);
     manager.stopping();
-    spdlog::info("{}: stopping", ::strsignal(signal));
+    spdlog::info("{}: stopping", signal == 0 ? "a new version is installed" : ::strsignal(signal));
     daemon.shut_down();
     // In wall time: the rig's clock may stand still, a link may be gone. A second signal cuts it
     // short.
@@ -147,7 +171,7 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
         return 1;
     }
     spdlog::info("stopped cleanly");
-    return 0;
+    return signal == 0 ? vibrig::kStartAgain : 0;
 }
 
 }  // namespace
@@ -192,7 +216,8 @@ int main(int argc, char** argv) {
         }
         auto loaded = vibrig::configuration::load(path, true);
         if (check) {
-            vibrig::Daemon::check_bindings(loaded.configuration);
+            vibrig::Daemon::check_bindings(loaded);
+            vibrig::Daemon::check_results(loaded.configuration);
             std::cout << vibrig::configuration::format_effective(loaded);
             // As comments: what stands above reads back as a configuration.
             const auto forecast = vibrig::forecast_campaign(loaded.configuration);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "drivers/can_port.hpp"
 #include "drivers/sample.hpp"
@@ -17,12 +18,17 @@ namespace vibrig::drivers {
 class BindingError : public std::runtime_error {
   public:
     BindingError(std::string key, std::string value, const std::string& offer);
+    /// Several at once, a line each; at least one.
+    explicit BindingError(std::vector<BindingError> all);
+    /// Each of several; of one alone empty.
+    [[nodiscard]] const std::vector<BindingError>& all() const noexcept { return all_; }
     [[nodiscard]] const std::string& key() const noexcept { return key_; }
     [[nodiscard]] const std::string& value() const noexcept { return value_; }
 
   private:
     std::string key_;
     std::string value_;
+    std::vector<BindingError> all_;
 };
 
 /// Which DBC signal carries what, as "Message.Signal"; empty: not bound. The defaults are those of

@@ -2,14 +2,23 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "drivers/signal_binding.hpp"
 
 namespace vibrig::drivers {
 
 FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(dbc) {
-    const auto bind = [this](const char* key, const std::string& name) {
-        return bind_signal(dbc_, std::string("can.signals.") + key, name);
+    // Another lab's DBC names most things otherwise: all that is missing is told at once.
+    std::vector<BindingError> missing;
+    const auto bind = [this, &missing](const char* key, const std::string& name) -> BoundSignal {
+        try {
+            return bind_signal(dbc_, std::string("can.signals.") + key, name);
+        } catch (const BindingError& error) {
+            missing.push_back(error);
+            return {};
+        }
     };
 
     if (const BoundSignal sync = bind("sync_count", names.sync_count)) {
@@ -46,7 +55,7 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
             plan_for(*valid.message).channels.push_back({index, valid.signal, true});
         }
     }
-    if (std::ranges::none_of(bound_, [](bool b) { return b; })) {
+    if (missing.empty() && std::ranges::none_of(bound_, [](bool b) { return b; })) {
         throw BindingError("can.signals", "",
                            "at least one measured channel, such as outer = \"Resolvers.Outer\"");
     }
@@ -72,6 +81,8 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
             plan_for(*bound.message).status.push_back({s.field, bound.signal});
         }
     }
+
+    if (!missing.empty()) throw BindingError(std::move(missing));
 
     for (std::size_t i = 0; i < plans_.size(); ++i) {
         MessagePlan& plan = plans_[i];

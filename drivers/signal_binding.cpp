@@ -51,6 +51,22 @@ BindingError::BindingError(std::string key, std::string value, const std::string
       key_(std::move(key)),
       value_(std::move(value)) {}
 
+namespace {
+
+std::string lines_of(const std::vector<BindingError>& all) {
+    std::string text;
+    for (const BindingError& one : all)
+        text += (text.empty() ? "" : "\n") + std::string(one.what());
+    return text;
+}
+
+}  // namespace
+
+BindingError::BindingError(std::vector<BindingError> all)
+    : std::runtime_error(lines_of(all)), key_(all.front().key()), value_(all.front().value()) {
+    if (all.size() > 1) all_ = std::move(all);
+}
+
 BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std::string& name) {
     if (name.empty()) return {};
     const std::size_t dot = name.find('.');

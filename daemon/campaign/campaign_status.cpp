@@ -41,6 +41,9 @@ void Campaign::fill(StatusData& status, Time now) const {
                             ? "press the emergency stop now"
                             : "";
     fill_rest(status, now);
+    // Of what has ended nothing is left and nothing is commanded.
+    status.remaining_s = 0;
+    status.command_table_g = 0;
     double done = static_cast<double>(positions_done_);
     if (state_ == State::recording && dwell_to_ > dwell_from_) {
         done += std::clamp(

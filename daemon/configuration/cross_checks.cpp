@@ -57,6 +57,7 @@ void CrossCheck::everywhere() {
 void CrossCheck::for_daemon() {
     rig_clock();
     simulated_rig();
+    status_signals();
     if (!c_.shaker.registers.watchdog) {
         refuse({"shaker.registers.watchdog"}, "no watchdog register",
                "one that vibrigd feeds: a dead daemon must mean a stopped shaker");
@@ -97,6 +98,18 @@ void CrossCheck::for_daemon() {
     set_points_fit();
     limits();
     frequency();
+}
+
+void CrossCheck::status_signals() {
+    const auto& names = c_.assembler.bindings;
+    if (!sound({"can.signals.ready", "can.signals.loop_closed", "can.signals.fault"})) return;
+    if (names.ready.empty() && names.loop_closed.empty() && names.gyros_at_speed.empty() &&
+        names.fault.empty())
+        refuse({"can.signals.ready", "can.signals.loop_closed", "can.signals.fault",
+                "can.signals.gyros_at_speed"},
+               "none of ready, loop_closed, gyros_at_speed and fault",
+               "one of them at least: a platform that says nothing of itself is never ready, and "
+               "its faults are never seen");
 }
 
 void CrossCheck::rest() {

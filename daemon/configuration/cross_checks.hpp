@@ -28,6 +28,7 @@ class CrossCheck {
     void bus();
     void broker();
     void doors();
+    void status_signals();
     void rest();
     void adaptive();
     void rig_clock();

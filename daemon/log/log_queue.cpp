@@ -112,6 +112,9 @@ bool LogQueue::end(std::chrono::milliseconds patience) {
         state_->ending = true;
         state_->changed.notify_all();
         all = state_->changed.wait_for(lock, patience, [this] { return state_->waiting() == 0; });
+        // What is given up is not written later, to whatever has the descriptor's number then.
+        state_->counts.dropped += state_->lines.size();
+        state_->lines.clear();
     }
     if (!thread_.joinable()) return all;
     all ? thread_.join() : thread_.detach();

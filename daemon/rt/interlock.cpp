@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -98,6 +99,7 @@ void Interlock::judge(Trip trip, const AmplitudeWitness::Verdict::Finding& findi
 void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time now,
                           std::uint8_t channel) noexcept {
     State& state = states_[row];
+    state.present.store(value);
     std::atomic<Time>& since = state.since[static_cast<std::size_t>(by)];
     const Rule& rule = rules_[row];
     if (!wrong) {
@@ -126,6 +128,7 @@ void Interlock::forget(By by, Guard above) noexcept {
         const Guard from = condition_of(rules_[i].condition).from;
         if (from <= above) continue;
         states_[i].since[static_cast<std::size_t>(by)] = 0;
+        states_[i].present.store(std::numeric_limits<double>::quiet_NaN());
         if (!rules_[i].latched && states_[i].met() && states_[i].raised.exchange(false))
             control_.notify();
     }
@@ -312,7 +315,8 @@ bool Interlock::acknowledge_alarm(const std::string& name) noexcept {
 }
 
 Interlock::RowState Interlock::row(std::size_t i) const noexcept {
-    return {&rules_[i], states_[i].raised.load(), states_[i].value.load()};
+    return {&rules_[i], states_[i].raised.load(), states_[i].value.load(),
+            states_[i].present.load()};
 }
 
 }  // namespace vibrig::rt

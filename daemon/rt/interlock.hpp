@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -70,7 +71,8 @@ class Interlock {
     struct RowState {
         const Rule* rule = nullptr;
         bool raised = false;
-        double value = 0;  ///< as last judged to be wrong
+        double value = 0;    ///< as last judged to be wrong
+        double present = 0;  ///< as judged now; NaN: not watched now
     };
 
     Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits limits);
@@ -150,6 +152,7 @@ class Interlock {
         }
         std::atomic<bool> raised{false};
         std::atomic<double> value{0};
+        std::atomic<double> present{std::numeric_limits<double>::quiet_NaN()};
     };
 
     [[nodiscard]] bool at_least(Guard level) const noexcept { return guard_.load() >= level; }

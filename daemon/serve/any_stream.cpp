@@ -2,10 +2,13 @@
 
 #include <openssl/x509v3.h>
 
+#include <algorithm>
 #include <boost/asio/ssl/host_name_verification.hpp>
 #include <boost/asio/ssl/stream.hpp>
 #include <optional>
 #include <vector>
+
+#include "daemon/serve/tls.hpp"
 
 namespace vibrig::serve {
 
@@ -51,7 +54,8 @@ void AnyStream::accept_handshake(std::function<void(error_code)> done) {
     impl_->tls->async_handshake(asio::ssl::stream_base::server, std::move(done));
 }
 
-void AnyStream::connect_handshake(const std::string& host, std::function<void(error_code)> done) {
+void AnyStream::connect_handshake(const std::string& host, std::function<void(error_code)> done,
+                                  bool expired_too) {
     SSL* const ssl = impl_->tls->native_handle();
     error_code numeric;
     asio::ip::make_address(host, numeric);
@@ -60,7 +64,10 @@ void AnyStream::connect_handshake(const std::string& host, std::function<void(er
         std::string name = host;
         SSL_ctrl(ssl, SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name, name.data());
     }
-    impl_->tls->set_verify_callback(asio::ssl::host_name_verification(host));
+    impl_->tls->set_verify_callback([named = asio::ssl::host_name_verification(host), expired_too](
+                                        bool good, asio::ssl::verify_context& at) {
+        return named(good || (expired_too && only_expired(at)), at);
+    });
     impl_->tls->async_handshake(asio::ssl::stream_base::client, std::move(done));
 }
 
@@ -83,6 +90,18 @@ std::pair<std::string, std::string> AnyStream::peer_subject() const {
         return found;
     };
     return {entry(NID_commonName), entry(NID_organizationalUnitName)};
+}
+
+std::int64_t AnyStream::peer_expiry() const {
+    if (!impl_->tls) return 0;
+    SSL* const ssl = impl_->tls->native_handle();
+    const std::unique_ptr<X509, void (*)(X509*)> certificate(SSL_get1_peer_certificate(ssl),
+                                                             X509_free);
+    std::int64_t end = end_of(certificate.get());
+    const STACK_OF(X509)* const chain = SSL_get0_verified_chain(ssl);
+    for (int i = 0; chain != nullptr && i < sk_X509_num(chain); ++i)
+        end = std::min(end, end_of(sk_X509_value(chain, i)));
+    return end;
 }
 
 std::string AnyStream::certificate_problem() const {

@@ -10,6 +10,7 @@
 #include <boost/asio/ssl/context.hpp>
 #include <boost/beast/core/role.hpp>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -54,13 +55,18 @@ class AnyStream {
         write(from, erased(std::forward<Handler>(handler)));
     }
 
-    /// TLS only. As a client: the server's certificate must be good for `host`.
+    /// TLS only. As a client: the server's certificate must be good for `host`; `expired_too`: it
+    /// may have expired.
     void accept_handshake(std::function<void(boost::system::error_code)> done);
     void connect_handshake(const std::string& host,
-                           std::function<void(boost::system::error_code)> done);
+                           std::function<void(boost::system::error_code)> done,
+                           bool expired_too = false);
     [[nodiscard]] bool encrypted() const noexcept;
     /// Subject of the other side's certificate: common name, organisational unit; empty without.
     [[nodiscard]] std::pair<std::string, std::string> peer_subject() const;
+
+    /// When the other side's certificate ends, or the first of its authorities, s UTC; 0 without.
+    [[nodiscard]] std::int64_t peer_expiry() const;
 
     /// Why the other side's certificate was not taken; empty: it was, or none came.
     [[nodiscard]] std::string certificate_problem() const;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <exception>
 #include <stdexcept>
 #include <utility>
@@ -18,18 +19,11 @@ namespace vibrig::serve {
 namespace {
 
 constexpr std::string_view kCommands = "/api/v1/commands";
-constexpr std::array<std::string_view, 12> kReadable{"/api/v1/status",
-                                                     "/api/v1/parameters",
-                                                     "/api/v1/campaign",
-                                                     "/api/v1/events",
-                                                     "/api/v1/config",
-                                                     "/api/v1/plan",
-                                                     "/api/v1/openapi.json",
-                                                     "/api/v1/selftest",
-                                                     "/api/v1/stream",
-                                                     "/metrics",
-                                                     "/healthz",
-                                                     "/readyz"};
+constexpr std::array<std::string_view, 13> kReadable{
+    "/api/v1/status",   "/api/v1/parameters", "/api/v1/campaign", "/api/v1/events",
+    "/api/v1/history",  "/api/v1/config",     "/api/v1/plan",     "/api/v1/openapi.json",
+    "/api/v1/selftest", "/api/v1/stream",     "/metrics",         "/healthz",
+    "/readyz"};
 constexpr int kDeepestBody = 8;                 // levels of JSON; a command has one
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
@@ -177,8 +171,11 @@ std::string_view query_value(std::string_view query, std::string_view name) {
     return {};
 }
 
-Api::Api(StatusSource& source, std::string instance)
-    : source_(source), instance_(std::move(instance)), feed_(source) {}
+Api::Api(StatusSource& source, std::string instance, CarryOut carry_out)
+    : source_(source),
+      instance_(std::move(instance)),
+      carry_out_(std::move(carry_out)),
+      feed_(source) {}
 
 ApiAnswer Api::problem(int status, const std::string& detail) {
     ApiAnswer answer;
@@ -214,21 +211,57 @@ ApiAnswer Api::check_browser(const ApiRequest& request, const Caller& caller) {
     return {};
 }
 
-ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
-    ++traffic.requests;
+bool Api::is_stop(const ApiRequest& request, const Caller& caller) {
+    if (request.method != "POST" || request.target != kCommands || caller.role < Role::operate ||
+        depth_of(request.body) > kDeepestBody)
+        return false;
     try {
-        if (ApiAnswer refusal = check_browser(request, caller); refusal.status != 200)
+        return parse_command(request.body).kind == CommandRequest::Kind::abort;
+    } catch (const std::invalid_argument&) {
+        return false;
+    }
+}
+
+void Api::answer(const ApiRequest& request, const Caller& caller, Done done) {
+    ++traffic.requests;
+    const std::size_t mark = std::min(request.target.find('?'), request.target.size());
+    if (request.method != "POST" || request.target.substr(0, mark) != kCommands)
+        return done(answer_at_once(request, caller));
+    auto found = command_of(request, caller);
+    if (auto* const refusal = std::get_if<ApiAnswer>(&found)) return done(std::move(*refusal));
+    const bool taken =
+        carry_out_(std::get<CommandRequest>(found), [this, done](CommandReply reply) {
+            feed_.forget();
+            if (!reply.accepted) return done(problem(409, reply.message));
+            ApiAnswer answer;
+            answer.body = reply_json(reply);
+            done(std::move(answer));
+        });
+    if (!taken) done(problem(503, "too many commands wait for their answers"));
+}
+
+ApiAnswer Api::without_a_command(const ApiRequest& request, const Caller& caller) {
+    if (ApiAnswer refusal = check_browser(request, caller); refusal.status != 200) return refusal;
+    if (caller.role == Role::none) {
+        return refuse(403, caller, asked_by(request),
+                      "the certificate names no role: its organisational unit is none of "
+                      "viewer, operator, admin");
+    }
+    return {};
+}
+
+ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
+    try {
+        if (ApiAnswer refusal = without_a_command(request, caller); refusal.status != 200)
             return refusal;
+        if (caller.expired)
+            return refuse(403, caller, asked_by(request),
+                          "the certificate has expired: only an abort is taken");
         const std::size_t mark = std::min(request.target.find('?'), request.target.size());
         const std::string_view path = request.target.substr(0, mark);
         const std::string_view query =
             request.target.substr(std::min(mark + 1, request.target.size()));
         const bool takes_commands = path == kCommands;
-        if (caller.role == Role::none) {
-            return refuse(403, caller, asked_by(request),
-                          "the certificate names no role: its organisational unit is none of "
-                          "viewer, operator, admin");
-        }
         if (caller.browser && request.method == "GET") {
             if (const auto* file = page_file(path)) {
                 ApiAnswer page;
@@ -249,7 +282,7 @@ ApiAnswer Api::answer(const ApiRequest& request, const Caller& caller) {
             refusal.allow = method;
             return refusal;
         }
-        return takes_commands ? command(request, caller) : get(path, query);
+        return get(path, query);
     } catch (const std::invalid_argument& error) {
         return problem(400, error.what());
     } catch (const std::exception& error) {
@@ -290,6 +323,18 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
         answer.body = events_json(instance_, source_.events(wanted.after, wanted.limit));
         return answer;
     }
+    if (path == "/api/v1/history") {
+        double from_s = 0;
+        if (const auto text = query_value(query, "from"); !text.empty()) {
+            const auto [stop, error] =
+                std::from_chars(text.data(), text.data() + text.size(), from_s);
+            if (error != std::errc{} || stop != text.data() + text.size() || !std::isfinite(from_s))
+                throw std::invalid_argument("from: found " + in_quotes(text) +
+                                            ", expected s of the daemon's clock");
+        }
+        answer.body = history_.json(query_value(query, "channel"), from_s);
+        return answer;
+    }
     if (path == "/readyz" || path == "/api/v1/selftest") {
         const Readiness found = readiness(source_.status());
         if (!found.ready() && path == "/readyz") return problem(503, found.failures());
@@ -315,7 +360,10 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
     return answer;
 }
 
-ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
+std::variant<ApiAnswer, CommandRequest> Api::command_of(const ApiRequest& request,
+                                                        const Caller& caller) {
+    if (ApiAnswer refusal = without_a_command(request, caller); refusal.status != 200)
+        return refusal;
     // A page of another origin can send anything but this type without asking first.
     if ((!request.content_type.empty() || caller.browser) && !is_json(request.content_type)) {
         return refuse(415, caller, "a command",
@@ -338,6 +386,8 @@ ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
                       std::string("commands take an operator; this connection is a ") +
                           name_of(caller.role) + "'s: " + caller.identity);
     }
+    if (caller.expired && parsed.kind != CommandRequest::Kind::abort)
+        return refuse(403, caller, what, "the certificate has expired: only an abort is taken");
     // A stop is never one too many.
     const auto now = std::chrono::steady_clock::now();
     if (parsed.kind != CommandRequest::Kind::abort &&
@@ -347,12 +397,10 @@ ApiAnswer Api::command(const ApiRequest& request, const Caller& caller) {
     // The name is what the person says; the rest is what the kernel or a certificate says. The
     // audit line has both.
     parsed.by += " (" + caller.identity + ")";
-    const CommandReply reply = source_.command(parsed);
-    feed_.forget();
-    if (!reply.accepted) return problem(409, reply.message);
-    ApiAnswer answer;
-    answer.body = reply_json(reply);
-    return answer;
+    if (caller.expired)
+        source_.told(Severity::warning,
+                     "an abort is taken from an expired certificate: " + parsed.by);
+    return parsed;
 }
 
 }  // namespace vibrig::serve

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
+#include <variant>
 
 #include "daemon/serve/caller.hpp"
+#include "daemon/serve/history.hpp"
 #include "daemon/serve/rate_limit.hpp"
 #include "daemon/serve/stream_feed.hpp"
 #include "daemon/status.hpp"
@@ -34,9 +37,16 @@ struct ApiAnswer {
 class Api {
   public:
     /// `instance` names this start of the daemon: event ids are unique within it.
-    Api(StatusSource& source, std::string instance);
-    /// Never throws for what a client sends; a failing source is a 500.
-    [[nodiscard]] ApiAnswer answer(const ApiRequest& request, const Caller& caller);
+    /// `carry_out`: as StatusSource::command, but it calls back later, on the server's thread;
+    /// false: too many commands wait.
+    using CarryOut = std::function<bool(CommandRequest, std::function<void(CommandReply)>)>;
+    Api(StatusSource& source, std::string instance, CarryOut carry_out);
+    using Done = std::function<void(ApiAnswer)>;
+    /// Calls back at once, unless it is a command. Never throws for what a client sends; a failing
+    /// source is a 500.
+    void answer(const ApiRequest& request, const Caller& caller, Done done);
+    /// A stop is never one too many: who orders one needs no free place.
+    [[nodiscard]] static bool is_stop(const ApiRequest& request, const Caller& caller);
     /// Why a browser's request is refused before it is looked at; status 200: it is not.
     [[nodiscard]] ApiAnswer check_browser(const ApiRequest& request, const Caller& caller);
 
@@ -46,6 +56,7 @@ class Api {
     [[nodiscard]] static ApiAnswer problem(int status, const std::string& detail);
     [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
     [[nodiscard]] StreamFeed& feed() noexcept { return feed_; }
+    [[nodiscard]] History& history() noexcept { return history_; }
 
     /// What the server itself counts, for /metrics.
     struct Traffic {
@@ -56,14 +67,20 @@ class Api {
 
   private:
     ApiAnswer get(std::string_view path, std::string_view query);
-    ApiAnswer command(const ApiRequest& request, const Caller& caller);
+    [[nodiscard]] ApiAnswer answer_at_once(const ApiRequest& request, const Caller& caller);
+    [[nodiscard]] ApiAnswer without_a_command(const ApiRequest& request, const Caller& caller);
+    /// The command of the request; else why there is none to be carried out.
+    [[nodiscard]] std::variant<ApiAnswer, CommandRequest> command_of(const ApiRequest& request,
+                                                                     const Caller& caller);
     /// What is told of is limited: a flood must not drown the events.
     ApiAnswer refuse(int status, const Caller& caller, const std::string& what,
                      const std::string& why);
 
     StatusSource& source_;
     std::string instance_;
+    CarryOut carry_out_;
     StreamFeed feed_;
+    History history_;
     TokenBuckets commands_{10, 50};
     TokenBuckets told_{0.1, 20};  ///< refusals that are told of
 };

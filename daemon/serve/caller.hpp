@@ -18,7 +18,8 @@ struct Caller {
     std::string identity;  ///< "uid 1000", "certificate ada, operator, from 10.0.0.7"
     bool browser = false;  ///< over TCP: Host, Origin and Content-Type are checked, pages served
     bool encrypted = false;
-    std::string host;  ///< plain HTTP: "127.0.0.1:8090"; what Host may say, besides localhost
+    bool expired = false;  ///< the certificate: known, and good for an abort alone
+    std::string host;      ///< plain HTTP: "127.0.0.1:8090"; what Host may say, besides localhost
 };
 
 }  // namespace vibrig::serve

@@ -122,7 +122,8 @@ struct Client::Impl {
         }
         if (!error) {
             error = run([&](auto done) {
-                stream->connect_handshake(host, [done](error_code code) { done(code); });
+                stream->connect_handshake(
+                    host, [done](error_code code) { done(code); }, address.expired_too);
             });
         }
         if (!error) return;
@@ -207,7 +208,7 @@ struct Client::Impl {
 };
 
 Client::Client(std::string path, std::chrono::milliseconds timeout)
-    : Client(Address{std::move(path), {}, {}}, timeout) {}
+    : Client(Address{std::move(path), {}, {}, false}, timeout) {}
 
 Client::Client(const Address& address, std::chrono::milliseconds timeout)
     : impl_(std::make_unique<Impl>(address, timeout)) {}

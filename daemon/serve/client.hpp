@@ -27,8 +27,9 @@ struct Reply {
 /// Where a daemon is asked: at its Unix socket, or with TLS when there is a host.
 struct Address {
     std::string socket;
-    std::string host;      ///< "rig.lab", "rig.lab:8443"; empty: the socket
-    std::string identity;  ///< "FOLDER/NAME": NAME.crt, NAME.key and authority.crt are there
+    std::string host;          ///< "rig.lab", "rig.lab:8443"; empty: the socket
+    std::string identity;      ///< "FOLDER/NAME": NAME.crt, NAME.key and authority.crt are there
+    bool expired_too = false;  ///< for a stop: the daemon's certificate may have expired
 };
 
 /// Asks a running vibrigd. Blocks up to the timeout; one thread.

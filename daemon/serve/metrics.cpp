@@ -282,12 +282,40 @@ void add_estimate(Families& to, const StatusData& s) {
                s.noise.alarms_total);
 }
 
+void add_server(Families& to, const ServerStatus& s) {
+    std::vector<std::pair<Labels, double>> open, ends;
+    std::vector<std::pair<Labels, std::uint64_t>> anew;
+    for (const auto& door : s.doors) {
+        const Labels name{{"door", door.name}};
+        open.emplace_back(name, yes(door.open));
+        anew.emplace_back(name, door.made_anew);
+    }
+    for (const auto& certificate : s.certificates)
+        ends.push_back({{{"whose", certificate.whose}}, static_cast<double>(certificate.expires)});
+    to.gauge("vibrig_door_open", "1 while the daemon answers there.", open);
+    if (!anew.empty())
+        to.counter("vibrig_door_made_anew_total",
+                   "Times a socket's file had been removed or replaced.", anew);
+    to.gauge("vibrig_certificate_expiry_timestamp_seconds",
+             "When a certificate ends: the server's, the authority's, and of who is connected.",
+             ends);
+}
+
 void add_interlock(Families& to, const StatusData& s) {
-    std::vector<std::pair<Labels, double>> raised;
+    std::vector<std::pair<Labels, double>> raised, present, limits, margins;
     for (const auto& row : s.interlock.rows) {
+        const Labels name{{"name", row.name}, {"unit", row.unit}};
+        if (row.has_limit) {
+            present.emplace_back(name, row.present);
+            limits.emplace_back(name, row.limit);
+            margins.push_back({{{"name", row.name}}, row.margin()});
+        }
         raised.push_back({{{"name", row.name}, {"reaction", row.reaction}}, yes(row.raised)});
     }
     to.gauge("vibrig_interlock_raised", "1 while the condition of this row is met.", raised);
+    to.gauge("vibrig_interlock_value", "What is judged now, in the unit named.", present);
+    to.gauge("vibrig_interlock_limit", "What it is judged by, in the unit named.", limits);
+    to.gauge("vibrig_interlock_margin_ratio", "The part of the limit that is left.", margins);
     to.gauge("vibrig_interlock_tripped", "1: the shaker was stopped; latched until acknowledged.",
              yes(!s.interlock.tripped.empty()));
     to.histogram("vibrig_interlock_reaction_seconds",
@@ -305,6 +333,7 @@ std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) 
     add_acquisition(families, status);
     add_estimate(families, status);
     add_interlock(families, status);
+    add_server(families, status.server);
     families.gauge("vibrig_journal_up", "1 while the journal writes, or none is kept.",
                    yes(status.journal.path.empty() || status.journal.running));
     families.counter("vibrig_journal_entries_total", "Entries of the journal.",

@@ -106,13 +106,21 @@ constexpr const char* kStreamParameters =
     R"({"name":"status","in":"query","description":"false: events alone, looked for at the rate","schema":{"type":"boolean","default":true}},)"
     R"({"name":"after","in":"query","description":"events with a greater id","schema":{"type":"integer","minimum":0}})";
 
-constexpr std::array<Path, 11> kPaths{{
+constexpr const char* kHistoryParameters =
+    R"({"name":"channel","in":"query","required":true,"description":"one or more, with commas","schema":{"type":"string"}},)"
+    R"({"name":"from","in":"query","description":"s of the daemon's clock","schema":{"type":"number"}})";
+
+constexpr std::array<Path, 12> kPaths{{
     {"/api/v1/status", "The whole status.", "application/json", "Status"},
     {"/api/v1/parameters", "The result so far: 30 coefficients with their covariance.",
      "application/json", "Parameters"},
     {"/api/v1/campaign", "The campaign's part of the status.", "application/json", "Campaign"},
     {"/api/v1/events", "What happened, oldest first.", "application/json", "Events",
      kEventParameters},
+    {"/api/v1/history",
+     "The campaign so far as curves: least, greatest and mean of each channel in at most 1200 "
+     "steps of equal length; null where nothing is known.",
+     "application/json", nullptr, kHistoryParameters},
     {"/api/v1/config", "The configuration in force, as vibrigd --check prints it.",
      "application/json", "Configuration"},
     {"/api/v1/plan", "What the campaign does, and the standard errors to be expected.",

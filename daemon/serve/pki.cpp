@@ -107,11 +107,9 @@ Identity make_identity(const CertificateSettings& settings, const Identity* issu
     BIGNUM* const number = BN_bin2bn(serial.data(), serial.size(), nullptr);
     BN_to_ASN1_INTEGER(number, X509_get_serialNumber(to));
     BN_free(number);
-    const auto seconds = [](std::chrono::hours time) {
-        return static_cast<long>(std::chrono::seconds(time).count());
-    };
-    X509_gmtime_adj(X509_getm_notBefore(to), seconds(settings.valid_from));
-    X509_gmtime_adj(X509_getm_notAfter(to), seconds(settings.valid_from + settings.valid_for));
+    X509_gmtime_adj(X509_getm_notBefore(to), static_cast<long>(settings.valid_from.count()));
+    X509_gmtime_adj(X509_getm_notAfter(to),
+                    static_cast<long>((settings.valid_from + settings.valid_for).count()));
     must(X509_set_pubkey(to, key.get()) == 1, "public key");
     add_name(X509_get_subject_name(to), "O", "Vibrig");
     add_name(X509_get_subject_name(to), "OU", settings.role);

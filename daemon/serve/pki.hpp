@@ -18,8 +18,8 @@ struct CertificateSettings {
     std::string common_name;
     std::string role;                ///< organisational unit; of clients
     std::vector<std::string> hosts;  ///< of servers: names and addresses
-    std::chrono::hours valid_from{-1};
-    std::chrono::hours valid_for{24 * 825};
+    std::chrono::seconds valid_from{-3600};
+    std::chrono::seconds valid_for{std::chrono::hours(24 * 825)};
 };
 
 /// A key (elliptic, P-256) with its certificate, both PEM.

@@ -1,5 +1,7 @@
 #include "daemon/serve/readiness.hpp"
 
+#include "daemon/serve/expiry_watch.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -89,7 +91,8 @@ Readiness readiness(const StatusData& status) {
     add("interlock", status.interlock.tripped.empty(),
         status.interlock.tripped.empty() ? "not tripped" : "tripped: " + status.interlock.tripped);
     const std::string verdict = status.loop_check.verdict;
-    add("loop check", verdict != "out of band" && verdict != "running",
+    // One that was never made says nothing about the loop.
+    add("loop check", verdict == "in band",
         verdict.empty()                     ? "none yet"
         : status.loop_check.message.empty() ? verdict
                                             : verdict + ": " + status.loop_check.message);
@@ -102,6 +105,21 @@ Readiness readiness(const StatusData& status) {
         journal.path.empty() ? "none is kept"
         : journal.running    ? "writes"
                              : journal.note);
+    std::string shut;
+    for (const auto& door : status.server.doors)
+        if (!door.open) shut += (shut.empty() ? "" : "; ") + door.name + ": " + door.note;
+    add("doors", shut.empty(), shut.empty() ? "open" : shut);
+    const std::int64_t now_s = status.utc_ns / drivers::kSecond;
+    bool expired = false;
+    std::string ends;
+    for (const auto& certificate : status.server.certificates) {
+        if (!certificate.own) continue;
+        const bool over = certificate.expires <= now_s;
+        expired = expired || over;
+        ends += (ends.empty() ? "" : ", ") + certificate.whose + (over ? " EXPIRED " : " until ") +
+                date_of(certificate.expires);
+    }
+    add("certificates", !expired, ends.empty() ? "none in use" : ends);
     add("losses", status.estimator_ring.dropped == 0,
         std::to_string(status.estimator_ring.dropped) + " samples dropped before the filter");
     return found;

@@ -1,5 +1,6 @@
 #include "daemon/serve/session.hpp"
 
+#include <algorithm>
 #include <boost/asio/ssl/error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
@@ -10,11 +11,13 @@
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket.hpp>
+#include <ctime>
 #include <memory>
 #include <optional>
 #include <sstream>
 #include <utility>
 
+#include "daemon/serve/expiry_watch.hpp"
 #include "daemon/serve/one_line.hpp"
 
 namespace vibrig::serve {
@@ -54,6 +57,11 @@ Response response_of(ApiAnswer answer, unsigned version, bool keep_alive) {
     return response;
 }
 
+/// Until that moment, s UTC.
+std::chrono::seconds left_of(std::int64_t expires) {
+    return std::chrono::seconds(expires - static_cast<std::int64_t>(std::time(nullptr)));
+}
+
 std::string_view repeated(const Request& request) {
     if (request.count(http::field::host) > 1) return "Host";
     if (request.count(http::field::origin) > 1) return "Origin";
@@ -67,12 +75,13 @@ class Stream : public std::enable_shared_from_this<Stream> {
   public:
     /// `admitted`: Shared::certificates when the client's was looked at.
     Stream(AnyStream stream, StreamClient client, Shared& shared, Place place,
-           std::uint64_t admitted)
+           std::uint64_t admitted, std::shared_ptr<const CertificateStatus> certificate)
         : socket_(std::move(stream)),
           client_(std::move(client)),
           shared_(shared),
           place_(std::move(place)),
           admitted_(admitted),
+          certificate_(std::move(certificate)),
           timer_(socket_.get_executor()) {
         ++shared_.api.traffic.streams;
         ++shared_.api.traffic.connections;
@@ -117,6 +126,8 @@ class Stream : public std::enable_shared_from_this<Stream> {
         if (ended_) return;
         if (socket_.next_layer().encrypted() && admitted_ != shared_.certificates)
             return close(websocket::close_code::try_again_later, "certificates have changed");
+        if (certificate_ && left_of(certificate_->expires) <= std::chrono::seconds(0))
+            return close(websocket::close_code::policy_error, "the certificate has expired");
         try {
             text_ = client_.next(Clock::now());
         } catch (const std::exception& slow) {
@@ -124,7 +135,9 @@ class Stream : public std::enable_shared_from_this<Stream> {
             return close(websocket::close_code::try_again_later, slow.what());
         }
         if (!text_) {
-            timer_.expires_at(client_.due());
+            timer_.expires_at(certificate_ ? std::min(client_.due(),
+                                                      Clock::now() + left_of(certificate_->expires))
+                                           : client_.due());
             timer_.async_wait([self = shared_from_this()](error_code error) {
                 if (!error) self->go_on();
             });
@@ -158,6 +171,7 @@ class Stream : public std::enable_shared_from_this<Stream> {
     Shared& shared_;
     const Place place_;
     const std::uint64_t admitted_;
+    const std::shared_ptr<const CertificateStatus> certificate_;  ///< null: none
     asio::steady_timer timer_;
     beast::flat_buffer buffer_;
     std::shared_ptr<const std::string> text_;
@@ -189,20 +203,12 @@ class Session : public std::enable_shared_from_this<Session> {
     void start() {
         if (!caller_.encrypted) {
             if (take_place()) return read();
-            turn_away();
-            return;
+            // Who may command is heard: it may be a stop.
+            if (caller_.role < Role::operate) return turn_away();
+            become_newcomer();
+            return read();
         }
-        // Strangers may hold connections open, but no place that somebody with a certificate needs:
-        // one who has one is quicker than so many others come.
-        if (shared_.newcomers.size() >= shared_.limits.newcomers) {
-            shared_.api.turned_away(caller_,
-                                    std::to_string(shared_.limits.newcomers) +
-                                        " wait to show a certificate: the oldest has to go",
-                                    shared_.crowd);
-            shared_.newcomers.front()->close();
-            shared_.newcomers.pop_front();
-        }
-        shared_.newcomers.push_back(&stream_);
+        become_newcomer();
         arm(kHandshakeTime);
         stream_.accept_handshake([self = shared_from_this()](error_code error) {
             if (error) {
@@ -216,9 +222,18 @@ class Session : public std::enable_shared_from_this<Session> {
             const auto [name, unit] = self->stream_.peer_subject();
             Caller& who = self->caller_;
             who.role = role_named(unit);
+            const std::int64_t expires = self->stream_.peer_expiry();
+            who.expired = left_of(expires) <= std::chrono::seconds(0);
             // It goes into the audit.
-            who.identity =
-                "certificate " + one_line(name) + ", " + name_of(who.role) + who.identity;
+            const std::string from = who.identity;
+            who.identity = "certificate " + one_line(name) + ", " + name_of(who.role);
+            self->certificate_ =
+                std::make_shared<const CertificateStatus>(CertificateStatus{who.identity, expires});
+            if (!who.expired) self->shared_.clients.push_back(self->certificate_);
+            if (who.expired) who.identity += ", expired " + date_of(expires);
+            who.identity += from;
+            // Nothing but a stop is taken, and one needs no place.
+            if (who.expired) return self->read();
             // Without a place one stays a newcomer until the first request, to be told so.
             self->take_place();
             self->read();
@@ -226,6 +241,19 @@ class Session : public std::enable_shared_from_this<Session> {
     }
 
   private:
+    /// Strangers may hold connections open, but no place that somebody with a certificate needs:
+    /// one who has one is quicker than so many others come.
+    void become_newcomer() {
+        if (shared_.newcomers.size() >= shared_.limits.newcomers) {
+            shared_.api.turned_away(caller_,
+                                    std::to_string(shared_.limits.newcomers) +
+                                        " wait to show a certificate: the oldest has to go",
+                                    shared_.crowd);
+            shared_.newcomers.front()->close();
+            shared_.newcomers.pop_front();
+        }
+        shared_.newcomers.push_back(&stream_);
+    }
     bool take_place() {
         place_ = places_.take();
         if (place_) shared_.newcomers.remove(&stream_);
@@ -258,7 +286,12 @@ class Session : public std::enable_shared_from_this<Session> {
         parser_->header_limit(shared_.limits.header_bytes);
         parser_->body_limit(shared_.limits.body_bytes);
         // One deadline for the whole request: who sends a byte now and then does not hold a place.
-        arm(place_ ? shared_.limits.idle_timeout : kHandshakeTime);
+        std::chrono::milliseconds patience = place_ ? shared_.limits.idle_timeout : kHandshakeTime;
+        // A connection lives no longer than its certificate.
+        if (certificate_ && !caller_.expired)
+            patience = std::clamp<std::chrono::milliseconds>(
+                left_of(certificate_->expires), std::chrono::milliseconds(1), patience);
+        arm(patience);
         http::async_read(
             stream_, buffer_, *parser_,
             [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
@@ -293,10 +326,9 @@ class Session : public std::enable_shared_from_this<Session> {
         }
         if (error) return end();  // gone, or out of time
         if (caller_.encrypted && admitted_ != shared_.certificates) return finish();
-        if (!place_ && !take_place()) {
-            none_left();
-            return refuse(503, places_.none_left());
-        }
+        if (certificate_ && !caller_.expired &&
+            left_of(certificate_->expires) <= std::chrono::seconds(0))
+            return finish();  // he may come again, with a stop
 
         const Request& request = parser_->get();
         const bool head = request.method() == http::verb::head;
@@ -310,18 +342,29 @@ class Session : public std::enable_shared_from_this<Session> {
                                view(request[http::field::origin]),
                                request.body(),
                                repeated(request)};
+        const bool stop = Api::is_stop(asked, caller_);
+        if (!place_ && !stop && !caller_.expired && !take_place()) {
+            none_left();
+            return refuse(503, places_.none_left());
+        }
+        // HEAD is refused like any other method, but its answer may not carry a body.
+        const auto reply = [self = shared_from_this(), head, version = request.version(),
+                            keep = request.keep_alive() && place_](ApiAnswer answer) {
+            if (head) answer.body.clear();
+            self->write(response_of(std::move(answer), version, keep));
+        };
+        // What is carried out has no deadline of the connection's; its answer has.
+        deadline_.cancel();
         ApiAnswer answer;
-        if (!requests_.take(Clock::now())) {
+        if (!stop && !requests_.take(Clock::now())) {
             answer = Api::problem(429, "too many requests on this connection");
-        } else if (wants_stream && caller_.role != Role::none) {
+        } else if (wants_stream && caller_.role != Role::none && !caller_.expired) {
             answer = upgrade(asked);
             if (answer.status == 200) return;
         } else {
-            answer = shared_.api.answer(asked, caller_);
+            return shared_.api.answer(asked, caller_, reply);
         }
-        // HEAD is refused like any other method, but its answer may not carry a body.
-        if (head) answer.body.clear();
-        write(response_of(std::move(answer), request.version(), request.keep_alive()));
+        reply(std::move(answer));
     }
 
     /// Hands the connection to a Stream; status 200: done.
@@ -349,7 +392,7 @@ class Session : public std::enable_shared_from_this<Session> {
         StreamClient client(shared_.api.feed(), shared_.api.instance(), caller_.role, rate, after,
                             with_status);
         std::make_shared<Stream>(std::move(stream_), std::move(client), shared_, std::move(place_),
-                                 admitted_)
+                                 admitted_, std::move(certificate_))
             ->start(parser_->get());
         return {};
     }
@@ -371,6 +414,7 @@ class Session : public std::enable_shared_from_this<Session> {
     Places& places_;
     Place place_;
     const std::uint64_t admitted_;
+    std::shared_ptr<const CertificateStatus> certificate_;  ///< null: none
     asio::steady_timer deadline_;
     beast::flat_buffer buffer_;
     TokenBucket requests_;

@@ -5,6 +5,7 @@
 #include <list>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "daemon/serve/any_stream.hpp"
 #include "daemon/serve/api.hpp"
@@ -44,6 +45,8 @@ struct Shared {
     /// Grows when certificates or the list of revoked ones change: who came in with TLS before has
     /// to show his certificate again.
     std::uint64_t certificates = 0;
+    /// Who is connected with a certificate, while he is.
+    std::vector<std::weak_ptr<const CertificateStatus>> clients = {};
 };
 
 /// Serves one connection until it ends. With TLS the role comes from the certificate, and a place

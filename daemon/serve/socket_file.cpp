@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
@@ -110,14 +111,44 @@ SocketFile::SocketFile(const std::string& path) : path_(path) {
     descriptor_ = listener.release();
 }
 
+SocketFile::SocketFile(SocketFile&& other) noexcept
+    : path_(std::exchange(other.path_, {})),
+      descriptor_(other.release()),
+      device_(other.device_),
+      inode_(other.inode_) {}
+
 SocketFile::~SocketFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
+    if (path_.empty()) return;
     struct stat found {};
     // Somebody may have removed the file and put another daemon's there: only our own is ours to
     // remove.
     if (::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ && found.st_ino == inode_) {
         ::unlink(path_.c_str());
     }
+}
+
+std::string SocketFile::problem() const {
+    struct stat found {};
+    if (::lstat(path_.c_str(), &found) != 0)
+        return errno == ENOENT || errno == ENOTDIR ? "was removed"
+                                                   : "cannot be looked at: " + text_of(errno);
+    if (found.st_dev != device_ || found.st_ino != inode_) return "was replaced";
+    const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    if (probe.get() < 0) return {};  // no descriptor left: that says nothing about the door
+    const sockaddr_un address = address_of(path_);
+    // EAGAIN: somebody listens, with a full queue.
+    if (::connect(probe.get(), generic(address), sizeof address) == 0 || errno == EAGAIN) return {};
+    return "takes no connection: " + text_of(errno);
+}
+
+void SocketFile::make_room(const std::string& path) {
+    std::error_code ignored;
+    if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
+        std::filesystem::create_directories(folder, ignored);
+    struct stat found {};
+    if (::lstat(path.c_str(), &found) == 0 && !S_ISSOCK(found.st_mode))
+        ::rename(path.c_str(), (path + ".found").c_str());
 }
 
 int SocketFile::release() noexcept { return std::exchange(descriptor_, -1); }

@@ -20,8 +20,16 @@ class SocketFile {
     /// Throws ServeError.
     explicit SocketFile(const std::string& path);
     ~SocketFile();
+    SocketFile(SocketFile&& other) noexcept;
+    SocketFile& operator=(SocketFile&&) = delete;
     SocketFile(const SocketFile&) = delete;
     SocketFile& operator=(const SocketFile&) = delete;
+
+    /// Why nobody finds this daemon by that name; empty: a connection of one's own leads here.
+    [[nodiscard]] std::string problem() const;
+    /// Before one is made anew: the folder if it is gone, and what is no socket out of the way, as
+    /// PATH.found.
+    static void make_room(const std::string& path);
 
     /// The listening descriptor; the caller closes it from now on.
     [[nodiscard]] int release() noexcept;

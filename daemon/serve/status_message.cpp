@@ -87,6 +87,25 @@ void fill(v1::Log& out, const LogStatus& log) {
     out.set_blocked(log.blocked);
 }
 
+void fill(v1::Server& out, const ServerStatus& server, std::int64_t utc_ns) {
+    for (const ServerStatus::Door& door : server.doors) {
+        v1::Server::Door& to = *out.add_doors();
+        to.set_name(door.name);
+        to.set_address(mend_utf8(door.address));
+        to.set_open(door.open);
+        to.set_note(mend_utf8(door.note));
+        to.set_made_anew(door.made_anew);
+    }
+    for (const CertificateStatus& certificate : server.certificates) {
+        constexpr double kDay = 86'400;  // s
+        v1::Server::Certificate& to = *out.add_certificates();
+        to.set_whose(mend_utf8(certificate.whose));
+        set_time(*to.mutable_expires(), certificate.expires * drivers::kSecond);
+        to.set_days_left((static_cast<double>(certificate.expires) - drivers::to_seconds(utc_ns)) /
+                         kDay);
+    }
+}
+
 void fill(v1::Recorder& out, const RecorderStatus& recorder) {
     out.set_folder(mend_utf8(recorder.folder));
     out.set_file(mend_utf8(recorder.file));
@@ -165,6 +184,8 @@ void fill(v1::Interlock& out, const InterlockStatus& status) {
         to.set_condition(row.condition);
         to.set_reaction(row.reaction);
         if (row.has_limit) set(to, &v1::Interlock::Row::set_limit, row.limit);
+        set(to, &v1::Interlock::Row::set_present, row.present);
+        set(to, &v1::Interlock::Row::set_margin, row.margin());
         to.set_unit(row.unit);
         to.set_dwell_s(row.dwell_s);
         to.set_latched(row.latched);
@@ -516,6 +537,7 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_noise(), status.noise);
     fill(*out.mutable_mqtt(), status.mqtt);
     fill(*out.mutable_log(), status.log);
+    fill(*out.mutable_server(), status.server, status.utc_ns);
     fill(*out.mutable_frame(), status.frame);
     fill(*out.mutable_real_time(), status.real_time);
     v1::Latency& latency = *out.mutable_acquisition_latency();

@@ -16,12 +16,17 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <random>
 #include <thread>
 #include <utility>
+#include <vector>
 
+#include "daemon/serve/command_queue.hpp"
+#include "daemon/serve/expiry_watch.hpp"
 #include "daemon/serve/session.hpp"
 #include "daemon/serve/tcp_listener.hpp"
 #include "daemon/serve/tls.hpp"
@@ -36,6 +41,8 @@ using boost::system::error_code;
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 constexpr auto kCertificateLook = std::chrono::seconds(1);
 constexpr auto kLife = std::chrono::milliseconds(500);
+constexpr auto kDoorLook = std::chrono::seconds(1);
+constexpr std::array<const char*, 4> kDoorNames{"control", "status", "page", "remote"};
 
 /// Changes whenever one of the files does.
 std::string stamp_of(const ServerSettings& settings) {
@@ -86,24 +93,28 @@ struct StatusServer::Impl {
             acceptor.assign(protocol, descriptor);
         }
         Door door;
+        std::optional<SocketFile> file;  ///< of a Unix socket
+        ServerStatus::Door told;
         asio::basic_socket_acceptor<Protocol> acceptor;
         asio::steady_timer pause;
     };
 
     Impl(StatusSource& from, const ServerSettings& given)
-        : settings(given), source(from), api(from, random_instance()) {
+        : settings(given),
+          source(from),
+          api(from, random_instance(),
+              [this](CommandRequest request, std::function<void(CommandReply)> done) {
+                  return carry_out(std::move(request), std::move(done));
+              }) {
         if (!settings.operator_group.empty()) operators = group_named(settings.operator_group);
         open_unix(Door::control, settings.socket);
-        if (operators && ::chown(settings.socket.c_str(), static_cast<uid_t>(-1), *operators) != 0)
-            throw ServeError("server.operator_group: cannot give " + settings.socket +
-                             " to group '" + settings.operator_group +
-                             "': " + std::strerror(errno));
         if (!settings.status_socket.empty()) open_unix(Door::status, settings.status_socket);
         if (!settings.page.empty())
             page = open_tcp(Door::page, listen_tcp("server.page", settings.page, true));
         if (!settings.remote.empty()) {
             certificates_seen = stamp_of(settings);
             tls.emplace(read_certificates());
+            read_ends();
             look_at_certificates();
             remote = open_tcp(Door::remote, listen_tcp("server.remote", settings.remote, false));
         }
@@ -111,7 +122,10 @@ struct StatusServer::Impl {
 
     void answer() {
         for (Listener& listener : listeners) accept(listener);
+        commands.emplace(source);
+        api.history().expect(source.plan());
         show_life();
+        look_at_doors();
         // Signals are for the main thread.
         sigset_t all, before;
         sigfillset(&all);
@@ -126,26 +140,129 @@ struct StatusServer::Impl {
     ~Impl() {
         io.stop();
         if (thread.joinable()) thread.join();
+        commands.reset();
     }
 
-    void open_unix(Door door, const std::string& path) {
-        files.emplace_back(path);
-        listeners.emplace_back(io, door, Protocol(AF_UNIX, 0), files.back().release());
+    /// Throws ServeError.
+    [[nodiscard]] SocketFile make_socket(Door door, const std::string& path) const {
+        SocketFile file(path);
+        if (door == Door::control && operators &&
+            ::chown(path.c_str(), static_cast<uid_t>(-1), *operators) != 0)
+            throw ServeError("server.operator_group: cannot give " + path + " to group '" +
+                             settings.operator_group + "': " + std::strerror(errno));
+        return file;
     }
+    void open_unix(Door door, const std::string& path) {
+        SocketFile file = make_socket(door, path);
+        Listener& made = listeners.emplace_back(io, door, Protocol(AF_UNIX, 0), file.release());
+        made.file.emplace(std::move(file));
+        made.told.address = path;
+    }
+
+    /// A stop goes past all that waits; the rest must not hold up who comes next.
+    bool carry_out(CommandRequest request, std::function<void(CommandReply)> done) {
+        if (request.kind == CommandRequest::Kind::abort) {
+            commands->refuse_waiting("a stop came before it");
+            done(source.command(request));
+            return true;
+        }
+        return commands->put(
+            std::move(request), [this, done = std::move(done)](CommandReply reply) mutable {
+                // With `done` goes the last of its session: it ends on the server's thread.
+                asio::post(io, [done = std::move(done), reply = std::move(reply)]() mutable {
+                    done(std::move(reply));
+                });
+            });
+    }
+
+    /// A door that nobody finds is no door: whoever removed it, it is made anew.
+    void look_at_doors() {
+        for (Listener& listener : listeners)
+            if (listener.file) look_at(listener);
+        door_look.expires_after(kDoorLook);
+        door_look.async_wait([this](error_code error) {
+            if (!error) look_at_doors();
+        });
+    }
+    void look_at(Listener& listener) {
+        ServerStatus::Door& told = listener.told;
+        const std::string wrong = listener.file->problem();
+        if (wrong.empty()) {
+            told.open = true;
+            told.note.clear();
+            return;
+        }
+        const std::string door = std::string(kDoorNames[static_cast<std::size_t>(listener.door)]) +
+                                 " socket " + told.address;
+        try {
+            SocketFile::make_room(told.address);
+            SocketFile fresh = make_socket(listener.door, told.address);
+            error_code ignored;
+            listener.acceptor.close(ignored);
+            listener.acceptor.assign(Protocol(AF_UNIX, 0), fresh.release());
+            listener.file.emplace(std::move(fresh));
+            accept(listener);
+            source.told(Severity::alarm, told.open ? door + ' ' + wrong + ": made anew"
+                                                   : door + ": made anew at last");
+            told.open = true;
+            told.note.clear();
+            ++told.made_anew;
+        } catch (const std::exception& error) {
+            if (told.open || told.note != error.what())
+                source.told(Severity::alarm, door + (told.open ? ' ' + wrong : "") +
+                                                 " and cannot be made anew: " + error.what());
+            told.open = false;
+            told.note = error.what();
+        }
+    }
+
     std::string open_tcp(Door door, const TcpListener& opened) {
         const bool v6 = opened.address.front() == '[';
-        listeners.emplace_back(io, door, Protocol(v6 ? AF_INET6 : AF_INET, IPPROTO_TCP),
-                               opened.descriptor);
+        listeners
+            .emplace_back(io, door, Protocol(v6 ? AF_INET6 : AF_INET, IPPROTO_TCP),
+                          opened.descriptor)
+            .told.address = (door == Door::remote ? "https://" : "http://") + opened.address + '/';
         return opened.address;
     }
 
     [[nodiscard]] asio::ssl::context read_certificates() const {
         return mutual_tls(settings.certificate, settings.key, settings.clients_ca, true,
-                          settings.revoked);
+                          settings.revoked, true);
+    }
+
+    /// Throws ServeError.
+    void read_ends() {
+        own_ends = {{"server", expiry_of(settings.certificate, true), true},
+                    {"authority", expiry_of(settings.clients_ca, false), true}};
+    }
+
+    [[nodiscard]] ServerStatus look_around() {
+        ServerStatus status;
+        for (const Listener& listener : listeners) {
+            status.doors.push_back(listener.told);
+            status.doors.back().name = kDoorNames[static_cast<std::size_t>(listener.door)];
+        }
+        status.certificates = own_ends;
+        std::erase_if(shared.clients, [](const auto& client) { return client.expired(); });
+        for (const auto& client : shared.clients) {
+            const auto one = client.lock();
+            const auto same = [&one](const auto& known) { return known.whose == one->whose; };
+            if (one && std::ranges::none_of(status.certificates, same))
+                status.certificates.push_back(*one);
+        }
+        return status;
     }
 
     void show_life() {
-        source.serving();
+        const ServerStatus status = look_around();
+        api.history().add(source.serving(status));
+        const auto now = static_cast<std::int64_t>(std::time(nullptr));
+        for (const auto& certificate : status.certificates) {
+            const auto words = expiry_watch.look(
+                (certificate.own ? "certificate of the " : "") + certificate.whose,
+                certificate.expires, now);
+            if (!words.empty()) source.told(Severity::alarm, words);
+        }
         life.expires_after(kLife);
         life.async_wait([this](error_code error) {
             if (!error) show_life();
@@ -161,6 +278,7 @@ struct StatusServer::Impl {
                 certificates_seen = std::move(stamp);
                 try {
                     tls.emplace(read_certificates());
+                    read_ends();
                     ++shared.certificates;
                 } catch (const ServeError& wrong) {
                     source.refused("server", "changed certificates", wrong.what());
@@ -189,6 +307,9 @@ struct StatusServer::Impl {
     }
 
     void welcome(Door door, AnyStream::Socket socket) {
+        // Gone again without a word, as look_at() is.
+        char nothing = 0;
+        if (::recv(socket.native_handle(), &nothing, 1, MSG_PEEK | MSG_DONTWAIT) == 0) return;
         Caller caller;
         if (door == Door::control || door == Door::status) {
             ucred peer{};
@@ -227,8 +348,7 @@ struct StatusServer::Impl {
     const ServerSettings settings;
     StatusSource& source;
     std::optional<gid_t> operators;
-    // Outlive the io_context, whose end destroys the waiting sessions.
-    std::deque<SocketFile> files;
+    // Outlives the io_context, whose end destroys the waiting sessions.
     Api api;
     Shared shared{api, settings.limits};
     std::array<Places, 4> places{{{"the control socket", settings.limits.connections},
@@ -240,8 +360,12 @@ struct StatusServer::Impl {
     asio::io_context io{1};
     asio::steady_timer life{io};
     asio::steady_timer certificate_look{io};
+    asio::steady_timer door_look{io};
     std::string certificates_seen;
+    std::vector<CertificateStatus> own_ends;
+    ExpiryWatch expiry_watch;
     std::deque<Listener> listeners;
+    std::optional<CommandQueue> commands;  ///< since somebody answers them
     std::thread thread;
 };
 

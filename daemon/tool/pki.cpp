@@ -160,6 +160,9 @@ int revoke(const PkiOptions& options) {
 void add_pki(CLI::App& app, int& exit_code) {
     CLI::App& pki = *app.add_subcommand("pki", "Certificates for a daemon that is asked remotely");
     pki.require_subcommand(1);
+    pki.footer(
+        "Example: vibrig pki init --host rig.lab --operator ada --viewer wall\n"
+        "More: vibrig pki init --help, vibrig pki revoke --help");
     CLI::App& making =
         *pki.add_subcommand("init", "Make an authority, a server's certificate and people's");
     auto options = std::make_shared<PkiOptions>();

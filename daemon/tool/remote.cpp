@@ -44,7 +44,8 @@ struct TestOptions {
     bool json = false, emergency_stop = false;
 };
 
-constexpr int kRefused = 409;
+/// The daemon understands and says no: not now, not you, not so often. Remotely as locally.
+bool is_no(int status) { return status == 403 || status == 409 || status == 429; }
 
 std::string json_of(const v1::Command& command) {
     std::string json;
@@ -139,7 +140,7 @@ int self_test(const TestOptions& options) {
         const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
         if (begun.status != 200) {
             std::cerr << kWho << problem_of(begun) << '\n';
-            return begun.status == kRefused ? kNo : kBadInput;
+            return is_no(begun.status) ? kNo : kBadInput;
         }
         show_loop_check(client, before);
     }
@@ -198,7 +199,7 @@ int send_command(const CommandOptions& options) {
         return 0;
     }
     std::cerr << kWho << problem_of(reply) << '\n';
-    return reply.status == kRefused ? kNo : kBadInput;
+    return is_no(reply.status) ? kNo : kBadInput;
 }
 
 void add_socket(CLI::App& command, serve::Address& at) {
@@ -220,6 +221,7 @@ void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const ch
     CLI::App& command = *app.add_subcommand(name, help);
     auto options = std::make_shared<CommandOptions>();
     options->kind = kind;
+    options->at.expired_too = kind == v1::Command::abort;
     options->by = login_name();
     add_socket(command, options->at);
     command.add_option("--by", options->by, "Who commands; goes into the event log")

@@ -274,10 +274,17 @@ def upgrades(checks, rig, package):
     kept = (CONFIGURATION, os.path.join(DATA, "**", "result.json"), os.path.join(DATA, "**", "raw-*"),
             os.path.join(DATA, "**", "campaign.h5"))
     before, pid = digest(*kept), int(prop("MainPID"))
-    succeeds(checks, "the package upgrades while the daemon runs", "dpkg", "-i", package)
+    rig.wait_for(lambda s: stages.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted"), 30)
+    armed = rig.tool("arm", "--by", "tester")
+    checks.equal(armed.returncode, 0, "armed again")
+    status, said = output("dpkg", "-i", package, timeout=120)
+    checks.check(status == 0 and "takes the new one at its next rest" in said,
+                 "the package upgrades while the daemon is armed, and says that it is not restarted", said)
+    checks.equal((int(prop("MainPID")), rig.status()["campaign"]["state"]), (pid, "armed"), "it goes on, armed")
+    rig.tool("abort", "--by", "tester")
     checks.equal(output("dpkg-query", "-W", "-f", "${Version}", "vibrig")[1], VERSIONS[1], "to the new version")
     checks.check(wait_until(lambda: int(prop("MainPID")) not in (0, pid) and prop("ActiveState") == "active", 60),
-                 "the new program takes over", prop("ActiveState"))
+                 "at rest the new program takes over", prop("ActiveState"))
     checks.equal(prop("UnitFileState"), "enabled", "it stays enabled")
     after = digest(*kept)
     checks.check(len(before) > 3 and before == after, "configuration and recordings are kept",

@@ -9,6 +9,7 @@ import os
 import signal
 import socket
 import struct
+import subprocess
 import sys
 import tempfile
 import time
@@ -57,9 +58,9 @@ class Manager:
             pass
 
 
-def start_daemon(rig, manager):
+def start_daemon(rig, manager, **more):
     rig.daemon = r.Child("vibrigd", [rig.program("vibrigd"), "--config", rig.configuration], rig.folder,
-                         {"NOTIFY_SOCKET": manager.path, "WATCHDOG_USEC": "2000000"})
+                         {"NOTIFY_SOCKET": manager.path, "WATCHDOG_USEC": "2000000", **more})
 
 
 def shaker_state(rig, address=0):
@@ -147,6 +148,37 @@ def talks(checks, rig, manager):
     checks.equal(rig.daemon.end(timeout=30), 0, "and ends with status 0")
 
 
+def restarts_at_rest(checks, rig, manager):
+    """An upgrade leaves a file in the service's folder."""
+    request = os.path.join(rig.folder, "restart-when-at-rest")
+    start_daemon(rig, manager, RUNTIME_DIRECTORY=rig.folder)
+    rig.wait_for(lambda s: measuring(s) and s["shaker"].get("state") == 0, 20)
+    if rig.status()["campaign"]["state"] == "tripped":
+        rig.tool("ack", "trip", "--by", "tester")
+    rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
+    checks.equal(rig.tool("arm", "--by", "tester").returncode, 0, "upgrade: armed")
+    with open(request, "w", encoding="ascii"):
+        pass
+    checks.check(rig.wait_for(lambda s: "restart waits for rest: the campaign is armed" in rig.daemon.text(), 10) and
+                 rig.daemon.running(), "upgrade: while it is armed the restart waits, and says for what", rig.logs())
+    rig.tool("start", "--by", "tester")
+    status = rig.wait_for_state(("recording", "aborted", "tripped"), 60)
+    checks.equal(status["campaign"]["state"], "recording", "upgrade: the campaign goes on")
+    checks.check(rig.daemon.running() and os.path.exists(request), "upgrade: nor does it restart while the table shakes")
+    rig.tool("abort", "--by", "tester")
+    try:
+        checks.equal(rig.daemon.process.wait(timeout=30), 75, "upgrade: at rest it ends, to be started again")
+    except subprocess.TimeoutExpired:
+        checks.check(False, "upgrade: at rest it ends, to be started again", rig.logs())
+    checks.check(shaker_state(rig) in (0, 4) and not os.path.exists(request), "upgrade: the table rests, the request is gone")
+    with open(request, "w", encoding="ascii"):
+        pass
+    start_daemon(rig, manager, RUNTIME_DIRECTORY=rig.folder)
+    checks.check(rig.wait_for(measuring, 20) is not None and not os.path.exists(request),
+                 "upgrade: what was asked of the one before does not restart this one", rig.logs())
+    checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "upgrade: it ends cleanly")
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
@@ -158,6 +190,7 @@ def main():
             rig.be_punctual()
             rig.configure(CAMPAIGN, **{**r.PATIENT, "shaker": LINK})
             talks(checks, rig, manager)
+            restarts_at_rest(checks, rig, manager)
             for stage in STAGES:
                 blocked(checks, rig, manager, stage)
         finally:

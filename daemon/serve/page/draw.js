@@ -3,7 +3,8 @@
 const Draw = (() => {
   const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const byId = id => document.getElementById(id);
-  const charts = new Map();
+  const charts = new Map(), watched = new Set();
+  const sizes = new ResizeObserver(() => resize());   // the room of a chart is what the tables beside it leave
 
   function options(element, name) {
     const axis = {stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
@@ -18,6 +19,8 @@ const Draw = (() => {
         axes: [minutes, {...axis, size: 40}],
         series: [{}, none, none, none, none, line(1, {dash: [6, 4]}), line(0)],
         bands: [{series: [2, 1], fill: css('--alarm')}, {series: [4, 3], fill: css('--abort')}]};
+      case 'temperature': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [Math.min(lo, (lo + hi) / 2 - .5), Math.max(hi, (lo + hi) / 2 + .5)]}},
+        axes: [minutes, {...axis, size: 44}], series: [{}, line(0)]};
       case 'innovations': return {...sized, scales: {x: {time: false}}, axes: [minutes, {...axis, size: 44}],
         series: [{}, line(0, {width: 1}), line(1, {width: 1}), line(2, {width: 1})]};
       case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},
@@ -36,6 +39,7 @@ const Draw = (() => {
       element.textContent = '';
       plot = new uPlot(options(element, name), data, element);
       charts.set(name, plot);
+      if (!watched.has(element)) { watched.add(element); sizes.observe(element); }
     } else {
       plot.setData(data);
     }
@@ -48,7 +52,8 @@ const Draw = (() => {
   function resize() {
     for (const [name, plot] of charts) {
       const element = byId('c-' + name);
-      plot.setSize({width: element.clientWidth, height: element.clientHeight});
+      if (plot.width !== element.clientWidth || plot.height !== element.clientHeight)
+        plot.setSize({width: element.clientWidth, height: element.clientHeight});
     }
   }
 

@@ -2,8 +2,10 @@
 // Follows /api/v1/stream and shows what it says; loud when it says nothing.
 (() => {
   const {byId} = Draw;
-  const kKept = 1200, kStale_ms = 4000, kRate_hz = 2, kHidden_hz = 0.2, kEvents = 300;
+  const kKept = 2400, kStale_ms = 4000, kRate_hz = 2, kHidden_hz = 0.2, kEvents = 300;
   let direction = null, status = null, plan = null, targets = {}, role = 'viewer', instance = '', lastEvent = 0;
+  let known = '';   // whose history is here
+  let caughtUp = false;   // what happened before one came makes no noise
   let heard = performance.now(), socket = null, pause = 500, failing = false;
   const history = {t: [], rows: []};
 
@@ -68,17 +70,17 @@
     set('reason', c.reason || (c.resume_offer ? 'to be resumed: ' + c.resume_offer : ''));
     set('campaign', c.name + (c.armed_by ? ', armed by ' + c.armed_by : ', not armed'));
     document.querySelector('header').className = kBad.includes(c.state) ? 'bad' : kCalm.includes(c.state) ? 'good' : 'active';
-    const done = 100 * (c.progress || 0);
+    const done = 100 * (c.progress || 0), broken = kBad.includes(c.state);
     document.title = `${c.state.toUpperCase()} ${done.toFixed(0)} % – ${c.name}`;
     set('position', c.run > 0 ? `run ${c.run}/${c.runs}, position ${c.position}/${c.positions}` : 'no position');
-    set('left', `${done.toFixed(1)} %` + (c.remaining_s > 0 ? `, ${duration(c.remaining_s)} left` : ''));
+    set('left', `${done.toFixed(1)} %` + (broken ? ', interrupted' : c.remaining_s > 0 ? `, ${duration(c.remaining_s)} left` : ''));
     byId('progress').value = done;
-    stops(c);
+    stops(c, broken);
   }
-  function stops(c) {
+  function stops(c, broken) {
     const e = byId('stops'), all = plan ? plan.stops : [];
     const dwells = new Map((c.dwells || []).map(d => [d.run + '/' + d.position, d]));
-    const key = JSON.stringify([all.length, [...dwells].map(([k, d]) => k + d.flagged), c.run, c.position]);
+    const key = JSON.stringify([all.length, [...dwells].map(([k, d]) => k + d.flagged), c.run, c.position, broken]);
     if (e.dataset.key === key) return;
     e.dataset.key = key;
     e.textContent = '';
@@ -92,11 +94,12 @@
       }
       const li = document.createElement('li'), dwell = dwells.get(stop.run + '/' + stop.position);
       const now = stop.run === c.run && stop.position === c.position;
-      li.className = (dwell ? (dwell.flagged ? 'flagged' : 'done') : '') + (now ? ' now' : '');
+      const cut = now && broken;   // what it recorded before is no position done
+      li.className = (cut ? 'cut' : dwell ? (dwell.flagged ? 'flagged' : 'done') : '') + (now ? ' now' : '');
       li.textContent = stop.position;
       const a = stop.angles;
       li.title = `${a.outer_deg}, ${a.inner_deg}, ${a.azimuth_deg} deg` + (dwell && dwell.flagged ? ': ' + dwell.reason : '');
-      li.setAttribute('aria-label', `position ${stop.position}${dwell ? (dwell.flagged ? ', flagged' : ', done') : ''}${now ? ', now' : ''}`);
+      li.setAttribute('aria-label', `position ${stop.position}${cut ? ', interrupted' : dwell ? (dwell.flagged ? ', flagged' : ', done') : ''}${now && !cut ? ', now' : ''}`);
       e.append(li);
     }
   }
@@ -143,8 +146,33 @@
     const v = s.estimate.innovation || {}, n = x => (x === undefined ? null : x);
     history.t.push(t);
     history.rows.push([...band('alarm'), ...band('abort'), command, n(s.shaker.measured_g),
-      n(v.x_arcsec), n(v.y_arcsec), n(v.z_arcsec), ...worst.map(w => w || null)]);
-    if (history.t.length > kKept) { history.t.splice(0, kKept / 4); history.rows.splice(0, kKept / 4); }
+      n(v.x_arcsec), n(v.y_arcsec), n(v.z_arcsec), ...worst.map(w => w || null), n((s.platform || {}).temperature_c)]);
+    if (history.t.length > kKept) {   // every other one of the older half: the beginning stays
+      const thin = list => list.filter((_, i) => i > kKept / 2 || i % 2 === 0);
+      history.t = thin(history.t);
+      history.rows = thin(history.rows);
+    }
+  }
+  // What was before this page came: means of the steps, and of the innovations what was farthest from zero.
+  const kHistory = ['measured_g', 'command_g', 'innovation_x_arcsec', 'innovation_y_arcsec', 'innovation_z_arcsec',
+    'sigma_over_target_bias', 'sigma_over_target_linear', 'sigma_over_target_quadratic', 'temperature_c'];
+  async function getHistory() {
+    try {
+      const past = await (await fetch('/api/v1/history?channel=' + kHistory.join(','))).json();
+      const [measured, command, x, y, z, bias, linear, quadratic, temperature] = past.channels;
+      const farthest = c => c.max.map((most, i) => (most === null ? null : most > -c.min[i] ? most : c.min[i]));
+      const around = [x, y, z].map(farthest), rows = (status && status.interlock.rows || []).filter(r => r.condition === 'amplitude_off_command' && r.limit !== undefined);
+      const factor = reaction => { const row = rows.find(r => r.reaction === reaction); return row ? 10 ** (row.limit / 20) : null; };
+      const old = past.time_s.map((t, i) => [t, [...['alarm', 'abort'].flatMap(reaction => {
+        const f = factor(reaction), g = command.min[i];
+        return f && g > 0 ? [g / f, g * f] : [null, null];
+      }), command.mean[i], measured.mean[i], ...around.map(a => a[i]), ...[bias, linear, quadratic].map(c => c.mean[i] || null), temperature.mean[i]]])
+        .filter(([t]) => history.t.length === 0 || t < history.t[0]);
+      history.t.unshift(...old.map(([t]) => t));
+      history.rows.unshift(...old.map(([, row]) => row));
+      byId('c-amplitude').dataset.past = old.length;
+      show();
+    } catch { /* the stream tells when the link is lost */ }
   }
   const column = k => history.rows.map(r => r[k]);
   function charts(s) {
@@ -153,6 +181,7 @@
     Draw.chart('amplitude', [t, ...[0, 1, 2, 3, 4, 5].map(column)]);
     Draw.chart('innovations', [t, ...[6, 7, 8].map(column)]);
     Draw.chart('sigma', [t, ...[9, 10, 11].map(column), t.map(() => 1)]);
+    Draw.chart('temperature', [t, column(12)]);
     const e = s.estimate, c = s.campaign;
     set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
     set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`);
@@ -192,11 +221,10 @@
   function health(s) {
     list('channels', (s.clock_misfit ? [['bad', 'clock', s.clock_misfit]] : []).concat((s.sample.channels || []).map(c => {
       const kind = c.quality === 'unbound' ? 'off' : c.quality !== 'good' || c.age_s > 1 ? 'bad' : c.age_s > 0.2 ? 'warn' : '';
-      return [kind, c.name, `${c.quality}${c.value === undefined ? '' : ', ' + c.value.toFixed(4) + ' ' + c.unit}${c.age_s === undefined ? '' : ', ' + c.age_s.toFixed(2) + ' s'}`];
+      return [kind, Watch.person(c.name), [...(c.quality === 'good' ? [] : [c.quality]), ...(c.value === undefined ? [] : [`${c.value.toFixed(4)} ${c.unit}`]),
+        ...(c.age_s === undefined ? [] : [`${c.age_s.toFixed(2)} s ago`])].join(', ')];
     })));
     const i = s.interlock;
-    list('interlock', (i.rows || []).map(r => [r.raised ? (r.reaction === 'abort' ? 'bad' : 'warn') : '', r.name,
-      (r.raised ? 'RAISED' + (r.value === undefined ? '' : ` ${r.value.toPrecision(3)} ${r.unit}`).trimEnd() + ', ' : '') + r.reaction + (r.limit === undefined ? '' : ` at ${r.limit} ${r.unit}`)]));
     const a = s.assembler, stopped = (i.reaction_counts || []).reduce((n, c) => n + Number(c), 0);
     const dropped = number(s.can.kernel_dropped) + number(s.estimator_ring.dropped);
     table('links', [
@@ -219,6 +247,7 @@
     charts(status);
     Draw.coefficients(status.estimate.parameters || [], targets);
     health(status);
+    Watch.show(status);
   }
 
   function events(more) {
@@ -228,7 +257,9 @@
       const li = document.createElement('li'), time = document.createElement('time');
       li.className = event.severity;
       time.dateTime = event.utc;
-      time.textContent = new Date(event.utc).toLocaleTimeString();
+      time.textContent = Watch.clock(event.utc);
+      time.title = event.utc;
+      if (caughtUp) Watch.alarmed(event);
       li.append(time, `${event.source}: ${event.text}`);
       e.prepend(li);
     }
@@ -261,9 +292,13 @@
         role = message.role;
         stopButton();
         break;
-      case 'status': status = message.status; show(); break;
+      case 'status':
+        status = message.status;
+        show();
+        if (known !== instance) { known = instance; getHistory(); }   // once of each life of the daemon
+        break;
       case 'delta': merge(status, message.patch); show(); break;
-      case 'events': events(message.events); break;
+      case 'events': events(message.events); caughtUp = true; break;
     }
     state();
   }

@@ -66,6 +66,13 @@ TEST(Together, TheRigsClockNeedsASimulatedBusAndALoopbackShaker) {
         HasSubstr("a serial line"));
 }
 
+TEST(Together, APlatformSaysSomethingOfItself) {
+    const std::string silent =
+        "can.signals = { ready = \"\", loop_closed = \"\", gyros_at_speed = \"\", fault = \"\" }";
+    EXPECT_THAT(complaint(silent, true), HasSubstr("is never ready"));
+    EXPECT_EQ(complaint(silent, false), "") << "the daemon alone needs it";
+}
+
 TEST(Together, ThePageIsForThisMachineAlone) {
     for (const char* page : {"127.0.0.1:8979", "[::1]:0", "localhost:8979", "127.1.2.3:1"})
         EXPECT_EQ(complaint(std::string("server.page = \"") + page + "\"", true), "") << page;

@@ -393,6 +393,24 @@ TEST(AssemblerBindings, NameTheKeyTheValueAndWhatThereIs) {
     EXPECT_EQ(message_of([](auto&) {}), "no error");
 }
 
+TEST(AssemblerBindings, NameAllThatIsMissingAtOnce) {
+    AssemblerSettings settings;
+    settings.bindings.outer = "Angles.Alpha";
+    settings.bindings.fault = "State.Broken";
+    settings.bindings.accel_z_valid = "AccelerometerZ.Good";
+    try {
+        const SampleAssembler assembler(rig_dbc(), settings, {});
+        ADD_FAILURE() << "no error";
+    } catch (const BindingError& error) {
+        ASSERT_EQ(error.all().size(), 3u) << error.what();
+        EXPECT_EQ(error.all()[0].key(), "can.signals.outer");
+        EXPECT_EQ(error.all()[1].key(), "can.signals.accel_z_valid");
+        EXPECT_EQ(error.all()[2].key(), "can.signals.fault");
+        const std::string text = error.what();
+        EXPECT_EQ(std::ranges::count(text, '\n'), 2) << text;
+    }
+}
+
 TEST(AssemblerBindings, RefuseSettingsThatCannotWork) {
     for (const auto& spoil : std::vector<std::function<void(AssemblerSettings&)>>{
              [](auto& s) { s.open_samples = 0; }, [](auto& s) { s.open_samples = 65; },

@@ -94,9 +94,13 @@ TEST(LogQueue, EndsAlthoughNobodyReads) {
         LogQueue queue(pipe.ends[1], 10);
         for (int i = 0; i < 100; ++i) queue.put(std::string(1000, '.') + '\n');
         EXPECT_FALSE(queue.end(50ms)) << "it is told that not all is written";
+        EXPECT_LE(queue.counts().waiting, 1u) << "the line that the pipe has half of";
+        expect_balance(queue.counts());
     }
-    // and the thread that is left behind ends with its write
+    // and the thread that is left behind ends with its write; its descriptor's number is not given
+    // to anybody before
     pipe.close_reader();
+    std::this_thread::sleep_for(100ms);
 }
 
 TEST(LogQueue, CountsWhatADeadDescriptorRefuses) {

@@ -150,9 +150,6 @@ TEST_F(Access, BadCertificatesAreRefused) {
         const char* told;  ///< in the events
     };
     const std::vector<Row> bad{
-        {"expired",
-         make_identity({Use::client, "a", "admin", {}, hours(-48), hours(24)}, &authority),
-         "certificate has expired"},
         {"not yet valid", make_identity({Use::client, "a", "admin", {}, hours(24)}, &authority),
          "certificate is not yet valid"},
         {"of another authority with the same name",
@@ -218,6 +215,97 @@ TEST_F(Access, RevokedCertificatesAreRefusedAtOnce) {
     EXPECT_TRUE(told("a connection | somebody, from 127.0.0.1 | certificate revoked"));
     EXPECT_THROW((void)Client(remote("eve", eve)).get("/healthz"), ClientError);
     EXPECT_EQ(Client(remote("ada", ada)).get("/healthz").status, 200);
+}
+
+TEST_F(Access, OfAnExpiredCertificateAnAbortIsTakenAndNothingElse) {
+    const auto expired = [&](const char* name, const char* role) {
+        return make_identity({Use::client, name, role, {}, hours(-48), hours(24)}, &authority);
+    };
+    const Identity gone = expired("gone", "operator");
+    std::ofstream(folder.file("revoked.crl")) << revoke(gone.certificate, authority, "");
+    settings.revoked = folder.file("revoked.crl");
+    server.emplace(source, settings);
+    server->answer();
+    const Address ada = remote("ada", expired("ada", "operator"));
+    for (const std::string& kind : all_kinds()) {
+        const Reply reply = Client(ada).post("/api/v1/commands", body_for(kind));
+        EXPECT_EQ(reply.status, kind == "abort" ? 200 : 403) << kind << ' ' << reply.body;
+        if (kind != "abort") {
+            EXPECT_NE(reply.body.find("has expired"), std::string::npos);
+        }
+    }
+    for (const char* path : {"/api/v1/status", "/metrics", "/healthz", "/"})
+        EXPECT_EQ(Client(ada).get(path).status, 403) << path;
+    EXPECT_THROW(Client(ada).follow("/api/v1/stream", [](const std::string&) { return false; }),
+                 ClientError);
+    // Its audit says whose it was, and since when it is over.
+    ASSERT_EQ(source.requests().size(), 1u);
+    const std::string by = source.requests().front().by;
+    EXPECT_EQ(by.rfind("Ada (certificate ada, operator, expired 20", 0), 0u) << by;
+    EXPECT_NE(source.told_of().find("an abort is taken from an expired certificate"),
+              std::string::npos);
+    // One who never could, cannot now; a revoked one is nobody.
+    EXPECT_EQ(Client(remote("wall", expired("wall", "viewer")))
+                  .post("/api/v1/commands", body_for("abort"))
+                  .status,
+              403);
+    EXPECT_THROW((void)Client(remote("gone", gone)).post("/api/v1/commands", body_for("abort")),
+                 ClientError);
+    EXPECT_EQ(source.requests().size(), 1u);
+}
+
+TEST_F(Access, AnAbortGetsThroughWhenTheAuthorityAndTheServerHaveExpired) {
+    authority = make_identity({Use::authority, "authority", "", {}, hours(-48), hours(24)});
+    save("authority", authority);
+    save("server",
+         make_identity({Use::server, "rig", "", {"127.0.0.1"}, hours(-48), hours(24)}, &authority));
+    server.emplace(source, settings);
+    server->answer();
+    Address ada = remote("ada", person("operator"));
+    EXPECT_THROW((void)Client(ada).get("/healthz"), ClientError);
+    ada.expired_too = true;
+    EXPECT_EQ(Client(ada).post("/api/v1/commands", body_for("abort")).status, 200);
+    EXPECT_EQ(Client(ada).post("/api/v1/commands", body_for("arm")).status, 403);
+    EXPECT_EQ(source.requests().size(), 1u);
+    // and it is told
+    for (int i = 0; i < 500 && source.told_of().find("authority") == std::string::npos; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_NE(source.told_of().find("certificate of the server has expired"), std::string::npos);
+    EXPECT_NE(source.told_of().find("certificate of the authority has expired"), std::string::npos);
+}
+
+TEST_F(Access, AConnectionLivesNoLongerThanItsCertificate) {
+    server.emplace(source, settings);
+    server->answer();
+    const auto ends_soon = [&](const char* name) {
+        return make_identity(
+            {Use::client, name, "operator", {}, hours(-1), hours(1) + std::chrono::seconds(4)},
+            &authority);
+    };
+    // GIVEN one who streams and one who asks, with certificates that end in 4 s
+    const Address eve = remote("eve", ends_soon("eve"));
+    Client of_ada(remote("ada", ends_soon("ada")));
+    EXPECT_EQ(of_ada.get("/healthz").status, 200);
+    std::thread streaming([&] {
+        EXPECT_THROW(
+            Client(eve).follow("/api/v1/stream?rate_hz=1", [](const std::string&) { return true; }),
+            ClientError)
+            << "the stream ends by itself";
+    });
+    // While they are there, the status says when they have to go.
+    const auto listed = [&](const char* who) {
+        for (const auto& certificate : source.server().certificates)
+            if (certificate.whose.find(who) != std::string::npos) return true;
+        return false;
+    };
+    for (int i = 0; i < 300 && !(listed("ada") && listed("eve")); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(listed("ada") && listed("eve"));
+    streaming.join();
+    // THEN what is asked on the old connection is asked with an expired certificate
+    EXPECT_EQ(of_ada.get("/healthz").status, 403);
+    EXPECT_EQ(of_ada.post("/api/v1/commands", body_for("arm")).status, 403);
+    EXPECT_EQ(of_ada.post("/api/v1/commands", body_for("abort")).status, 200);
 }
 
 TEST_F(Access, OnlyTheAuthoritysOwnCertificatesAreRevokedAndOnce) {

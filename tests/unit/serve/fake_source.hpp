@@ -4,6 +4,7 @@
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "daemon/serve/event_log.hpp"
@@ -37,11 +38,31 @@ class FakeSource : public StatusSource {
         return "can.interface = vcan0\n";
     }
     CommandReply command(const CommandRequest& request) override {
+        if (request.kind == slow_kind) ++asked_to_arm;
+        if (request.kind == slow_kind)
+            while (slow) std::this_thread::sleep_for(std::chrono::milliseconds(1));
         const std::lock_guard lock(mutex_);
         requests_.push_back(request);
         return reply_;
     }
 
+    void told(Severity severity, const std::string& text) override {
+        const std::lock_guard lock(mutex_);
+        told_ += std::string(name_of(severity)) + ": " + text + '\n';
+    }
+    [[nodiscard]] std::string told_of() const {
+        const std::lock_guard lock(mutex_);
+        return told_;
+    }
+    StatusData serving(const ServerStatus& server) override {
+        const std::lock_guard lock(mutex_);
+        server_ = server;
+        return status_;
+    }
+    [[nodiscard]] ServerStatus server() const {
+        const std::lock_guard lock(mutex_);
+        return server_;
+    }
     void refused(const std::string& who, const std::string& what, const std::string& why) override {
         const std::lock_guard lock(mutex_);
         refusals_.push_back(what + " | " + who + " | " + why);
@@ -66,6 +87,10 @@ class FakeSource : public StatusSource {
 
     EventLog log;
     std::atomic<bool> broken = false;
+    /// An arming is answered when `slow` is over.
+    std::atomic<bool> slow = false;
+    static constexpr auto slow_kind = CommandRequest::Kind::arm;
+    std::atomic<int> asked_to_arm = 0;
 
   private:
     mutable std::mutex mutex_;
@@ -73,6 +98,8 @@ class FakeSource : public StatusSource {
     CommandReply reply_{true, "done"};
     std::vector<CommandRequest> requests_;
     std::vector<std::string> refusals_;
+    std::string told_;
+    ServerStatus server_;
 };
 
 }  // namespace vibrig::serve

@@ -98,6 +98,8 @@ StatusData full_status() {
         "out of band", "Ada", "transmission", {{"transmission", "1", 0.5, 0.6, 0.7, true}}};
     s.latency.add(150'000);
     s.mqtt = {"broker.lab:8883", true, "no route to host", 101, 102, 103, 104};
+    s.server = {{{"control", "/run/vibrig/vibrigd.sock", true, "gone", 131}},
+                {{"server", 1'800'000'000, true}}};
     s.log = {121, 122, 123, 124, true};
     s.real_time = {
         {{"acquisition", 60, "0-1", 111, 112, 113, 1.5}, {"estimator", 0, "1", 114, 115, 116, 2.5}},
@@ -108,7 +110,7 @@ StatusData full_status() {
     s.interlock.latches = {
         {"emergency_stop", "chain open", "Ada", "Grace", true, 1'700'000'000'000'000'000}};
     s.interlock.rows = {{"amplitude_abort", "amplitude_off_command", "abort", "dB", 1, 0.5, true,
-                         true, true, 1.25}};
+                         true, true, 1.25, 2, true}};
     s.interlock.reaction_bounds_ms = {0.1, 1};
     s.interlock.reaction_counts = {1, 2, 3};
     s.interlock.reaction_largest_ms = 0.75;

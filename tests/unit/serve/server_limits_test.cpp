@@ -140,10 +140,15 @@ TEST_F(ServerLimitsTest, TurnAwayOneConnectionTooMany) {
     // WHEN one more comes, THEN it is told so
     for (int i = 0; i < 10; ++i) {
         const RawConnection extra(path);
+        extra.send(kHealth);
         const std::string answer = extra.until_closed();
         EXPECT_EQ(status_of(answer), 503) << answer;
         EXPECT_NE(answer.find("64 connections"), std::string::npos);
     }
+    // but with a stop, which is never one too many
+    EXPECT_EQ(status_of(post(path, "/api/v1/commands", R"({"kind":"arm","by":"Ada"})")), 503);
+    EXPECT_EQ(status_of(post(path, "/api/v1/commands", R"({"kind":"abort","by":"Ada"})")), 200);
+    EXPECT_EQ(source.requests().size(), 1u);
     // and those who have a place keep it
     for (RawConnection& connection : taken) {
         connection.send(kHealth);

@@ -170,6 +170,9 @@ TEST(Readiness, NamesWhatIsNotWell) {
     well.sample.quality.fill(drivers::Quality::good);
     well.time = well.sample.time = well.platform.time = drivers::kSecond;
     well.platform.ready = true;
+    well.loop_check.verdict = "in band";
+    well.utc_ns = 1'700'000'000 * drivers::kSecond;
+    well.server = {{{"control", "/s", true, "", 0}}, {{"server", 1'700'000'001, true}}};
     EXPECT_TRUE(readiness(well).ready()) << readiness(well).failures();
     struct Row {
         const char* words;
@@ -212,6 +215,14 @@ TEST(Readiness, NamesWhatIsNotWell) {
              Row{"sample rate: 80 is not 40",
                  [](StatusData& s) { s.rate_misfit = "80 is not 40"; }},
              Row{"platform: not ready", [](StatusData& s) { s.platform.ready = false; }},
+             Row{"loop check: none yet", [](StatusData& s) { s.loop_check = {}; }},
+             Row{"doors: control: another vibrigd answers",
+                 [](StatusData& s) {
+                     s.server.doors[0].open = false;
+                     s.server.doors[0].note = "another vibrigd answers";
+                 }},
+             Row{"certificates: server EXPIRED 2023-11-14",
+                 [](StatusData& s) { s.server.certificates[0].expires = 1'700'000'000; }},
              Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
              Row{"journal: disk full",
                  [](StatusData& s) { s.journal = {"j", false, "disk full", 0, 0, 0}; }},
@@ -267,6 +278,12 @@ TEST(Metrics, CarryWhatIsValidAndAddUp) {
         text, "vibrig_thread_page_faults_total{kind=\"major\",thread=\"acquisition\"} 111\n"));
     EXPECT_TRUE(holds(text, "vibrig_thread_fifo_priority{thread=\"acquisition\"} 60\n"));
     EXPECT_TRUE(holds(text, "vibrig_memory_locked 1\n"));
+    EXPECT_TRUE(holds(text, "vibrig_door_made_anew_total{door=\"control\"} 131\n"));
+    EXPECT_TRUE(
+        holds(text, "vibrig_certificate_expiry_timestamp_seconds{whose=\"server\"} 1800000000\n"));
+    EXPECT_TRUE(holds(text, "vibrig_log_lines_total{outcome=\"dropped\"} 123\n"));
+    EXPECT_TRUE(holds(text, "vibrig_interlock_value{name=\"amplitude_abort\",unit=\"dB\"} 2\n"));
+    EXPECT_TRUE(holds(text, "vibrig_interlock_margin_ratio{name=\"amplitude_abort\"} 0.5\n"));
     EXPECT_FALSE(holds(text, "nan") || holds(text, "Nan")) << text;
     status.shaker.valid = false;
     EXPECT_FALSE(holds(metrics_text(status, {}), "vibrig_shaker_measured"));

@@ -1,0 +1,43 @@
+#include "daemon/serve/expiry_watch.hpp"
+
+#include <array>
+#include <ctime>
+
+namespace vibrig::serve {
+namespace {
+
+constexpr std::int64_t kDay_s = 86'400;  // s
+
+int stage_of(std::int64_t left) {
+    return left <= 0 ? 3 : left <= 7 * kDay_s ? 2 : left <= 30 * kDay_s ? 1 : 0;
+}
+
+}  // namespace
+
+std::string date_of(std::int64_t utc_s) {
+    const std::time_t time = utc_s;
+    std::tm parts{};
+    std::array<char, 32> text{};
+    if (gmtime_r(&time, &parts) == nullptr ||
+        std::strftime(text.data(), text.size(), "%Y-%m-%d", &parts) == 0)
+        return "?";
+    return text.data();
+}
+
+std::string ExpiryWatch::look(const std::string& whose, std::int64_t expires, std::int64_t now) {
+    if (told_.size() >= kMostKnown && told_.find(whose) == told_.end()) told_.clear();
+    auto& [known, told] = told_[whose];
+    if (known != expires) told = 0;  // a renewed one
+    known = expires;
+    const int stage = stage_of(expires - now);
+    if (stage <= told) return {};
+    told = stage;
+    const std::string date = date_of(expires);
+    if (stage == 3) return whose + " has expired on " + date + ": renew it with `vibrig pki init`";
+    const std::int64_t days = (expires - now) / kDay_s;
+    return whose + " expires in " +
+           (days < 1 ? "less than a day" : std::to_string(days) + (days == 1 ? " day" : " days")) +
+           ", on " + date + ": renew it with `vibrig pki init`";
+}
+
+}  // namespace vibrig::serve
