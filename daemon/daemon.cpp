@@ -147,7 +147,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                to_write_ = complete ? ToWrite::complete : ToWrite::partial;
                noise_monitor_.report();
            },
-           [this](Severity severity, const std::string& text) { log(severity, "campaign", text); },
+           [this](Severity severity, const std::string& text) { tell_campaign(severity, text); },
            [this](const std::array<double, 3>& here_deg, double elapsed_s) {
                return next_dwell(here_deg, elapsed_s);
            },
@@ -261,6 +261,13 @@ void Daemon::start() {
     open_journal();
     if (recorder_) recorder_->start();
     if (pre_trip_) pre_trip_->start();
+    annunciator_ = std::make_unique<drivers::Annunciator>(
+        configuration_.annunciator, [this](bool good, const std::string& text) {
+            log(good ? Severity::info : Severity::alarm, "annunciator", text);
+        });
+    if (!configuration_.guard_socket.empty())
+        guard_link_ = std::make_unique<watch::GuardLink>(configuration_.guard_socket,
+                                                         [this] { return word_for_guard(); });
     // A daemon that died may have left it running inside the watchdog's time.
     shaker_->stop_now();
     shaker_->on_reading([this] {
@@ -282,6 +289,7 @@ void Daemon::start() {
                    });
     start_threads();
     if (publisher_) publisher_->start();
+    if (guard_link_) guard_link_->start();
 }
 
 void Daemon::shut_down() noexcept {
@@ -297,6 +305,7 @@ bool Daemon::wait_for_end(double wall_seconds) {
 
 void Daemon::join() {
     if (publisher_) publisher_->stop();
+    if (guard_link_) guard_link_->stop();
     give_up_.store(true);
     control_waiter_->notify();
     if (control_thread_.joinable()) control_thread_.join();
@@ -355,11 +364,15 @@ void Daemon::take_commands(Time now) {
         }
         std::string overdue;
         if (waiting.request.kind == CommandRequest::Kind::arm) overdue = tell_overdue();
-        const auto unknown = unknown_to_acknowledge(waiting.request);
-        auto reply = unknown.empty() ? campaign_.command(waiting.request, now)
-                                     : CommandReply{false, unknown};
+        auto why_not = unknown_to_acknowledge(waiting.request);
+        if (why_not.empty()) why_not = guard_refuses(waiting.request);
+        auto reply = why_not.empty() ? campaign_.command(waiting.request, now)
+                                     : CommandReply{false, why_not};
         if (reply.accepted) reply.message += overdue;
         if (reply.accepted && waiting.request.kind == CommandRequest::Kind::acknowledge) {
+            // First what would trip it again.
+            if (guard_link_) guard_link_->acknowledge(guard_link_->word().finding);
+            watch_outside();
             interlock_.acknowledge(handled);
         }
         if (journal_) {
@@ -421,6 +434,7 @@ void Daemon::control_loop() {
         if (recorder_) tell_recorder();
         watch_onlookers();
         tell_log();
+        watch_outside();
         interlock_.filter(excitation_.load() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
@@ -432,6 +446,8 @@ void Daemon::control_loop() {
             const std::lock_guard lock(mutex_);
             campaign_.fill(campaign_status_, now);
             campaign_status_.noise = noise_monitor_.status();
+            armed_.store(!campaign_status_.armed_by.empty());
+            armed_g_.store(highest_level());
             done = campaign_.done(now);
             if (done) break;
         }
@@ -484,33 +500,6 @@ void Daemon::write_result_file(const std::string& text, bool complete) {
     }
 }
 
-void Daemon::check_balance(Time now) {
-    if (now - balance_checked_ < drivers::kSecond) return;
-    balance_checked_ = now;
-    const auto a = acquisition_.view();
-    const auto e = estimator_stage_.view();
-    std::string found;
-    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
-        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
-    };
-    equal("frames received", a.port.received,
-          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
-    equal("frames delivered", a.port.delivered,
-          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
-    equal("frames for samples", a.assembler.received,
-          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
-              a.assembler.wrong_length);
-    equal("samples offered", a.samples_offered, a.assembler.samples);
-    equal("samples taken", e.taken, e.in_dwell + e.idle);
-    if (log_queue_ != nullptr) {
-        const auto lines = log_queue_->counts();
-        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
-    }
-    if (!found.empty() && imbalance_.empty())
-        log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
-    imbalance_ = found;
-}
-
 StatusData Daemon::status() const {
     StatusData status;
     {
@@ -559,6 +548,8 @@ StatusData Daemon::status() const {
         const auto lines = log_queue_->counts();
         status.log = {lines.taken, lines.written, lines.dropped, lines.waiting, lines.blocked};
     }
+    if (guard_link_) status.guard = guard_link_->status();
+    if (annunciator_) status.annunciator = annunciator_->status();
     return status;
 }
 

@@ -56,9 +56,10 @@ std::string Daemon::result_configuration() const {
     for (const auto& value : loaded_.effective) {
         const auto section = value.key.substr(0, value.key.find('.'));
         if (section == "server" || section == "log" || section == "threads" ||
-            section == "journal" || section == "mqtt" || section == "clock" ||
-            section == "record" || section == "unit" || section == "instrument" ||
-            section == "selftest" || section == "commission" || value.key == "campaign.results")
+            section == "journal" || section == "mqtt" || section == "clock" || section == "guard" ||
+            section == "annunciator" || section == "record" || section == "unit" ||
+            section == "instrument" || section == "selftest" || section == "commission" ||
+            value.key == "campaign.results")
             continue;
         text += value.key + " = " + value.value + "\n";
     }
@@ -106,6 +107,7 @@ std::unique_ptr<record::PreTrip> Daemon::make_pre_trip() {
 void Daemon::on_trip(const rt::Tripped& tripped, Time now) {
     const std::string text = interlock_.text_of(tripped);
     campaign_.on_trip(text, now);
+    annunciator_->announce(drivers::HornPattern::abort, text);
     if (!pre_trip_) return;
     const auto utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                             std::chrono::system_clock::now().time_since_epoch())
@@ -209,14 +211,17 @@ void Daemon::tell_alarms() {
         if (!row.raised) {
             log(Severity::info, "interlock", fmt::format("{}: over", row.rule->name));
         } else if (condition.has_limit()) {
-            log(Severity::alarm, "interlock",
-                fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
-                            row.value, row.rule->limit, condition.unit));
+            raise_alarm(fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name,
+                                    condition.text, row.value, row.rule->limit, condition.unit));
         } else {
-            log(Severity::alarm, "interlock",
-                fmt::format("{}: {}", row.rule->name, condition.text));
+            raise_alarm(fmt::format("{}: {}", row.rule->name, condition.text));
         }
     }
+}
+
+void Daemon::raise_alarm(const std::string& text) {
+    log(Severity::alarm, "interlock", text);
+    annunciator_->announce(drivers::HornPattern::alarm, text);
 }
 
 void Daemon::tell_controller() {
@@ -281,6 +286,33 @@ void Daemon::tell_journal() {
     if (std::exchange(journal_was_running_, status.running) == status.running) return;
     log(status.running ? Severity::info : Severity::alarm, "journal",
         status.running ? "writes again" : "entries wait: " + status.note);
+}
+
+void Daemon::check_balance(Time now) {
+    if (now - balance_checked_ < drivers::kSecond) return;
+    balance_checked_ = now;
+    const auto a = acquisition_.view();
+    const auto e = estimator_stage_.view();
+    std::string found;
+    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
+        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
+    };
+    equal("frames received", a.port.received,
+          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
+    equal("frames delivered", a.port.delivered,
+          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
+    equal("frames for samples", a.assembler.received,
+          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
+              a.assembler.wrong_length);
+    equal("samples offered", a.samples_offered, a.assembler.samples);
+    equal("samples taken", e.taken, e.in_dwell + e.idle);
+    if (log_queue_ != nullptr) {
+        const auto lines = log_queue_->counts();
+        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
+    }
+    if (!found.empty() && imbalance_.empty())
+        log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
+    imbalance_ = found;
 }
 
 InterlockStatus Daemon::interlock_status() const {
