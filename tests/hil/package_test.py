@@ -237,6 +237,7 @@ def is_guarded(checks, rig):
     status = rig.wait_for(watches, 30)
     checks.check(status is not None and watches(status), "and it watches again", status and status.get("guard"))
     output("systemctl", "disable", "--now", GUARD)
+    rig.wait_for(lambda s: not s["guard"].get("heard"), 20)
     checks.equal(rig.tool("arm", "--by", "tester").returncode, 1, "without it nothing is armed")
     configure(rig)
     output("systemctl", "restart", UNIT)
