@@ -179,7 +179,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
            [this](const rt::Ramp& ramp) { interlock_.ramp(ramp); },
            [this](double measured) { interlock_.transmission(measured); },
            [this](Time now) { return rest_.rest(now); },
-           [this](bool disobeyed) { interlock_.stop_disobeyed(disobeyed); },
+           [this](bool disobeyed) { on_disobeyed(disobeyed); },
            [this](campaign::Proving what) {
                starving_.store(what == campaign::Proving::watchdog);
                interlock_.proving(what != campaign::Proving::nothing);

@@ -114,6 +114,7 @@ class Daemon final : public StatusSource {
     /// Of what is armed, peak at the table; 0: nothing is.
     [[nodiscard]] double highest_level() const;
     void tell_campaign(Severity severity, const std::string& text);
+    void on_disobeyed(bool disobeyed);
     void watch_outside();
     void show_state();
     /// Why the guard lets nothing be armed; empty: it does.
@@ -209,6 +210,7 @@ class Daemon final : public StatusSource {
     std::unique_ptr<watch::GuardLink> guard_link_;  ///< start() makes it; null: there is no guard
     std::unique_ptr<drivers::Annunciator> annunciator_;           ///< made by start()
     bool guard_was_heard_ = false, guard_was_disobeyed_ = false;  ///< control thread
+    bool disobeyed_ = false;                ///< by the table, now; control thread
     std::uint64_t guard_finding_ = 0;       ///< the one that tripped; control thread
     std::atomic<bool> armed_{false};        ///< by a named person
     std::atomic<double> armed_g_{0};        ///< its highest level

@@ -21,7 +21,7 @@ proto::DaemonWord Daemon::word_for_guard() {
                      shaker_->beats() + marks_[1]};
     word.armed = armed_.load();
     word.excitation = excitation_.load();
-    word.stop_ordered = shaker_->stop_pending();
+    word.stop_ordered = campaign_.stopping();
     word.level_g = armed_g_.load();
     return word;
 }
@@ -50,6 +50,13 @@ void Daemon::tell_campaign(Severity severity, const std::string& text) {
     log(severity, "campaign", text);
     // Whoever is not there wants to know that it does not go on.
     if (severity == Severity::alarm) annunciator_->announce(HornPattern::abort, text);
+}
+
+void Daemon::on_disobeyed(bool disobeyed) {
+    interlock_.stop_disobeyed(disobeyed);
+    disobeyed_ = disobeyed;
+    if (disobeyed)
+        annunciator_->announce(HornPattern::disobeyed, rt::text_of(rt::Trip::stop_disobeyed));
 }
 
 void Daemon::watch_outside() {
@@ -81,6 +88,7 @@ void Daemon::show_state() {
     auto pattern = HornPattern::none;
     if (std::ranges::find(raised_, true) != raised_.end()) pattern = HornPattern::alarm;
     if (interlock_.latched()) pattern = HornPattern::abort;
+    if (disobeyed_) pattern = HornPattern::disobeyed;
     if (guard_link_ && guard_link_->heard()) {
         const auto guard = guard_link_->word();
         if (guard.disobeyed && !guard.rest) pattern = HornPattern::disobeyed;

@@ -70,33 +70,6 @@ void fill(v1::RealTime& out, const RealTimeStatus& real_time) {
     for (const std::string& what : real_time.missing) out.add_missing(mend_utf8(what));
 }
 
-void fill(v1::Guard& out, const GuardStatus& guard) {
-    out.set_socket(mend_utf8(guard.socket));
-    out.set_heard(guard.heard);
-    out.set_note(mend_utf8(guard.note));
-    out.set_cause(guard.cause);
-    out.set_text(guard.text);
-    out.set_disobeyed(guard.disobeyed);
-    out.set_sees(guard.sees);
-    out.set_rest(guard.rest);
-    out.set_reaches_shaker(guard.reaches_shaker);
-    out.set_horn_confirms(guard.horn_confirms);
-    out.set_table_g(guard.table_g);
-}
-
-void fill(v1::Annunciator& out, const drivers::AnnunciatorStatus& annunciator) {
-    out.set_horn(annunciator.horn);
-    out.set_confirms(annunciator.confirms);
-    out.set_horn_note(mend_utf8(annunciator.horn_note));
-    out.set_pattern(drivers::name_of(annunciator.pattern));
-    out.set_command(annunciator.command);
-    out.set_started(annunciator.started);
-    out.set_failed(annunciator.failed);
-    out.set_timed_out(annunciator.timed_out);
-    out.set_left_out(annunciator.left_out);
-    out.set_command_note(mend_utf8(annunciator.command_note));
-}
-
 void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
     out.set_broker(mend_utf8(mqtt.broker));
     out.set_connected(mqtt.connected);
@@ -505,9 +478,7 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_noise(), status.noise);
     fill(*out.mutable_mqtt(), status.mqtt);
     fill(*out.mutable_log(), status.log);
-    if (!status.guard.socket.empty()) fill(*out.mutable_guard(), status.guard);
-    if (status.annunciator.horn || status.annunciator.command)
-        fill(*out.mutable_annunciator(), status.annunciator);
+    fill_outside(out, status);
     fill(*out.mutable_frame(), status.frame);
     fill(*out.mutable_real_time(), status.real_time);
     v1::Latency& latency = *out.mutable_acquisition_latency();
