@@ -145,7 +145,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                to_write_ = complete ? ToWrite::complete : ToWrite::partial;
                noise_monitor_.report();
            },
-           [this](Severity severity, const std::string& text) { log(severity, "campaign", text); },
+           [this](Severity severity, const std::string& text) { tell_campaign(severity, text); },
            [this](const std::array<double, 3>& here_deg, double elapsed_s) {
                return next_dwell(here_deg, elapsed_s);
            },
@@ -177,7 +177,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
            [this](const rt::Ramp& ramp) { interlock_.ramp(ramp); },
            [this](double measured) { interlock_.transmission(measured); },
            [this](Time now) { return rest_.rest(now); },
-           [this](bool disobeyed) { interlock_.stop_disobeyed(disobeyed); },
+           [this](bool disobeyed) { on_disobeyed(disobeyed); },
            [this](campaign::Proving what) {
                starving_.store(what == campaign::Proving::watchdog);
                interlock_.proving(what != campaign::Proving::nothing);
@@ -242,6 +242,13 @@ void Daemon::start() {
     open_journal();
     if (recorder_) recorder_->start();
     if (pre_trip_) pre_trip_->start();
+    annunciator_ = std::make_unique<drivers::Annunciator>(
+        configuration_.annunciator, [this](bool good, const std::string& text) {
+            log(good ? Severity::info : Severity::alarm, "annunciator", text);
+        });
+    if (!configuration_.guard_socket.empty())
+        guard_link_ = std::make_unique<watch::GuardLink>(configuration_.guard_socket,
+                                                         [this] { return word_for_guard(); });
     // A daemon that died may have left it running inside the watchdog's time.
     shaker_->stop_now();
     shaker_->on_reading([this] {
@@ -268,6 +275,7 @@ void Daemon::start() {
                    });
     start_threads();
     if (publisher_) publisher_->start();
+    if (guard_link_) guard_link_->start();
 }
 
 void Daemon::shut_down() noexcept {
@@ -283,6 +291,7 @@ bool Daemon::wait_for_end(double wall_seconds) {
 
 void Daemon::join() {
     if (publisher_) publisher_->stop();
+    if (guard_link_) guard_link_->stop();
     give_up_.store(true);
     control_waiter_->notify();
     if (control_thread_.joinable()) control_thread_.join();
@@ -375,6 +384,7 @@ void Daemon::control_loop() {
         if (recorder_) tell_recorder();
         watch_onlookers();
         tell_log();
+        watch_outside();
         interlock_.filter(excitation_.load() ? estimator_stage_.view().estimate.nis_per_dof : 0);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
@@ -388,6 +398,8 @@ void Daemon::control_loop() {
             campaign_.fill(campaign_status_, now);
             campaign_status_.interlock.latches = latches_.open();
             campaign_status_.noise = noise_monitor_.status();
+            armed_.store(!campaign_status_.armed_by.empty());
+            armed_g_.store(highest_level());
             done = campaign_.done(now);
             if (done) break;
         }
@@ -499,6 +511,8 @@ StatusData Daemon::status() const {
         const auto lines = log_queue_->counts();
         status.log = {lines.taken, lines.written, lines.dropped, lines.waiting, lines.blocked};
     }
+    if (guard_link_) status.guard = guard_link_->status();
+    if (annunciator_) status.annunciator = annunciator_->status();
     return status;
 }
 

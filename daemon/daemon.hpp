@@ -28,6 +28,7 @@
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
+#include "daemon/watch/guard_link.hpp"
 
 namespace vibrig {
 
@@ -122,12 +123,23 @@ class Daemon final : public StatusSource {
     /// Why there is nothing of the name it gives; empty: there is, or it gives none.
     [[nodiscard]] std::string unknown_to_acknowledge(const CommandRequest& request) const;
     void tell_alarms();
+    void raise_alarm(const std::string& text);
     void tell_controller();
     void tell_watchdog();
     void tell_journal();
     void tell_recorder();
     void watch_onlookers();
     [[nodiscard]] InterlockStatus interlock_status(std::vector<Latch> latches) const;
+    /// What vibrig-guard is told of this daemon.
+    [[nodiscard]] proto::DaemonWord word_for_guard();
+    /// Of what is armed, peak at the table; 0: nothing is.
+    [[nodiscard]] double highest_level() const;
+    void tell_campaign(Severity severity, const std::string& text);
+    void on_disobeyed(bool disobeyed);
+    void watch_outside();
+    void show_state();
+    /// Why the guard lets nothing be armed; empty: it does.
+    [[nodiscard]] std::string guard_refuses(const CommandRequest& request) const;
     [[nodiscard]] RealTimeStatus real_time_status(const rt::AcquisitionView& acquired,
                                                   const rt::EstimatorView& estimated) const;
     void take_done_dwells();
@@ -230,11 +242,19 @@ class Daemon final : public StatusSource {
     std::atomic<std::int64_t> serving_wall_ns_{0};  ///< 0: there is no server
     drivers::Time started_ = 0;
     serve::EventLog event_log_;
-    std::unique_ptr<journal::Journal> journal_;  ///< null: none is kept
-    bool journal_was_running_ = true;            ///< control thread
-    bool recorder_was_stuck_ = false;            ///< control thread
-    std::string misfit_told_;                    ///< thread of stuck_stage()
-    bool log_was_blocked_ = false;               ///< control thread
+    std::unique_ptr<journal::Journal> journal_;     ///< null: none is kept
+    bool journal_was_running_ = true;               ///< control thread
+    bool recorder_was_stuck_ = false;               ///< control thread
+    std::string misfit_told_;                       ///< thread of stuck_stage()
+    bool log_was_blocked_ = false;                  ///< control thread
+    std::unique_ptr<watch::GuardLink> guard_link_;  ///< start() makes it; null: there is no guard
+    std::unique_ptr<drivers::Annunciator> annunciator_;           ///< made by start()
+    bool guard_was_heard_ = false, guard_was_disobeyed_ = false;  ///< control thread
+    bool disobeyed_ = false;                ///< by the table, now; control thread
+    std::uint64_t guard_finding_ = 0;       ///< the one that tripped; control thread
+    std::atomic<bool> armed_{false};        ///< by a named person
+    std::atomic<double> armed_g_{0};        ///< its highest level
+    std::array<std::uint64_t, 2> marks_{};  ///< guard link's thread
     mutable std::mutex mutex_;  ///< guards what follows; never taken by acquisition or estimator
     std::deque<WaitingCommand> commands_;
     StatusData campaign_status_;

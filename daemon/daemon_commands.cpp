@@ -29,9 +29,11 @@ void Daemon::take_commands(Time now) {
         if (kind == CommandRequest::Kind::arm || kind == CommandRequest::Kind::selftest) {
             begin_arming(std::move(waiting), now);
         } else {
+            const auto guarded = guard_refuses(waiting.request);
             answer(waiting, kind == CommandRequest::Kind::acknowledge
                                 ? acknowledge(waiting.request, now)
-                                : campaign_.command(waiting.request, now));
+                            : guarded.empty() ? campaign_.command(waiting.request, now)
+                                              : CommandReply{false, guarded});
         }
     }
 }
@@ -49,6 +51,7 @@ void Daemon::answer(WaitingCommand& waiting, const CommandReply& reply) {
 
 std::string Daemon::not_fit_to_arm(const CommandRequest& request, Time now) const {
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
+    if (auto why = guard_refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
         return changed->cause + ": vibrig ack journal";
     if (arming_) return "another arming is being written to the journal";
@@ -156,6 +159,7 @@ void Daemon::on_trip(const rt::Tripped& tripped, Time now) {
            {},
            tripped.cause == rt::Trip::emergency_stop && configuration_.campaign.second_person});
     campaign_.on_trip(text, now);
+    annunciator_->announce(drivers::HornPattern::abort, text);
     watch_arming();
     if (!pre_trip_) return;
     pre_trip_->tripped(
@@ -208,7 +212,12 @@ CommandReply Daemon::acknowledge(const CommandRequest& request, Time now) {
         }
     }
     auto reply = campaign_.command(request, now);
-    if (reply.accepted) interlock_.acknowledge(handled);
+    if (reply.accepted) {
+        // First what would trip it again.
+        if (guard_link_) guard_link_->acknowledge(guard_link_->word().finding);
+        watch_outside();
+        interlock_.acknowledge(handled);
+    }
     return reply;
 }
 

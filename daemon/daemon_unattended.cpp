@@ -61,10 +61,11 @@ std::string Daemon::result_configuration() const {
     for (const auto& value : loaded_.effective) {
         const auto section = value.key.substr(0, value.key.find('.'));
         if (section == "server" || section == "log" || section == "threads" ||
-            section == "journal" || section == "mqtt" || section == "clock" ||
-            section == "record" || section == "unit" || section == "instrument" ||
-            section == "selftest" || section == "commission" || value.key == "campaign.results" ||
-            value.key == "campaign.arming_valid_s" || value.key == "campaign.second_person")
+            section == "journal" || section == "mqtt" || section == "clock" || section == "guard" ||
+            section == "annunciator" || section == "record" || section == "unit" ||
+            section == "instrument" || section == "selftest" || section == "commission" ||
+            value.key == "campaign.results" || value.key == "campaign.arming_valid_s" ||
+            value.key == "campaign.second_person")
             continue;
         text += value.key + " = " + value.value + "\n";
     }
@@ -251,14 +252,17 @@ void Daemon::tell_alarms() {
         if (!row.raised) {
             log(Severity::info, "interlock", fmt::format("{}: over", row.rule->name));
         } else if (condition.has_limit()) {
-            log(Severity::alarm, "interlock",
-                fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
-                            row.value, row.rule->limit, condition.unit));
+            raise_alarm(fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name,
+                                    condition.text, row.value, row.rule->limit, condition.unit));
         } else {
-            log(Severity::alarm, "interlock",
-                fmt::format("{}: {}", row.rule->name, condition.text));
+            raise_alarm(fmt::format("{}: {}", row.rule->name, condition.text));
         }
     }
+}
+
+void Daemon::raise_alarm(const std::string& text) {
+    log(Severity::alarm, "interlock", text);
+    annunciator_->announce(drivers::HornPattern::alarm, text);
 }
 
 void Daemon::tell_controller() {

@@ -8,6 +8,7 @@
 
 #include "daemon/rt/frame_latency.hpp"
 #include "daemon/rt/rest_monitor.hpp"
+#include "drivers/annunciator.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
 #include "drivers/sample.hpp"
@@ -87,6 +88,18 @@ struct RecorderStatus {
     std::uint64_t raw_bytes = 0, segments = 0, gaps = 0;
     std::uint64_t samples_dropped = 0, frames_dropped = 0;  ///< by full rings, since the start
     std::uint64_t entries_dropped = 0;
+};
+
+/// The process that watches the daemon from outside.
+struct GuardStatus {
+    std::string socket;  ///< empty: none is configured
+    bool heard = false;  ///< a word came within its deadline
+    std::string note;    ///< why not
+    std::string cause;   ///< what it found, "none" without; as last heard
+    std::string text;    ///< in words
+    bool disobeyed = false, sees = false, rest = false, reaches_shaker = false,
+         horn_confirms = false;
+    double table_g = 0;  ///< peak at the table, by its own measurement
 };
 
 /// The broker that watches a fleet of rigs.
@@ -320,6 +333,8 @@ struct StatusData {
     MqttStatus mqtt;
     LogStatus log;
     ServerStatus server;
+    GuardStatus guard;
+    drivers::AnnunciatorStatus annunciator;
     bool stop_pending = false;  ///< a stop is ordered and rest not measured since
     RestStatus rest;
 

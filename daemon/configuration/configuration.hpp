@@ -9,6 +9,7 @@
 #include "daemon/fleet/settings.hpp"
 #include "daemon/record/settings.hpp"
 #include "daemon/rt/interlock_table.hpp"
+#include "drivers/annunciator.hpp"
 #include "drivers/assembler.hpp"
 #include "drivers/can_port.hpp"
 #include "drivers/gimbal.hpp"
@@ -56,9 +57,11 @@ struct Configuration {
         std::string operator_group, status_socket, page, remote;
         std::string certificate, key, clients_ca, revoked;
     } server;
-    fleet::Settings mqtt;            ///< [mqtt]
-    std::string log_level = "info";  ///< [log] level
-    std::string log_file;            ///< [log] file; empty: standard error
+    std::string guard_socket;                  ///< [guard] socket; empty: there is no guard
+    drivers::AnnunciatorSettings annunciator;  ///< [annunciator]
+    fleet::Settings mqtt;                      ///< [mqtt]
+    std::string log_level = "info";            ///< [log] level
+    std::string log_file;                      ///< [log] file; empty: standard error
     /// [journal] file; empty: journal.sqlite3 in results, and none without results
     std::string journal;
     std::string results;  ///< [campaign] results: folder for result.json; empty: none written

@@ -93,6 +93,7 @@ void CrossCheck::for_daemon() {
     }
     doors();
     broker();
+    onlookers();
     adaptive();
     rest();
     set_points_fit();
@@ -157,6 +158,25 @@ void CrossCheck::broker() {
     }
     if (mqtt.username.empty() && !mqtt.password_file.empty()) {
         refuse({"mqtt.password_file"}, "a password without mqtt.username", "both or none");
+    }
+}
+
+void CrossCheck::onlookers() {
+    if (sound({"guard.socket", "shaker.transport"}) && !c_.guard_socket.empty() &&
+        c_.shaker.transport == drivers::ShakerSettings::Transport::rtu) {
+        refuse({"guard.socket"}, '"' + c_.guard_socket + "\" with the shaker on a serial line",
+               "shaker.transport \"tcp\": a serial line has one master, so that the guard could "
+               "not stop the shaker");
+    }
+    const auto& horn = c_.annunciator.horn;
+    if (sound({"annunciator.modbus.unit"}) && horn.unit > 247 && horn.unit != 255) {
+        refuse({"annunciator.modbus.unit"}, std::to_string(horn.unit),
+               "1 to 247, or 255 (Modbus/TCP)");
+    }
+    if (sound({"annunciator.modbus.horn_coil", "annunciator.modbus.lamp_coil"}) &&
+        horn.horn_coil == horn.lamp_coil) {
+        refuse({"annunciator.modbus.lamp_coil", "annunciator.modbus.horn_coil"},
+               std::to_string(horn.lamp_coil) + " for horn and lamp", "two coils, or -1: no lamp");
     }
 }
 

@@ -27,6 +27,7 @@ class CrossCheck {
                 const std::string& expected);
     void bus();
     void broker();
+    void onlookers();
     void doors();
     void status_signals();
     void rest();

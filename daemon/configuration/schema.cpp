@@ -9,6 +9,7 @@ const std::vector<Key>& schema() {
         add_campaign_keys(all);
         add_shaker_keys(all);
         add_bus_keys(all);
+        add_guard_keys(all);
         add_daemon_keys(all);
         add_interlock_keys(all);
         add_paperwork_keys(all);

@@ -33,6 +33,7 @@ void add_identification_keys(std::vector<Key>& keys);
 void add_campaign_keys(std::vector<Key>& keys);
 void add_shaker_keys(std::vector<Key>& keys);
 void add_bus_keys(std::vector<Key>& keys);
+void add_guard_keys(std::vector<Key>& keys);
 void add_daemon_keys(std::vector<Key>& keys);
 void add_interlock_keys(std::vector<Key>& keys);
 void add_paperwork_keys(std::vector<Key>& keys);

@@ -227,7 +227,12 @@ void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) 
         loss_.add(now, counters.samples, counters.incomplete, counters.gaps);
         judge(By::sample, Trip::frame_loss, loss_.percent(), now);
     }
-    if (guard >= Guard::armed) judge(By::sample, Trip::shaker_lost, !shaker_.reading().valid, now);
+    // Of those outside, whether samples come or not.
+    judge(By::sample, Trip::guard_stop, guard_stopped_.load(), now);
+    judge(By::sample, Trip::horn, horn_silent_.load(), now);
+    if (guard < Guard::armed) return;
+    judge(By::sample, Trip::guard_lost, guard_lost_.load(), now);
+    judge(By::sample, Trip::shaker_lost, !shaker_.reading().valid, now);
 }
 
 void Interlock::lost_bus() noexcept {

@@ -105,6 +105,12 @@ class Interlock {
         recording_degraded_.store(recording_degraded);
         server_stuck_.store(server_stuck);
     }
+    /// Control thread: what those outside say, and whether they can be heard.
+    void outside(bool guard_lost, bool guard_stopped, bool horn_silent) noexcept {
+        guard_lost_.store(guard_lost);
+        guard_stopped_.store(guard_stopped);
+        horn_silent_.store(horn_silent);
+    }
 
     /// Acquisition thread: a batch of frames came in at this moment (CLOCK_MONOTONIC).
     void arrived(drivers::Time wall) noexcept { arrived_ = wall; }
@@ -180,6 +186,7 @@ class Interlock {
     std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
     std::atomic<bool> proving_{false};
     std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
+    std::atomic<bool> guard_lost_{false}, guard_stopped_{false}, horn_silent_{false};
     std::array<std::atomic<double>, 3> position_rad_{};
     std::atomic<bool> position_known_{false};
     std::atomic<drivers::Time> stop_asked_{0};  ///< arrival of the frames that tripped; 0: none

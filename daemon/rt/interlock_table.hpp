@@ -36,9 +36,12 @@ enum class Trip : std::uint8_t {
     over_armed,
     stuck,
     stop_disobeyed,
-    watchdog_changed
+    watchdog_changed,
+    guard_lost,
+    guard_stop,
+    horn
 };
-inline constexpr std::size_t kTrips = 27;
+inline constexpr std::size_t kTrips = 30;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -106,6 +109,9 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
      "a stop was not obeyed in its time: press the emergency stop", Guard::idle, true},
     {Trip::watchdog_changed, "watchdog_changed",
      "the controller's watchdog timeout is not what was written", Guard::armed, true},
+    {Trip::guard_lost, "guard_lost", "no word from vibrig-guard", Guard::armed},
+    {Trip::guard_stop, "guard_stop", "vibrig-guard has stopped the shaker", Guard::idle, true},
+    {Trip::horn, "annunciator_silent", "horn or lamp do not read back as told"},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];
@@ -152,6 +158,8 @@ inline constexpr std::size_t kMostRules = 64;
     add("disk", Trip::disk, Reaction::alarm, 200, 0, false);
     add("recording_degraded", Trip::recording, Reaction::alarm, 0, 0, false);
     add("server_stuck", Trip::server, Reaction::alarm, 0, 0, false);
+    add("guard_lost", Trip::guard_lost, Reaction::alarm, 0, 0, false);
+    add("annunciator_silent", Trip::horn, Reaction::alarm, 0, 0, false);
     return rules;
 }
 

@@ -344,6 +344,21 @@ std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) 
                       {{{"outcome", "dropped"}}, status.log.dropped}});
     families.gauge("vibrig_log_blocked", "1 while nobody takes the log's lines.",
                    yes(status.log.blocked));
+    if (!status.guard.socket.empty()) {
+        families.gauge("vibrig_guard_up", "1 while vibrig-guard is heard.",
+                       yes(status.guard.heard));
+        families.gauge("vibrig_guard_finding", "1 while vibrig-guard has found something.",
+                       yes(!status.guard.text.empty()));
+    }
+    if (status.annunciator.horn)
+        families.gauge("vibrig_annunciator_confirms", "1 while horn and lamp read back as told.",
+                       yes(status.annunciator.confirms));
+    if (status.annunciator.command)
+        families.counter("vibrig_annunciator_command_runs_total", "Runs of the page command.",
+                         {{{{"outcome", "started"}}, status.annunciator.started},
+                          {{{"outcome", "failed"}}, status.annunciator.failed},
+                          {{{"outcome", "timed_out"}}, status.annunciator.timed_out},
+                          {{{"outcome", "left_out"}}, status.annunciator.left_out}});
     if (!status.mqtt.broker.empty()) {
         families.gauge("vibrig_mqtt_up", "1 while the broker is connected.",
                        yes(status.mqtt.connected));

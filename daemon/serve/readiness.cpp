@@ -100,6 +100,15 @@ Readiness readiness(const StatusData& status) {
         !status.proof.refusal.empty() ? status.proof.refusal
         : !status.proof.by.empty()    ? "proved by " + status.proof.by
                                       : "none, none is demanded of a simulated rig");
+    if (const auto& guard = status.guard; !guard.socket.empty())
+        add("guard", guard.heard && guard.text.empty() && guard.sees && guard.reaches_shaker,
+            !guard.heard            ? "not heard: " + guard.note
+            : !guard.text.empty()   ? guard.text
+            : !guard.sees           ? "sees no accelerometer"
+            : !guard.reaches_shaker ? "does not reach the shaker"
+                                    : "watches");
+    if (const auto& horn = status.annunciator; horn.horn)
+        add("annunciator", horn.confirms, horn.confirms ? "confirms" : horn.horn_note);
     const auto& journal = status.journal;
     add("journal", journal.path.empty() || journal.running,
         journal.path.empty() ? "none is kept"

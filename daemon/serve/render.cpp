@@ -308,6 +308,16 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
         lines.push_back(labelled("clock", "MISFIT: " + status.clock_misfit()));
     lines.push_back(labelled("filter", estimate_line(estimate)));
     lines.push_back(labelled("noise", noise_line(status.noise())));
+    if (status.has_guard()) {
+        const v1::Guard& guard = status.guard();
+        lines.push_back(labelled("guard", !guard.heard() ? "NOT HEARD, " + guard.note()
+                                          : !guard.text().empty()
+                                              ? guard.cause() + ": " + guard.text()
+                                              : std::string("watches")));
+    }
+    if (const v1::Annunciator& horn = status.annunciator(); horn.horn())
+        lines.push_back(labelled(
+            "horn", horn.pattern() + (horn.confirms() ? "" : ", SILENT: " + horn.horn_note())));
     if (const v1::Mqtt& mqtt = status.mqtt(); !mqtt.broker().empty())
         lines.push_back(labelled(
             "broker", mqtt.broker() + (mqtt.connected() ? ": " : ": DOWN, ") +

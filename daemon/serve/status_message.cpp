@@ -538,6 +538,7 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_mqtt(), status.mqtt);
     fill(*out.mutable_log(), status.log);
     fill(*out.mutable_server(), status.server, status.utc_ns);
+    fill_outside(out, status);
     fill(*out.mutable_frame(), status.frame);
     fill(*out.mutable_real_time(), status.real_time);
     v1::Latency& latency = *out.mutable_acquisition_latency();

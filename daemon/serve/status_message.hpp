@@ -19,6 +19,8 @@ class Status;
 namespace vibrig::serve {
 
 void fill(v1::Status& out, const StatusData& status);
+/// Part of it: guard and annunciator, where they are configured.
+void fill_outside(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);
 void fill(v1::Plan& out, const PlanData& plan);

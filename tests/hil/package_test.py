@@ -26,6 +26,7 @@ import service_manager as stages  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 UNIT = "vibrigd.service"
+GUARD = "vibrig-guard.service"
 EXAMPLES = "/usr/share/doc/vibrig/examples"
 CONFIGURATION, DATA = "/etc/vibrig/vibrigd.toml", "/var/lib/vibrig"
 VERSIONS = ("0.1.0", "0.1.1")
@@ -140,15 +141,19 @@ def makes_interfaces(checks):
                  "networkd understands every line")
 
 
+def configure(rig, **more):
+    rig.configure(rig.campaign, can={"sample_rate_hz": 40.0, **r.PATIENT["can"]}, gimbal=r.PATIENT["gimbal"],
+                  server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
+                          "page": "127.0.0.1:8090"}, **more)
+    os.chmod(CONFIGURATION, 0o640)
+    shutil.chown(CONFIGURATION, "root", "vibrig")
+
+
 def starts(checks, rig):
     with open(os.path.join(EXAMPLES, "vibrigd.toml"), encoding="utf-8") as file:
         example = file.read()
     checks.check(f'results = "{DATA}"' in example and "operator_group" in example, "the example is the one installed")
-    rig.configure(rig.campaign, can={"sample_rate_hz": 40.0, **r.PATIENT["can"]}, gimbal=r.PATIENT["gimbal"],
-                  server={"operator_group": "vibrig-operator", "status_socket": "/run/vibrig/status.sock",
-                          "page": "127.0.0.1:8090"})
-    os.chmod(CONFIGURATION, 0o640)
-    shutil.chown(CONFIGURATION, "root", "vibrig")
+    configure(rig)
     succeeds(checks, "systemctl enable --now", "systemctl", "enable", "--now", UNIT)
     checks.equal((prop("Type"), prop("ActiveState"), prop("SubState")), ("notify", "active", "running"),
                  "started as it has said READY")
@@ -205,6 +210,37 @@ def runs_a_campaign(checks, rig, timeout_s):
     checks.check(path is not None and owner(path).startswith("vibrig:vibrig"), "it is the daemon's user's")
     recorded = glob.glob(os.path.join(DATA, "packaged-*", "campaign.h5"))
     checks.check(recorded and output("h5dump", "-H", recorded[0])[0] == 0, "the recording opens", str(recorded))
+
+
+def is_guarded(checks, rig):
+    """The guard's unit beside the daemon's, for this part only."""
+    configure(rig, guard={"socket": "/run/vibrig-guard/guard.sock"})
+    succeeds(checks, "systemctl enable --now vibrig-guard", "systemctl", "enable", "--now", GUARD)
+    output("systemctl", "restart", UNIT)
+
+    def watches(status):
+        guard = status.get("guard", {})
+        return guard.get("heard") and guard.get("sees") and guard.get("reaches_shaker") and guard.get("cause") == "none"
+    status = rig.wait_for(watches, 30)
+    said = output("journalctl", "-u", GUARD, "-o", "cat", "--no-pager")[1]
+    checks.check(status is not None and watches(status), "the guard watches: heard, sees the bus, reaches the shaker",
+                 f"{status and status.get('guard')} {said[-800:]}")
+    pid = int(prop("MainPID", GUARD))
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        process = dict(line.split(":", 1) for line in file.read().splitlines())
+    checks.equal((pwd.getpwuid(int(process["Uid"].split()[1])).pw_name, process["CapEff"].strip(), process["Seccomp"].strip()),
+                 ("vibrig-guard", "0" * 16, "2"), "as a user of its own, without capabilities, its system calls filtered")
+    checks.equal(owner("/run/vibrig-guard/guard.sock"), "vibrig-guard:vibrig 660", "its socket is for the daemon's group")
+    os.kill(pid, signal.SIGKILL)
+    checks.check(wait_until(lambda: int(prop("MainPID", GUARD)) not in (0, pid) and prop("ActiveState", GUARD) == "active", 30),
+                 "killed, systemd starts it again", prop("ActiveState", GUARD))
+    status = rig.wait_for(watches, 30)
+    checks.check(status is not None and watches(status), "and it watches again", status and status.get("guard"))
+    output("systemctl", "disable", "--now", GUARD)
+    rig.wait_for(lambda s: not s["guard"].get("heard"), 20)
+    checks.equal(rig.tool("arm", "--by", "tester").returncode, 1, "without it nothing is armed")
+    configure(rig)
+    output("systemctl", "restart", UNIT)
 
 
 def shakes(checks, rig, what):
@@ -296,7 +332,7 @@ def upgrades(checks, rig, package):
 def is_removed(checks, rig):
     succeeds(checks, "the package is removed", "dpkg", "-r", "vibrig")
     checks.equal((prop("ActiveState"), prop("LoadState")), ("inactive", "not-found"), "daemon and unit are gone")
-    checks.check(rig_tool() is None and not glob.glob("/etc/systemd/system/*/vibrigd.service"), "programs too")
+    checks.check(rig_tool() is None and not glob.glob("/etc/systemd/system/*/vibrig*.service"), "programs too")
     checks.check(os.path.exists(CONFIGURATION) and glob.glob(DATA + "/*/campaign.h5"),
                  "configuration and recordings stay")
     succeeds(checks, "the package is purged", "dpkg", "-P", "vibrig")
@@ -326,6 +362,7 @@ def inside(programs, old, new, soak):
             timed(starts, rig)
             timed(is_confined, rig)
             timed(runs_a_campaign, rig, 12000 if soak else 120)
+            timed(is_guarded, rig)
             timed(is_killed, rig)
             timed(hangs, rig)
             timed(upgrades, rig, new)

@@ -31,7 +31,7 @@ def main():
         with open(unit, encoding="utf-8") as file:
             text = file.read()
         program = re.search(r"^ExecStart=(\S+)", text, re.M)[1]
-        copy = os.path.join(place, "vibrigd.service")
+        copy = os.path.join(place, os.path.basename(unit))
         with open(copy, "w", encoding="utf-8") as file:
             file.write(text.replace(program, shutil.which("true")))
         status, said = output("systemd-analyze", "verify", copy)
@@ -44,7 +44,7 @@ def main():
             failed.append(f"systemd-analyze security: expected {LARGEST_EXPOSURE} at most: {said[-400:]}")
         else:
             print(f"exposure {exposure[1]}")
-        for line in ("Type=notify", "WatchdogSec=", "User=vibrig", "CapabilityBoundingSet=\n", "StartLimitBurst=",
+        for line in ("Type=notify", "WatchdogSec=", "User=vibrig", "CapabilityBoundingSet=\n", "StartLimit",
                      "RestartPreventExitStatus=2", "RestartForceExitStatus=75"):
             if "\n" + line not in text:
                 failed.append(f"{unit}: {line.strip()} is missing")

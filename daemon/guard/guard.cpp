@@ -1,0 +1,155 @@
+#include "daemon/guard/guard.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <utility>
+
+namespace vibrig::guard {
+
+namespace {
+
+constexpr auto kLook = std::chrono::milliseconds(50);
+
+drivers::Time monotonic() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+/// A number no earlier life has given: the clock's, in ms.
+std::uint64_t first_finding() {
+    return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::milliseconds>(
+                                          std::chrono::system_clock::now().time_since_epoch())
+                                          .count());
+}
+
+}  // namespace
+
+void say(const char* severity, const std::string& text) {
+    pollfd out{STDERR_FILENO, POLLOUT, 0};
+    if (::poll(&out, 1, 0) != 1 || (out.revents & POLLOUT) == 0) return;
+    const std::string line = std::string(severity) + ": " + text + "\n";
+    (void)!::write(STDERR_FILENO, line.data(), line.size());
+}
+
+Guard::Guard(boost::asio::io_context& io, const Settings& settings)
+    : settings_(settings),
+      timer_(io),
+      port_(drivers::make_can_port(io, settings.can)),
+      witnesses_(settings.witness),
+      shaker_(settings.shaker),
+      meeting_(settings.socket),
+      judge_(settings.judge, first_finding()),
+      annunciator_(settings.annunciator, [](bool good, const std::string& text) {
+          say(good ? "info" : "warning", text);
+      }) {}
+
+void Guard::start() {
+    port_->start(
+        [this](std::span<const drivers::ReceivedFrame> frames) { witnesses_.take(frames); },
+        [](drivers::PortState, const char* text) { say("info", text); },
+        [](const drivers::ReceivedFrame&) {});
+    look();
+}
+
+void Guard::stop() {
+    timer_.cancel();
+    port_->stop();
+}
+
+void Guard::look_later() {
+    timer_.expires_after(kLook);
+    timer_.async_wait([this](const boost::system::error_code& error) {
+        if (!error) look();
+    });
+}
+
+void Guard::look() {
+    const auto now = monotonic();
+    const bool asked = meeting_.attend(now);
+    sight_ = witnesses_.sight(now);
+    judge_.judge(
+        {now, witnesses_.time(now), sight_, shaker_.word(now), meeting_.word(), meeting_.heard()});
+    annunciator_.show(judge_.pattern());
+    // Before the shaker, whose answer may take its time.
+    if (asked) meeting_.tell(word(now));
+    tell_findings();
+    shaker_.step(now, judge_.stop_wanted());
+    tell_links(now);
+    look_later();
+}
+
+void Guard::acknowledge() {
+    if (judge_.acknowledge()) {
+        say("info", "acknowledged by hand");
+    } else {
+        say("warning", "not acknowledged: the table is not measured to be at rest");
+    }
+}
+
+void Guard::tell_findings() {
+    using drivers::HornPattern;
+    if (judge_.cause() != proto::GuardCause::none && judge_.finding() != told_finding_) {
+        told_finding_ = judge_.finding();
+        told_disobeyed_ = told_over_ = false;
+        const std::string text = std::string(proto::name_of(judge_.cause())) + ": " +
+                                 proto::text_of(judge_.cause()) + "; " + words();
+        say("alarm", text);
+        if (judge_.cause() != proto::GuardCause::stop_disobeyed)
+            annunciator_.announce(HornPattern::abort, text);
+    }
+    if (judge_.disobeyed() && !std::exchange(told_disobeyed_, true)) {
+        const std::string text = proto::text_of(proto::GuardCause::stop_disobeyed);
+        say("alarm", text);
+        annunciator_.announce(HornPattern::disobeyed, text);
+    }
+    if (judge_.cause() == proto::GuardCause::none && !std::exchange(told_over_, true))
+        say("info", "acknowledged, watching");
+}
+
+void Guard::tell_links(drivers::Time now) {
+    const bool silent = !meeting_.word() ||
+                        drivers::to_seconds(now - meeting_.heard()) > safety::kHeartbeatDeadline_s;
+    if (std::exchange(told_silent_, silent) != silent)
+        say(silent ? "warning" : "info", silent ? "vibrigd is silent" : "vibrigd is heard");
+    if (std::exchange(told_blind_, !sight_.known()) != !sight_.known())
+        say(sight_.known() ? "info" : "warning",
+            sight_.known() ? "an accelerometer is seen" : "no accelerometer is seen");
+    const bool unreached = !shaker_.word(now).known;
+    if (std::exchange(told_shaker_, unreached) != unreached)
+        say(unreached ? "warning" : "info",
+            unreached ? "the shaker is not reached: " + shaker_.note() : "the shaker is reached");
+}
+
+proto::GuardWord Guard::word(drivers::Time now) const {
+    proto::GuardWord word;
+    word.sequence = meeting_.word() ? meeting_.word()->sequence : 0;
+    word.cause = judge_.cause();
+    word.finding = judge_.finding();
+    word.disobeyed = judge_.disobeyed();
+    word.sees = sight_.known();
+    word.rest = judge_.rests();
+    word.reaches_shaker = shaker_.word(now).known;
+    word.horn_confirms = annunciator_.status().confirms;
+    word.table_g = sight_.table_g;
+    return word;
+}
+
+std::string Guard::words() const {
+    const auto now = monotonic();
+    const auto shaker = shaker_.word(now);
+    const auto of = [](bool there, const Motion& motion) {
+        if (!there) return std::string("none");
+        return motion.known ? std::to_string(motion.rest_g) + " g rms" : std::string("not seen");
+    };
+    return "table accelerometer " + of(sight_.has_table, sight_.table) + ", platform " +
+           of(sight_.has_platform, sight_.platform) + ", shaker " +
+           (shaker.known ? (shaker.runs ? "runs" : "does not run") : "not reached") + ", vibrigd " +
+           (!meeting_.word()              ? "never heard"
+            : meeting_.word()->armed      ? "says armed"
+            : meeting_.word()->excitation ? "says excitation"
+                                          : "says disarmed");
+}
+
+}  // namespace vibrig::guard

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <boost/asio/basic_waitable_timer.hpp>
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "daemon/guard/judge.hpp"
+#include "daemon/guard/meeting.hpp"
+#include "daemon/guard/settings.hpp"
+#include "daemon/guard/shaker_line.hpp"
+#include "daemon/guard/witnesses.hpp"
+#include "drivers/annunciator.hpp"
+#include "drivers/can_port.hpp"
+
+namespace vibrig::guard {
+
+/// Joins the parts: one thread, one loop, a look twenty times a second. Only horn and pager have a
+/// thread of their own, so that they hold up no stop.
+class Guard {
+  public:
+    /// Throws SettingsError, DbcError, CanError, ShakerError, std::runtime_error.
+    Guard(boost::asio::io_context& io, const Settings& settings);
+    void start();
+    void stop();
+    /// By hand, where there is no daemon to acknowledge with.
+    void acknowledge();
+    [[nodiscard]] std::string words() const;
+
+  private:
+    using Timer = boost::asio::basic_waitable_timer<std::chrono::steady_clock>;
+    void look();
+    void look_later();
+    void tell_findings();
+    void tell_links(drivers::Time now);
+    [[nodiscard]] proto::GuardWord word(drivers::Time now) const;
+
+    Settings settings_;
+    Timer timer_;
+    std::unique_ptr<drivers::CanPort> port_;
+    Witnesses witnesses_;
+    ShakerLine shaker_;
+    Meeting meeting_;
+    Judge judge_;
+    drivers::Annunciator annunciator_;
+    Sight sight_;
+
+    std::uint64_t told_finding_ = 0;
+    bool told_disobeyed_ = false, told_over_ = true;
+    bool told_silent_ = true, told_blind_ = true, told_shaker_ = true;
+};
+
+/// One line on standard error, and none where it would have to wait for it.
+void say(const char* severity, const std::string& text);
+
+}  // namespace vibrig::guard

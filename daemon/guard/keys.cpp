@@ -1,0 +1,178 @@
+#include "daemon/guard/keys.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "daemon/guard/settings.hpp"
+
+namespace vibrig::guard {
+
+namespace {
+
+std::string quoted(const std::string& text) {
+    std::ostringstream out;
+    const toml::value<std::string> node{text};
+    out << toml::toml_formatter{node, toml::format_flags::none};
+    return out.str();
+}
+
+/// Shortest text that reads back as the same number.
+std::string plain(double value) {
+    std::array<char, 32> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+    return {text.data(), end};
+}
+
+/// As TOML: a number keeps its point.
+std::string written(double value) {
+    const auto text = plain(value);
+    return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
+}
+
+/// The value as a person wrote it, with its type.
+std::string described(const toml::node& node) {
+    if (const auto* text = node.as_string()) return quoted(text->get()) + " (a string)";
+    if (const auto* whole = node.as_integer()) return std::to_string(whole->get());
+    if (const auto* real = node.as_floating_point()) return written(real->get());
+    if (const auto* flag = node.as_boolean()) return flag->get() ? "true" : "false";
+    if (node.is_array()) return "an array";
+    return node.is_table() ? "a table" : "a date or time";
+}
+
+}  // namespace
+
+Keys::Keys(const std::string& text, std::string file) : file_(std::move(file)) {
+    try {
+        table_ = toml::parse(text, file_);
+    } catch (const toml::parse_error& error) {
+        const auto& place = error.source().begin;
+        throw SettingsError(file_ + ":" + std::to_string(place.line) + ":" +
+                            std::to_string(place.column) +
+                            ": not TOML: " + std::string(error.description()));
+    }
+}
+
+void Keys::wrong(const std::string& key, const toml::node* node, const std::string& found,
+                 const std::string& expected) {
+    problems_ += file_;
+    if (node != nullptr) {
+        const auto& place = node->source().begin;
+        problems_ += ":" + std::to_string(place.line) + ":" + std::to_string(place.column);
+    }
+    problems_ += ": " + key + ": found " + found + ", expected " + expected + "\n";
+}
+
+void Keys::refuse(const std::string& key, const std::string& found, const std::string& expected) {
+    const auto* node = at(key).node();
+    wrong(key, node, node == nullptr ? found + " (default)" : found, expected);
+}
+
+void Keys::believe(const std::string& key, const std::string& value) {
+    const auto* node = at(key).node();
+    believed_ +=
+        key + " = " + value + "  # " +
+        (node == nullptr ? "default" : file_ + ":" + std::to_string(node->source().begin.line)) +
+        "\n";
+}
+
+std::string Keys::text(const std::string& key, const std::string& otherwise) {
+    std::string value = otherwise;
+    if (const auto* node = at(key).node()) {
+        if (const auto* text = node->as_string()) {
+            value = text->get();
+        } else {
+            wrong(key, node, described(*node), "a string");
+        }
+    }
+    if (value.find('\0') != std::string::npos) refuse(key, "a zero byte", "text");
+    believe(key, quoted(value));
+    return value;
+}
+
+bool Keys::boolean(const std::string& key, bool otherwise) {
+    bool value = otherwise;
+    if (const auto* node = at(key).node()) {
+        if (const auto* flag = node->as_boolean()) {
+            value = flag->get();
+        } else {
+            wrong(key, node, described(*node), "true or false");
+        }
+    }
+    believe(key, value ? "true" : "false");
+    return value;
+}
+
+double Keys::number(const std::string& key, double otherwise, double low, double high) {
+    double value = otherwise;
+    if (const auto* node = at(key).node()) {
+        const auto found = node->is_number() ? node->value<double>() : std::nullopt;
+        if (found && *found >= low && *found <= high) {
+            value = *found;
+        } else {
+            wrong(key, node, described(*node),
+                  "a number from " + plain(low) + " to " + plain(high));
+        }
+    }
+    believe(key, written(value));
+    return value;
+}
+
+int Keys::integer(const std::string& key, int otherwise, int low, int high) {
+    std::int64_t value = otherwise;
+    if (const auto* node = at(key).node()) {
+        const auto* whole = node->as_integer();
+        if (whole != nullptr && whole->get() >= low && whole->get() <= high) {
+            value = whole->get();
+        } else {
+            wrong(key, node, described(*node),
+                  "a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+        }
+    }
+    believe(key, std::to_string(value));
+    return static_cast<int>(value);
+}
+
+std::size_t Keys::choice(const std::string& key, std::size_t otherwise,
+                         const std::vector<std::string>& words) {
+    std::size_t value = otherwise;
+    if (const auto* node = at(key).node()) {
+        const auto* text = node->as_string();
+        const auto found =
+            text == nullptr ? words.end() : std::find(words.begin(), words.end(), text->get());
+        if (found != words.end()) {
+            value = static_cast<std::size_t>(found - words.begin());
+        } else {
+            std::string expected;
+            for (std::size_t i = 0; i < words.size(); ++i)
+                expected += (i == 0                  ? "\""
+                             : i + 1 == words.size() ? " or \""
+                                                     : ", \"") +
+                            words[i] + '"';
+            wrong(key, node, described(*node), expected);
+        }
+    }
+    believe(key, quoted(words[value]));
+    return value;
+}
+
+void Keys::numbers(const std::string& key, double* values, std::size_t count) {
+    if (const auto* node = at(key).node()) {
+        const auto* array = node->as_array();
+        bool good = array != nullptr && array->size() == count;
+        for (std::size_t i = 0; good && i < count; ++i) {
+            const auto value = (*array)[i].is_number() ? (*array)[i].value<double>() : std::nullopt;
+            good = value && std::isfinite(*value);
+            if (good) values[i] = *value;
+        }
+        if (!good) wrong(key, node, described(*node), std::to_string(count) + " finite numbers");
+    }
+    std::string list;
+    for (std::size_t i = 0; i < count; ++i) list += (i == 0 ? "" : ", ") + written(values[i]);
+    // A row of a matrix is no key of its own in TOML.
+    if (key.back() != ']') believe(key, "[" + list + "]");
+}
+
+}  // namespace vibrig::guard

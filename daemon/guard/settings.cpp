@@ -1,0 +1,154 @@
+#include "daemon/guard/settings.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+
+#include "daemon/guard/keys.hpp"
+
+namespace vibrig::guard {
+
+namespace {
+
+/// A path of sun_path, or a name in the abstract space.
+bool is_socket(const std::string& path) {
+    return path.size() > 1 && path.size() <= 107 && (path.front() == '/' || path.front() == '@');
+}
+
+proto::Register read_register(Keys& keys, const std::string& role, proto::Register reg) {
+    const std::string name = "shaker.registers." + role + ".";
+    reg.address =
+        static_cast<std::uint16_t>(keys.integer(name + "address", reg.address, 0, 65'535));
+    reg.type = static_cast<proto::RegisterType>(
+        keys.choice(name + "type", static_cast<std::size_t>(reg.type),
+                    {"u16", "i16", "u32", "i32", "f32", "bits"}));
+    reg.order = static_cast<proto::WordOrder>(
+        keys.choice(name + "word_order", static_cast<std::size_t>(reg.order), {"big", "little"}));
+    reg.table = static_cast<proto::RegisterTable>(
+        keys.choice(name + "table", static_cast<std::size_t>(reg.table), {"holding", "input"}));
+    reg.scale = keys.number(name + "scale", reg.scale, 1e-12, 1e12);
+    reg.mask = static_cast<std::uint16_t>(keys.integer(name + "mask", reg.mask, 1, 65'535));
+    return reg;
+}
+
+void read_shaker(Keys& keys, Settings& s) {
+    if (keys.choice("shaker.transport", 0, {"tcp", "rtu"}) == 1)
+        keys.refuse("shaker.transport", "\"rtu\"",
+                    "\"tcp\": a serial line has one master, and that is vibrigd; the guard needs a "
+                    "controller (or a gateway) that both reach over TCP");
+    s.shaker.host = keys.text("shaker.host", s.shaker.host);
+    if (s.shaker.host.empty()) keys.refuse("shaker.host", "\"\"", "a host");
+    s.shaker.port = keys.integer("shaker.port", s.shaker.port, 1, 65'535);
+    s.shaker.unit = keys.integer("shaker.unit", s.shaker.unit, 1, 255);
+    if (s.shaker.unit > 247 && s.shaker.unit != 255)
+        keys.refuse("shaker.unit", std::to_string(s.shaker.unit), "1 to 247, or 255 (Modbus/TCP)");
+    const proto::ShakerRegisters defaults;
+    s.shaker.run = read_register(keys, "run", defaults.run);
+    if (s.shaker.run.table != proto::RegisterTable::holding)
+        keys.refuse("shaker.registers.run.table", "\"input\"",
+                    "\"holding\": the guard has to write it");
+    s.shaker.measured_amplitude =
+        read_register(keys, "measured_amplitude", defaults.measured_amplitude);
+    const double gravity = keys.number("site.gravity_mps2", 9.80665, 9.7, 9.9);
+    const auto unit = keys.choice("shaker.amplitude_unit", 0, {"g_peak", "g_rms", "mps2_peak"});
+    const std::array<double, 3> to_g_peak{1, std::numbers::sqrt2, 1 / gravity};
+    s.shaker.measured_amplitude.scale *= to_g_peak[unit];
+    s.judge.limit_g = keys.number("shaker.limits.acceleration_g", s.judge.limit_g, 0.001, 1000);
+    s.judge.stop_deadline_s =
+        keys.number("shaker.stop_deadline_s", s.judge.stop_deadline_s, safety::kLeastStopDeadline_s,
+                    safety::kMostStopDeadline_s);
+    s.judge.rest_g = keys.number("shaker.rest_g", s.judge.rest_g, 1e-4, 1);
+    s.witness.window_s = keys.number("shaker.rest_window_s", s.witness.window_s, 0.1, 10);
+}
+
+void read_witness(Keys& keys, WitnessSettings& w) {
+    w.dbc = keys.text("can.dbc", w.dbc);
+    w.sample_rate_hz = keys.number("can.sample_rate_hz", w.sample_rate_hz, 1, 1000);
+    constexpr std::array<const char*, 3> kAxes{"accel_x", "accel_y", "accel_z"};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const std::string key = std::string("can.signals.") + kAxes[i];
+        w.platform[i] = keys.text(key, w.platform[i]);
+        w.platform_valid[i] = keys.text(key + "_valid", w.platform_valid[i]);
+    }
+    w.table = keys.text("can.signals.table_accel", w.table);
+    w.transmission = keys.number("vibration.transmission", w.transmission, 0.001, 10);
+    keys.numbers("accelerometer.zero_g", w.zero_g.data(), 3);
+    for (std::size_t i = 0; i < 3; ++i)
+        keys.numbers("accelerometer.matrix[" + std::to_string(i) + "]", w.matrix[i].data(), 3);
+    w.rig_time = keys.choice("clock.source", 0, {"real", "rig"}) == 1;
+}
+
+void read_bus(Keys& keys, drivers::CanPortSettings& can) {
+    using Kind = drivers::CanPortSettings::Kind;
+    can.kind = static_cast<Kind>(keys.choice("can.port", 0, {"socketcan", "seqpacket"}));
+    can.interface = keys.text("can.interface", can.interface);
+    can.path = keys.text("can.path", can.path);
+    can.fd = keys.boolean("can.fd", can.fd);
+    can.receive_buffer = keys.integer("can.receive_buffer", can.receive_buffer, 4096, 1 << 30);
+    if (can.kind == Kind::seqpacket && !is_socket(can.path))
+        keys.refuse("can.path", '"' + can.path + '"', "an absolute path or \"@name\"");
+}
+
+void read_annunciator(Keys& keys, drivers::AnnunciatorSettings& a) {
+    a.source = "vibrig-guard";
+    auto& horn = a.horn;
+    horn.host = keys.text("annunciator.modbus.host", horn.host);
+    horn.port = keys.integer("annunciator.modbus.port", horn.port, 1, 65'535);
+    horn.unit = keys.integer("annunciator.modbus.unit", horn.unit, 1, 255);
+    if (horn.unit > 247 && horn.unit != 255)
+        keys.refuse("annunciator.modbus.unit", std::to_string(horn.unit),
+                    "1 to 247, or 255 (Modbus/TCP)");
+    horn.horn_coil = keys.integer("annunciator.modbus.horn_coil", horn.horn_coil, 0, 65'535);
+    horn.lamp_coil = keys.integer("annunciator.modbus.lamp_coil", horn.lamp_coil, -1, 65'535);
+    if (horn.lamp_coil == horn.horn_coil)
+        keys.refuse("annunciator.modbus.lamp_coil", std::to_string(horn.lamp_coil),
+                    "another coil than the horn's, or -1: none");
+    a.command = keys.text("annunciator.command", a.command);
+    if (!a.command.empty() && a.command.front() != '/')
+        keys.refuse("annunciator.command", '"' + a.command + '"', "an absolute path, or \"\"");
+    const double limit =
+        keys.number("annunciator.command_limit_s", drivers::to_seconds(a.command_limit), 1, 600);
+    a.command_limit = drivers::from_seconds(limit);
+}
+
+}  // namespace
+
+Settings parse_settings(const std::string& text, const std::string& file) {
+    Keys keys(text, file);
+    Settings s;
+    s.socket = keys.text("guard.socket", s.socket);
+    if (!is_socket(s.socket))
+        keys.refuse("guard.socket", '"' + s.socket + '"',
+                    "an absolute path or \"@name\": vibrigd and the guard meet there");
+    read_bus(keys, s.can);
+    read_witness(keys, s.witness);
+    read_shaker(keys, s);
+    read_annunciator(keys, s.annunciator);
+    if (!keys.problems().empty()) throw SettingsError(keys.problems());
+    s.believed = keys.believed();
+    const auto folder = std::filesystem::path(file).parent_path();
+    if (!s.witness.dbc.empty() && !folder.empty())
+        s.witness.dbc = (folder / s.witness.dbc).lexically_normal().string();
+    return s;
+}
+
+Settings read_settings(const std::string& path) {
+    std::error_code error;
+    const bool folder = std::filesystem::is_directory(path, error);
+    errno = 0;
+    std::ifstream file(path, std::ios::binary);
+    if (folder || !file)
+        throw SettingsError(path + ": found " +
+                            (folder       ? "a folder"
+                             : errno != 0 ? std::strerror(errno)
+                                          : "nothing that can be read") +
+                            ", expected vibrigd's configuration file");
+    std::ostringstream text;
+    text << file.rdbuf();
+    return parse_settings(text.str(), path);
+}
+
+}  // namespace vibrig::guard

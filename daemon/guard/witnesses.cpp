@@ -1,0 +1,119 @@
+#include "daemon/guard/witnesses.hpp"
+
+#include <algorithm>
+
+namespace vibrig::guard {
+
+namespace {
+
+/// At a low sample rate the window has to be longer to hold enough.
+double window_of(const WitnessSettings& settings) {
+    constexpr double kSamples = 16;
+    return std::max(settings.window_s, kSamples / settings.sample_rate_hz);
+}
+
+}  // namespace
+
+Witnesses::Witnesses(const WitnessSettings& settings)
+    : settings_(settings),
+      dbc_(settings.dbc.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")
+                                : proto::read_dbc(settings.dbc)),
+      platform_motion_(window_of(settings), 3),
+      table_motion_(window_of(settings), 1) {
+    constexpr std::array<const char*, 3> kKeys{"can.signals.accel_x", "can.signals.accel_y",
+                                               "can.signals.accel_z"};
+    for (std::size_t i = 0; i < 3; ++i) {
+        platform_[i] = find(kKeys[i], settings.platform[i]);
+        if (platform_[i] && !settings.platform_valid[i].empty()) {
+            const Place valid = find(std::string(kKeys[i]) + "_valid", settings.platform_valid[i]);
+            // One that comes in another message would have to be joined; it is left out.
+            if (valid.message == platform_[i].message) platform_[i].valid = valid.value;
+        }
+    }
+    table_ = find("can.signals.table_accel", settings.table);
+    if (!table_ && !(platform_[0] && platform_[1] && platform_[2]))
+        throw SettingsError(
+            "can.signals: found neither a table accelerometer nor three on the platform, expected "
+            "one of them at least: the guard would see nothing");
+    if (!settings.rig_time) return;
+    rig_time_ = dbc_.find("RigTime");
+    if (rig_time_ != nullptr)
+        for (const auto& signal : rig_time_->signals)
+            if (signal.name == "TimeUs") rig_time_us_ = &signal;
+    if (rig_time_us_ == nullptr)
+        throw SettingsError(
+            "clock.source: found \"rig\" and no RigTime.TimeUs in the DBC, expected the simulated "
+            "rig's message");
+}
+
+Witnesses::Place Witnesses::find(const std::string& key, const std::string& name) const {
+    if (name.empty()) return {};
+    const auto dot = name.find('.');
+    const auto* message = dbc_.find(std::string_view(name).substr(0, dot));
+    if (message != nullptr && dot != std::string::npos)
+        for (const auto& signal : message->signals)
+            if (signal.name == std::string_view(name).substr(dot + 1))
+                return {message, &signal, nullptr};
+    throw SettingsError(key + ": found \"" + name + "\", expected a signal of the DBC, as \"" +
+                        "Message.Signal\"");
+}
+
+std::optional<double> Witnesses::value_of(const Place& place,
+                                          std::span<const std::uint8_t> payload) noexcept {
+    if (!proto::present(*place.message, *place.value, payload)) return {};
+    if (place.valid != nullptr && proto::decode_raw(*place.valid, payload).value_or(0) == 0)
+        return {};
+    return proto::decode(*place.value, payload);
+}
+
+void Witnesses::take(std::span<const drivers::ReceivedFrame> frames) {
+    for (const auto& frame : frames) take(frame);
+}
+
+void Witnesses::take(const drivers::ReceivedFrame& received) {
+    const auto& frame = received.frame;
+    if ((frame.can_id & CAN_RTR_FLAG) != 0) return;
+    const bool extended = (frame.can_id & CAN_EFF_FLAG) != 0;
+    const auto* message =
+        dbc_.find(frame.can_id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK), extended);
+    if (message == nullptr) return;
+    const std::span<const std::uint8_t> payload(frame.data, frame.len);
+    if (message == rig_time_) {
+        if (const auto us = proto::decode_raw(*rig_time_us_, payload))
+            rig_now_ = *us * drivers::kMicrosecond;
+        return;
+    }
+    const double time_s = drivers::to_seconds(time(received.time));
+    if (message == table_.message)
+        if (const auto value = value_of(table_, payload)) table_motion_.add(time_s, {*value, 0, 0});
+    for (std::size_t i = 0; i < 3; ++i)
+        if (message == platform_[i].message)
+            if (const auto value = value_of(platform_[i], payload))
+                take_platform(i, *value, time_s);
+}
+
+void Witnesses::take_platform(std::size_t axis, double value, double time_s) {
+    // An axis that comes again before the others have: theirs were lost, and this begins anew.
+    if (seen_[axis]) seen_ = {};
+    raw_[axis] = value - settings_.zero_g[axis];
+    seen_[axis] = true;
+    if (!(seen_[0] && seen_[1] && seen_[2])) return;
+    seen_ = {};
+    std::array<double, 3> force{};
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j) force[i] += settings_.matrix[i][j] * raw_[j];
+    platform_motion_.add(time_s, force);
+}
+
+Sight Witnesses::sight(drivers::Time now) const {
+    Sight sight;
+    const double now_s = drivers::to_seconds(time(now));
+    sight.has_table = static_cast<bool>(table_);
+    sight.has_platform = platform_[0] && platform_[1] && platform_[2];
+    if (sight.has_table) sight.table = table_motion_.at(now_s);
+    if (sight.has_platform) sight.platform = platform_motion_.at(now_s);
+    sight.table_g = std::max(sight.table.peak_g, sight.platform.peak_g / settings_.transmission);
+    return sight;
+}
+
+}  // namespace vibrig::guard

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "daemon/guard/motion.hpp"
+#include "daemon/guard/settings.hpp"
+#include "drivers/can_port.hpp"
+#include "proto/dbc.hpp"
+
+namespace vibrig::guard {
+
+/// What all accelerometers say together at one moment.
+struct Sight {
+    bool has_table = false, has_platform = false;
+    Motion table, platform;
+    double table_g = 0;  ///< the largest peak at the table that any of them shows
+
+    [[nodiscard]] bool known() const { return table.known || platform.known; }
+    /// One of them moves by more than so much, rms.
+    [[nodiscard]] bool moves(double g) const {
+        return (table.known && table.rest_g > g) || (platform.known && platform.rest_g > g);
+    }
+    [[nodiscard]] bool table_rests(double g) const {
+        return !has_table || (table.known && table.rest_g < g);
+    }
+    [[nodiscard]] bool platform_rests(double g) const {
+        return !has_platform || (platform.known && platform.rest_g < g);
+    }
+    /// Measured, by all there are.
+    [[nodiscard]] bool rests(double g) const {
+        return (has_table || has_platform) && table_rests(g) && platform_rests(g);
+    }
+};
+
+/// The accelerometers on the bus, decoded anew from the DBC.
+class Witnesses {
+  public:
+    /// Throws SettingsError, DbcError.
+    explicit Witnesses(const WitnessSettings& settings);
+    void take(std::span<const drivers::ReceivedFrame> frames);
+    [[nodiscard]] Sight sight(drivers::Time now) const;
+    /// What is judged by: CLOCK_MONOTONIC, or the simulated rig's time where it owns the time.
+    [[nodiscard]] drivers::Time time(drivers::Time now) const {
+        return rig_time_ == nullptr ? now : rig_now_;
+    }
+
+  private:
+    struct Place {
+        const proto::Message* message = nullptr;
+        const proto::Signal* value = nullptr;
+        const proto::Signal* valid = nullptr;
+        explicit operator bool() const noexcept { return value != nullptr; }
+    };
+    [[nodiscard]] Place find(const std::string& key, const std::string& name) const;
+    void take(const drivers::ReceivedFrame& frame);
+    void take_platform(std::size_t axis, double value, double time_s);
+    [[nodiscard]] static std::optional<double> value_of(
+        const Place& place, std::span<const std::uint8_t> payload) noexcept;
+
+    WitnessSettings settings_;
+    proto::Dbc dbc_;
+    std::array<Place, 3> platform_;
+    Place table_;
+    const proto::Message* rig_time_ = nullptr;
+    const proto::Signal* rig_time_us_ = nullptr;
+    drivers::Time rig_now_ = 0;
+    std::array<double, 3> raw_{};
+    std::array<bool, 3> seen_{};
+    MotionWindow platform_motion_, table_motion_;
+};
+
+}  // namespace vibrig::guard

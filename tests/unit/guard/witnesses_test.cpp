@@ -1,0 +1,146 @@
+#include "daemon/guard/witnesses.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+namespace vibrig::guard {
+namespace {
+
+constexpr drivers::Time kPeriod = 25 * drivers::kMillisecond;
+
+/// Frames as the rig sends them, by the codec.
+class Bus {
+  public:
+    explicit Bus(Witnesses& witnesses)
+        : witnesses_(witnesses), dbc_(proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")) {}
+
+    void send(const char* message, std::initializer_list<std::pair<const char*, double>> values,
+              drivers::Time time) {
+        const auto* found = dbc_.find(message);
+        drivers::ReceivedFrame received;
+        received.time = time;
+        received.frame.can_id = found->id;
+        received.frame.len = found->size;
+        for (const auto& [name, value] : values)
+            for (const auto& signal : found->signals)
+                if (signal.name == name) {
+                    ASSERT_TRUE(proto::encode(signal, value, {received.frame.data, found->size}));
+                }
+        witnesses_.take(std::span(&received, 1));
+    }
+    /// One sample: table and platform, along y.
+    void sample(double table_g, double platform_g, drivers::Time time, bool valid = true) {
+        send("AccelerometersXY",
+             {{"X", 0}, {"Y", 1 + platform_g}, {"XValid", 1}, {"YValid", valid ? 1 : 0}}, time);
+        send("AccelerometerZ", {{"Z", 0}, {"ZValid", 1}}, time);
+        send("TableAccelerometer", {{"Axial", table_g}}, time);
+    }
+    void shake(double table_g, double platform_g, int samples) {
+        for (int i = 0; i < samples; ++i) {
+            now += kPeriod;
+            const double wave = std::sin(2 * std::numbers::pi * 15 * drivers::to_seconds(now));
+            sample(table_g * wave, platform_g * wave, now);
+        }
+    }
+    drivers::Time now = drivers::kSecond;
+
+  private:
+    Witnesses& witnesses_;
+    proto::Dbc dbc_;
+};
+
+TEST(Witnesses, SeeThePlatformThroughItsTransmissionAndTheTableAsItIs) {
+    Witnesses witnesses{WitnessSettings{}};
+    Bus bus(witnesses);
+    bus.shake(6, 4, 80);
+    const auto sight = witnesses.sight(bus.now);
+    ASSERT_TRUE(sight.table.known && sight.platform.known);
+    EXPECT_NEAR(sight.table.peak_g, 6, 0.3);
+    EXPECT_NEAR(sight.platform.peak_g, 4, 0.2);
+    EXPECT_NEAR(sight.table_g, 6, 0.3);
+    EXPECT_TRUE(sight.moves(safety::kMoving_g));
+    EXPECT_FALSE(sight.rests(safety::kRest_g));
+}
+
+TEST(Witnesses, RestOnlyWhenAllOfThemDo) {
+    Witnesses witnesses{WitnessSettings{}};
+    Bus bus(witnesses);
+    bus.shake(0, 0, 80);
+    EXPECT_TRUE(witnesses.sight(bus.now).rests(safety::kRest_g));
+    bus.shake(0, 1, 80);  // the table's is dead, the platform moves
+    EXPECT_FALSE(witnesses.sight(bus.now).rests(safety::kRest_g));
+    EXPECT_TRUE(witnesses.sight(bus.now).moves(safety::kMoving_g));
+    bus.shake(1, 0, 80);
+    EXPECT_FALSE(witnesses.sight(bus.now).rests(safety::kRest_g));
+    EXPECT_TRUE(witnesses.sight(bus.now).moves(safety::kMoving_g));
+}
+
+TEST(Witnesses, AnAxisThatSaysInvalidIsNotBelieved) {
+    Witnesses witnesses{WitnessSettings{}};
+    Bus bus(witnesses);
+    for (int i = 0; i < 80; ++i) bus.sample(0, 0, bus.now += kPeriod, false);
+    const auto sight = witnesses.sight(bus.now);
+    EXPECT_FALSE(sight.platform.known);
+    EXPECT_TRUE(sight.table.known);
+    EXPECT_FALSE(sight.rests(safety::kRest_g)) << "a witness that is not known does not rest";
+}
+
+TEST(Witnesses, ASilentBusIsNeitherRestNorMotion) {
+    Witnesses witnesses{WitnessSettings{}};
+    Bus bus(witnesses);
+    bus.shake(5, 3, 80);
+    const auto sight = witnesses.sight(bus.now + drivers::kSecond);
+    EXPECT_FALSE(sight.known());
+    EXPECT_FALSE(sight.moves(safety::kMoving_g));
+    EXPECT_FALSE(sight.rests(safety::kRest_g));
+}
+
+TEST(Witnesses, WithoutATableAccelerometerThePlatformIsTheWitness) {
+    WitnessSettings settings;
+    settings.table.clear();
+    Witnesses witnesses(settings);
+    Bus bus(witnesses);
+    bus.shake(0, 0, 80);
+    EXPECT_TRUE(witnesses.sight(bus.now).rests(safety::kRest_g));
+    bus.shake(0, 4, 80);
+    EXPECT_NEAR(witnesses.sight(bus.now).table_g, 6, 0.3);
+}
+
+TEST(Witnesses, WithoutAnyTheGuardRefusesToStart) {
+    WitnessSettings settings;
+    settings.table.clear();
+    settings.platform = {};
+    EXPECT_THROW(Witnesses{settings}, SettingsError);
+    settings.table = "TableAccelerometer.Axal";
+    try {
+        Witnesses witnesses(settings);
+        ADD_FAILURE() << "a signal that does not exist is taken";
+    } catch (const SettingsError& error) {
+        EXPECT_NE(std::string(error.what())
+                      .find("can.signals.table_accel: found \"TableAccelerometer.Axal\", expected"),
+                  std::string::npos)
+            << error.what();
+    }
+}
+
+TEST(Witnesses, GoByTheRigsTimeWhereItOwnsTheTime) {
+    WitnessSettings settings;
+    settings.rig_time = true;
+    Witnesses witnesses(settings);
+    Bus bus(witnesses);
+    // GIVEN 80 samples that come within 80 us, at 100 000 times real time
+    for (int i = 0; i < 80; ++i) {
+        bus.send("RigTime", {{"TimeUs", 25e3 * i}, {"TickEnd", 0}}, 1000 * i);
+        bus.sample(0, 0, 1000 * i);
+    }
+    EXPECT_TRUE(witnesses.sight(80'000).rests(safety::kRest_g));
+    EXPECT_EQ(witnesses.time(80'000), 79 * kPeriod);
+    // THEN an hour of silence in our time is none there
+    EXPECT_TRUE(witnesses.sight(3600 * drivers::kSecond).rests(safety::kRest_g));
+}
+
+}  // namespace
+}  // namespace vibrig::guard
