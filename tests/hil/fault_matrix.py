@@ -24,6 +24,7 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import modbus_proxy  # noqa: E402
 import rig as r  # noqa: E402
+import shaker_lies  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 BUS = "vcan0"
@@ -355,6 +356,7 @@ def matrix(checks, rig, pattern=""):
     for row in ROWS:
         if re.search(pattern, row[0]):
             fault(checks, rig, row)
+    shaker_lies.rows(checks, rig, pattern)
     if pattern:
         return
     one_acknowledgement(checks, rig, "emergency stop", plant("estop"), 2, plant_is_well)
