@@ -104,9 +104,9 @@ struct Settings {
     StopSettings stop;
     ProofSettings proof;
     double watchdog_timeout_s = 1.5;  ///< that the controller is told
-    double arming_valid_s = 600.0;  ///< an arming ends after so long without a start
-    bool second_person = false;     ///< after an emergency stop two persons acknowledge it
-    std::string unit;               ///< type and serial, for whoever arms
+    double arming_valid_s = 600.0;    ///< an arming ends after so long without a start
+    bool second_person = false;       ///< after an emergency stop two persons acknowledge it
+    std::string unit;                 ///< type and serial, for whoever arms
     // limits of the shaker, checked at the frequency in force
     double max_acceleration_g = 12.0;
     double max_velocity_mps = 1.5;

@@ -431,48 +431,6 @@ void fill(v1::Zeros& out, const ZeroStatus& zeros) {
     out.set_message(mend_utf8(zeros.message));
 }
 
-void fill(v1::LoopCheck& out, const LoopCheckStatus& check) {
-    out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
-    out.set_by(mend_utf8(check.by));
-    out.set_message(mend_utf8(check.message));
-    for (const auto& row : check.rows) {
-        v1::LoopCheck::Row& to = *out.add_rows();
-        to.set_name(row.name);
-        to.set_unit(row.unit);
-        set(to, &v1::LoopCheck::Row::set_value, row.value);
-        set(to, &v1::LoopCheck::Row::set_low, row.low);
-        set(to, &v1::LoopCheck::Row::set_high, row.high);
-        to.set_passed(row.passed);
-    }
-}
-
-void fill(v1::Proof& out, const ProofStatus& proof) {
-    out.set_demanded(proof.demanded);
-    out.set_refusal(mend_utf8(proof.refusal));
-    out.set_advice(proof.advice);
-    out.set_by(mend_utf8(proof.by));
-    out.set_utc_ns(proof.utc_ns);
-    out.set_passed(proof.passed);
-    out.set_message(mend_utf8(proof.message));
-    out.set_asks(proof.asks);
-    for (const auto& row : proof.rows) {
-        v1::LoopCheck::Row& to = *out.add_rows();
-        to.set_name(mend_utf8(row.name));
-        to.set_unit(mend_utf8(row.unit));
-        set(to, &v1::LoopCheck::Row::set_value, row.value);
-        set(to, &v1::LoopCheck::Row::set_low, row.low);
-        set(to, &v1::LoopCheck::Row::set_high, row.high);
-        to.set_passed(row.passed);
-    }
-    for (const auto& past : proof.history) {
-        v1::Proof::Past& to = *out.add_history();
-        to.set_utc_ns(past.utc_ns);
-        to.set_passed(past.passed);
-        to.set_stop_s(past.stop_s);
-        to.set_watchdog_s(past.watchdog_s);
-    }
-}
-
 void fill(v1::Campaign& out, const StatusData& status) {
     out.set_name(mend_utf8(status.campaign_name));
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
@@ -509,8 +467,7 @@ void fill(v1::Status& out, const StatusData& status) {
     out.set_time_s(drivers::to_seconds(status.time));
     out.set_uptime_s(drivers::to_seconds(status.uptime));
     fill(*out.mutable_campaign(), status);
-    fill(*out.mutable_loop_check(), status.loop_check);
-    fill(*out.mutable_proof(), status.proof);
+    fill_checks(out, status);
     out.set_simulated(status.simulated);
     fill(*out.mutable_shaker(), status);
     fill(*out.mutable_can(), status);

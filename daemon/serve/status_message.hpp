@@ -21,6 +21,8 @@ namespace vibrig::serve {
 void fill(v1::Status& out, const StatusData& status);
 /// Part of it: guard and annunciator, where they are configured.
 void fill_outside(v1::Status& out, const StatusData& status);
+/// Likewise of the newest loop check and safe-state proof.
+void fill_checks(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);
 void fill(v1::Plan& out, const PlanData& plan);

@@ -1,0 +1,60 @@
+// Loop check and safe-state proof, carried into the messages of proto/vibrig.proto.
+#include <cmath>
+
+#include "daemon/serve/status_message.hpp"
+#include "proto/vibrig.pb.h"
+
+namespace vibrig::serve {
+
+namespace {
+
+void fill_loop_check(v1::LoopCheck& out, const LoopCheckStatus& check) {
+    out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
+    out.set_by(mend_utf8(check.by));
+    out.set_message(mend_utf8(check.message));
+    for (const auto& row : check.rows) {
+        v1::LoopCheck::Row& to = *out.add_rows();
+        to.set_name(row.name);
+        to.set_unit(row.unit);
+        if (std::isfinite(row.value)) to.set_value(row.value);
+        if (std::isfinite(row.low)) to.set_low(row.low);
+        if (std::isfinite(row.high)) to.set_high(row.high);
+        to.set_passed(row.passed);
+    }
+}
+
+void fill_proof(v1::Proof& out, const ProofStatus& proof) {
+    out.set_demanded(proof.demanded);
+    out.set_refusal(mend_utf8(proof.refusal));
+    out.set_advice(proof.advice);
+    out.set_by(mend_utf8(proof.by));
+    out.set_utc_ns(proof.utc_ns);
+    out.set_passed(proof.passed);
+    out.set_message(mend_utf8(proof.message));
+    out.set_asks(proof.asks);
+    for (const auto& row : proof.rows) {
+        v1::LoopCheck::Row& to = *out.add_rows();
+        to.set_name(mend_utf8(row.name));
+        to.set_unit(mend_utf8(row.unit));
+        if (std::isfinite(row.value)) to.set_value(row.value);
+        if (std::isfinite(row.low)) to.set_low(row.low);
+        if (std::isfinite(row.high)) to.set_high(row.high);
+        to.set_passed(row.passed);
+    }
+    for (const auto& past : proof.history) {
+        v1::Proof::Past& to = *out.add_history();
+        to.set_utc_ns(past.utc_ns);
+        to.set_passed(past.passed);
+        to.set_stop_s(past.stop_s);
+        to.set_watchdog_s(past.watchdog_s);
+    }
+}
+
+}  // namespace
+
+void fill_checks(v1::Status& out, const StatusData& status) {
+    fill_loop_check(*out.mutable_loop_check(), status.loop_check);
+    fill_proof(*out.mutable_proof(), status.proof);
+}
+
+}  // namespace vibrig::serve
