@@ -50,7 +50,10 @@ def command(rig, kind):
 def shake(checks, rig, what):
     rig.wait_for(lambda t: s.measuring(t) and t["shaker"].get("state") == 0 and not t["shaker"].get("running", True), 30)
     said = []
-    for kind in ("arm", "start"):
+    end = time.monotonic() + 30
+    while command(rig, "arm")[0] != 200 and time.monotonic() < end:   # rest has to be measured first
+        time.sleep(0.2)
+    for kind in ("start",):
         status, text, _ = command(rig, kind)
         said.append(f"{kind}: {status} {text}")
     status = rig.wait_for_state(("recording", "aborted", "tripped"), 60)
