@@ -65,7 +65,7 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops)
     }
     // Whatever the caller thinks: the frequency changes at rest only, or it passes the resonance.
     const auto now = reading();
-    if (now.valid && (now.running || !now.still()) &&
+    if (set_point.amplitude_g > 0 && now.valid && (now.running || !now.still()) &&
         std::abs(set_point.frequency_hz - now.frequency_hz) > kSameFrequency_hz)
         return false;
     const auto ticket = orders_.ticket();

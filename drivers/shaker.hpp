@@ -102,10 +102,10 @@ class Shaker {
     /// Starts the thread. `may_feed` is asked in that thread before each watchdog feed.
     virtual void start(std::function<bool()> may_feed, StateHandler on_state) = 0;
     /// Replaces a waiting set-point; false if a stop is pending or was asked for since `stops` was
-    /// read, the link is not running, the table moves at another frequency, or a value does not fit
-    /// its register (nothing is kept then).
-    /// Who arms the shaker reads stops() then and asks under that number: a stop that came in
-    /// between is not undone, however long the caller slept before it asked.
+    /// read, the link is not running, the table moves at another frequency and is to go on, or a
+    /// value does not fit its register (nothing is kept then). Who arms the shaker reads stops()
+    /// then and asks under that number: a stop that came in between is not undone, however long the
+    /// caller slept before it asked.
     [[nodiscard]] virtual bool request(const ShakerSetPoint& set_point,
                                        std::uint64_t stops) noexcept = 0;
     /// Any thread; never blocks. Cuts off a request in flight.

@@ -60,8 +60,9 @@ std::string value_schema(const pb::FieldDescriptor& field) {
 bool always_there(const pb::FieldDescriptor& field) {
     // Of a command, which comes in, the one field that may be left out is known here alone.
     if (field.containing_type() == v1::Command::descriptor()) return field.name() != "argument";
-    // A status has all its parts, whatever the rig does.
-    if (field.containing_type() == v1::Status::descriptor()) return true;
+    // A status has all its parts, whatever the rig does, but for those that are not configured.
+    if (field.containing_type() == v1::Status::descriptor())
+        return field.name() != "guard" && field.name() != "annunciator";
     return !field.has_presence();
 }
 

@@ -58,6 +58,7 @@ struct WatchedCampaign : testing::Test {
 
     WatchedCampaign() {
         settings.sample_s = 0.025;
+        settings.proof.demanded = false;
         settings.positions_deg = {{0, 0, 0}, {0, 0, 90}};
         settings.table_g = {9, 0};
         settings.dwell_s = 10;

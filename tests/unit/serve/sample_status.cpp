@@ -66,6 +66,30 @@ StatusData full_status() {
     s.channel_deadline_s = s.platform_deadline_s = 5;
     s.sample_rate_hz = 40.01;
     s.clock_misfit = "no time in common";
+    s.simulated = true;
+    s.proof = {true,
+               "it is old",
+               "press it",
+               "Ada",
+               1'800'000'000'000'000'000,
+               true,
+               "stop too slow",
+               {{"stop, table", "s", 0.4, 0.1, 3, true}},
+               "press the emergency stop now",
+               {{1'700'000'000'000'000'000, true, 0.5, 1.7}}};
+    s.guard = {"/run/vibrig/guard.sock",
+               true,
+               "late",
+               "over_armed",
+               "5 g for 2 g",
+               true,
+               true,
+               true,
+               true,
+               true,
+               5.0};
+    s.annunciator = {true, true, "no answer", drivers::HornPattern::abort, true, 3, 1,
+                     1,    1,    "it hung"};
     s.witness_g = {8.9, 9.1};
     s.channel_age_s = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7};
     s.platform = {1'234'000'000'000, true, true, true, 31.25, true,
