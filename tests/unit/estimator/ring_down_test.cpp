@@ -54,7 +54,8 @@ TEST(RingDown, FindsFrequencyAndDampingOfPadsWhereverTheSwingBegins) {
 TEST(RingDown, TellsNothingOfRestNoiseOrAFewReadings) {
     EXPECT_EQ(ring_down({}, kFloor_g).rate_per_s, 0);
     EXPECT_EQ(ring_down(swing(9.5, 0.1, 0, 40, 3e-4, 1), kFloor_g).rate_per_s, 0) << "at rest";
-    EXPECT_EQ(ring_down(swing(9.5, 0.1, 0.3, 40, 3e-4, 1, 0.15), kFloor_g).rate_per_s, 0) << "short";
+    EXPECT_EQ(ring_down(swing(9.5, 0.1, 0.3, 40, 3e-4, 1, 0.15), kFloor_g).rate_per_s, 0)
+        << "short";
     // what grows, or goes on, is no decay
     auto steady = swing(9.5, 0, 0.3, 40, 0, 1);
     EXPECT_LT(ring_down(steady, kFloor_g).rate_per_s, 0.05);
