@@ -469,6 +469,7 @@ void fill(v1::Status& out, const StatusData& status) {
     fill(*out.mutable_campaign(), status);
     fill_checks(out, status);
     out.set_simulated(status.simulated);
+    out.set_clock_misfit(status.clock_misfit);
     fill(*out.mutable_shaker(), status);
     fill(*out.mutable_can(), status);
     fill(*out.mutable_assembler(), status.assembler);
