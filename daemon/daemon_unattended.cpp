@@ -166,7 +166,7 @@ void Daemon::check_balance(Time now) {
 std::string Daemon::clock_misfit() const {
     const auto view = acquisition_.view();
     if (rig_clock_)
-        return view.rig_ticks == 0 && view.port.delivered > kFramesWithoutTime
+        return view.rig_ticks == 0 && port_->counters().delivered > kFramesWithoutTime
                    ? "clock.source is \"rig\", but no simulated rig sends its time on the bus: "
                      "vibrig-plant --clock rig, or clock.source = \"real\""
                    : "";

@@ -94,7 +94,11 @@ std::string Campaign::not_fit_to_excite(Time now) const {
 void Campaign::enter(State state, Time now) {
     state_ = state;
     if (state == State::ramping) excited_deg_ = here().stop.position_deg;
-    if (state == State::ramping || state == State::checking) asked_g_ = 0;  // from rest
+    if (state == State::ramping || state == State::checking) {
+        // From rest: what the table was told last is over, and no witness may hold it to that.
+        asked_g_ = 0;
+        tell_ramp(0, now);
+    }
     if (ports_.commanded) {
         ports_.commanded(state == State::settling ? table_g() : 0, excited_deg_);
     }

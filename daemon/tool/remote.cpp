@@ -129,6 +129,14 @@ void show_loop_check(serve::Client& client, std::int64_t before) {
     if (!status.proof().passed()) std::cout << "not proved: " << status.proof().message() << '\n';
 }
 
+/// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
+/// rest is measured, which takes a window. What lasts longer is the daemon's to explain.
+void wait_for_rest(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
+        std::this_thread::sleep_for(kLook);
+}
+
 int self_test(const TestOptions& options) {
     serve::Client client(options.at);
     if (!options.by.empty()) {
@@ -136,6 +144,7 @@ int self_test(const TestOptions& options) {
         command.set_kind(v1::Command::selftest);
         command.set_by(options.by);
         if (options.emergency_stop) command.set_argument("emergency_stop");
+        wait_for_rest(client);
         const std::int64_t before = ask_status(client).proof().utc_ns();
         const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
         if (begun.status != 200) {
@@ -170,14 +179,6 @@ void wait_for_shaker(serve::Client& client) {
         std::this_thread::sleep_for(kLook);
     }
     std::cerr << kWho << "the shaker has not confirmed it yet: vibrig status\n";
-}
-
-/// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
-/// rest is measured, which takes a window. What lasts longer is the daemon's to explain.
-void wait_for_rest(serve::Client& client) {
-    constexpr auto kLook = std::chrono::milliseconds(100);
-    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
-        std::this_thread::sleep_for(kLook);
 }
 
 int send_command(const CommandOptions& options) {
