@@ -80,7 +80,9 @@ struct WatchedCampaign : testing::Test {
                     [] {},
                     [](bool) {},
                     [this](Severity, const std::string& text) { events.push_back(text); }};
-        ports.ramping = [this](const rt::Ramp& ramp) { ramps.push_back(ramp); };
+        ports.ramping = [this](const rt::Ramp& ramp) {
+            if (ramp.start_g > 0 || ramp.target_g > 0) ramps.push_back(ramp);  // else: it rests
+        };
         ports.rest = [this](drivers::Time at) { return accelerometers.monitor.rest(at); };
         ports.unfit = [this] { return unfit; };
         if (watched) ports.second = [this] { return second(); };
