@@ -256,6 +256,8 @@ def outcome_of(status):
 
 def is_set_point(write):
     _, address, values = write
+    if address == modbus_proxy.RUN - 1 and values == (0,):   # the ramp of a stop that is not taken as one write
+        return False
     return not is_stop(write) and (address < modbus_proxy.RUN or (address == modbus_proxy.RUN and values[0] != 0))
 
 
