@@ -1,0 +1,160 @@
+#include "daemon/journal/database.hpp"
+
+#include <sqlite3.h>
+
+#include <cstring>
+#include <filesystem>
+
+namespace vibrig::journal {
+
+namespace {
+constexpr int kBusyTimeout_ms = 2000;  // a person may be reading the file
+
+/// As a URI: nothing in a path may look like a query.
+std::string uri_of(const std::string& path) {
+    std::string uri = "file:";
+    for (const char c : path) {
+        if (c == '%' || c == '?' || c == '#') {
+            constexpr const char* kDigits = "0123456789abcdef";
+            uri += {'%', kDigits[c >> 4], kDigits[c & 0xf]};
+        } else {
+            uri += c;
+        }
+    }
+    return uri;
+}
+
+template <typename Number>
+void append_bytes(std::string& bytes, Number number) {
+    char raw[sizeof number];
+    std::memcpy(raw, &number, sizeof number);
+    bytes.append(raw, sizeof number);
+}
+}
+
+bool DatabaseError::damaged() const noexcept {
+    const int primary = code_ & 0xff;
+    return primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB;
+}
+
+void Database::Close::operator()(sqlite3* database) const noexcept { sqlite3_close_v2(database); }
+void Database::Finalize::operator()(sqlite3_stmt* statement) const noexcept {
+    sqlite3_finalize(statement);
+}
+
+Database::Database(const std::string& path, Mode mode) : path_(path) {
+    sqlite3* opened = nullptr;
+    std::error_code none;
+    // Without a log beside it nobody writes, and what only reads should make none.
+    const bool alone = mode == Mode::read && !std::filesystem::exists(path + "-wal", none);
+    const std::string uri = uri_of(path) + (alone ? "?immutable=1" : "");
+    const int result = sqlite3_open_v2(
+        uri.c_str(), &opened,
+        SQLITE_OPEN_URI | SQLITE_OPEN_EXRESCODE |
+            (mode == Mode::read ? SQLITE_OPEN_READONLY
+                                : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE),
+        nullptr);
+    database_.reset(opened);
+    if (result != SQLITE_OK) fail("open");
+    sqlite3_busy_timeout(opened, kBusyTimeout_ms);
+    if (mode == Mode::read) return;
+    execute("PRAGMA journal_mode = WAL");
+    execute("PRAGMA synchronous = FULL");
+    execute("PRAGMA foreign_keys = ON");
+    // What is written is seldom read again: of 2 MB, the usual, a daemon would fill each byte in
+    // its first night.
+    execute("PRAGMA cache_size = -256");
+}
+
+Database::~Database() = default;
+
+void Database::fail(const char* doing) const {
+    const int code = database_ ? sqlite3_extended_errcode(database_.get()) : SQLITE_NOMEM;
+    throw DatabaseError(path_ + ": cannot " + doing + ": " +
+                            (database_ ? sqlite3_errmsg(database_.get()) : "out of memory"),
+                        code);
+}
+
+void Database::execute(const char* sql) {
+    if (sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK) fail("write");
+}
+
+Database::Statement Database::prepare(const char* sql, const std::vector<Value>& values) {
+    sqlite3_stmt* prepared = nullptr;
+    if (sqlite3_prepare_v2(database_.get(), sql, -1, &prepared, nullptr) != SQLITE_OK)
+        fail("prepare");
+    Statement statement(prepared);
+    int index = 0;
+    for (const Value& value : values) {
+        ++index;
+        int result = SQLITE_OK;
+        if (const auto* number = std::get_if<std::int64_t>(&value)) {
+            result = sqlite3_bind_int64(prepared, index, *number);
+        } else if (const auto* text = std::get_if<std::string_view>(&value)) {
+            result = sqlite3_bind_text64(prepared, index, text->data(), text->size(),
+                                         SQLITE_TRANSIENT, SQLITE_UTF8);
+        } else {
+            const auto& blob = std::get<Blob>(value).bytes;
+            result =
+                sqlite3_bind_blob64(prepared, index, blob.data(), blob.size(), SQLITE_TRANSIENT);
+        }
+        if (result != SQLITE_OK) fail("bind");
+    }
+    return statement;
+}
+
+void Database::run(const char* sql, const std::vector<Value>& values) {
+    const Statement statement = prepare(sql, values);
+    if (sqlite3_step(statement.get()) != SQLITE_DONE) fail("write");
+}
+
+std::vector<Row> Database::ask(const char* sql, const std::vector<Value>& values) {
+    const Statement statement = prepare(sql, values);
+    std::vector<Row> rows;
+    for (;;) {
+        const int result = sqlite3_step(statement.get());
+        if (result == SQLITE_DONE) return rows;
+        if (result != SQLITE_ROW) fail("read");
+        Row& row = rows.emplace_back();
+        for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
+            const bool number = sqlite3_column_type(statement.get(), i) == SQLITE_INTEGER;
+            row.numbers.push_back(number ? sqlite3_column_int64(statement.get(), i) : 0);
+            std::string& text = row.texts.emplace_back();
+            if (number) continue;
+            if (const void* bytes = sqlite3_column_blob(statement.get(), i)) {
+                text.assign(static_cast<const char*>(bytes),
+                            static_cast<std::size_t>(sqlite3_column_bytes(statement.get(), i)));
+            }
+        }
+    }
+}
+
+std::string Database::row_bytes(const std::string& table, std::int64_t row) {
+    const std::string sql = "SELECT * FROM " + table + " WHERE rowid = ?";
+    const Statement statement = prepare(sql.c_str(), {row});
+    const int result = sqlite3_step(statement.get());
+    if (result == SQLITE_DONE) return {};
+    if (result != SQLITE_ROW) fail("read");
+    std::string bytes;
+    for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
+        const int type = sqlite3_column_type(statement.get(), i);
+        bytes += static_cast<char>(type);
+        if (type == SQLITE_INTEGER) {
+            append_bytes(bytes, std::int64_t{sqlite3_column_int64(statement.get(), i)});
+        } else if (type == SQLITE_FLOAT) {
+            append_bytes(bytes, sqlite3_column_double(statement.get(), i));
+        } else if (type != SQLITE_NULL) {
+            const void* const column = sqlite3_column_blob(statement.get(), i);
+            const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement.get(), i));
+            append_bytes(bytes, std::uint64_t{size});
+            if (size > 0) bytes.append(static_cast<const char*>(column), size);
+        }
+    }
+    return bytes;
+}
+
+std::int64_t Database::last_id() const noexcept {
+    return sqlite3_last_insert_rowid(database_.get());
+}
+
+}  // namespace vibrig::journal

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace vibrig::journal {
+
+/// What SQLite says, with its extended code.
+class DatabaseError : public std::runtime_error {
+  public:
+    DatabaseError(const std::string& what, int code) : std::runtime_error(what), code_(code) {}
+    /// The file is no database or is damaged.
+    [[nodiscard]] bool damaged() const noexcept;
+
+  private:
+    int code_;
+};
+
+struct Blob {
+    std::string_view bytes;
+};
+using Value = std::variant<std::int64_t, std::string_view, Blob>;
+
+/// A row of a question; texts and blobs as strings.
+struct Row {
+    std::vector<std::int64_t> numbers;  ///< 0 for a text
+    std::vector<std::string> texts;     ///< empty for a number
+};
+
+/// One SQLite file: WAL, synchronous FULL. One thread at a time. Everything throws DatabaseError.
+class Database {
+  public:
+    /// read: changes nothing, and makes no files beside it.
+    enum class Mode : std::uint8_t { write, read };
+    explicit Database(const std::string& path, Mode mode = Mode::write);
+    ~Database();
+    Database(const Database&) = delete;
+    Database& operator=(const Database&) = delete;
+
+    void execute(const char* sql);
+    void run(const char* sql, const std::vector<Value>& values);
+    [[nodiscard]] std::vector<Row> ask(const char* sql, const std::vector<Value>& values = {});
+    [[nodiscard]] std::int64_t last_id() const noexcept;
+    /// A row as bytes, with the types of its columns; empty: there is no such row.
+    [[nodiscard]] std::string row_bytes(const std::string& table, std::int64_t row);
+
+  private:
+    struct Close {
+        void operator()(sqlite3* database) const noexcept;
+    };
+    struct Finalize {
+        void operator()(sqlite3_stmt* statement) const noexcept;
+    };
+    using Statement = std::unique_ptr<sqlite3_stmt, Finalize>;
+    [[nodiscard]] Statement prepare(const char* sql, const std::vector<Value>& values);
+    [[noreturn]] void fail(const char* doing) const;
+
+    std::string path_;
+    std::unique_ptr<sqlite3, Close> database_;
+};
+
+}  // namespace vibrig::journal

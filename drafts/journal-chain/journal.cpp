@@ -1,0 +1,484 @@
+#include "daemon/journal/journal.hpp"
+
+#include <pthread.h>
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <utility>
+
+#include "daemon/journal/database.hpp"
+
+namespace vibrig::journal {
+
+namespace {
+
+// Measurements in the ring are taken out this often; also how soon a sick disk is tried again.
+constexpr auto kPeriod = std::chrono::milliseconds(200);
+constexpr auto kRetry = std::chrono::seconds(1);
+
+// What stands in the table safety.
+constexpr const char* kArmed = "armed";
+constexpr const char* kDisarmed = "disarmed";
+constexpr const char* kLatched = "latched";
+constexpr const char* kFirst = "acknowledged by the first";
+constexpr const char* kOver = "acknowledged";
+
+std::int64_t utc_now() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
+
+const char* word_of(CommandRequest::Kind kind) {
+    using Kind = CommandRequest::Kind;
+    switch (kind) {
+        case Kind::arm:
+            return "arm";
+        case Kind::start:
+            return "start";
+        case Kind::pause:
+            return "pause";
+        case Kind::resume:
+            return "resume";
+        case Kind::abort:
+            return "abort";
+        case Kind::acknowledge:
+            return "acknowledge";
+        case Kind::selftest:
+            return "selftest";
+    }
+    return "unknown";
+}
+
+std::string joined(const std::vector<std::string>& words) {
+    std::string all;
+    for (const std::string& one : words) all += (all.empty() ? "" : "; ") + one;
+    return all;
+}
+
+}  // namespace
+
+Journal::Journal(const std::string& path, std::uint64_t configuration_hash,
+                 std::function<void(double)> on_space, ChainedFile::Pace pace)
+    : path_(path), configuration_hash_(configuration_hash), on_space_(std::move(on_space)) {
+    file_ = std::make_unique<ChainedFile>(path_, pace,
+                                          [this](Database& old) { read_safety(old); });
+    recovery_.begins = file_->begins();
+    if (!file_->found().empty()) {
+        carry_over();
+        recovery_.refused.push_back(take_found().front() + ": cold start");
+    }
+    recover();
+    status_.path = path_;
+    status_.running = true;
+    status_.public_key = file_->public_key();
+}
+
+Journal::~Journal() { stop(); }
+
+void Journal::recover() {
+    recover_loop_check();
+    recover_safety();
+    const auto found = database().ask(
+        "SELECT id, name, started_by, configuration_hash, state FROM campaign "
+        "ORDER BY id DESC LIMIT 1");
+    if (found.empty() || found.front().texts.at(4) != "running") return;
+    const Row& row = found.front();
+    Unfinished campaign{row.numbers.at(0), row.texts.at(1), row.texts.at(2), {}};
+    if (static_cast<std::uint64_t>(row.numbers.at(3)) != configuration_hash_) {
+        recovery_.refused.push_back(
+            fmt::format("campaign {} ({}) was of another configuration: cold start", campaign.id,
+                        campaign.name));
+        return;
+    }
+    recover_dwells(campaign);
+    if (!campaign.dwells.empty()) recovery_.campaign = std::move(campaign);
+}
+
+void Journal::recover_loop_check() {
+    const auto newest =
+        database().ask("SELECT out_of_band FROM loop_check ORDER BY id DESC LIMIT 1");
+    if (!newest.empty()) recovery_.out_of_band = newest.front().texts.at(0);
+}
+
+void Journal::follow(const Safety& safety) {
+    const std::string_view what = safety.what;
+    if (what == kArmed) {
+        arming_ = safety;
+    } else if (what == kDisarmed) {
+        arming_ = {};
+    } else if (what == kLatched) {
+        latches_.add({safety.name, safety.text, safety.person, {}, safety.two_persons,
+                      safety.utc_ns});
+    } else if (what == kFirst || what == kOver) {
+        static_cast<void>(latches_.acknowledge(safety.name, safety.person));
+    }
+}
+
+void Journal::read_safety(Database& from) {
+    for (const Row& row :
+         from.ask("SELECT utc_ns, what, name, person, text, two_persons FROM safety ORDER BY id")) {
+        for (const char* what : {kArmed, kDisarmed, kLatched, kFirst, kOver}) {
+            if (row.texts[1] == what)
+                follow({what, row.texts[2], row.texts[3], row.texts[4], row.numbers[5] != 0,
+                        row.numbers[0]});
+        }
+    }
+}
+
+void Journal::recover_safety() {
+    latches_ = {};
+    arming_ = {};
+    read_safety(database());
+    recovery_.latches = latches_.open();
+    if (*arming_.what == '\0') return;
+    // Before anything else is written, and as one: killed again, the next start finds the same.
+    const Latch died{
+        kDiedArmed,
+        fmt::format("the daemon ended while armed by {}: {}", arming_.person, arming_.text),
+        arming_.person,
+        {},
+        false,
+        utc_now()};
+    recovery_.latches.push_back(died);
+    latched(died);
+    disarmed(arming_.person, "died");
+}
+
+std::vector<std::string> Journal::take_found() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(found_, {});
+}
+
+void Journal::recover_dwells(Unfinished& campaign) {
+    const auto rows = database().ask(
+        "SELECT run, position, checkpoint FROM dwell WHERE campaign = ? ORDER BY rowid",
+        {campaign.id});
+    int without_noise = 0;
+    for (const Row& row : rows) {
+        DwellCheckpoint dwell;
+        std::string why = decode(row.texts.at(2), configuration_hash_, dwell);
+        if (why.empty() &&
+            (dwell.info.run != row.numbers.at(0) || dwell.info.position != row.numbers.at(1)))
+            why = "of another position";
+        if (!why.empty()) {
+            recovery_.refused.push_back(
+                fmt::format("campaign {} ({}), checkpoint of run {} position {}: {}: cold start",
+                            campaign.id, campaign.name, row.numbers.at(0), row.numbers.at(1), why));
+            campaign.dwells.clear();
+            return;
+        }
+        without_noise += dwell.noise_known ? 0 : 1;
+        campaign.dwells.push_back(std::move(dwell));
+    }
+    if (without_noise > 0) {
+        recovery_.assumed = fmt::format(
+            "campaign {} ({}): {} checkpoints of version 1 do not say with which noise levels they "
+            "were filtered: assumed those that the noise monitor comes to again",
+            campaign.id, campaign.name, without_noise);
+    }
+}
+
+void Journal::start() {
+    thread_ = std::thread([this] { loop(); });
+    ::pthread_setname_np(thread_.native_handle(), "journal");
+}
+
+void Journal::stop() noexcept {
+    {
+        const std::lock_guard lock(mutex_);
+        stop_ = true;
+        changed_.notify_all();
+    }
+    if (thread_.joinable()) thread_.join();
+}
+
+std::uint64_t Journal::put(Entry entry) {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() >= kMostWaiting && !std::holds_alternative<Safety>(entry)) {
+        ++status_.dropped;
+        return 0;
+    }
+    waiting_.push_back(std::move(entry));
+    changed_.notify_all();
+    return ++status_.taken;
+}
+
+bool Journal::on_disk(std::uint64_t entry) const {
+    const std::lock_guard lock(mutex_);
+    return status_.written >= entry;
+}
+
+std::uint64_t Journal::armed(const std::string& by, const std::string& what) {
+    return put(Safety{kArmed, {}, by, what, false, utc_now()});
+}
+std::uint64_t Journal::disarmed(const std::string& by, const std::string& why) {
+    return put(Safety{kDisarmed, {}, by, why, false, utc_now()});
+}
+std::uint64_t Journal::latched(const Latch& latch) {
+    return put(
+        Safety{kLatched, latch.name, latch.armed_by, latch.cause, latch.two_persons, latch.utc_ns});
+}
+std::uint64_t Journal::acknowledged(const std::string& name, const std::string& by, bool last) {
+    return put(Safety{last ? kOver : kFirst, name, by, {}, false, utc_now()});
+}
+
+void Journal::campaign_begun(const std::string& name, const std::string& by) {
+    put(Begun{name, by, 0, utc_now()});
+}
+void Journal::campaign_resumed(std::int64_t id, const std::string& by) {
+    put(Begun{{}, by, id, utc_now()});
+}
+void Journal::dwell_done(const estimator::DwellInfo& info, const estimator::DwellSummary& summary,
+                         const StopDone& stop) {
+    put(Done{info, summary, stop});
+}
+void Journal::campaign_ended(const std::string& state, const std::string& reason,
+                             const std::string& result_json) {
+    put(Ended{state, reason, result_json, utc_now()});
+}
+void Journal::loop_checked(const std::string& by, const std::string& out_of_band) {
+    put(LoopChecked{by, out_of_band, utc_now()});
+}
+void Journal::event(const EventRecord& event) { put(event); }
+void Journal::command(const CommandRequest& request, const CommandReply& reply,
+                      std::int64_t utc_ns) {
+    put(Commanded{request, reply, utc_ns});
+}
+
+JournalStatus Journal::status() const {
+    const std::lock_guard lock(mutex_);
+    return status_;
+}
+
+void Journal::loop() {
+    std::deque<Entry> at_work;
+    for (;;) {
+        look();
+        std::deque<Entry> taken;
+        bool last = false;
+        {
+            std::unique_lock lock(mutex_);
+            changed_.wait_for(
+                lock, at_work.empty() ? kPeriod : std::chrono::milliseconds(kRetry),
+                [this, &at_work] { return stop_ || (at_work.empty() && !waiting_.empty()); });
+            taken.swap(waiting_);
+            last = stop_;
+        }
+        std::ranges::move(taken, std::back_inserter(at_work));
+        take_fed();
+        if (on_space_) {
+            std::error_code error;
+            const auto folder = std::filesystem::absolute(path_).parent_path();
+            const auto space = std::filesystem::space(folder, error);
+            if (!error) on_space_(static_cast<double>(space.available) / 1e6);
+        }
+        if (!at_work.empty() && write(at_work)) at_work.clear();
+        if (last) return;
+    }
+}
+
+/// What is no longer what was written is put aside at once; what waits goes into the new file.
+void Journal::look() {
+    try {
+        if (to_replace_.empty()) {
+            const auto now = std::chrono::steady_clock::now().time_since_epoch();
+            to_replace_ = file_->look(std::chrono::nanoseconds(now).count());
+        }
+        if (!to_replace_.empty()) begin_anew();
+    } catch (const DatabaseError& error) {
+        file_->roll_back();
+        if (error.damaged() && to_replace_.empty()) to_replace_ = {error.what()};
+        const std::lock_guard lock(mutex_);
+        status_.running = false;
+        status_.note = error.what();
+        return;
+    }
+    const std::lock_guard lock(mutex_);
+    status_.verified = file_->verified();
+    status_.entries = static_cast<std::uint64_t>(file_->head().entry);
+    status_.head = to_hex(file_->head().hash);
+    status_.public_key = file_->public_key();
+}
+
+void Journal::begin_anew() {
+    std::vector<Row> campaign;
+    try {
+        if (campaign_ != 0) {
+            campaign = database().ask(
+                "SELECT id, name, started_by, started_utc_ns, configuration_hash FROM campaign "
+                "WHERE id = ?",
+                {campaign_});
+        }
+    } catch (const DatabaseError&) {  // without it
+    }
+    file_->replace(to_replace_);
+    carry_over();
+    if (!campaign.empty()) {
+        const Row& row = campaign.front();
+        file_->begin();
+        database().run(
+            "INSERT INTO campaign (id, name, started_by, started_utc_ns, configuration_hash, state) "
+            "VALUES (?, ?, ?, ?, ?, 'running')",
+            {campaign_, std::string_view(row.texts[1]), std::string_view(row.texts[2]),
+             row.numbers[3], row.numbers[4]});
+        file_->chained("campaign", campaign_);
+        file_->commit();
+    } else {
+        campaign_ = 0;
+    }
+    to_replace_.clear();
+    if (on_written_) on_written_();
+}
+
+/// What is latched and armed stands in the new file before anything else, and why there is one.
+void Journal::carry_over() {
+    const Latch changed{kJournalLatch, joined(file_->found()), {}, {}, false, utc_now()};
+    file_->begin();
+    for (const Latch& latch : latches_.open()) {
+        write_one(Safety{kLatched, latch.name, latch.armed_by, latch.cause, latch.two_persons,
+                         latch.utc_ns});
+        if (!latch.first.empty()) write_one(Safety{kFirst, latch.name, latch.first});
+    }
+    write_one(Safety{kLatched, changed.name, {}, changed.cause, false, changed.utc_ns});
+    if (*arming_.what != '\0') write_one(arming_);
+    file_->commit();
+    latches_.add(changed);
+    const std::lock_guard lock(mutex_);
+    found_.push_back(fmt::format("{}; put aside as {}", changed.cause, file_->aside()));
+}
+
+void Journal::take_fed() {
+    constexpr std::size_t kMostCollected = 8;
+    while (fed_.consume([this](const rt::Fed& fed) {
+        if (fed.first || collected_.empty()) {
+            if (collected_.size() == kMostCollected) collected_.pop_front();
+            collected_.emplace_back().info = {fed.run, fed.position, 0};
+        }
+        collected_.back().measurements.push_back(fed.measurement);
+    }) > 0) {
+    }
+}
+
+bool Journal::write(const std::deque<Entry>& entries) {
+    const std::int64_t campaign = campaign_;
+    std::string why;
+    try {
+        file_->begin();
+        for (const Entry& entry : entries) {
+            std::visit([this](const auto& one) { write_one(one); }, entry);
+        }
+        file_->commit();
+        for (const Entry& entry : entries) {
+            if (const auto* safety = std::get_if<Safety>(&entry)) follow(*safety);
+        }
+    } catch (const DatabaseError& error) {
+        why = error.what();
+        campaign_ = campaign;
+        file_->roll_back();
+        if (error.damaged()) to_replace_ = {why};
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        status_.running = why.empty();
+        status_.note = why;
+        if (why.empty()) status_.written += entries.size();
+    }
+    if (on_written_) on_written_();
+    return why.empty();
+}
+
+void Journal::write_one(const Begun& begun) {
+    if (begun.resumed_id != 0) {
+        campaign_ = begun.resumed_id;
+        return;
+    }
+    for (const Row& row : database().ask("SELECT id FROM campaign WHERE state = 'running'")) {
+        database().run("UPDATE campaign SET state = 'given up' WHERE id = ?", {row.numbers[0]});
+        file_->chained("campaign", row.numbers[0]);
+    }
+    database().run(
+        "INSERT INTO campaign (name, started_by, started_utc_ns, configuration_hash, state) "
+        "VALUES (?, ?, ?, ?, 'running')",
+        {std::string_view(begun.name), std::string_view(begun.by), begun.utc_ns,
+         static_cast<std::int64_t>(configuration_hash_)});
+    campaign_ = database().last_id();
+    file_->chained("campaign", campaign_);
+}
+
+void Journal::write_one(const Done& done) {
+    if (campaign_ == 0) return;
+    DwellCheckpoint empty;
+    const auto same = [&done](const DwellCheckpoint& dwell) {
+        return dwell.info.run == done.info.run && dwell.info.position == done.info.position;
+    };
+    const auto found = std::find_if(collected_.rbegin(), collected_.rend(), same);
+    DwellCheckpoint& dwell = found == collected_.rend() ? empty : *found;
+    dwell.info = done.info;
+    dwell.summary = done.summary;
+    dwell.stop = done.stop;
+    // Measurements that were lost on the way would give another filter.
+    const bool whole = dwell.measurements.size() == done.summary.samples;
+    const std::string bytes = whole ? encode(dwell, configuration_hash_) : std::string{};
+    const auto row = database().ask(
+        "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
+        "ON CONFLICT (campaign, run, position) DO UPDATE SET samples = excluded.samples, "
+        "used = excluded.used, rejected = excluded.rejected, flagged = excluded.flagged, "
+        "reason = excluded.reason, checkpoint = excluded.checkpoint RETURNING rowid",
+                   {campaign_, std::int64_t{done.info.run}, std::int64_t{done.info.position},
+                    std::int64_t{done.summary.samples}, std::int64_t{done.summary.used},
+                    std::int64_t{done.summary.rejected}, std::int64_t{done.summary.flagged},
+                    std::string_view(done.summary.reason), Blob{bytes}});
+    file_->chained("dwell", row.front().numbers[0]);
+}
+
+void Journal::write_one(const Ended& ended) {
+    if (campaign_ == 0) return;
+    database().run(
+        "UPDATE campaign SET state = ?, reason = ?, ended_utc_ns = ?, result_json = ? "
+        "WHERE id = ?",
+        {std::string_view(ended.state), std::string_view(ended.reason), ended.utc_ns,
+         std::string_view(ended.result), campaign_});
+    file_->chained("campaign", campaign_);
+    campaign_ = 0;
+    collected_.clear();
+}
+
+void Journal::write_one(const EventRecord& event) {
+    database().run(
+        "INSERT INTO event (utc_ns, time_ns, severity, source, text) VALUES (?, ?, ?, ?, ?)",
+        {event.utc_ns, event.time, std::string_view(name_of(event.severity)),
+         std::string_view(event.source), std::string_view(event.text)});
+    file_->chained("event", database().last_id());
+}
+
+void Journal::write_one(const Commanded& commanded) {
+    database().run(
+        "INSERT INTO command (utc_ns, kind, person, argument, accepted, answer) "
+        "VALUES (?, ?, ?, ?, ?, ?)",
+        {commanded.utc_ns, std::string_view(word_of(commanded.request.kind)),
+         std::string_view(commanded.request.by), std::string_view(commanded.request.argument),
+         std::int64_t{commanded.reply.accepted}, std::string_view(commanded.reply.message)});
+    file_->chained("command", database().last_id());
+}
+
+void Journal::write_one(const LoopChecked& checked) {
+    database().run(
+        "INSERT INTO loop_check (utc_ns, person, out_of_band) VALUES (?, ?, ?)",
+        {checked.utc_ns, std::string_view(checked.by), std::string_view(checked.out_of_band)});
+    file_->chained("loop_check", database().last_id());
+}
+
+void Journal::write_one(const Safety& safety) {
+    database().run(
+        "INSERT INTO safety (utc_ns, what, name, person, text, two_persons) "
+        "VALUES (?, ?, ?, ?, ?, ?)",
+        {safety.utc_ns, std::string_view(safety.what), std::string_view(safety.name),
+         std::string_view(safety.person), std::string_view(safety.text),
+         std::int64_t{safety.two_persons}});
+    file_->chained("safety", database().last_id());
+}
+
+}  // namespace vibrig::journal
