@@ -10,15 +10,15 @@ namespace vibrig::estimator::allan {
 
 namespace {
 
-constexpr std::size_t kFewestSamples = 9;
+constexpr std::size_t kShortestWindow = 9;
 constexpr std::size_t kGrid = 20;
 constexpr std::size_t kDecimation = 16;
-constexpr double kLargestMissingShare = 0.1;
+constexpr double kMostMissing = 0.1;
 
 std::size_t checked_window(std::size_t window) {
-    if (window < kFewestSamples) {
+    if (window < kShortestWindow) {
         throw DataError("window: " + std::to_string(window) + " samples found, at least " +
-                        std::to_string(kFewestSamples) + " needed");
+                        std::to_string(kShortestWindow) + " needed");
     }
     return window;
 }
@@ -107,7 +107,7 @@ WindowRow DynamicAllan::row() const {
     }
     const std::vector<VariancePoint> curve = curve_of(row.allan, row.share, factors, tau0);
     row.refused = static_cast<double>(row.missing) >
-                      kLargestMissingShare * static_cast<double>(settings_.window) ||
+                      kMostMissing * static_cast<double>(settings_.window) ||
                   curve.size() < 2 || classical.size() < kPowers.size();
     if (!row.refused) {
         row.fit = fit_noise(curve, covariance_, settings_.wanted);
