@@ -36,6 +36,7 @@ class CrossCheck {
     void set_points_fit();
     void limits();
     void frequency();
+    void inputs();
 
     const Configuration& c_;
     const std::map<std::string, Place>& places_;
