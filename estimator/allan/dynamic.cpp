@@ -106,9 +106,9 @@ WindowRow DynamicAllan::row() const {
         }
     }
     const std::vector<VariancePoint> curve = curve_of(row.allan, row.share, factors, tau0);
-    row.refused = static_cast<double>(row.missing) >
-                      kMostMissing * static_cast<double>(settings_.window) ||
-                  curve.size() < 2 || classical.size() < kPowers.size();
+    row.refused =
+        static_cast<double>(row.missing) > kMostMissing * static_cast<double>(settings_.window) ||
+        curve.size() < 2 || classical.size() < kPowers.size();
     if (!row.refused) {
         row.fit = fit_noise(curve, covariance_, settings_.wanted);
         row.classical_fit = fit_classical(classical, settings_.mode);
