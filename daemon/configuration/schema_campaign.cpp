@@ -80,7 +80,7 @@ void add_loop_check_keys(std::vector<Key>& keys) {
                               [member](C& c) -> double& { return c.campaign.loop.*member; }));
     };
     using S = campaign::LoopCheckSettings;
-    loop("table_g", "g", {0.05, 1}, "peak acceleration at the table during the loop check",
+    loop("table_g", "g", {0.05, 0.5}, "peak acceleration at the table during the loop check",
          &S::table_g);
     loop("measure_s", "s", {2, 20}, "that the loop check measures at its level", &S::measure_s);
     loop("transmission_tolerance", "", {0.001, 1}, "about vibration.transmission, relative",
