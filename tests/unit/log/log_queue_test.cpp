@@ -28,7 +28,7 @@ struct Pipe {
     }
     ~Pipe() {
         close_reader();
-        ::close(ends[1]);
+        if (ends[1] >= 0) ::close(ends[1]);
     }
     Pipe(const Pipe&) = delete;
     Pipe& operator=(const Pipe&) = delete;
@@ -97,9 +97,9 @@ TEST(LogQueue, EndsAlthoughNobodyReads) {
         EXPECT_LE(queue.counts().waiting, 1u) << "the line that the pipe has half of";
         expect_balance(queue.counts());
     }
-    // and the thread that is left behind ends with its write; its descriptor's number is not given
-    // to anybody before
+    // and the thread that is left behind ends with its write; its descriptor stays its own
     pipe.close_reader();
+    pipe.ends[1] = -1;
     std::this_thread::sleep_for(100ms);
 }
 
