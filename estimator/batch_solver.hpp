@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 
 #include "estimator/drift_filter.hpp"
+#include "estimator/dwell_row.hpp"
 #include "estimator/two_step.hpp"
 
 namespace vibrig::estimator {
@@ -21,14 +23,21 @@ class BatchSolver {
     /// The angles start afresh, as at the first reading of a dwell.
     void start(double time_s, const Eigen::Vector3d& angles_rad) noexcept;
     /// One reading; those that are not `used` only pass the time.
-    void step(double time_s, const Eigen::Vector3d& angles_rad, double kappa, bool used) noexcept;
+    void step(double time_s, const Eigen::Vector3d& angles_rad, const VibrationMoment& vibration,
+              bool used) noexcept;
+    /// What of a row the sums of the dwell tell: rates, ramps and their regressors; those of the
+    /// gyros' own coefficients. False if they do not determine them. Before end_dwell().
+    [[nodiscard]] bool row(DwellRow& out) noexcept;
     void end_dwell(bool keep) noexcept;
+    void set_noise(const FilterNoise& noise) noexcept { noise_ = noise; }
 
     /// Over the dwells kept, filter order; false if the sums are not finite.
     [[nodiscard]] bool solve(ParameterArray& value, Covariance& covariance) const noexcept;
 
   private:
-    static constexpr Eigen::Index kColumns = static_cast<Eigen::Index>(kParameters) + 1;
+    /// Coefficients, a drift of each gyro that grows along the dwell, the angles.
+    static constexpr Eigen::Index kRamps = static_cast<Eigen::Index>(kParameters);
+    static constexpr Eigen::Index kColumns = kRamps + 4;
     static constexpr Eigen::Index kReadingsPerBlock = 8;
     using Columns = Eigen::Matrix<double, 3, kColumns>;
     using Sums = Eigen::Matrix<double, kColumns, kColumns>;
@@ -41,6 +50,9 @@ class BatchSolver {
     ParameterArray prior_;
     Eigen::Vector3d path_ = Eigen::Vector3d::Zero();  ///< last used reading, rad
     double time_s_ = 0;
+    double first_s_ = 0, last_s_ = 0;  ///< readings of the dwell
+    Eigen::Vector3d first_path_ = Eigen::Vector3d::Zero(), path_sum_ = Eigen::Vector3d::Zero();
+    std::uint32_t readings_ = 0;  ///< used in the dwell
     bool started_ = false;
     /// Integrated regressors and, last, the angles less the Earth's share, arcsec; each less the
     /// local level that random walk and encoder noise leave known.

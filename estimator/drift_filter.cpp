@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/second_moment.hpp"
+
 namespace vibrig::estimator {
 namespace {
 
@@ -50,7 +52,7 @@ DriftFilter::DriftFilter(const Settings& settings, const ParameterArray& sigma)
       noise_(FilterNoise::of(settings)),
       gate_(settings.gate_nis),
       filter_(sigma),
-      up_(kinematics_.up_reference()) {}
+      level_(kinematics_.pose(Eigen::Vector3d::Zero()).level) {}
 
 void DriftFilter::begin_dwell() noexcept {
     started_ = false;
@@ -62,12 +64,13 @@ Eigen::Vector3d DriftFilter::angles() const noexcept {
     return Eigen::Vector3d(a[0], a[1], a[2]) / kArcsecPerRad;
 }
 
-void DriftFilter::predict(double dt, double kappa) noexcept {
+void DriftFilter::predict(double dt, const VibrationMoment& vibration) noexcept {
     const Pose pose = kinematics_.pose(angles());
-    up_ = pose.up;
-    const Regressors h = model_.regressors(pose.up, kappa);
+    level_ = pose.level;
+    const Eigen::Matrix3d moment = second_moment(pose, vibration);
+    const Regressors h = model_.regressors(pose.up, moment);
     const Eigen::Vector3d rate = model_.platform_rate(pose, h, filter_.constants());
-    const Eigen::Matrix3d jacobian = model_.jacobian(pose, kappa, filter_.constants(), rate);
+    const Eigen::Matrix3d jacobian = model_.jacobian(pose, moment, filter_.constants(), rate);
     const Eigen::Vector3d increment = dt * (pose.m * rate);
 
     UdFilter::Transition t{};
@@ -89,7 +92,7 @@ void DriftFilter::predict(double dt, double kappa) noexcept {
 }
 
 StepResult DriftFilter::step(double time_s, const Eigen::Vector3d& angles_rad,
-                             double kappa) noexcept {
+                             const VibrationMoment& vibration) noexcept {
     StepResult result;
     UdFilter::Vector3 z{};
     // Readings without good angles leave a gap here that the caller does not see.
@@ -100,13 +103,13 @@ StepResult DriftFilter::step(double time_s, const Eigen::Vector3d& angles_rad,
         }
         filter_.start_angles(z, noise_.angle_variance);
         started_ = true;
-        up_ = kinematics_.pose(angles()).up;
+        level_ = kinematics_.pose(angles()).level;
         time_s_ = time_s;
         gated_in_a_row_ = 0;
         result.outcome = StepOutcome::initialised;
         return result;
     }
-    predict(time_s - time_s_, kappa);
+    predict(time_s - time_s_, vibration);
     time_s_ = time_s;
 
     const UdFilter::Vector3 predicted = filter_.angles();

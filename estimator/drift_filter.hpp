@@ -32,27 +32,27 @@ class DriftFilter {
     /// The next sample starts the angles afresh.
     void begin_dwell() noexcept;
     /// One reading at `time_s`, later than the one before.
-    StepResult step(double time_s, const Eigen::Vector3d& angles_rad, double kappa) noexcept;
+    StepResult step(double time_s, const Eigen::Vector3d& angles_rad,
+                    const VibrationMoment& vibration) noexcept;
 
     [[nodiscard]] const UdFilter& state() const noexcept { return filter_; }
     /// Takes back what was learnt since `state` was copied.
     void restore(const UdFilter& state) noexcept { filter_ = state; }
     /// Present gimbal angles, rad.
     [[nodiscard]] Eigen::Vector3d angles() const noexcept;
-    /// Direction of specific force at the last time step, platform axes: the vertical that spikes
-    /// do not move.
-    [[nodiscard]] const Eigen::Vector3d& up() const noexcept { return up_; }
+    /// North, up and east at the last time step, platform axes: the level that spikes do not move.
+    [[nodiscard]] const Eigen::Matrix3d& level() const noexcept { return level_; }
     [[nodiscard]] bool started() const noexcept { return started_; }
 
   private:
-    void predict(double dt, double kappa) noexcept;
+    void predict(double dt, const VibrationMoment& vibration) noexcept;
 
     Kinematics kinematics_;
     DriftModel model_;
     FilterNoise noise_;
     double gate_;
     UdFilter filter_;
-    Eigen::Vector3d up_;
+    Eigen::Matrix3d level_;
     double time_s_ = 0;
     int gated_in_a_row_ = 0;
     bool started_ = false;

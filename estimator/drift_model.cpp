@@ -13,23 +13,25 @@ DriftModel::DriftModel(const Settings& settings) : axes_{}, sign_(settings.drift
     }
 }
 
-Regressors DriftModel::regressors(const Eigen::Vector3d& up, double kappa) const noexcept {
+Regressors DriftModel::regressors(const Eigen::Vector3d& up,
+                                  const Eigen::Matrix3d& moment) const noexcept {
     Regressors h{};
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        const double i = g.sign[0] * up[g.axis[0]];
-        const double o = g.sign[1] * up[g.axis[1]];
-        const double s = g.sign[2] * up[g.axis[2]];
+        const auto product = [&](std::size_t p, std::size_t q) {
+            return g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
+        };
+        constexpr std::size_t kInput = 0, kOutput = 1, kSpin = 2;
         h[kDt][j] = 1.0;
-        h[kDi][j] = i;
-        h[kDs][j] = s;
-        h[kDo][j] = o;
-        h[kDii][j] = kappa * i * i;
-        h[kDss][j] = kappa * s * s;
-        h[kDoo][j] = kappa * o * o;
-        h[kDis][j] = kappa * i * s;
-        h[kDio][j] = kappa * i * o;
-        h[kDos][j] = kappa * s * o;
+        h[kDi][j] = g.sign[kInput] * up[g.axis[kInput]];
+        h[kDs][j] = g.sign[kSpin] * up[g.axis[kSpin]];
+        h[kDo][j] = g.sign[kOutput] * up[g.axis[kOutput]];
+        h[kDii][j] = product(kInput, kInput);
+        h[kDss][j] = product(kSpin, kSpin);
+        h[kDoo][j] = product(kOutput, kOutput);
+        h[kDis][j] = product(kInput, kSpin);
+        h[kDio][j] = product(kInput, kOutput);
+        h[kDos][j] = product(kSpin, kOutput);
     }
     return h;
 }
@@ -46,28 +48,37 @@ Eigen::Vector3d DriftModel::platform_rate(const Pose& pose, const Regressors& h,
     return sign_ * drift - pose.earth_rate;
 }
 
-Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, double kappa, const double* parameters,
+Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, const Eigen::Matrix3d& moment,
+                                     const double* parameters,
                                      const Eigen::Vector3d& platform_rate) const noexcept {
-    // Gradient of each gyro's drift with respect to the specific force direction, platform axes.
-    Eigen::Matrix3d gradient = Eigen::Matrix3d::Zero();
+    // A turn of the platform by e changes u by e x u and S by E S - S E, E = [e x]; what that does
+    // to a gyro's drift, l . u + tr(Q S), is e . (u x l + 2 axial(S Q)).
+    Eigen::Matrix3d turning;  // one gyro a row
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        const double i = g.sign[0] * pose.up[g.axis[0]];
-        const double o = g.sign[1] * pose.up[g.axis[1]];
-        const double s = g.sign[2] * pose.up[g.axis[2]];
         const auto d = [&](std::size_t group) { return parameters[internal_index(group, j)]; };
-        const double gi = d(kDi) + kappa * (2.0 * d(kDii) * i + d(kDis) * s + d(kDio) * o);
-        const double gs = d(kDs) + kappa * (2.0 * d(kDss) * s + d(kDis) * i + d(kDos) * o);
-        const double go = d(kDo) + kappa * (2.0 * d(kDoo) * o + d(kDio) * i + d(kDos) * s);
-        const auto row = static_cast<Eigen::Index>(j);
-        gradient(row, g.axis[0]) += g.sign[0] * gi;
-        gradient(row, g.axis[1]) += g.sign[1] * go;
-        gradient(row, g.axis[2]) += g.sign[2] * gs;
+        const auto [i, o, s] = g.axis;
+        const auto [si, so, ss] = g.sign;
+        Eigen::Vector3d linear;
+        linear[i] = si * d(kDi);
+        linear[o] = so * d(kDo);
+        linear[s] = ss * d(kDs);
+        Eigen::Matrix3d q;
+        q(i, i) = d(kDii);
+        q(o, o) = d(kDoo);
+        q(s, s) = d(kDss);
+        q(i, s) = q(s, i) = 0.5 * si * ss * d(kDis);
+        q(i, o) = q(o, i) = 0.5 * si * so * d(kDio);
+        q(o, s) = q(s, o) = 0.5 * so * ss * d(kDos);
+        const Eigen::Matrix3d a = moment * q;
+        turning.row(static_cast<Eigen::Index>(j)) =
+            pose.up.cross(linear) +
+            2.0 * Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0));
     }
     Eigen::Matrix3d j;
     for (int k = 0; k < 3; ++k) {
         const Eigen::Vector3d& e = pose.axis[static_cast<std::size_t>(k)];
-        const Eigen::Vector3d dw = sign_ * (gradient * e.cross(pose.up)) - e.cross(pose.earth_rate);
+        const Eigen::Vector3d dw = sign_ * (turning * e) - e.cross(pose.earth_rate);
         j.col(k) = pose.m * dw;
     }
     // d m / d angle, applied to the rate.

@@ -17,14 +17,21 @@ class DriftModel {
   public:
     explicit DriftModel(const Settings& settings);
 
-    [[nodiscard]] Regressors regressors(const Eigen::Vector3d& up, double kappa) const noexcept;
+    /// `moment`: mean of f f', platform axes, g^2.
+    [[nodiscard]] Regressors regressors(const Eigen::Vector3d& up,
+                                        const Eigen::Matrix3d& moment) const noexcept;
+    /// Of a vibration along the vertical.
+    [[nodiscard]] Regressors regressors(const Eigen::Vector3d& up, double kappa) const noexcept {
+        return regressors(up, kappa * up * up.transpose());
+    }
 
     /// Rate of the platform relative to the Earth, platform axes: drift_sign * h.D - w_e.
     [[nodiscard]] Eigen::Vector3d platform_rate(const Pose& pose, const Regressors& h,
                                                 const double* parameters) const noexcept;
 
     /// d (angle rates) / d (angles), deg/h per rad; `platform_rate` is that of the same pose.
-    [[nodiscard]] Eigen::Matrix3d jacobian(const Pose& pose, double kappa, const double* parameters,
+    [[nodiscard]] Eigen::Matrix3d jacobian(const Pose& pose, const Eigen::Matrix3d& moment,
+                                           const double* parameters,
                                            const Eigen::Vector3d& platform_rate) const noexcept;
 
     [[nodiscard]] double drift_sign() const noexcept { return sign_; }

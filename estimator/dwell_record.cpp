@@ -84,6 +84,10 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     if (r.level_samples > 0 && !sparse) {
         s.kappa = r.kappa_sum / r.level_samples;
         s.mean_force_g = r.mean_force_sum / r.level_samples;
+        if (r.shape_weight > 0) {
+            for (std::size_t k = 0; k < s.gamma.size(); ++k)
+                s.gamma[k] = r.shape_sum[k] / r.shape_weight;
+        }
     }
     s.amplitude_g = std::sqrt(2.0 * std::max(0.0, s.kappa - 1.0));
     s.frequency_hz = r.frequency_samples > 0 ? r.frequency_sum / r.frequency_samples : 0.0;

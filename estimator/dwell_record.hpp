@@ -20,6 +20,8 @@ struct DwellRecord {
     // Over the stretches of the dwell between gaps of more than 1 s, weighted by their samples.
     double level_samples = 0, kappa_sum = 0, mean_force_sum = 0, frequency_sum = 0,
            frequency_samples = 0;
+    double shape_weight = 0;  ///< samples times kappa - 1
+    LevelTensor shape_sum{};
     double period_s = 0, span_s = 0;
     double least_kappa = 0, largest_kappa = 0;  ///< of the streaming level; 0: none yet
     std::uint32_t stuck = 0;                    ///< samples with a resolver that stands still

@@ -3,12 +3,13 @@
 #include <Eigen/LU>
 
 #include "estimator/drift_model.hpp"
+#include "estimator/second_moment.hpp"
 
 namespace vibrig::estimator {
 
 DwellResidual dwell_residual(const Settings& settings,
-                             const std::array<double, kParameters>& coefficients, double kappa,
-                             std::span<const AngleBlock> blocks) {
+                             const std::array<double, kParameters>& coefficients,
+                             const VibrationMoment& vibration, std::span<const AngleBlock> blocks) {
     DwellResidual residual;
     if (blocks.empty()) return residual;
     const Kinematics kinematics(settings);
@@ -17,7 +18,7 @@ DwellResidual dwell_residual(const Settings& settings,
     for (std::size_t i = 0; i < kParameters; ++i) parameters[internal_of(i)] = coefficients[i];
     const auto rate = [&](const Eigen::Vector3d& angles) -> Eigen::Vector3d {  // arcsec/s
         const Pose pose = kinematics.pose(angles);
-        const Regressors h = model.regressors(pose.up, kappa);
+        const Regressors h = model.regressors(pose.up, second_moment(pose, vibration));
         return pose.m * model.platform_rate(pose, h, parameters.data());
     };
 

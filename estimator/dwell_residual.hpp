@@ -24,9 +24,10 @@ struct DwellResidual {
 };
 
 /// The angles minus the model's with the given coefficients (in the order of parameter_names()) and
-/// vibration kappa, which starts at the first block. Errors of the coefficients leave a rate.
+/// vibration, which starts at the first block. Errors of the coefficients leave a rate.
 [[nodiscard]] DwellResidual dwell_residual(const Settings& settings,
                                            const std::array<double, kParameters>& coefficients,
-                                           double kappa, std::span<const AngleBlock> blocks);
+                                           const VibrationMoment& vibration,
+                                           std::span<const AngleBlock> blocks);
 
 }  // namespace vibrig::estimator

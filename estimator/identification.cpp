@@ -41,6 +41,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
       saturation_(s.accelerometer_g, s.accelerometer_range_g),
       buffer_(VibrationLevel::kFirstWindow_s, kBufferCapacity),
       level_(s.level_window_s, s.accelerometer_g, s.frequency_hz),
+      sync_(s.frequency_hz),
       paper_(s.frequency_hz, s.forgetting) {
     for (std::size_t r = 0; r < 3; ++r) {
         for (std::size_t c = 0; c < 3; ++c) {
@@ -49,6 +50,7 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
         }
     }
     dwells.reserve(max_dwells);
+    rows.reserve(s.method == Method::joint ? max_dwells : 0);
     paper_starts_.reserve(max_dwells);
     solve(solution);
 }
@@ -86,6 +88,7 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     buffer_.clear();
     primed_ = false;
     stuck_.clear();
+    sync_.clear();
     saturation_.clear();
     bad_times_in_a_row_ = 0;
     active_ = filter_of(dwell.run);
@@ -121,6 +124,7 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         return step;
     }
     const bool first = record_.samples == 1 || (buffer_.empty() && !primed_);
+    if (record_.samples == 1) dwell_begin_s_ = measurement.time_s;
     const double dt = measurement.time_s - last_time_s_;
     bool restart = false;
     if (!std::isfinite(measurement.time_s) || (!first && !(dt > 0))) {
@@ -178,26 +182,35 @@ StepResult Identification::Impl::replay() noexcept {
         return nothing;
     }
     level_.begin(period_s_);
+    tensor_.clear();
+    vibration_ = {};
     Eigen::Vector3d angles = Eigen::Vector3d::Zero();
     const bool vertical_known = buffer_.median_angles(angles);
-    const Eigen::Vector3d up = kinematics_.pose(angles).up;
+    const Eigen::Matrix3d level = kinematics_.pose(angles).level;
     double previous = buffer_.readings().front().time_s - period_s_;
     std::size_t good = 0;
     for (const Reading& reading : buffer_.readings()) {
         const double slots =
             std::min(std::round((reading.time_s - previous) / period_s_), 1.0 / period_s_);
-        for (double k = 1; k < slots; ++k) level_.add_first_missing();
+        for (double k = 1; k < slots; ++k) {
+            level_.add_first_missing();
+            tensor_.add_missing();
+        }
         record_.note_interval((reading.time_s - previous) / period_s_);
         previous = reading.time_s;
         if (reading.force_good && vertical_known) {
-            level_.add_first(up.dot(reading.force));
+            const Eigen::Vector3d force = level.transpose() * reading.force;
+            level_.add_first(force[1]);
+            tensor_.add(force);
             ++good;
         } else {
             level_.add_first_missing();
+            tensor_.add_missing();
         }
     }
     // With fewer than half of the readings the fit that fills the gaps stands on nothing.
     level_.prime();
+    refresh_vibration();
     primed_ = 2 * good >= buffer_.readings().size();
     StepResult step;
     if (primed_) {
@@ -215,14 +228,31 @@ StepResult Identification::Impl::replay() noexcept {
 void Identification::Impl::to_level(const Reading& reading) noexcept {
     const double slots = std::round((reading.time_s - last_time_s_) / period_s_);
     record_.note_interval((reading.time_s - last_time_s_) / period_s_);
-    for (double k = 1; k < slots; ++k) level_.add_missing();
+    for (double k = 1; k < slots; ++k) {
+        level_.add_missing();
+        tensor_.add_missing();
+    }
     // The filter's angles, not the encoders': a spike must not tilt the vertical.
     if (reading.force_good) {
-        level_.add(active_->filter.up().dot(reading.force));
+        const Eigen::Vector3d force = active_->filter.level().transpose() * reading.force;
+        level_.add(force[1]);
+        tensor_.add(force);
     } else {
         level_.add_missing();
+        tensor_.add_missing();
     }
+    refresh_vibration();
     record_.note_level(level_.kappa());
+}
+
+/// The shape follows the level; the two-step route has none.
+void Identification::Impl::refresh_vibration() noexcept {
+    if (vibration_.kappa == level_.kappa()) return;
+    vibration_.kappa = level_.kappa();
+    if (settings.second_moment == SecondMoment::vertical || settings.method != Method::joint ||
+        !(vibration_.kappa > 1.0) || !tensor_.due())
+        return;
+    static_cast<void>(tensor_.shape(settings.accelerometer_g, vibration_.gamma));
 }
 
 StepResult Identification::Impl::through_filter(const Reading& reading) noexcept {
@@ -231,14 +261,18 @@ StepResult Identification::Impl::through_filter(const Reading& reading) noexcept
     if (!reading.angles_good) {
         step.outcome = StepOutcome::bad_angles;
     } else {
-        const double kappa = settings.method == Method::joint ? level_.kappa() : paper_.kappa();
-        step = active_->filter.step(reading.time_s, reading.angles, kappa);
+        const VibrationMoment vibration = settings.method == Method::joint
+                                              ? vibration_
+                                              : VibrationMoment{paper_.kappa(), kVertical};
+        step = active_->filter.step(reading.time_s, reading.angles, vibration);
         innovation_arcsec_ = step.innovation_arcsec;
+        if (step.outcome == StepOutcome::used && vibration.kappa > 1.0)
+            sync_.add(reading.time_s - dwell_begin_s_, step.innovation_arcsec);
         if (step.outcome == StepOutcome::initialised ||
             step.outcome == StepOutcome::reinitialised) {
             active_->batch.start(reading.time_s, reading.angles);
         } else {
-            active_->batch.step(reading.time_s, reading.angles, kappa,
+            active_->batch.step(reading.time_s, reading.angles, vibration,
                                 step.outcome == StepOutcome::used);
         }
     }
@@ -246,6 +280,14 @@ StepResult Identification::Impl::through_filter(const Reading& reading) noexcept
     if (step.outcome == StepOutcome::used && !reading.force_good)
         step.outcome = StepOutcome::bad_force;
     return step;
+}
+
+void Identification::Impl::note_shape(double weight) noexcept {
+    LevelTensor whole = kVertical;
+    if (settings.second_moment == SecondMoment::measured && weight > 0)
+        static_cast<void>(tensor_.shape(settings.accelerometer_g, whole));
+    record_.shape_weight += weight;
+    for (std::size_t k = 0; k < whole.size(); ++k) record_.shape_sum[k] += weight * whole[k];
 }
 
 void Identification::Impl::end_stretch() noexcept {
@@ -256,6 +298,7 @@ void Identification::Impl::end_stretch() noexcept {
         record_.level_samples += weight;
         record_.kappa_sum += weight * whole.kappa;
         record_.mean_force_sum += weight * whole.mean_force_g;
+        note_shape(weight * (whole.kappa - 1.0));
         if (level_.frequency_hz() > 0) {
             record_.frequency_samples += weight;
             record_.frequency_sum += weight * level_.frequency_hz();
@@ -264,6 +307,25 @@ void Identification::Impl::end_stretch() noexcept {
         record_.span_s = std::max(record_.span_s, last_time_s_ - stretch_begin_s_ + period_s_);
     }
     primed_ = false;
+}
+
+void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
+    DwellRow row;
+    if (rows.size() == rows.capacity() || !active_->batch.row(row)) return;
+    row.run = summary.run;
+    row.position = summary.position;
+    row.table_g = record_.info.table_g;
+    row.common_clock = std::isfinite(record_.info.begin_s);
+    if (row.common_clock) row.middle_s += record_.info.begin_s;
+    row.vibration = summary.vibration();
+    row.frequency_hz = summary.frequency_hz;
+    row.nis_per_dof = summary.nis_per_dof;
+    row.innovation_correlation = summary.innovation_correlation;
+    row.flagged = summary.flagged && !summary.followed;
+    if (row.frequency_hz > 0)
+        row.sync_arcsec =
+            sync_.amplitude_arcsec(row.frequency_hz, noise.angle_arcsec * noise.angle_arcsec);
+    rows.push_back(row);
 }
 
 DwellSummary Identification::Impl::end_dwell() noexcept {
@@ -279,6 +341,7 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             verdict.summary.kappa = paper_.kappa();
             verdict.summary.amplitude_g = paper_.amplitude_g();
         }
+        if (!verdict.rejected) keep_row(verdict.summary);
         active_->batch.end_dwell(!verdict.rejected);
         if (verdict.rejected) {
             active_->filter.restore(active_->saved);
@@ -355,7 +418,10 @@ DwellSummary Identification::end_dwell() noexcept { return impl_->end_dwell(); }
 void Identification::estimate(Estimate& out) const noexcept { impl_->estimate(out); }
 void Identification::set_noise(const NoiseLevels& levels) noexcept {
     impl_->noise = levels;
-    for (RunFilter& run : impl_->filters) run.filter.set_noise(FilterNoise::of(levels));
+    for (RunFilter& run : impl_->filters) {
+        run.filter.set_noise(FilterNoise::of(levels));
+        run.batch.set_noise(FilterNoise::of(levels));
+    }
 }
 const NoiseLevels& Identification::noise() const noexcept { return impl_->noise; }
 Result Identification::result() const { return impl_->result(); }

@@ -4,11 +4,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "estimator/dwell_row.hpp"
+#include "estimator/uncertainty/declared.hpp"
 
 namespace vibrig::estimator {
 
@@ -29,6 +33,9 @@ struct SignedAxis {
 
 enum class Method : std::uint8_t { joint, two_step };
 
+/// Whether the shape is measured, or taken as along the vertical.
+enum class SecondMoment : std::uint8_t { measured, vertical };
+
 /// Units are those of the configuration file; names are its keys.
 struct Settings {
     // site
@@ -45,6 +52,7 @@ struct Settings {
     std::array<std::array<SignedAxis, 3>, 3> gyro_axes{
         {{{{0, 1}, {1, 1}, {2, 1}}}, {{{1, 1}, {2, 1}, {0, 1}}}, {{{2, 1}, {0, 1}, {1, 1}}}}};
     int drift_sign = -1;
+    SecondMoment second_moment = SecondMoment::measured;
     std::array<int, 3> encoder_sign{1, 1, 1};
     std::array<double, 3> encoder_zero_deg{0, 0, 0};
     // accelerometer
@@ -63,6 +71,9 @@ struct Settings {
     double prior_quadratic = 1.0;  ///< deg/h/g^2
     double forgetting = 0.95;
     double gate_nis = 25.0;
+    // uncertainty, drift
+    uncertainty::Inputs uncertainty;
+    uncertainty::Drift drift;
 };
 
 /// One sample as the estimator takes it: raw encoder angles and raw specific force.
@@ -85,6 +96,8 @@ struct DwellInfo {
     int run = 1;          ///< from 1; the two-step route joins two runs
     int position = 1;     ///< from 1
     double table_g = -1;  ///< commanded peak at the table; negative: not known (a CSV recording)
+    /// When its measurements' time is 0, on a clock common to all dwells, s; NaN: there is none.
+    double begin_s = std::numeric_limits<double>::quiet_NaN();
 };
 
 enum class StepOutcome : std::uint8_t {
@@ -110,7 +123,9 @@ struct DwellSummary {
     std::uint32_t used = 0;     ///< of them in the filter
     std::uint32_t rejected = 0;
     std::uint32_t reinitialised = 0;
-    double kappa = 1;         ///< whole dwell, spec section 6.3
+    double kappa = 1;               ///< whole dwell, spec section 6.3
+    LevelTensor gamma = kVertical;  ///< whole dwell
+    [[nodiscard]] VibrationMoment vibration() const noexcept { return {kappa, gamma}; }
     double amplitude_g = 0;   ///< sqrt(2 (kappa - 1)), platform
     double frequency_hz = 0;  ///< lock-in; 0 at rest
     double mean_force_g = 0;  ///< W{fu}; 1 within 2 % or the dwell is rejected
@@ -170,6 +185,7 @@ struct Result {
     double nis_per_dof = 0;
     std::uint64_t samples = 0, rejected = 0;
     std::vector<DwellSummary> dwells;
+    std::vector<DwellRow> rows;  ///< of the dwells kept, in their order
     CrossCheck cross_check;
     std::vector<std::string> warnings;
 };

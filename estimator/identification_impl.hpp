@@ -8,11 +8,13 @@
 #include "estimator/drift_filter.hpp"
 #include "estimator/dwell_buffer.hpp"
 #include "estimator/dwell_record.hpp"
+#include "estimator/growing_tensor.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/observability.hpp"
 #include "estimator/paper_level.hpp"
 #include "estimator/saturation_detector.hpp"
 #include "estimator/stuck_detector.hpp"
+#include "estimator/sync_motion.hpp"
 #include "estimator/two_step.hpp"
 #include "estimator/vibration_level.hpp"
 
@@ -59,6 +61,7 @@ struct Identification::Impl {
     NoiseLevels noise;  ///< that the filters take
     Solution solution;  ///< after the last ended dwell
     std::vector<DwellSummary> dwells;
+    std::vector<DwellRow> rows;
     std::size_t dwells_not_kept = 0;  ///< summaries beyond max_dwells
     std::uint64_t samples = 0, used = 0, rejected = 0, nis_count = 0;
     std::uint32_t dwells_ended = 0;
@@ -73,7 +76,10 @@ struct Identification::Impl {
     StepResult replay() noexcept;
     StepResult through_filter(const Reading& reading) noexcept;
     void to_level(const Reading& reading) noexcept;
+    void refresh_vibration() noexcept;
+    void note_shape(double weight) noexcept;
     void end_stretch() noexcept;
+    void keep_row(const DwellSummary& summary) noexcept;
 
     /// Final eq. 13 amplitude of a position of the first run, for eq. 17.
     struct PaperStart {
@@ -88,13 +94,16 @@ struct Identification::Impl {
     SaturationDetector saturation_;
     DwellBuffer buffer_;
     VibrationLevel level_;
+    GrowingTensor tensor_;
+    SyncMotion sync_;
+    VibrationMoment vibration_;  ///< as the filter takes it
     PaperLevel paper_;
     std::vector<PaperStart> paper_starts_;
     RunFilter* active_ = nullptr;
     DwellRecord record_;
     bool in_dwell_ = false;
     bool primed_ = false;  ///< the level of this stretch is known
-    double last_time_s_ = 0, stretch_begin_s_ = 0;
+    double last_time_s_ = 0, stretch_begin_s_ = 0, dwell_begin_s_ = 0;
     double period_s_ = 0;  ///< of the newest stretch with two readings or more; 0: none yet
     int bad_times_in_a_row_ = 0;
     std::array<double, 3> innovation_arcsec_{};

@@ -217,6 +217,7 @@ Result Identification::Impl::result() const {
     out.samples = samples;
     out.rejected = rejected;
     out.dwells = dwells;
+    out.rows = rows;
     out.warnings = dwell_warnings(dwells);
     if (settings.method == Method::two_step) {
         std::map<int, KappaSpread> levels;

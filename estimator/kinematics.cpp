@@ -16,6 +16,15 @@ double wrap_next_to(double angle_rad, double reference_rad) noexcept {
     return reference_rad + wrap(angle_rad - reference_rad);
 }
 
+Eigen::Vector3d earth_rate_reference(const SignedAxis& up, double latitude_rad,
+                                     double azimuth_rad) noexcept {
+    Eigen::Vector3d rate;
+    rate[(up.axis + 2) % 3] = std::cos(latitude_rad) * std::cos(azimuth_rad);
+    rate[up.axis] = up.sign * std::sin(latitude_rad);
+    rate[(up.axis + 1) % 3] = -up.sign * std::cos(latitude_rad) * std::sin(azimuth_rad);
+    return kEarthRateDegPerHour * rate;
+}
+
 Kinematics::Kinematics(const Settings& settings)
     : up_(Eigen::Vector3d::Zero()),
       earth_rate_(Eigen::Vector3d::Zero()),
@@ -23,17 +32,15 @@ Kinematics::Kinematics(const Settings& settings)
       encoder_zero_(settings.encoder_zero_deg[0], settings.encoder_zero_deg[1],
                     settings.encoder_zero_deg[2]) {
     encoder_zero_ *= kRadPerDeg;
-    // North is the axis before `up`, east the axis after it; a minus sign turns up and east round.
     const int up = settings.up.axis;
     const int north = (up + 2) % 3;
     const int east = (up + 1) % 3;
     const double latitude = settings.latitude_deg * kRadPerDeg;
     const double azimuth = settings.azimuth_deg * kRadPerDeg;
+    level_axis_ = {north, up, east};
+    level_sign_ = settings.up.sign;
     up_[up] = settings.up.sign;
-    earth_rate_[north] = std::cos(latitude) * std::cos(azimuth);
-    earth_rate_[up] = settings.up.sign * std::sin(latitude);
-    earth_rate_[east] = -settings.up.sign * std::cos(latitude) * std::sin(azimuth);
-    earth_rate_ *= kEarthRateDegPerHour;
+    earth_rate_ = estimator::earth_rate_reference(settings.up, latitude, azimuth);
 }
 
 Eigen::Vector3d Kinematics::gimbal_angles(const std::array<double, 3>& encoder_rad) const noexcept {
@@ -80,7 +87,10 @@ Pose Kinematics::pose(const Eigen::Vector3d& angles_rad) const noexcept {
     pose.axis[0] = {cg * cb, sg * cb, -sb};
     pose.axis[1] = {-sg, cg, 0.0};
     pose.axis[2] = {0.0, 0.0, 1.0};
-    pose.up = pose.c * up_;
+    pose.level.col(0) = pose.c.col(level_axis_[0]);
+    pose.level.col(1) = level_sign_ * pose.c.col(level_axis_[1]);
+    pose.level.col(2) = level_sign_ * pose.c.col(level_axis_[2]);
+    pose.up = pose.level.col(1);
     pose.earth_rate = pose.c * earth_rate_;
     return pose;
 }

@@ -18,6 +18,11 @@ inline constexpr double kMaxInnerAngleRad = 80.0 * kPi / 180.0;
 /// The same angle, next to `reference`.
 [[nodiscard]] double wrap_next_to(double angle_rad, double reference_rad) noexcept;
 
+/// Of the Earth, deg/h, reference frame. North is the axis before `up`, east the axis after it; a
+/// minus sign turns up and east round.
+[[nodiscard]] Eigen::Vector3d earth_rate_reference(const SignedAxis& up, double latitude_rad,
+                                                   double azimuth_rad) noexcept;
+
 /// All that follows from the gimbal angles (outer alpha about x, inner beta about y, azimuth gamma
 /// about z).
 struct Pose {
@@ -25,6 +30,7 @@ struct Pose {
     Eigen::Matrix3d c;  ///< C_r^p, reference (north, up, east for up = +y) to platform
     Eigen::Matrix3d m;  ///< d angles/dt = m w_p
     std::array<Eigen::Vector3d, 3> axis;  ///< gimbal axes e_alpha, e_beta, e_gamma in platform axes
+    Eigen::Matrix3d level;                ///< north, up, east in platform axes, one a column
     Eigen::Vector3d up;                   ///< direction of specific force, platform axes
     Eigen::Vector3d earth_rate;           ///< deg/h, platform axes
 };
@@ -46,6 +52,8 @@ class Kinematics {
     }
 
   private:
+    std::array<int, 3> level_axis_{};  ///< of the reference frame: north, up, east
+    double level_sign_ = 1;            ///< of up and east along their axes
     Eigen::Vector3d up_, earth_rate_, encoder_sign_, encoder_zero_;
 };
 

@@ -1,19 +1,21 @@
 #include "estimator/predicted_rate.hpp"
 
 #include "estimator/drift_model.hpp"
+#include "estimator/second_moment.hpp"
 
 namespace vibrig::estimator {
 
 PredictedRate predicted_rate(const Settings& settings,
                              const std::array<double, kParameters>& coefficients,
                              const std::vector<double>& covariance,
-                             const std::array<double, 3>& encoder_rad, double kappa) {
+                             const std::array<double, 3>& encoder_rad,
+                             const VibrationMoment& vibration) {
     const Kinematics kinematics(settings);
     const DriftModel model(settings);
     ParameterArray parameters{};
     for (std::size_t i = 0; i < kParameters; ++i) parameters[internal_of(i)] = coefficients[i];
     const Pose pose = kinematics.pose(kinematics.gimbal_angles(encoder_rad));
-    const Regressors h = model.regressors(pose.up, kappa);
+    const Regressors h = model.regressors(pose.up, second_moment(pose, vibration));
     const Eigen::Vector3d rate = model.platform_rate(pose, h, parameters.data());
     // Gyro j holds platform axis j, with its own ten coefficients: parameter 10 j + k.
     std::array<std::array<double, kGroups>, kGyros> row{};

@@ -15,10 +15,11 @@ struct PredictedRate {
 };
 
 /// `coefficients` and `covariance` (30 x 30, row-major) in the order of parameter_names(); encoder
-/// angles; kappa 1 at rest.
+/// angles.
 [[nodiscard]] PredictedRate predicted_rate(const Settings& settings,
                                            const std::array<double, kParameters>& coefficients,
                                            const std::vector<double>& covariance,
-                                           const std::array<double, 3>& encoder_rad, double kappa);
+                                           const std::array<double, 3>& encoder_rad,
+                                           const VibrationMoment& vibration);
 
 }  // namespace vibrig::estimator

@@ -6,6 +6,7 @@ namespace {
 
 using C = Configuration;
 using estimator::Method;
+using estimator::SecondMoment;
 
 void add_rig_keys(std::vector<Key>& keys) {
     keys.push_back(number("site.latitude_deg", "deg", {-90, 90}, "latitude of the rig",
@@ -41,6 +42,11 @@ void add_rig_keys(std::vector<Key>& keys) {
     keys.push_back(sign("platform.drift_sign",
                         "sign of the platform's rate for a positive drift coefficient",
                         [](C& c) -> int& { return c.estimator.drift_sign; }));
+    keys.push_back(choice<SecondMoment>(
+        "platform.second_moment",
+        {{"measured", SecondMoment::measured}, {"vertical", SecondMoment::vertical}},
+        "vibration across the vertical: from all three accelerometers, or taken as none",
+        [](C& c) -> SecondMoment& { return c.estimator.second_moment; }));
     keys.push_back(signs(
         "platform.encoder_sign", "outer, inner, azimuth: -1 counts the other way",
         [](C & c) -> auto& { return c.estimator.encoder_sign; }));

@@ -130,7 +130,7 @@ bool NoiseMonitor::end_dwell(const estimator::DwellSummary& dwell, Knowledge now
     }
     for (const rt::BlockRecord& block : blocks) samples = std::max<double>(samples, block.samples);
     const auto residual =
-        estimator::dwell_residual(settings_, known_.coefficients, dwell.kappa, usable);
+        estimator::dwell_residual(settings_, known_.coefficients, dwell.vibration(), usable);
     std::array<DwellAngles, 3> angles;
     for (std::size_t j = 0; j < 3; ++j) {
         angles[j].angle_arcsec = residual.angle_arcsec[j];
@@ -167,12 +167,12 @@ bool NoiseMonitor::mean_has_stepped(const estimator::DwellSummary& dwell, const 
                                     const std::array<DwellAngles, 3>& angles) {
     if (settings_.method != estimator::Method::joint) return false;
     const auto residual =
-        estimator::dwell_residual(settings_, before.coefficients, dwell.kappa, blocks);
+        estimator::dwell_residual(settings_, before.coefficients, dwell.vibration(), blocks);
     const auto& middle = blocks[blocks.size() / 2].angle_rad;
     const auto predicted = estimator::predicted_rate(settings_, before.coefficients,
-                                                     before.covariance, middle, dwell.kappa);
+                                                     before.covariance, middle, dwell.vibration());
     const auto at_first = estimator::predicted_rate(settings_, prior_.coefficients,
-                                                    prior_.covariance, middle, dwell.kappa);
+                                                    prior_.covariance, middle, dwell.vibration());
     const auto slope = slope_weights(blocks);
     const double tail =
         DwellMonitorSettings{}.alpha /
@@ -218,7 +218,7 @@ bool NoiseMonitor::mean_has_stepped(const estimator::DwellSummary& dwell, const 
 void NoiseMonitor::levelled(const LevelDrift& drift) {
     if (settings_.method != estimator::Method::joint) return;
     const auto predicted = estimator::predicted_rate(settings_, known_.coefficients,
-                                                     known_.covariance, drift.encoder_rad, 1);
+                                                     known_.covariance, drift.encoder_rad, {});
     NoiseStatus::Level& level = status_.level;
     level.run = drift.run;
     level.position = drift.position;

@@ -121,13 +121,13 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
         out.run = dwell.order->run;
         out.position = dwell.order->position;
         out.table_g = dwell.order->table_g;
-        const double kappa = replayed.dwells[d].summary.kappa;
-        const auto before = estimator::dwell_residual(settings, {}, kappa, blocks);
-        const auto after = estimator::dwell_residual(settings, others.value, kappa, blocks);
+        const auto vibration = replayed.dwells[d].summary.vibration();
+        const auto before = estimator::dwell_residual(settings, {}, vibration, blocks);
+        const auto after = estimator::dwell_residual(settings, others.value, vibration, blocks);
         std::array<double, 3> middle{};
         for (std::size_t k = 0; k < 3; ++k)
             middle[k] = blocks[blocks.size() / 2].angle_rad[k] * 180 / std::numbers::pi;
-        const Prediction expected = predict(settings, others, middle, kappa);
+        const Prediction expected = predict(settings, others, middle, vibration);
         const double span_s = blocks.back().time_s - blocks.front().time_s + kBlock_s;
         const double in_block =
             static_cast<double>(dwell.count) / static_cast<double>(blocks.size());
@@ -199,7 +199,8 @@ void allan_of(const Campaign& campaign, const std::vector<RecordedDwell>& dwells
             const auto blocks = blocks_of(campaign, dwells[d]);
             if (blocks.size() < 16) continue;
             const auto residual = estimator::dwell_residual(
-                out.settings, out.coefficients.value, out.replayed.dwells[d].summary.kappa, blocks);
+                out.settings, out.coefficients.value, out.replayed.dwells[d].summary.vibration(),
+                blocks);
             std::vector<double> rate;  // arcsec/s, which is deg/h
             for (std::size_t i = 1; i < blocks.size(); ++i)
                 rate.push_back((residual.angle_arcsec[k][i] - residual.angle_arcsec[k][i - 1]) /

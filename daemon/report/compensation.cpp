@@ -6,6 +6,7 @@
 #include "estimator/drift_model.hpp"
 #include "estimator/kinematics.hpp"
 #include "estimator/parameters.hpp"
+#include "estimator/second_moment.hpp"
 
 namespace vibrig::report {
 
@@ -13,13 +14,14 @@ using estimator::kGroups;
 using estimator::kParameters;
 
 Prediction predict(const estimator::Settings& settings, const Coefficients& of,
-                   const std::array<double, 3>& attitude_deg, double kappa) {
+                   const std::array<double, 3>& attitude_deg,
+                   const estimator::VibrationMoment& vibration) {
     const estimator::Kinematics kinematics(settings);
     const estimator::DriftModel model(settings);
     std::array<double, 3> raw{};
     for (std::size_t i = 0; i < 3; ++i) raw[i] = attitude_deg[i] * std::numbers::pi / 180;
     const auto pose = kinematics.pose(kinematics.gimbal_angles(raw));
-    const auto h = model.regressors(pose.up, kappa);
+    const auto h = model.regressors(pose.up, estimator::second_moment(pose, vibration));
     Prediction out;
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         const auto weight = [&](std::size_t k) { return h[estimator::kPublicGroup[k]][gyro]; };

@@ -27,6 +27,7 @@ struct Prediction {
 /// coefficients' covariance; encoder angles in deg, kappa = 1 + a^2 / 2 with a in g at the
 /// platform.
 [[nodiscard]] Prediction predict(const estimator::Settings& settings, const Coefficients& of,
-                                 const std::array<double, 3>& attitude_deg, double kappa);
+                                 const std::array<double, 3>& attitude_deg,
+                                 const estimator::VibrationMoment& vibration);
 
 }  // namespace vibrig::report

@@ -295,7 +295,7 @@ int compensate(CompensateArguments arguments) {
     const double kappa = 1 + level * level / 2;
     const auto predicted = report::predict(
         settings, coefficients,
-        {arguments.attitude[0], arguments.attitude[1], arguments.attitude[2]}, kappa);
+        {arguments.attitude[0], arguments.attitude[1], arguments.attitude[2]}, {.kappa = kappa});
     const bool all = std::ranges::all_of(coefficients.observable, [](bool b) { return b; });
     if (arguments.format == "c" && !all)
         throw std::runtime_error(

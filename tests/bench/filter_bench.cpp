@@ -10,6 +10,7 @@
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
 #include "estimator/kinematics.hpp"
+#include "estimator/second_moment.hpp"
 #include "estimator/ud_filter.hpp"
 #include "tests/bench/dense_filter.hpp"
 #include "tests/bench/multiply_adds.hpp"
@@ -99,7 +100,7 @@ void whole_step(benchmark::State& state, const std::string& instruction_set) {
         const double noise = 1e-5 * (static_cast<double>(n % 7) - 3);
         ++n;
         benchmark::DoNotOptimize(
-            filter.step(0.025 * static_cast<double>(n), {noise, -noise, noise}, 19));
+            filter.step(0.025 * static_cast<double>(n), {noise, -noise, noise}, {.kappa = 19}));
     }
 }
 
@@ -118,9 +119,10 @@ void model(benchmark::State& state) {
     Eigen::Vector3d angles(0.1, 0.2, 0.3);
     for (auto _ : state) {
         const estimator::Pose pose = kinematics.pose(angles);
-        const estimator::Regressors h = drift.regressors(pose.up, 19);
+        const Eigen::Matrix3d moment = estimator::second_moment(pose, {.kappa = 19});
+        const estimator::Regressors h = drift.regressors(pose.up, moment);
         const Eigen::Vector3d rate = drift.platform_rate(pose, h, constants.data());
-        const Eigen::Matrix3d jacobian = drift.jacobian(pose, 19, constants.data(), rate);
+        const Eigen::Matrix3d jacobian = drift.jacobian(pose, moment, constants.data(), rate);
         benchmark::DoNotOptimize(h);
         benchmark::DoNotOptimize(jacobian);
         angles += 1e-6 * (pose.m * rate);

@@ -69,14 +69,21 @@ struct Shaking {
     }
 };
 
-Vec gyro_drift(const Vec& u, double k1, double k2, const std::array<double, kParameters>& p) {
+/// Vibration A1 along `v` on top of gravity along `u`; k1, k2: means of 1 + A1 and of its square.
+Vec gyro_drift(const Vec& u, const Vec& v, double k1, double k2,
+               const std::array<double, kParameters>& p) {
+    const double a = k1 - 1, aa = k2 - 2 * k1 + 1;
     Vec drift{};
     for (std::size_t j = 0; j < 3; ++j) {
-        const double i = u[j], o = u[(j + 1) % 3], s = u[(j + 2) % 3];
+        const std::size_t i = j, o = (j + 1) % 3, s = (j + 2) % 3;
+        const auto force = [&](std::size_t x) { return u[x] + a * v[x]; };
+        const auto both = [&](std::size_t x, std::size_t y) {
+            return u[x] * u[y] + a * (u[x] * v[y] + v[x] * u[y]) + aa * v[x] * v[y];
+        };
         const double* d = &p[10 * j];  // F I O S II OO SS IO IS OS
-        drift[j] = d[0] + k1 * (d[1] * i + d[2] * o + d[3] * s) +
-                   k2 * (d[4] * i * i + d[5] * o * o + d[6] * s * s + d[7] * i * o + d[8] * i * s +
-                         d[9] * o * s);
+        drift[j] = d[0] + d[1] * force(i) + d[2] * force(o) + d[3] * force(s) + d[4] * both(i, i) +
+                   d[5] * both(o, o) + d[6] * both(s, s) + d[7] * both(i, o) + d[8] * both(i, s) +
+                   d[9] * both(o, s);
     }
     return drift;
 }
@@ -132,6 +139,7 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
         if (late && n * dt < plan.late_s) shaking.a = 0;
         const Mat c = to_platform(angle);
         const Vec u = times(c, Vec{0, 1, 0});
+        const Vec shaken = times(c, Vec{plan.cross_north, 1, plan.cross_east});
         Measurement m;
         m.time_s = n * dt;
         for (std::size_t k = 0; k < 3; ++k) {
@@ -142,13 +150,14 @@ DwellSummary RigSimulator::dwell(Identification& to, const SimulatedDwell& plan)
             if (quantise) reading = lsb * std::round(reading / lsb);
             const double turn = 360 * kRad;
             m.angle_rad[k] = reading - turn * std::floor(reading / turn);
-            m.force_g[k] = plan.force_scale * u[k] * (1 + shaking.at(t)) + force_noise_g * gauss();
+            m.force_g[k] =
+                plan.force_scale * (u[k] + shaken[k] * shaking.at(t)) + force_noise_g * gauss();
         }
         if (spoil) spoil(plan.info, n, m);
         if (uniform_(random_) >= plan.lost_probability) to.add(m);
 
         const std::array<double, 2> k12 = shaking.means(t, dt);
-        const Vec drift = gyro_drift(u, k12[0], k12[1], truth);
+        const Vec drift = gyro_drift(u, shaken, k12[0], k12[1], truth);
         const Vec we = times(c, earth);
         Vec turn{};  // arcsec
         for (std::size_t j = 0; j < 3; ++j)

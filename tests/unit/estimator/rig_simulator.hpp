@@ -27,9 +27,10 @@ struct SimulatedDwell {
     double spike_probability = 0;  ///< per angle, 0.5 deg
     double lost_probability = 0;   ///< per sample
     double force_scale = 1;
-    double amplitude_drift = 0;  ///< relative growth of the amplitude over the dwell
-    double late_s = 0;           ///< the vibration starts so late ...
-    int late_position = 0;       ///< ... in this position of the first run
+    double cross_north = 0, cross_east = 0;  ///< in phase, of the vertical vibration
+    double amplitude_drift = 0;              ///< relative growth of the amplitude over the dwell
+    double late_s = 0;                       ///< the vibration starts so late ...
+    int late_position = 0;                   ///< ... in this position of the first run
 };
 
 /// A rig of its own: up = +y, cyclic gyro axes, drift sign -1, latitude 45.75 deg, written a second

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace vibrig::estimator {
+
+/// Amplitude of what the angles do in step with the vibration: the innovations, which hold all of
+/// it but next to nothing of the slow motion, Hann-weighted at the vibration's frequency. That is
+/// known only in the end: phasors of short blocks are kept at the nominal one. Never allocates
+/// after construction.
+class SyncMotion {
+  public:
+    explicit SyncMotion(double nominal_hz);
+    void clear() noexcept;
+    /// One reading, time from the beginning of the dwell.
+    void add(double time_s, const std::array<double, 3>& innovation_arcsec) noexcept;
+    /// Of the three axes together, arcsec; `variance`: of one innovation, arcsec^2, whose share is
+    /// taken out.
+    [[nodiscard]] double amplitude_arcsec(double frequency_hz, double variance) const noexcept;
+
+  private:
+    static constexpr std::size_t kBlocks = 512;
+    struct Block {
+        double samples = 0;
+        std::array<std::array<double, 2>, 3> phasor{};  ///< cosine, minus sine
+    };
+    void merge() noexcept;
+
+    double nominal_hz_;
+    double block_s_;
+    std::vector<Block> blocks_;
+    std::size_t used_ = 0;
+};
+
+}  // namespace vibrig::estimator

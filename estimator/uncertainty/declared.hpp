@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace vibrig::estimator::uncertainty {
+
+enum class Shape : std::uint8_t { normal, rectangular, triangular, arcsine };
+
+/// What is known of an input that the data do not determine: its standard uncertainty and the
+/// distribution it is drawn from.
+struct Declared {
+    double u = 0;
+    Shape shape = Shape::normal;
+    double dof = std::numeric_limits<double>::infinity();
+    bool declared = false;  ///< by somebody, not by default
+
+    [[nodiscard]] static constexpr Declared rectangular(double half_width) noexcept {
+        return {half_width / 1.7320508075688772, Shape::rectangular};
+    }
+};
+
+/// One harmonic of the resolvers' error per turn: amplitude known, phase not.
+struct Harmonic {
+    int order = 1;
+    double arcsec = 0;
+};
+
+struct Correlation {
+    std::string first, second;  ///< keys of inputs, the axis after a dot: "encoder_zero.inner"
+    double value = 0;
+};
+
+/// Whose motion it is that the encoders see in step with the vibration.
+enum class SyncMotionOf : std::uint8_t { warn, platform, base };
+
+/// Type B inputs, in the units of their keys.
+struct Inputs {
+    Declared latitude_arcsec{10}, azimuth_arcsec{20};
+    std::array<Declared, 3> encoder_zero_arcsec{{{10}, {10}, {10}}};
+    std::array<Declared, 2> non_orthogonality_arcsec{{{5}, {5}}};  ///< outer-inner, inner-azimuth
+    std::vector<Harmonic> resolver_harmonics{{1, 5}, {2, 5}, {16, 3}};
+    bool resolver_harmonics_declared = false;
+    Declared time_base = Declared::rectangular(1e-5);
+    Declared accelerometer_gain = Declared::rectangular(0.005);
+    std::array<Declared, 3> accelerometer_zero_g{{{1e-4}, {1e-4}, {1e-4}}};
+    /// Off-diagonal elements xy, xz, yx, yz, zx, zy, rad.
+    std::array<Declared, 6> accelerometer_cross{
+        {{2.4e-4}, {2.4e-4}, {2.4e-4}, {2.4e-4}, {2.4e-4}, {2.4e-4}}};
+    std::array<Declared, 2> cross_axis{{{0}, {0}}};  ///< north, east: share that Gamma does not see
+    Declared local_g{1e-5};
+    Declared bias_step_between_runs{0};  ///< deg/h
+    SyncMotionOf sync_motion = SyncMotionOf::warn;
+    double noise_dof = std::numeric_limits<double>::infinity();
+    /// Repeatability from one switch-on to the next, deg/h and deg/h/g; negative: not declared.
+    double turn_on_bias = -1, turn_on_linear = -1;
+    std::vector<Correlation> correlations;
+    double coverage = 0.95;
+};
+
+enum class BiasModel : std::uint8_t { automatic, constant, walk };
+/// Whether the gyros' power was on all the time.
+enum class Power : std::uint8_t { unknown, unbroken, per_run };
+
+/// How the bias may move during a campaign.
+struct Drift {
+    BiasModel model = BiasModel::automatic;
+    double walk_deg_h_rt_h = 0.01;
+    Power power = Power::unknown;
+};
+
+}  // namespace vibrig::estimator::uncertainty
