@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/configuration/value.hpp"
+#include "estimator/uncertainty/budget.hpp"
 
 namespace vibrig::configuration {
 
@@ -99,6 +100,7 @@ void CrossCheck::for_daemon() {
     set_points_fit();
     limits();
     frequency();
+    inputs();
 }
 
 void CrossCheck::status_signals() {
@@ -194,6 +196,18 @@ void CrossCheck::adaptive() {
     if (c_.estimator.method != estimator::Method::joint) {
         refuse({"campaign.adaptive", "estimator.method"}, "true with the two-step route",
                "estimator.method \"joint\"");
+    }
+}
+
+void CrossCheck::inputs() {
+    if (!sound({"uncertainty.correlation"})) return;
+    try {
+        estimator::uncertainty::check(c_.estimator.uncertainty);
+    } catch (const estimator::SettingsError& error) {
+        const std::string text = error.what();
+        const auto found = text.find("found "), expected = text.find(", expected ");
+        refuse({"uncertainty.correlation"}, text.substr(found + 6, expected - found - 6),
+               text.substr(expected + 11));
     }
 }
 

@@ -39,6 +39,7 @@ class CrossCheck {
     void set_points_fit();
     void limits();
     void frequency();
+    void inputs();
 
     const Configuration& c_;
     const std::map<std::string, Place>& places_;

@@ -288,7 +288,8 @@ Span part_span(const std::string& path) {
 
 std::string identification_sections(const std::string& configuration) {
     static const std::set<std::string> kSections{"site",  "vibration", "platform", "accelerometer",
-                                                 "noise", "estimator", "unit",     "instrument"};
+                                                 "noise", "estimator", "uncertainty", "drift", "unit",
+                                                 "instrument"};
     std::istringstream lines(configuration);
     std::string kept;
     for (std::string line; std::getline(lines, line);) {

@@ -1,0 +1,346 @@
+#include "estimator/uncertainty/assessment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "estimator/parameters.hpp"
+#include "estimator/uncertainty/distributions.hpp"
+#include "estimator/uncertainty/verdict.hpp"
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr auto kAll = static_cast<Index>(kParameters);
+
+Index index(std::size_t i) { return static_cast<Index>(i); }
+
+VectorXd prior_information(const Settings& settings) {
+    const ParameterArray sigma = prior_sigma(settings);
+    VectorXd information(kAll);
+    for (std::size_t i = 0; i < kParameters; ++i) information[index(i)] = 1 / (sigma[i] * sigma[i]);
+    return information;
+}
+
+/// Dwells after which a power cut is likely: each change of run, if the power goes with it.
+std::vector<std::size_t> breaks_of(const DwellTable& table, const Drift& drift) {
+    std::vector<std::size_t> breaks;
+    if (drift.power != Power::per_run) return breaks;
+    for (std::size_t k = 1; k < table.rows.size(); ++k) {
+        if (table.rows[k].run != table.rows[k - 1].run) breaks.push_back(k);
+    }
+    return breaks;
+}
+
+std::array<GyroRates, 3> gyros_of(const DwellTable& table, const Settings& settings) {
+    const VectorXd prior = prior_information(settings);
+    std::array<GyroRates, 3> gyros;
+    for (Index j = 0; j < 3; ++j) {
+        GyroRates& gyro = gyros[static_cast<std::size_t>(j)];
+        const Index n = table.dwells();
+        gyro.time_h = table.time_h;
+        gyro.rate.resize(n);
+        gyro.variance.resize(n);
+        gyro.regressors.resize(n, 10);
+        for (Index k = 0; k < n; ++k) {
+            const DwellRow& row = table.rows[static_cast<std::size_t>(k)];
+            gyro.rate[k] = row.rate[j];
+            gyro.variance[k] = row.variance(j, j);
+            gyro.regressors.row(k) = row.regressors.row(j);
+        }
+        gyro.prior_information.resize(10);
+        for (Index g = 0; g < 10; ++g) gyro.prior_information[g] = prior[3 * g + j];
+        gyro.breaks = breaks_of(table, settings.drift);
+    }
+    return gyros;
+}
+
+/// The three gyros put together, filter order.
+struct Together {
+    VectorXd value = VectorXd::Zero(kAll);
+    MatrixXd covariance = MatrixXd::Zero(kAll, kAll), gain;
+};
+
+Together join(const std::array<DriftAverage, 3>& gyros, const NullFit& fit, Index dwells) {
+    Together all;
+    all.gain = MatrixXd::Zero(kAll, 3 * dwells);
+    for (Index j = 0; j < 3; ++j) {
+        const DriftAverage& gyro = gyros[static_cast<std::size_t>(j)];
+        for (Index a = 0; a < 10; ++a) {
+            all.value[3 * a + j] = gyro.value[a];
+            for (Index k = 0; k < dwells; ++k) all.gain(3 * a + j, 3 * k + j) = gyro.gain(a, k);
+            for (Index b = 0; b < 10; ++b)
+                all.covariance(3 * a + j, 3 * b + j) = gyro.covariance(a, b);
+        }
+    }
+    // Between the gyros: as with a constant bias, on the scale of what each has now.
+    const VectorXd widening =
+        (all.covariance.diagonal().array() / fit.covariance().diagonal().array()).sqrt();
+    for (Index a = 0; a < kAll; ++a) {
+        for (Index b = 0; b < kAll; ++b) {
+            if (a % 3 != b % 3)
+                all.covariance(a, b) = fit.covariance()(a, b) * widening[a] * widening[b];
+        }
+    }
+    return all;
+}
+
+/// Of a constant bias alone: as wide as the scatter of the dwells asks for.
+void widen_constant(const Settings& settings, const Assessment& out, Together& all) {
+    if (settings.drift.model != BiasModel::constant || out.degrees <= 0) return;
+    if (chi_square_tail(out.chi_square, out.degrees) > 0.05 || out.birge <= 1) return;
+    all.covariance *= out.birge * out.birge;
+}
+
+struct TypeB {
+    MatrixXd sensitivity;  ///< 30 x m: G z
+    MatrixXd covariance;   ///< 30 x 30
+    VectorXd local_g;      ///< per relative change of g
+};
+
+TypeB propagate(const Settings& settings, const Together& all,
+                const std::vector<InputSignature>& inputs, const MatrixXd& u, double sync_bound) {
+    TypeB b;
+    b.sensitivity.resize(kAll, index(inputs.size()));
+    for (std::size_t i = 0; i < inputs.size(); ++i)
+        b.sensitivity.col(index(i)) = all.gain * inputs[i].rates;
+    b.local_g = VectorXd::Zero(kAll);
+    for (std::size_t g = kDi; g < kGroups; ++g) {
+        for (std::size_t j = 0; j < kGyros; ++j) {
+            const auto i = index(internal_index(g, j));
+            b.local_g[i] = (g <= kDo ? 1.0 : 2.0) * all.value[i];
+        }
+    }
+    const double of_g = settings.uncertainty.local_g.u;
+    b.covariance = b.sensitivity * u * b.sensitivity.transpose() +
+                   of_g * of_g * b.local_g * b.local_g.transpose();
+    if (settings.uncertainty.sync_motion == SyncMotionOf::platform)
+        b.covariance.diagonal().tail(18).array() += sync_bound * sync_bound / 3;
+    return b;
+}
+
+std::vector<Contribution> contributions(const Settings& settings, Index i, double u_a,
+                                        const TypeB& b, const std::vector<InputSignature>& inputs,
+                                        double sync_bound) {
+    std::vector<Contribution> list;
+    list.push_back({"noise and drift states", "", 1, u_a, u_a, Shape::normal,
+                    std::numeric_limits<double>::infinity(), true});
+    for (std::size_t p = 0; p < inputs.size(); ++p) {
+        const Declared& d = inputs[p].declared;
+        const double c = b.sensitivity(i, index(p));
+        list.push_back({inputs[p].input, inputs[p].element, c, d.u, std::abs(c) * d.u, d.shape,
+                        d.dof, d.declared});
+    }
+    const Declared& g = settings.uncertainty.local_g;
+    if (g.u > 0)
+        list.push_back({"local_g", "", b.local_g[i], g.u, std::abs(b.local_g[i]) * g.u, g.shape,
+                        g.dof, g.declared});
+    if (settings.uncertainty.sync_motion == SyncMotionOf::platform && i >= 12)
+        list.push_back({"sync_motion", "", 1, sync_bound / std::sqrt(3.0),
+                        sync_bound / std::sqrt(3.0), Shape::rectangular,
+                        std::numeric_limits<double>::infinity(), true});
+    std::stable_sort(list.begin(), list.end(),
+                     [](const auto& x, const auto& y) { return x.contribution > y.contribution; });
+    return list;
+}
+
+void expand(const Settings& settings, const DwellTable& table, Coefficient& c) {
+    const Inputs& in = settings.uncertainty;
+    const double rho = std::min(1.0, c.sigma * c.sigma / (c.u_a * c.u_a));
+    const double spare = static_cast<double>(table.dwells()) - 10;
+    double inverse = rho * rho / in.noise_dof;
+    if (rho < 1) inverse += (1 - rho) * (1 - rho) / std::max(spare, 1.0);
+    double sum = std::pow(c.u_a, 4) * inverse;
+    for (const Contribution& one : c.budget) {
+        if (std::isfinite(one.dof)) sum += std::pow(one.contribution, 4) / one.dof;
+    }
+    c.nu_eff = sum > 0 ? std::pow(c.u, 4) / sum : std::numeric_limits<double>::infinity();
+    c.k = student_quantile(in.coverage, std::max(1.0, std::floor(c.nu_eff)));
+    c.expanded = c.k * c.u;
+}
+
+/// For another power-on; stays NaN while nobody has said how it repeats.
+void for_use(const Settings& settings, std::size_t internal, const RampFit& ramps, Coefficient& c) {
+    const Inputs& in = settings.uncertainty;
+    if (in.turn_on_bias < 0 || in.turn_on_linear < 0) return;
+    const std::size_t group = internal / kGyros, gyro = internal % kGyros;
+    double square = c.u * c.u;
+    if (group == kDt) {
+        const double ramp = std::abs(ramps.mean[gyro]) / 2 / std::sqrt(3.0);
+        square += in.turn_on_bias * in.turn_on_bias + ramp * ramp;
+    } else if (group <= kDo) {
+        square += in.turn_on_linear * in.turn_on_linear;
+    }
+    c.u_use = std::sqrt(square);
+}
+
+/// Largest inflation of a coefficient's sigma when a step of the bias at one place is left free.
+double worst_step(const std::array<GyroRates, 3>& gyros) {
+    double worst = 1;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const GyroRates& gyro = gyros[j];
+        const VectorXd weight = gyro.variance.cwiseInverse();
+        MatrixXd information = gyro.regressors.transpose() * weight.asDiagonal() * gyro.regressors;
+        information.diagonal() += gyro.prior_information;
+        const MatrixXd p = information.llt().solve(MatrixXd::Identity(10, 10));
+        for (Index k = 2; k <= gyro.dwells() - 2; ++k) {
+            VectorXd z = VectorXd::Zero(gyro.dwells());
+            z.tail(gyro.dwells() - k).setOnes();
+            z.array() -= z.mean();
+            const VectorXd wz = weight.cwiseProduct(z);
+            const VectorXd b = p * (gyro.regressors.transpose() * wz);
+            const double left = z.dot(wz) - b.dot(gyro.regressors.transpose() * wz);
+            for (std::size_t g = 0; g < kGroups; ++g) {
+                const auto i = index(g);
+                const double more = b[i] * b[i] / (std::max(left, 1e-12 * z.dot(wz)) * p(i, i));
+                worst = std::max(worst, std::sqrt(1 + more));
+            }
+        }
+    }
+    return worst;
+}
+
+void tell_sync(const DwellTable& table, Assessment& out) {
+    for (const DwellRow& row : table.rows) {
+        const double a0_square = 2 * (row.vibration.kappa - 1);
+        if (!(a0_square > 0) || !(row.frequency_hz > 0)) continue;
+        const double a = row.sync_arcsec / kArcsecPerRad;
+        out.sync_arcsec = std::max(out.sync_arcsec, row.sync_arcsec);
+        out.sync_bound = std::max(out.sync_bound,
+                                  2 * kPi * row.frequency_hz * a * a * kArcsecPerRad / a0_square);
+    }
+}
+
+void tell_cross_axis(const DwellTable& table, Assessment& out) {
+    std::map<int, std::pair<int, LevelTensor>> runs;
+    for (const DwellRow& row : table.rows) {
+        if (!(row.vibration.kappa > 1)) continue;
+        auto& [count, sum] = runs.try_emplace(row.run, 0, LevelTensor{}).first->second;
+        ++count;
+        for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += row.vibration.gamma[k];
+    }
+    for (auto& [run, of] : runs) {
+        for (double& one : of.second) one /= of.first;
+        out.cross_axis.push_back({run, of.second});
+    }
+}
+
+void tell_rates(const DwellTable& table, const VectorXd& residual, const VectorXd& variance,
+                Assessment& out) {
+    for (std::size_t k = 0; k < table.rows.size(); ++k) {
+        const DwellRow& row = table.rows[k];
+        DwellRate rate;
+        rate.run = row.run;
+        rate.position = row.position;
+        rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
+        rate.time_h = table.time_h[index(k)];
+        for (std::size_t j = 0; j < 3; ++j) {
+            rate.rate[j] = row.rate[index(j)];
+            rate.sigma[j] = std::sqrt(row.variance(index(j), index(j)));
+            rate.residual[j] = residual[index(3 * k + j)];
+            rate.residual_sigma[j] = std::sqrt(variance[index(3 * k + j)]);
+        }
+        out.rates.push_back(rate);
+    }
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+void tell_coefficients(const Settings& settings, const Result& result, const DwellTable& table,
+                       const NullFit& fit, const Together& all, const TypeB& b, Assessment& out) {
+    const MatrixXd combined = all.covariance + b.covariance;
+    out.covariance_a.resize(kAll, kAll);
+    out.covariance_combined.resize(kAll, kAll);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            const bool both = result.observable[i] && result.observable[j];
+            const auto a = index(internal_of(i)), c = index(internal_of(j));
+            out.covariance_a(index(i), index(j)) = both ? all.covariance(a, c) : kNone;
+            out.covariance_combined(index(i), index(j)) = both ? combined(a, c) : kNone;
+        }
+    }
+    std::vector<double> widening;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t internal = internal_of(i);
+        const auto a = index(internal);
+        Coefficient& c = out.coefficients[i];
+        if (!result.observable[i]) continue;
+        c.value = all.value[a];
+        c.value_constant = fit.value()[a];
+        c.sigma = std::sqrt(fit.covariance()(a, a));
+        c.u_a = std::sqrt(all.covariance(a, a));
+        c.u_b = std::sqrt(std::max(0.0, b.covariance(a, a)));
+        c.u = std::hypot(c.u_a, c.u_b);
+        c.budget = contributions(settings, a, c.u_a, b, out.inputs, out.sync_bound);
+        expand(settings, table, c);
+        for_use(settings, internal, out.ramps, c);
+        widening.push_back(c.u_a / c.sigma);
+    }
+    out.widening = widening.empty() ? 1 : median(widening);
+}
+
+}  // namespace
+
+const char* word_of(Level level) noexcept {
+    return level == Level::valid ? "valid" : level == Level::doubtful ? "doubtful" : "not valid";
+}
+
+Assessment assess(const Settings& settings, const Result& result) {
+    Assessment out;
+    const DwellTable table = dwell_table(result.rows);
+    MatrixXd gain0;
+    if (table.dwells() >= 2 && settings.method == Method::joint) {
+        out.done = true;
+        out.times_assumed = table.times_assumed;
+        const VectorXd prior = prior_information(settings);
+        const std::array<GyroRates, 3> gyros = gyros_of(table, settings);
+        for (std::size_t j = 0; j < 3; ++j) out.drift[j] = average_drift(gyros[j], settings.drift);
+
+        ParameterArray coefficients{};
+        for (std::size_t g = 0; g < kGroups; ++g) {
+            for (std::size_t j = 0; j < kGyros; ++j)
+                coefficients[internal_index(g, j)] = out.drift[j].value[index(g)];
+        }
+        const ForwardModel model(settings, coefficients);
+        out.inputs = input_signatures(settings.uncertainty, table, model);
+        const MatrixXd u = input_covariance(settings.uncertainty, out.inputs);
+        MatrixXd declared(3 * table.dwells(), index(out.inputs.size()));
+        for (std::size_t i = 0; i < out.inputs.size(); ++i)
+            declared.col(index(i)) = out.inputs[i].rates;
+        const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
+        const MatrixXd scaled = declared * MatrixXd(root.matrixL());
+        const NullFit fit(table, scaled, prior);
+        out.chi_square = fit.chi_square();
+        out.degrees = fit.degrees();
+        if (out.degrees > 0) out.birge = std::sqrt(out.chi_square / out.degrees);
+        if (out.degrees >= 9) {
+            // Noise that is known to a relative r: 1/2 (1/r)^2 degrees of freedom.
+            out.p =
+                f_tail(out.chi_square / out.degrees, out.degrees, settings.uncertainty.noise_dof);
+        }
+        Together all = join(out.drift, fit, table.dwells());
+        widen_constant(settings, out, all);
+        out.gain = all.gain;
+        out.ramps = fit_ramps(table, all.value);
+        tell_sync(table, out);
+        tell_cross_axis(table, out);
+        out.worst_step = worst_step(gyros);
+        tell_rates(table, fit.residual(all.value), fit.residual_variance(), out);
+        if (out.degrees >= 9) out.evidence = weigh_patterns(table, fit, out.ramps, model, gyros);
+        const TypeB b = propagate(settings, all, out.inputs, u, out.sync_bound);
+        tell_coefficients(settings, result, table, fit, all, b, out);
+        gain0 = fit.gain();
+    }
+    out.verdict = judge(settings, result, out, gain0);
+    return out;
+}
+
+}  // namespace vibrig::estimator::uncertainty

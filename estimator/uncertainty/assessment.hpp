@@ -1,0 +1,98 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "estimator/identification.hpp"
+#include "estimator/uncertainty/budget.hpp"
+#include "estimator/uncertainty/fit.hpp"
+
+namespace vibrig::estimator::uncertainty {
+
+inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+struct Contribution {
+    std::string input, element;
+    double sensitivity = 0;   ///< of the coefficient, per unit of the input
+    double u = 0;             ///< of the input
+    double contribution = 0;  ///< to the coefficient's u
+    Shape shape = Shape::normal;
+    double dof = std::numeric_limits<double>::infinity();
+    bool declared = false;
+};
+
+/// NaN: not determined, or not declared.
+struct Coefficient {
+    double value = kNone;           ///< with a bias that may have moved, its mean over the dwells
+    double value_constant = kNone;  ///< with a constant bias
+    double sigma = kNone;           ///< noise only, of value_constant
+    double u_a = kNone, u_b = kNone, u = kNone;
+    double nu_eff = kNone, k = kNone, expanded = kNone;
+    double u_use = kNone;              ///< of what it will be after the next switch-on
+    std::vector<Contribution> budget;  ///< the largest first
+};
+
+enum class Level { valid, doubtful, not_valid };
+[[nodiscard]] const char* word_of(Level level) noexcept;
+
+struct Reason {
+    std::string code, text;
+    Level level = Level::doubtful;
+    double size = kNone, sigma = kNone;
+    std::string unit = {};
+    int dwell = 0;  ///< from 1; 0: of none in particular
+    double largest_effect_u = kNone;
+    std::string coefficient = {};
+};
+
+/// What can be believed of a result; the strongest reason first.
+struct Verdict {
+    Level level = Level::doubtful;
+    std::vector<Reason> reasons;
+    /// "valid: ...", or the first reason after "doubtful, because" or "not valid, because".
+    std::string sentence;
+};
+
+struct DwellRate {
+    int run = 0, position = 0;
+    double level_g = 0;  ///< of the platform
+    double time_h = 0;
+    std::array<double, 3> rate{}, sigma{}, residual{}, residual_sigma{};  ///< deg/h
+};
+
+struct CrossAxis {
+    int run = 0;
+    LevelTensor gamma = kVertical;  ///< mean over its vibrating dwells
+};
+
+/// Everything that follows from the rows of a campaign's dwells.
+struct Assessment {
+    bool done = false;                                  ///< there were rows to work on
+    std::array<Coefficient, kParameters> coefficients;  ///< order of parameter_names()
+    /// Type A, and with the declared inputs: 30 x 30, order of parameter_names().
+    Eigen::MatrixXd covariance_a, covariance_combined;
+    Verdict verdict;
+    double chi_square = 0, p = kNone;
+    int degrees = 0;
+    RampFit ramps;
+    double birge = 1, widening = 1;
+    std::vector<Evidence> evidence;  ///< the best first
+    std::array<DriftAverage, 3> drift;
+    double worst_step = 1;  ///< largest inflation of a sigma by one free step
+    std::vector<CrossAxis> cross_axis;
+    double sync_arcsec = 0, sync_bound = 0;  ///< deg/h/g^2
+    std::vector<DwellRate> rates;
+    bool times_assumed = false;
+    /// For the Monte Carlo: gain of the estimator and the inputs it acts on, filter order.
+    Eigen::MatrixXd gain;
+    std::vector<InputSignature> inputs;
+};
+
+/// A pure function of settings and result (its rows, observability, cross-check and dwells): live,
+/// resumed, replayed and read from a file it gives the same to the last bit.
+[[nodiscard]] Assessment assess(const Settings& settings, const Result& result);
+
+}  // namespace vibrig::estimator::uncertainty

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "estimator/uncertainty/declared.hpp"
+#include "estimator/uncertainty/signatures.hpp"
+
+namespace vibrig::estimator::uncertainty {
+
+/// One declared input on this campaign: how it moves the rates.
+struct InputSignature {
+    std::string input, element;  ///< key, and which of several
+    Declared declared;           ///< in the unit of the key
+    Eigen::VectorXd rates;       ///< per unit, 3 n
+    /// Cosine and sine of one amplitude are drawn together.
+    bool with_next = false;
+
+    /// "encoder_zero.inner", as correlations name it.
+    [[nodiscard]] std::string name() const;
+};
+
+[[nodiscard]] std::vector<InputSignature> input_signatures(const Inputs& inputs,
+                                                           const DwellTable& table,
+                                                           const ForwardModel& model);
+
+/// Covariance of the inputs; throws SettingsError when correlations name no input, or two that
+/// cannot be correlated so.
+[[nodiscard]] Eigen::MatrixXd input_covariance(const Inputs& inputs,
+                                               const std::vector<InputSignature>& list);
+
+/// Names that correlations may use, in the order of input_signatures(); throws SettingsError as
+/// input_covariance() does.
+void check(const Inputs& inputs);
+
+}  // namespace vibrig::estimator::uncertainty

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "estimator/uncertainty/declared.hpp"
+
+namespace vibrig::estimator::uncertainty {
+
+/// One gyro over the dwells of a campaign.
+struct GyroRates {
+    Eigen::VectorXd time_h, rate, variance;  ///< middle of the dwell, deg/h, (deg/h)^2
+    Eigen::MatrixXd regressors;              ///< n x 10, filter order
+    Eigen::VectorXd prior_information;       ///< 10, 1 over the prior variances; may be 0
+    /// Dwells after which the power was off, each a step as likely as not.
+    std::vector<std::size_t> breaks;
+
+    [[nodiscard]] Eigen::Index dwells() const { return rate.size(); }
+};
+
+/// How the bias, or the mass unbalance, of a gyro may have moved: sizes in units of the root of
+/// the mean variance of a dwell.
+struct DriftHypothesis {
+    double scatter = 0;  ///< from dwell to dwell
+    double walk = 0;     ///< rms at the end
+    double trend = 0;    ///< end minus start
+    int step_after = 0;  ///< dwells before a step; 0: none
+    enum class Unbalance { none, trend, step } unbalance = Unbalance::none;
+};
+
+/// Probabilities that the data leave, of what the bias did.
+struct DriftWeights {
+    double none = 1, scatter = 0, walk = 0, trend = 0, step = 0, unbalance = 0;
+};
+
+struct DriftStep {
+    int after_dwell = 0;                     ///< most likely place; 0: none
+    double weight = 0, size = 0, sigma = 0;  ///< deg/h
+};
+
+/// Coefficients of one gyro, averaged over what the bias may have done. The constant is its mean
+/// over the dwells.
+struct DriftAverage {
+    Eigen::VectorXd value;       ///< 10
+    Eigen::MatrixXd covariance;  ///< 10 x 10
+    Eigen::MatrixXd gain;        ///< value = gain * rates
+    DriftWeights weights;
+    DriftStep step;
+    double trend_deg_h_h = 0;
+    double bias_now = 0, bias_now_sigma = 0;                    ///< at the last dwell, deg/h
+    std::vector<std::pair<DriftHypothesis, double>> likeliest;  ///< with their weights
+};
+
+[[nodiscard]] DriftAverage average_drift(const GyroRates& gyro, const Drift& drift);
+
+/// Of a covariance with these sizes of scatter and walk over that of noise alone, for the same
+/// rates: logarithm of the likelihood ratio.
+class DriftLikelihood {
+  public:
+    explicit DriftLikelihood(const GyroRates& gyro);
+    [[nodiscard]] double ratio_of_scatter(double size) const;
+    [[nodiscard]] double ratio_of_walk(double size) const;
+
+  private:
+    const GyroRates& gyro_;
+    Eigen::MatrixXd walk_;
+    double s0_ = 0, none_ = 0;
+    [[nodiscard]] double log_likelihood(double scatter, double walk) const;
+};
+
+/// rates' covariance of a bias that walks by `walk_deg_h_rt_h`, about its mean over the dwells.
+[[nodiscard]] Eigen::MatrixXd walk_kernel(const Eigen::VectorXd& time_h);
+
+}  // namespace vibrig::estimator::uncertainty

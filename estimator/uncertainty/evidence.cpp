@@ -1,0 +1,210 @@
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/uncertainty/fit.hpp"
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::array<double, 3> kSizes{1, 4, 16};
+constexpr double kLargestSize = 16;
+/// Of F: unknowns, or combinations of them, of which the data say nothing.
+constexpr double kLeastEigenvalue = 1e-3, kLeastShare = 1e-9;
+/// So many sigma a misfit must be to be seen with 90 %.
+constexpr double kSeen = 4.2;
+constexpr Index kMostTried = 120;
+
+double log_mean(const std::vector<double>& logs) {
+    const double largest = *std::max_element(logs.begin(), logs.end());
+    double sum = 0;
+    for (const double one : logs) sum += std::exp(one - largest);
+    return largest + std::log(sum / static_cast<double>(logs.size()));
+}
+
+/// Logarithms of the odds for each size of the unknowns' prior.
+std::vector<double> log_odds(const NullFit::Projection& of) {
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(of.f);
+    const VectorXd s = eigen.eigenvectors().transpose() * of.s;
+    const double least = std::max(kLeastEigenvalue, kLeastShare * eigen.eigenvalues().maxCoeff());
+    std::vector<double> logs;
+    for (const double q : kSizes) {
+        double sum = 0;
+        for (Index i = 0; i < s.size(); ++i) {
+            const double f = eigen.eigenvalues()[i];
+            if (f < least) continue;
+            sum += -0.5 * std::log1p(q * q * f) + 0.5 * s[i] * s[i] / (f + 1 / (q * q));
+        }
+        logs.push_back(sum);
+    }
+    return logs;
+}
+
+void take_size(Evidence& out, const Signatures& of, const NullFit::Projection& projection) {
+    MatrixXd information = projection.f;
+    information.diagonal().array() += 1 / (kLargestSize * kLargestSize);
+    const MatrixXd covariance =
+        information.llt().solve(MatrixXd::Identity(information.rows(), information.cols()));
+    const VectorXd p = covariance * projection.s;
+    out.elements = of.elements;
+    out.unit = of.unit;
+    out.rates = of.z * p;
+    out.size.clear();
+    out.sigma.clear();
+    for (Index i = 0; i < p.size(); ++i) {
+        out.size.push_back(of.size * p[i]);
+        out.sigma.push_back(of.size * std::sqrt(covariance(i, i)));
+    }
+    out.smallest_seen =
+        kSeen * of.size / std::sqrt(std::max(projection.f.diagonal().maxCoeff(), 1e-300));
+}
+
+Evidence weigh(Pattern pattern, const Signatures& of, const NullFit& fit) {
+    Evidence out;
+    out.pattern = pattern;
+    const auto projection = fit.project(of.z);
+    out.log_odds = log_mean(log_odds(projection));
+    take_size(out, of, projection);
+    return out;
+}
+
+/// A step at any place from `first` to n - first.
+Evidence weigh_steps(Pattern pattern, Misfit misfit, int first, const DwellTable& table,
+                     const NullFit& fit, const ForwardModel& model, double s0) {
+    Evidence out;
+    out.pattern = pattern;
+    std::vector<double> logs;
+    double best = -1e300;
+    const Index last = table.dwells() - first;
+    const Index stride = std::max<Index>(1, (last - first + 1) / kMostTried * 3);
+    for (Index k = first; k <= last; k += stride) {
+        const Signatures of = signatures(misfit, table, model, s0, static_cast<int>(k));
+        const auto projection = fit.project(of.z);
+        const std::vector<double> here = log_odds(projection);
+        logs.insert(logs.end(), here.begin(), here.end());
+        if (const double mean = log_mean(here); mean > best) {
+            best = mean;
+            out.after_dwell = static_cast<int>(k);
+            take_size(out, of, projection);
+        }
+    }
+    out.log_odds = logs.empty() ? 0 : log_mean(logs);
+    return out;
+}
+
+/// One size for all gyros, and each gyro by itself with even odds of none, as likely.
+template <class Ratio>
+double log_odds_of(const std::array<GyroRates, 3>& gyros, const std::array<double, 5>& sizes,
+                   const Ratio& ratio) {
+    std::vector<double> together(sizes.size(), 0.0);
+    double apart = 0;
+    for (const GyroRates& gyro : gyros) {
+        const DriftLikelihood likelihood(gyro);
+        std::vector<double> logs;
+        for (std::size_t i = 0; i < sizes.size(); ++i) {
+            logs.push_back(ratio(likelihood, sizes[i]));
+            together[i] += logs.back();
+        }
+        apart += log_mean({0.0, log_mean(logs)});
+    }
+    return log_mean({log_mean(together), apart});
+}
+
+Evidence of_state(Pattern pattern, double odds, const char* unit) {
+    Evidence out;
+    out.pattern = pattern;
+    out.log_odds = odds;
+    out.unit = unit;
+    return out;
+}
+
+}  // namespace
+
+const char* name_of(Pattern pattern) noexcept {
+    static constexpr std::array<const char*, kPatterns> kNames{"cross-axis",
+                                                               "azimuth",
+                                                               "latitude",
+                                                               "time base",
+                                                               "encoder zero",
+                                                               "non-orthogonality",
+                                                               "resolver, once per turn",
+                                                               "resolver, twice per turn",
+                                                               "resolver, 16 per turn",
+                                                               "cubic term",
+                                                               "trend",
+                                                               "step",
+                                                               "walk",
+                                                               "scatter",
+                                                               "mass unbalance trend",
+                                                               "mass unbalance step",
+                                                               "ramp within dwells",
+                                                               "gyro noise"};
+    return kNames[static_cast<std::size_t>(pattern)];
+}
+
+bool is_structural(Pattern pattern) noexcept { return pattern <= Pattern::cubic; }
+
+std::vector<Evidence> weigh_patterns(const DwellTable& table, const NullFit& fit,
+                                     const RampFit& ramps, const ForwardModel& model,
+                                     const std::array<GyroRates, 3>& gyros) {
+    double variance = 0;
+    for (const GyroRates& gyro : gyros) variance += gyro.variance.mean() / 3.0;
+    const double s0 = std::sqrt(variance);
+    std::vector<Evidence> all;
+    constexpr std::array<std::pair<Pattern, Misfit>, 12> kOne{
+        {{Pattern::cross_axis, Misfit::cross_axis},
+         {Pattern::azimuth, Misfit::azimuth},
+         {Pattern::latitude, Misfit::latitude},
+         {Pattern::time_base, Misfit::time_base},
+         {Pattern::encoder_zero, Misfit::encoder_zero},
+         {Pattern::non_orthogonality, Misfit::non_orthogonality},
+         {Pattern::resolver_1, Misfit::resolver_1},
+         {Pattern::resolver_2, Misfit::resolver_2},
+         {Pattern::resolver_16, Misfit::resolver_16},
+         {Pattern::cubic, Misfit::cubic},
+         {Pattern::trend, Misfit::trend},
+         {Pattern::unbalance_trend, Misfit::unbalance_trend}}};
+    for (const auto& [pattern, misfit] : kOne)
+        all.push_back(weigh(pattern, signatures(misfit, table, model, s0), fit));
+    all.push_back(weigh_steps(Pattern::step, Misfit::step, 2, table, fit, model, s0));
+    all.push_back(
+        weigh_steps(Pattern::unbalance_step, Misfit::unbalance_step, 3, table, fit, model, s0));
+    all.push_back(of_state(Pattern::scatter,
+                           log_odds_of(gyros, {0.5, 1, 2, 4, 8},
+                                       [](const DriftLikelihood& of, double size) {
+                                           return of.ratio_of_scatter(size);
+                                       }),
+                           "deg/h"));
+    all.push_back(of_state(
+        Pattern::walk,
+        log_odds_of(gyros, {2, 4, 8, 16, 32},
+                    [](const DriftLikelihood& of, double size) { return of.ratio_of_walk(size); }),
+        "deg/h"));
+
+    Evidence ramp = of_state(Pattern::ramp, ramps.log_evidence(), "deg/h per 100 s");
+    ramp.elements = {"x", "y", "z"};
+    ramp.size.assign(ramps.mean.begin(), ramps.mean.end());
+    ramp.sigma.assign(ramps.sigma.begin(), ramps.sigma.end());
+    ramp.smallest_seen = kSeen * *std::min_element(ramps.sigma.begin(), ramps.sigma.end());
+    all.push_back(std::move(ramp));
+
+    const double freedom = fit.degrees() + 3.0 * static_cast<double>(table.dwells());
+    const double chi = fit.chi_square() + ramps.chi_square;
+    const double lambda = chi / freedom;
+    Evidence noise = of_state(
+        Pattern::gyro_noise,
+        0.5 * (chi * (1 - 1 / lambda) - freedom * std::log(lambda)) - 0.5 * std::log(freedom), "");
+    noise.size = {std::sqrt(lambda)};
+    noise.sigma = {std::sqrt(lambda / (2 * freedom))};
+    all.push_back(std::move(noise));
+
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Evidence& a, const Evidence& b) { return a.log_odds > b.log_odds; });
+    return all;
+}
+
+}  // namespace vibrig::estimator::uncertainty

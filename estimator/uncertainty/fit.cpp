@@ -1,0 +1,141 @@
+#include "estimator/uncertainty/fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/parameters.hpp"
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr auto kCoefficients = static_cast<Index>(kParameters);
+
+}  // namespace
+
+MatrixXd all_regressors(const DwellTable& table) {
+    MatrixXd h = MatrixXd::Zero(3 * table.dwells(), kCoefficients);
+    for (Index k = 0; k < table.dwells(); ++k) {
+        for (Index j = 0; j < 3; ++j) {
+            for (Index g = 0; g < 10; ++g)
+                h(3 * k + j, 3 * g + j) = table.rows[static_cast<std::size_t>(k)].regressors(j, g);
+        }
+    }
+    return h;
+}
+
+VectorXd all_rates(const DwellTable& table) {
+    VectorXd y(3 * table.dwells());
+    for (Index k = 0; k < table.dwells(); ++k)
+        y.segment<3>(3 * k) = table.rows[static_cast<std::size_t>(k)].rate;
+    return y;
+}
+
+NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
+                 const VectorXd& prior_information)
+    : table_(table), h_(all_regressors(table)), declared_(declared) {
+    MatrixXd columns(h_.rows(), kCoefficients + declared.cols());
+    columns << h_, declared;
+    white_ = whitened(columns);
+    VectorXd information = VectorXd::Ones(columns.cols());
+    information.head(kCoefficients) = prior_information;
+    MatrixXd normal = white_.transpose() * white_;
+    const MatrixXd of_data = normal.topLeftCorner(kCoefficients, kCoefficients);
+    normal.diagonal() += information;
+    normal_.compute(normal);
+
+    const MatrixXd y = whitened(all_rates(table));
+    y_left_ = left(y);
+    chi_square_ = y_left_.dot(y.col(0));
+
+    MatrixXd constant = of_data;
+    constant.diagonal() += prior_information;
+    const Eigen::LLT<MatrixXd> factor(constant);
+    covariance_ = factor.solve(MatrixXd::Identity(kCoefficients, kCoefficients));
+    value_ = covariance_ * (white_.leftCols(kCoefficients).transpose() * y);
+    // trace(I - P Pi0): how many coefficients the data determine.
+    const double determined =
+        static_cast<double>(kCoefficients) - covariance_.diagonal().dot(prior_information);
+    degrees_ = static_cast<int>(h_.rows()) - static_cast<int>(std::lround(determined));
+}
+
+MatrixXd NullFit::whitened(const MatrixXd& x) const {
+    MatrixXd white = x;
+    for (Index k = 0; k < table_.dwells(); ++k) {
+        const Eigen::LLT<Eigen::Matrix3d> factor(table_.rows[static_cast<std::size_t>(k)].variance);
+        factor.matrixL().solveInPlace(white.middleRows<3>(3 * k));
+    }
+    return white;
+}
+
+MatrixXd NullFit::left(const MatrixXd& white) const {
+    return white - white_ * normal_.solve(white_.transpose() * white);
+}
+
+NullFit::Projection NullFit::project(const MatrixXd& z) const {
+    const MatrixXd white = whitened(z);
+    return {white.transpose() * y_left_, white.transpose() * left(white)};
+}
+
+MatrixXd NullFit::gain() const {
+    MatrixXd back = white_.leftCols(kCoefficients);
+    for (Index k = 0; k < table_.dwells(); ++k) {
+        const Eigen::LLT<Eigen::Matrix3d> factor(table_.rows[static_cast<std::size_t>(k)].variance);
+        factor.matrixU().solveInPlace(back.middleRows<3>(3 * k));
+    }
+    return covariance_ * back.transpose();
+}
+
+VectorXd NullFit::residual(const VectorXd& coefficients) const {
+    return all_rates(table_) - h_ * coefficients;
+}
+
+VectorXd NullFit::residual_variance() const {
+    VectorXd variance(h_.rows());
+    for (Index k = 0; k < table_.dwells(); ++k)
+        variance.segment<3>(3 * k) = table_.rows[static_cast<std::size_t>(k)].variance.diagonal();
+    if (declared_.cols() > 0) variance += declared_.rowwise().squaredNorm();
+    const MatrixXd hp = h_ * covariance_;
+    variance -= hp.cwiseProduct(h_).rowwise().sum();
+    return variance.cwiseMax(0.0);
+}
+
+double RampFit::log_evidence() const {
+    double square = 0;
+    for (std::size_t j = 0; j < 3; ++j) square += (mean[j] / sigma[j]) * (mean[j] / sigma[j]);
+    constexpr std::array<double, 3> kSizes{2, 6, 20};
+    double sum = 0;
+    for (const double q : kSizes) {
+        const double share = q * q / (1 + q * q);
+        // Relative to the largest term: the exponent may be large.
+        sum += std::exp(-1.5 * std::log1p(q * q) + 0.5 * (share - 1) * square);
+    }
+    return 0.5 * square + std::log(sum / kSizes.size());
+}
+
+RampFit fit_ramps(const DwellTable& table, const VectorXd& coefficients) {
+    RampFit fit;
+    std::array<double, 3> weight{}, sum{};
+    for (const DwellRow& row : table.rows) {
+        for (std::size_t j = 0; j < 3; ++j) {
+            const auto g = static_cast<Index>(j);
+            double off = row.ramp[g];
+            for (Index i = 0; i < 10; ++i)
+                off -= row.ramp_regressors(g, i) * coefficients[3 * i + g];
+            const double variance = row.ramp_variance(g, g);
+            fit.chi_square += off * off / variance;
+            sum[j] += off / variance;
+            weight[j] += 1 / variance;
+        }
+    }
+    for (std::size_t j = 0; j < 3; ++j) {
+        fit.mean[j] = sum[j] / weight[j];
+        fit.sigma[j] = 1 / std::sqrt(weight[j]);
+    }
+    return fit;
+}
+
+}  // namespace vibrig::estimator::uncertainty

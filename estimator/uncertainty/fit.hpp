@@ -1,0 +1,113 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "estimator/uncertainty/drift_states.hpp"
+#include "estimator/uncertainty/signatures.hpp"
+
+namespace vibrig::estimator::uncertainty {
+
+/// The dwells against the model: noise and declared inputs only, coefficients constant.
+class NullFit {
+  public:
+    /// `declared`: 3 n x m, a standard uncertainty each; `prior_information`: 30, filter order.
+    NullFit(const DwellTable& table, const Eigen::MatrixXd& declared,
+            const Eigen::VectorXd& prior_information);
+
+    /// Chi-square of the rates about the model.
+    [[nodiscard]] double chi_square() const { return chi_square_; }
+    /// Rates less determined coefficients.
+    [[nodiscard]] int degrees() const { return degrees_; }
+    /// Coefficients of constant bias, filter order, and their covariance.
+    [[nodiscard]] const Eigen::VectorXd& value() const { return value_; }
+    [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
+    /// Gain of that estimator, 30 x 3 n.
+    [[nodiscard]] Eigen::MatrixXd gain() const;
+    /// y - H D and its variance, 3 n.
+    [[nodiscard]] Eigen::VectorXd residual(const Eigen::VectorXd& coefficients) const;
+    [[nodiscard]] Eigen::VectorXd residual_variance() const;
+
+    /// s = z' Q0 y and F = z' Q0 z of some signatures.
+    struct Projection {
+        Eigen::VectorXd s;
+        Eigen::MatrixXd f;
+    };
+    [[nodiscard]] Projection project(const Eigen::MatrixXd& z) const;
+
+  private:
+    [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::MatrixXd& x) const;
+    [[nodiscard]] Eigen::MatrixXd left(const Eigen::MatrixXd& white) const;
+
+    DwellTable table_;
+    Eigen::MatrixXd h_, declared_;  ///< 3 n x 30, 3 n x m
+    Eigen::MatrixXd white_;         ///< both, whitened
+    Eigen::LLT<Eigen::MatrixXd> normal_;
+    Eigen::VectorXd y_left_, value_;
+    Eigen::MatrixXd covariance_;
+    double chi_square_ = 0;
+    int degrees_ = 0;
+};
+
+/// Regressors of all rates, 3 n x 30, filter order.
+[[nodiscard]] Eigen::MatrixXd all_regressors(const DwellTable& table);
+[[nodiscard]] Eigen::VectorXd all_rates(const DwellTable& table);
+
+/// Slopes within the dwells about those of the model: chi-square with 3 n degrees, and of each
+/// gyro the weighted mean with its sigma, deg/h per 100 s.
+struct RampFit {
+    double chi_square = 0;
+    std::array<double, 3> mean{}, sigma{};
+    [[nodiscard]] double log_evidence() const;
+};
+[[nodiscard]] RampFit fit_ramps(const DwellTable& table, const Eigen::VectorXd& coefficients);
+
+enum class Pattern {
+    cross_axis,
+    azimuth,
+    latitude,
+    time_base,
+    encoder_zero,
+    non_orthogonality,
+    resolver_1,
+    resolver_2,
+    resolver_16,
+    cubic,
+    trend,
+    step,
+    walk,
+    scatter,
+    unbalance_trend,
+    unbalance_step,
+    ramp,
+    gyro_noise
+};
+inline constexpr std::size_t kPatterns = 18;
+[[nodiscard]] const char* name_of(Pattern pattern) noexcept;
+/// It moves the coefficients, and no state of the drift takes it up.
+[[nodiscard]] bool is_structural(Pattern pattern) noexcept;
+
+/// What the data say for a pattern against nothing, and how large it is then.
+struct Evidence {
+    Pattern pattern = Pattern::cross_axis;
+    double log_odds = 0;
+    int after_dwell = 0;  ///< of a step
+    std::vector<std::string> elements;
+    std::vector<double> size, sigma;  ///< in `unit`
+    const char* unit = "";
+    Eigen::VectorXd rates;     ///< what it does to them, 3 n
+    double smallest_seen = 0;  ///< of its best seen unknown, with 90 %
+
+    /// Odds enough to be named.
+    [[nodiscard]] bool named() const { return log_odds > 4.0; }
+};
+
+/// All patterns, the best first. `coefficients`: filter order, with which signatures are taken.
+[[nodiscard]] std::vector<Evidence> weigh_patterns(const DwellTable& table, const NullFit& fit,
+                                                   const RampFit& ramps, const ForwardModel& model,
+                                                   const std::array<GyroRates, 3>& gyros);
+
+}  // namespace vibrig::estimator::uncertainty
