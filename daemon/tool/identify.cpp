@@ -6,7 +6,6 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
@@ -36,27 +36,31 @@ namespace {
 
 using proto::RecordingRow;
 
-constexpr int kResultSaysNo = 1;
-
 struct Dwell {
     int run = 0;
     int position = 0;
     std::vector<const RecordingRow*> rows;
 };
 
-/// One dwell for each (run, position) in the order in which they begin; a pair that comes back
-/// continues its dwell.
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
 std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
     std::vector<Dwell> dwells;
-    std::map<std::pair<int, int>, std::size_t> index;
     for (const RecordingRow& row : rows) {
-        const auto [at, is_new] = index.try_emplace({row.run, row.position}, dwells.size());
-        if (is_new) {
+        if (dwells.empty() || dwells.back().run != row.run ||
+            dwells.back().position != row.position)
             dwells.push_back({row.run, row.position, {}});
-        }
-        dwells[at->second].rows.push_back(&row);
+        dwells.back().rows.push_back(&row);
     }
     return dwells;
+}
+
+/// The times of the file go on from dwell to dwell.
+bool has_common_clock(const std::vector<Dwell>& dwells) {
+    for (std::size_t d = 1; d < dwells.size(); ++d) {
+        if (!(dwells[d].rows.front()->time_s > dwells[d - 1].rows.back()->time_s)) return false;
+    }
+    return true;
 }
 
 estimator::Measurement measurement_of(const RecordingRow& row) {
@@ -158,11 +162,14 @@ estimator::Result identify(const std::vector<RecordingRow>& rows,
     tell_before(dwells, settings, [](const Dwell& dwell, SeenDwell& seen) {
         for (const RecordingRow* row : dwell.rows) seen.add(measurement_of(*row));
     });
+    const bool common_clock = has_common_clock(dwells);
     estimator::Identification identification(settings, dwells.size());
     Progress progress("identifying");
     std::size_t done = 0;
     for (const Dwell& dwell : dwells) {
-        identification.begin_dwell({dwell.run, dwell.position, -1});
+        estimator::DwellInfo info{dwell.run, dwell.position};
+        if (common_clock) info.begin_s = 0;
+        identification.begin_dwell(info);
         for (const RecordingRow* row : dwell.rows) {
             static_cast<void>(identification.add(measurement_of(*row)));
             // Asking a clock costs more than a filter step.
@@ -195,7 +202,12 @@ estimator::Result identify(const record::Campaign& campaign, const estimator::Se
     return identification.result();
 }
 
-estimator::Result identify_campaign(const std::string& path, const std::string& config) {
+struct Identified {
+    estimator::Settings settings;
+    estimator::Result result;
+};
+
+Identified identify_campaign(const std::string& path, const std::string& config) {
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
@@ -204,7 +216,8 @@ estimator::Result identify_campaign(const std::string& path, const std::string& 
             ? configuration::parse(record::identification_sections(campaign.head.configuration),
                                    "configuration in " + campaign.path, false)
             : configuration::load(config, false);
-    return identify(campaign, loaded.configuration.estimator);
+    const auto& settings = loaded.configuration.estimator;
+    return {settings, identify(campaign, settings)};
 }
 
 /// A folder, an HDF5 file, or the name of a campaign: then there is no such file.
@@ -223,28 +236,30 @@ std::vector<RecordingRow> read(const std::string& path) {
 }
 
 int run(const std::string& recording, const std::string& config, const std::string& instruction_set,
-        bool json) {
-    estimator::Result result;
+        bool json, bool strict) {
+    Identified identified;
     try {
         estimator::use_instruction_set(instruction_set);
         if (is_campaign(recording)) {
-            result = identify_campaign(recording, config);
+            identified = identify_campaign(recording, config);
         } else {
-            const estimator::Settings settings =
-                configuration::load(config, false).configuration.estimator;
-            result = identify(read(recording), settings);
+            identified.settings = configuration::load(config, false).configuration.estimator;
+            identified.result = identify(read(recording), identified.settings);
         }
     } catch (const std::exception& error) {
         // The room that found the fault named file, line, key and value already.
         std::cerr << error.what() << '\n';
         return kBadInput;
     }
-    std::cout << (json ? result_json(result) + "\n" : result_table(result)) << std::flush;
+    const auto assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    std::cout << (json ? result_json(identified.result, assessed) + "\n"
+                       : result_table(identified.result, assessed))
+              << std::flush;
     if (!std::cout) {
         std::cerr << "standard output: cannot be written\n";
         return kBadInput;
     }
-    return all_observable(result) ? 0 : kResultSaysNo;
+    return exit_status(assessed.verdict.level, strict);
 }
 
 }  // namespace
@@ -255,6 +270,7 @@ void add_identify(CLI::App& app, int& exit_code) {
         std::string config;
         std::string instruction_set = "auto";
         bool json = false;
+        bool strict = false;
     };
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand(
@@ -274,13 +290,15 @@ void add_identify(CLI::App& app, int& exit_code) {
                      "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
     command->add_flag("--json", options->json, "print the result as JSON");
+    command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
     command->footer(
         "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
-        "Exit codes: 0 all 30 coefficients are determined, 1 some are not observable (the result "
-        "names\nthem and the combinations that are determined), 2 bad usage or input.");
+        "Exit codes: 0 the result is valid or doubtful (the verdict says why), 1 it is not valid, "
+        "or\ncoefficients are not observable (the result names them and the combinations that are "
+        "determined),\nwith --strict also when it is doubtful; 2 bad usage or input.");
     command->callback([options, &exit_code] {
-        exit_code =
-            run(options->recording, options->config, options->instruction_set, options->json);
+        exit_code = run(options->recording, options->config, options->instruction_set,
+                        options->json, options->strict);
     });
 }
 

@@ -34,6 +34,7 @@ struct ReplayArguments {
     std::string config, dwells, speed = "max";
     std::string instruction_set = "auto";
     bool json = false;
+    bool strict = false;
 };
 
 double replay_speed(const std::string& text) {
@@ -98,8 +99,9 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
 }
 
 /// The result; where it is not the recording's, with a word about that.
-std::string replayed_json(const record::ReplayResult& replayed, bool same_build) {
-    std::string text = result_json(replayed.result);
+std::string replayed_json(const record::ReplayResult& replayed,
+                          const estimator::uncertainty::Assessment& assessed, bool same_build) {
+    std::string text = result_json(replayed.result, assessed);
     if (replayed.different == 0) return text;
     const nlohmann::ordered_json replay{{"dwells", replayed.compared},
                                         {"not_as_recorded", replayed.different},
@@ -135,8 +137,9 @@ int replay(const ReplayArguments& arguments) {
     const bool same_build = campaign.head.version == VIBRIG_VERSION &&
                             campaign.head.compiler == estimator::compiler() &&
                             campaign.head.instruction_set == estimator::instruction_set();
-    std::cout << (arguments.json ? replayed_json(replayed, same_build) + "\n"
-                                 : result_table(replayed.result))
+    const auto assessed = estimator::uncertainty::assess(settings, replayed.result);
+    std::cout << (arguments.json ? replayed_json(replayed, assessed, same_build) + "\n"
+                                 : result_table(replayed.result, assessed))
               << std::flush;
     std::array<char, 160> text{};
     std::snprintf(text.data(), text.size(),
@@ -160,7 +163,7 @@ int replay(const ReplayArguments& arguments) {
     }
     if (!std::cout) throw std::runtime_error("standard output: cannot be written");
     const bool as_recorded = replayed.different == 0 || !same_build;
-    return whole && as_recorded && all_observable(replayed.result) ? 0 : kNo;
+    return whole && as_recorded ? exit_status(assessed.verdict.level, arguments.strict) : kNo;
 }
 
 }  // namespace
@@ -185,14 +188,16 @@ void add_replay(CLI::App& app, int& exit_code) {
                      "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
     command->add_flag("--json", arguments->json, "print the result as JSON");
+    command->add_flag("--strict", arguments->strict, "a doubtful result is a no as well");
     command->footer(
         "Example: vibrig replay /var/lib/vibrig/platform-17-20260301T080000Z --speed max\n"
         "On the build and instruction set of the recording the estimates come out as they were to\n"
         "the last bit; standard error says whether they did. 28 dwells of 100 s at 40 samples/s "
         "(142 000\n"
         "samples) take about a second.\n"
-        "Exit codes: 0 all 30 coefficients are determined, 1 some are not, a segment of the raw "
-        "log is\nmissing, or the recording's build and instruction set give other estimates (then "
+        "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
+        "doubtful), a segment of the raw log is\nmissing, or the recording's build and instruction "
+        "set give other estimates (then "
         "\"replay\" in\nthe JSON), 2 bad usage or input.");
     command->callback(
         [arguments, &exit_code] { exit_code = guarded([&] { return replay(*arguments); }); });

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/tool/assessment_json.hpp"
 #include "estimator/instruction_set.hpp"
 
 namespace vibrig::tool {
@@ -12,20 +13,26 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using estimator::kParameters;
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+namespace uncertainty = estimator::uncertainty;
 
 Json number_if(bool exists, double value) { return exists ? number(value) : Json(nullptr); }
 
-Json parameters(const estimator::Result& result) {
+Json parameters(const estimator::Result& result, const uncertainty::Assessment& assessed) {
     Json list = Json::array();
     for (std::size_t i = 0; i < kParameters; ++i) {
         const bool observable = result.observable[i];
-        list.push_back({{"name", estimator::parameter_names()[i]},
-                        {"value", number_if(observable, result.value[i])},
-                        {"sigma", number_if(observable, result.sigma[i])},
-                        {"unit", estimator::parameter_unit(i)},
-                        {"observable", observable}});
+        const uncertainty::Coefficient& of = assessed.coefficients[i];
+        const double value = assessed.done ? of.value : result.value[i];
+        Json one{{"name", estimator::parameter_names()[i]},
+                 {"value", number_if(observable, value)},
+                 {"sigma", number_if(observable, result.sigma[i])},
+                 {"unit", estimator::parameter_unit(i)},
+                 {"observable", observable}};
+        if (assessed.done) {
+            one["value_constant"] = number_if(observable, result.value[i]);
+            one.update(coefficient_json(of));
+        }
+        list.push_back(std::move(one));
     }
     return list;
 }
@@ -72,9 +79,9 @@ Json combinations(const estimator::Result& result) {
 
 }  // namespace
 
-std::string result_json(const estimator::Result& result) {
+std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed) {
     Json root;
-    root["parameters"] = parameters(result);
+    root["parameters"] = parameters(result, assessed);
     root["covariance"] = covariance(result);
     root["amplitudes"] = amplitudes(result);
     root["combinations"] = combinations(result);
@@ -89,6 +96,7 @@ std::string result_json(const estimator::Result& result) {
                                             {"limit_sigma", estimator::CrossCheck::kLimit},
                                             {"agrees", check.agrees()}}
                                      : Json(nullptr);
+    if (!assessed.verdict.sentence.empty()) root.update(assessment_json(assessed));
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
     // A warning may carry bytes of a file; a broken sequence must not cost the result.

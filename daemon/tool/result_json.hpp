@@ -3,13 +3,16 @@
 #include <string>
 
 #include "estimator/identification.hpp"
+#include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::tool {
 
 /// The JSON form of a result, as `vibrig identify --json` prints it and vibrigd writes it to
 /// result.json: one line, keys in fixed order, numbers that read back exactly. What is not
-/// observable or does not exist is null, never NaN.
-[[nodiscard]] std::string result_json(const estimator::Result& result);
+/// observable or does not exist is null, never NaN. Without an assessment there is no verdict, no
+/// budget, and `value` is that of a constant bias.
+[[nodiscard]] std::string result_json(const estimator::Result& result,
+                                      const estimator::uncertainty::Assessment& assessed = {});
 
 /// True if all 30 coefficients are determined one by one.
 [[nodiscard]] bool all_observable(const estimator::Result& result);

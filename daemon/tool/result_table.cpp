@@ -11,6 +11,8 @@ namespace vibrig::tool {
 
 namespace {
 
+using estimator::uncertainty::Assessment;
+
 template <class... Values>
 std::string line(const char* format, Values... values) {
     std::array<char, 256> text{};
@@ -33,7 +35,22 @@ const char* unit_of(std::string_view name) {
     return "";
 }
 
-std::string coefficients(const estimator::Result& result) {
+std::string with_uncertainty(const estimator::Result& result, const Assessment& assessed) {
+    std::string text = line("%-12s %12s %11s %11s %11s  %-10s %s", "coefficient", "value", "u", "U",
+                            "sigma", "unit", "observable");
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto& of = assessed.coefficients[i];
+        text += line("%-12s %12s %11s %11s %11s  %-10s %s", estimator::parameter_names()[i],
+                     number("%.6f", of.value).c_str(), number("%.6f", of.u).c_str(),
+                     number("%.6f", of.expanded).c_str(), number("%.6f", of.sigma).c_str(),
+                     estimator::parameter_unit(i), result.observable[i] ? "yes" : "no");
+    }
+    return text;
+}
+
+/// sigma is noise alone; u is all that is known of, and U covers with the probability declared.
+std::string coefficients(const estimator::Result& result, const Assessment& assessed) {
+    if (assessed.done) return with_uncertainty(result, assessed);
     std::string text =
         line("%-12s %12s %11s  %-10s %s", "coefficient", "value", "sigma", "unit", "observable");
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
@@ -43,6 +60,14 @@ std::string coefficients(const estimator::Result& result) {
                      shown ? number("%.6f", result.sigma[i]).c_str() : "-",
                      estimator::parameter_unit(i), shown ? "yes" : "no");
     }
+    return text;
+}
+
+std::string verdict(const Assessment& assessed) {
+    const auto& of = assessed.verdict;
+    std::string text = "verdict: " + of.sentence + "\n";
+    for (std::size_t i = 1; i < of.reasons.size(); ++i)
+        text += "  also: " + of.reasons[i].text + "\n";
     return text;
 }
 
@@ -89,9 +114,9 @@ std::string not_observable(const estimator::Result& result) {
 
 }  // namespace
 
-std::string result_table(const estimator::Result& result) {
-    std::string text =
-        coefficients(result) + "\nVibration on the platform (peak):\n" + amplitudes(result) + "\n";
+std::string result_table(const estimator::Result& result, const Assessment& assessed) {
+    std::string text = coefficients(result, assessed) + "\nVibration on the platform (peak):\n" +
+                       amplitudes(result) + "\n";
     text += "samples " + std::to_string(result.samples) + ", rejected " +
             std::to_string(result.rejected) + ", NIS per degree of freedom " +
             number("%.4f", result.nis_per_dof) + "\n";
@@ -104,6 +129,7 @@ std::string result_table(const estimator::Result& result) {
     if (!all_observable(result)) {
         text += "\n" + not_observable(result);
     }
+    text += "\n" + verdict(assessed);
     for (const std::string& warning : result.warnings) {
         text += "warning: " + warning + "\n";
     }
