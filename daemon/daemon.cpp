@@ -416,12 +416,20 @@ void Daemon::control_loop() {
 
 void Daemon::write_result() {
     const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
+    // The dwells are over: some tens of milliseconds keep nobody waiting.
+    using estimator::uncertainty::Level;
+    const auto assessed = estimator::uncertainty::assess(configuration_.estimator, result_);
+    const Level level = assessed.verdict.level;
+    log(level == Level::not_valid  ? Severity::alarm
+        : level == Level::doubtful ? Severity::warning
+                                   : Severity::info,
+        "campaign", "result " + assessed.verdict.sentence);
     std::string text;
     {
         const std::lock_guard lock(mutex_);
         if (!campaign_.mark().empty())
             result_.warnings.push_back("campaign marked: " + campaign_.mark());
-        text = tool::result_json(result_);
+        text = tool::result_json(result_, assessed);
     }
     StatusData ended;
     campaign_.fill(ended, clock_.now());

@@ -43,17 +43,17 @@ std::optional<Declared> read_table(const toml::table& table, const std::string& 
     bool good = true;
     for (const auto& [key, node] : table) {
         const std::string part = name + "." + std::string(key.str());
-        const auto number = [&](Range range) {
+        const auto read_part = [&](Range range) {
             const auto value = read_number(node, part, range, unit, problems);
             good = good && value.has_value();
             return value;
         };
         if (key == "u") {
-            u = number({0, largest});
+            u = read_part({0, largest});
         } else if (key == "half_width") {
-            half_width = number({0, largest});
+            half_width = read_part({0, largest});
         } else if (key == "dof") {
-            if (const auto dof = number({1, 1e9})) out.dof = *dof;
+            if (const auto dof = read_part({1, 1e9})) out.dof = *dof;
         } else if (key == "declared" && node.is_boolean()) {
             out.declared = node.as_boolean()->get();
         } else if (key == "shape") {
@@ -235,15 +235,16 @@ Key correlations() {
 }
 
 /// Not declared while it is negative inside; no value in a file says so.
-Key optional_number(std::string name, std::string unit, std::string doc, At<double> at) {
-    auto read = [name, unit, at](const toml::node& node, C& c, Problems& problems) {
-        if (const auto value = read_number(node, name, {0, 1e6}, unit, problems)) at(c) = *value;
+Key optional_number(std::string name, std::string unit, Range range, std::string doc,
+                    At<double> at) {
+    auto read = [name, unit, range, at](const toml::node& node, C& c, Problems& problems) {
+        if (const auto value = read_number(node, name, range, unit, problems)) at(c) = *value;
     };
     auto write = [at](C& c) { return at(c) < 0 ? std::string() : write_number(at(c)); };
     return {std::move(name),
             "number",
             std::move(unit),
-            "0 to 1000000; none: not declared",
+            plain(range.low) + " to " + plain(range.high) + "; none: not declared",
             std::move(doc),
             read,
             write};
@@ -299,16 +300,16 @@ void add_uncertainty_keys(std::vector<Key>& keys) {
         "motion of the angles in step with the vibration: judged, taken into u as the platform's, "
         "or declared as the base's rocking",
         [in](C& c) -> SyncMotionOf& { return in(c).sync_motion; }));
-    keys.push_back(optional_number("uncertainty.noise_dof", "",
+    keys.push_back(optional_number("uncertainty.noise_dof", "", {1, 1e9},
                                    "degrees of freedom of the configured noise; none: known",
                                    [in](C& c) -> double& { return in(c).noise_dof; }));
     keys.back().write = [in](C& c) {
         return std::isfinite(in(c).noise_dof) ? write_number(in(c).noise_dof) : std::string();
     };
-    keys.push_back(optional_number("uncertainty.turn_on_bias", "deg/h",
+    keys.push_back(optional_number("uncertainty.turn_on_bias", "deg/h", {0, 1e6},
                                    "repeatability of D_F from one switch-on to the next",
                                    [in](C& c) -> double& { return in(c).turn_on_bias; }));
-    keys.push_back(optional_number("uncertainty.turn_on_linear", "deg/h/g",
+    keys.push_back(optional_number("uncertainty.turn_on_linear", "deg/h/g", {0, 1e6},
                                    "repeatability of D_I, D_O, D_S from one switch-on to the next",
                                    [in](C& c) -> double& { return in(c).turn_on_linear; }));
     keys.push_back(number("uncertainty.coverage", "", {0.5, 0.9999},

@@ -3,18 +3,10 @@
 #include <exception>
 #include <iostream>
 
-#include "estimator/uncertainty/assessment.hpp"
-
 namespace vibrig::tool {
 
 constexpr int kNo = 1;        ///< exit status: the result says no
 constexpr int kBadInput = 2;  ///< exit status: bad usage or input, or no daemon
-
-/// Of a result that is to be believed so far; `strict`: doubts count too.
-[[nodiscard]] inline int exit_status(estimator::uncertainty::Level level, bool strict) {
-    using estimator::uncertainty::Level;
-    return level == Level::not_valid || (strict && level == Level::doubtful) ? kNo : 0;
-}
 
 /// Exit status of a command whose body is `run`. What it throws becomes one line on standard error,
 /// after `who`, and kBadInput; so does an output that nobody could be given.

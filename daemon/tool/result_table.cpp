@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/result_json.hpp"
 
 namespace vibrig::tool {
@@ -113,6 +114,11 @@ std::string not_observable(const estimator::Result& result) {
 }
 
 }  // namespace
+
+int exit_status(estimator::uncertainty::Level level, bool strict) {
+    using estimator::uncertainty::Level;
+    return level == Level::not_valid || (strict && level == Level::doubtful) ? kNo : 0;
+}
 
 std::string result_table(const estimator::Result& result, const Assessment& assessed) {
     std::string text = coefficients(result, assessed) + "\nVibration on the platform (peak):\n" +

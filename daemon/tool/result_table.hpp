@@ -7,6 +7,10 @@
 
 namespace vibrig::tool {
 
+/// Exit status of a command that gives a result of which so much can be believed; `strict`: doubts
+/// count too.
+[[nodiscard]] int exit_status(estimator::uncertainty::Level level, bool strict);
+
 /// A result for people: the 30 coefficients, the amplitudes, what could not be told apart, the
 /// verdict, warnings.
 [[nodiscard]] std::string result_table(const estimator::Result& result,

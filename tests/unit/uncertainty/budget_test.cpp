@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 
+#include "estimator/kinematics.hpp"
 #include "estimator/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/unit/uncertainty/theory_rows.hpp"
@@ -95,7 +96,7 @@ TEST(Budget, ADeclaredLatitudeIsNoMisfit) {
     std::vector<DwellRow> rows = theory_rows(at, balanced(6, 14.0 / 3));
     const Kinematics true_site(at), site(believed);
     for (DwellRow& row : rows)
-        row.rate -= true_site.pose(row.angles).earth_rate - site.pose(row.angles).earth_rate;
+        row.rate += true_site.pose(row.angles).earth_rate - site.pose(row.angles).earth_rate;
     // WHEN it is declared as 10 arcsec, or as 6 arcmin
     const Assessment narrow = assess(believed, result_of(rows));
     believed.uncertainty.latitude_arcsec.u = 360;
