@@ -98,9 +98,6 @@ Json drift(const Assessment& a) {
     return {{"times", a.times_assumed ? "assumed" : "measured"},
             {"weights", std::move(weights)},
             {"step", std::move(step)},
-            {"trend_deg_h_h",
-             numbers(std::array<double, 3>{a.drift[0].trend_deg_h_h, a.drift[1].trend_deg_h_h,
-                                           a.drift[2].trend_deg_h_h})},
             {"ramp_deg_h_per_100_s", numbers(a.ramps.mean)},
             {"bias_now", std::move(now)}};
 }
