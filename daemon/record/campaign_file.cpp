@@ -287,9 +287,9 @@ Span part_span(const std::string& path) {
 }
 
 std::string identification_sections(const std::string& configuration) {
-    static const std::set<std::string> kSections{"site",  "vibration", "platform", "accelerometer",
-                                                 "noise", "estimator", "uncertainty", "drift", "unit",
-                                                 "instrument"};
+    static const std::set<std::string> kSections{
+        "site",      "vibration",   "platform", "accelerometer", "noise",
+        "estimator", "uncertainty", "drift",    "unit",          "instrument"};
     std::istringstream lines(configuration);
     std::string kept;
     for (std::string line; std::getline(lines, line);) {

@@ -198,9 +198,9 @@ void allan_of(const Campaign& campaign, const std::vector<RecordedDwell>& dwells
         for (std::size_t d = 0; d < dwells.size() && d < out.replayed.dwells.size(); ++d) {
             const auto blocks = blocks_of(campaign, dwells[d]);
             if (blocks.size() < 16) continue;
-            const auto residual = estimator::dwell_residual(
-                out.settings, out.coefficients.value, out.replayed.dwells[d].summary.vibration(),
-                blocks);
+            const auto residual =
+                estimator::dwell_residual(out.settings, out.coefficients.value,
+                                          out.replayed.dwells[d].summary.vibration(), blocks);
             std::vector<double> rate;  // arcsec/s, which is deg/h
             for (std::size_t i = 1; i < blocks.size(); ++i)
                 rate.push_back((residual.angle_arcsec[k][i] - residual.angle_arcsec[k][i - 1]) /

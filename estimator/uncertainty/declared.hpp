@@ -18,10 +18,6 @@ struct Declared {
     Shape shape = Shape::normal;
     double dof = std::numeric_limits<double>::infinity();
     bool declared = false;  ///< by somebody, not by default
-
-    [[nodiscard]] static constexpr Declared rectangular(double half_width) noexcept {
-        return {half_width / 1.7320508075688772, Shape::rectangular};
-    }
 };
 
 /// One harmonic of the resolvers' error per turn: amplitude known, phase not.
@@ -45,8 +41,8 @@ struct Inputs {
     std::array<Declared, 2> non_orthogonality_arcsec{{{5}, {5}}};  ///< outer-inner, inner-azimuth
     std::vector<Harmonic> resolver_harmonics{{1, 5}, {2, 5}, {16, 3}};
     bool resolver_harmonics_declared = false;
-    Declared time_base = Declared::rectangular(1e-5);
-    Declared accelerometer_gain = Declared::rectangular(0.005);
+    Declared time_base{1e-5, Shape::rectangular};
+    Declared accelerometer_gain{0.005, Shape::rectangular};
     std::array<Declared, 3> accelerometer_zero_g{{{1e-4}, {1e-4}, {1e-4}}};
     /// Off-diagonal elements xy, xz, yx, yz, zx, zy, rad.
     std::array<Declared, 6> accelerometer_cross{
