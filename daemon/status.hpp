@@ -192,6 +192,9 @@ struct StopDone {
     double table_g = 0;
     std::int32_t repeats = 0;  ///< of the position so far, because it was flagged
     double used_s = 0;         ///< of the campaign's time
+    /// When its dwell began: since the campaign's first, NaN: not known; and UTC.
+    double begin_s = std::numeric_limits<double>::quiet_NaN();
+    std::int64_t begun_utc_ns = 0;
 };
 
 /// What the platform drifted by at the end of a levelling, which torqued it out.

@@ -136,6 +136,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
             offer_.clear();
             offered_stops_.clear();
+            offered_last_.reset();
             ports_.begin();
             begin(request.by, now);
             return accept(started_by_ == armed_by_ ? "campaign started"
@@ -203,6 +204,7 @@ void Campaign::begin(const std::string& by, Time now) {
     zeroing_ = Zeroing::none;
     mark_.clear();
     level_variances_.clear();
+    origin_.reset();
     if (zero_) zero_->reset();
     started_ = now;
     enter(State::waiting, now);
@@ -371,7 +373,9 @@ Time Campaign::record(Time now) {
         rt::DwellOrder order;
         order.from = dwell_from_;
         order.to = dwell_to_;
-        order.dwell = {here().run, here().position, table_g()};
+        dwell_utc_ns_ = utc_ns() + (dwell_from_ - now);
+        if (!origin_) take_over_origin();
+        order.dwell = dwell_info();
         if (zero_) {
             order.zero_g = zero_->raw_zero_g();
             order.level_sigma_g = zero_->level_sigma(here().stop.position_deg);
@@ -409,8 +413,9 @@ Time Campaign::record(Time now) {
 void Campaign::next_position(Time now) {
     ++positions_done_;
     if (ports_.position_done) {
-        ports_.position_done({here().run, here().position, table_g()}, dwells_.back(),
-                             {here().stop.position_deg, table_g(), repeats_, used_s(now)});
+        ports_.position_done(dwell_info(), dwells_.back(),
+                             {here().stop.position_deg, table_g(), repeats_, used_s(now),
+                              dwell_info().begin_s, dwell_utc_ns_});
     }
     ++at_;
     enter(State::resting, now);

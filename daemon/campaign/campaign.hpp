@@ -115,7 +115,7 @@ class Campaign {
 
     /// Before the first step(): positions that an interrupted campaign has done. Nothing moves
     /// until a person arms and resumes it. False if they are not the first of the list; of an
-    /// adaptive campaign `stops` says what was chosen.
+    /// adaptive campaign `stops` says what was chosen; the last one when it began.
     bool offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops = {});
     /// Before the first step(): what the newest loop check of an earlier life found out of band.
     /// No campaign is armed until another one is in band.
@@ -275,6 +275,12 @@ class Campaign {
         return times_.levelling_s + settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
     }
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
+    /// Of the dwell that is being done.
+    [[nodiscard]] estimator::DwellInfo dwell_info() const {
+        return {here().run, here().position, table_g(),
+                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_))};
+    }
+    void take_over_origin();
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
 
@@ -310,6 +316,8 @@ class Campaign {
     bool dwell_done_ = false;
     drivers::Time dwell_from_ = 0;
     drivers::Time dwell_to_ = 0;
+    std::int64_t dwell_utc_ns_ = 0;        ///< of its beginning
+    std::optional<drivers::Time> origin_;  ///< when the campaign's first dwell began
     /// Where the gimbals are while the table moves; at_ is ahead when it comes to rest.
     std::array<double, 3> excited_deg_{};
     std::size_t positions_done_ = 0;
@@ -317,6 +325,7 @@ class Campaign {
     double used_before_s_ = 0;          ///< of the campaign, before a restart
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;  ///< of an adaptive campaign
+    std::optional<StopDone> offered_last_;
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made

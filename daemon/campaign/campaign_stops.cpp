@@ -2,6 +2,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "daemon/campaign/campaign.hpp"
 
@@ -98,7 +99,20 @@ std::string Campaign::resume_offer() const {
     return fmt::format("{} of {} positions done", offer_.size(), stops_.size());
 }
 
+/// After a restart the clock may be another one: what both have in common is UTC, unless that was
+/// set back meanwhile.
+void Campaign::take_over_origin() {
+    origin_ = dwell_from_;
+    if (!offered_last_ || !std::isfinite(offered_last_->begin_s)) return;
+    const Time before = drivers::from_seconds(offered_last_->begin_s);
+    const Time least = drivers::from_seconds(settings_.dwell_s);
+    const Time since = dwell_utc_ns_ - offered_last_->begun_utc_ns;
+    *origin_ -= before + std::max(since, least);
+}
+
 bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops) {
+    offered_last_.reset();
+    if (!stops.empty()) offered_last_ = stops.back();
     if (settings_.adaptive) {
         offered_stops_ = std::move(stops);
         plan_stops();
@@ -110,6 +124,7 @@ bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<Stop
         offer_ = std::move(done);
     } else {
         offered_stops_.clear();
+        offered_last_.reset();
         plan_stops();
     }
     return fits;

@@ -129,6 +129,8 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     bytes += numbers_of(dwell.summary);
     bytes += bytes_of(dwell.summary.noise);
     each_part(dwell.stop, [&bytes](auto value) { put(bytes, value); });
+    put(bytes, dwell.stop.begin_s);
+    put(bytes, dwell.stop.begun_utc_ns);
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -181,6 +183,13 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
         each_part(dwell.stop, [&good](auto value) { good = good && std::isfinite(value); });
         if (reader.good() && !good) return "corrupt: position, repeats or time used";
     }
+    dwell.time_known = version >= 4;
+    if (dwell.time_known) {
+        reader.get(dwell.stop.begin_s);
+        reader.get(dwell.stop.begun_utc_ns);
+        if (reader.good() && dwell.stop.begin_s < 0) return "corrupt: time of the beginning";
+    }
+    dwell.info.begin_s = dwell.stop.begin_s;
     std::uint64_t count = 0;
     reader.get(count);
     if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())

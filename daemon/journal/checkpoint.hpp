@@ -20,9 +20,10 @@ struct DwellCheckpoint {
     StopDone stop;
     bool noise_known = true;  ///< false: of version 1, which did not keep the noise levels
     bool stop_known = true;   ///< false: of version 2 or older
+    bool time_known = true;   ///< false: of version 3 or older
 };
 
-inline constexpr std::uint32_t kCheckpointVersion = 3;
+inline constexpr std::uint32_t kCheckpointVersion = 4;
 
 /// Of everything that the results depend on, "key = value" one per line.
 [[nodiscard]] std::uint64_t configuration_hash(std::string_view text) noexcept;

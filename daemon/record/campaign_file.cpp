@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <set>
 #include <sstream>
 
@@ -24,6 +25,7 @@ using hdf5::File;
 namespace {
 
 constexpr std::size_t kCoefficients = estimator::kParameters;
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
 /// Columns of one table; as long as the shortest, since a reader may come between two columns.
 class Columns {
@@ -41,6 +43,10 @@ class Columns {
         const auto end = std::ranges::find(found.values, hdf5::kUnwritten);
         rows_ = std::min(rows_, static_cast<std::size_t>(end - found.values.begin()) / width);
         return std::move(found.values);
+    }
+    /// A column that older files do not have: empty then.
+    std::vector<double> doubles_if_any(const char* name) {
+        return file_.has(group_ + "/" + name) ? doubles(name) : std::vector<double>{};
     }
     std::vector<std::string> texts(const char* name) {
         auto found = file_.texts(group_ + "/" + name);
@@ -103,7 +109,7 @@ void read_orders(const File& file, Campaign& to) {
                position = c.integers("position"), cancel = c.integers("cancel");
     const auto table = c.doubles("table_g"), zero = c.doubles("zero_g", 3),
                level = c.doubles("level_sigma_g"), angle = c.doubles("noise_angle_arcsec"),
-               walk = c.doubles("noise_walk", 3);
+               walk = c.doubles("noise_walk", 3), begin = c.doubles_if_any("begin_s");
     for (std::size_t i = 0; i < c.rows(); ++i) {
         to.orders.push_back({announced[i],
                              from[i],
@@ -114,7 +120,8 @@ void read_orders(const File& file, Campaign& to) {
                              cancel[i] != 0,
                              row<3>(zero, i),
                              level[i],
-                             {angle[i], row<3>(walk, i)}});
+                             {angle[i], row<3>(walk, i)},
+                             i < begin.size() ? begin[i] : kNotKnown});
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -43,12 +44,14 @@ struct Order {
     std::array<double, 3> zero_g{};  ///< taken off the raw specific force
     double level_sigma_g = 0;
     estimator::NoiseLevels noise{};  ///< that the filter takes in it; angle 0: not known
+    /// Since the campaign's first dwell, a restart included; NaN: not known.
+    double begin_s = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// dwells.csv beside the raw log: orders in the log's times.
+/// dwells.csv beside the raw log: orders in the log's times. Older ones end before begin_s.
 inline constexpr const char* kDwellsHeader =
     "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us,zero_x_g,zero_y_g,zero_z_g,"
-    "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z";
+    "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z,begin_s";
 /// In it, with a number: the daemon was started again and went on after so many dwells.
 inline constexpr const char* kRestartLine = "# restart after dwells: ";
 

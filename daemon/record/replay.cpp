@@ -303,7 +303,9 @@ void keep_dwells(Campaign& campaign, std::size_t count) {
 void read_dwells(const std::string& path, Campaign& to) {
     std::ifstream file(path);
     std::string line;
-    if (!std::getline(file, line) || line != kDwellsHeader)
+    const std::string header = kDwellsHeader;
+    const std::string before_begin = header.substr(0, header.rfind(','));
+    if (!std::getline(file, line) || (line != header && line != before_begin))
         throw std::runtime_error(path + ":1: found '" + proto::printable(line.substr(0, 80)) +
                                  "', expected the header " + kDwellsHeader);
     for (std::size_t number = 2; std::getline(file, line); ++number) {
@@ -331,14 +333,17 @@ void read_dwells(const std::string& path, Campaign& to) {
              {12, &walk[0]},
              {13, &walk[1]},
              {14, &walk[2]}}};
-        bool good = fields.size() == 15 && proto::read_number(fields[0], order.run) &&
+        const bool dated = fields.size() == 16 && !fields[15].empty();
+        bool good = (fields.size() == 15 || fields.size() == 16) &&
+                    (!dated || (proto::read_number(fields[15], order.begin_s) &&
+                                std::isfinite(order.begin_s))) && proto::read_number(fields[0], order.run) &&
                     proto::read_number(fields[1], order.position) &&
                     proto::read_number(fields[6], offset_us);
         for (const auto& [field, value] : numbers)
             good = good && proto::read_number(fields[field], *value) && std::isfinite(*value);
         if (!good)
             throw std::runtime_error(place + ": found '" + proto::printable(line.substr(0, 80)) +
-                                     "', expected 15 fields as the header says");
+                                     "', expected the fields that the header names");
         to.head.utc_offset_ns = offset_us * drivers::kMicrosecond;
         if (!fields[5].empty()) {
             order.cancel = true;
@@ -374,7 +379,7 @@ void feed(estimator::Identification& identification, const Campaign& campaign,
           const RecordedDwell& dwell, const OnStep& on_step) {
     const Order& order = *dwell.order;
     set_noise(identification, order.noise);
-    identification.begin_dwell({order.run, order.position, order.table_g});
+    identification.begin_dwell({order.run, order.position, order.table_g, order.begin_s});
     for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
         const auto step =
             identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
@@ -437,7 +442,8 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
         order.from = dwell.order->from;
         order.to = dwell.order->to;
         order.zero_g = dwell.order->zero_g;
-        order.dwell = {dwell.order->run, dwell.order->position, dwell.order->table_g};
+        order.dwell = {dwell.order->run, dwell.order->position, dwell.order->table_g,
+                       dwell.order->begin_s};
         player.order(order);
         const std::size_t end = dwell.first + dwell.count;
         play_until(end);

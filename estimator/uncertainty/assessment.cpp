@@ -179,28 +179,35 @@ void for_use(const Settings& settings, std::size_t internal, const RampFit& ramp
 }
 
 /// Largest inflation of a coefficient's sigma when a step of the bias at one place is left free.
+double worst_step_of(const GyroRates& gyro) {
+    const Index n = gyro.dwells();
+    const VectorXd weight = gyro.variance.cwiseInverse();
+    MatrixXd information = gyro.regressors.transpose() * weight.asDiagonal() * gyro.regressors;
+    const VectorXd all = gyro.regressors.transpose() * weight;
+    information.diagonal() += gyro.prior_information;
+    const MatrixXd p = information.llt().solve(MatrixXd::Identity(10, 10));
+    const double sum = weight.sum();
+    double worst = 1, tail = 0;
+    VectorXd of_tail = VectorXd::Zero(10);
+    for (Index k = n - 1; k >= 2; --k) {
+        tail += weight[k];
+        of_tail += weight[k] * gyro.regressors.row(k).transpose();
+        if (k > n - 2) continue;
+        // A step after dwell k is 1 from there on, less its mean.
+        const double mean = static_cast<double>(n - k) / static_cast<double>(n);
+        const VectorXd hz = of_tail - mean * all;
+        const double zz = tail * (1 - 2 * mean) + mean * mean * sum;
+        const VectorXd b = p * hz;
+        const double left = std::max(zz - b.dot(hz), 1e-12 * zz);
+        for (Index i = 0; i < 10; ++i)
+            worst = std::max(worst, std::sqrt(1 + b[i] * b[i] / (left * p(i, i))));
+    }
+    return worst;
+}
+
 double worst_step(const std::array<GyroRates, 3>& gyros) {
     double worst = 1;
-    for (std::size_t j = 0; j < 3; ++j) {
-        const GyroRates& gyro = gyros[j];
-        const VectorXd weight = gyro.variance.cwiseInverse();
-        MatrixXd information = gyro.regressors.transpose() * weight.asDiagonal() * gyro.regressors;
-        information.diagonal() += gyro.prior_information;
-        const MatrixXd p = information.llt().solve(MatrixXd::Identity(10, 10));
-        for (Index k = 2; k <= gyro.dwells() - 2; ++k) {
-            VectorXd z = VectorXd::Zero(gyro.dwells());
-            z.tail(gyro.dwells() - k).setOnes();
-            z.array() -= z.mean();
-            const VectorXd wz = weight.cwiseProduct(z);
-            const VectorXd b = p * (gyro.regressors.transpose() * wz);
-            const double left = z.dot(wz) - b.dot(gyro.regressors.transpose() * wz);
-            for (std::size_t g = 0; g < kGroups; ++g) {
-                const auto i = index(g);
-                const double more = b[i] * b[i] / (std::max(left, 1e-12 * z.dot(wz)) * p(i, i));
-                worst = std::max(worst, std::sqrt(1 + more));
-            }
-        }
-    }
+    for (const GyroRates& gyro : gyros) worst = std::max(worst, worst_step_of(gyro));
     return worst;
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/uncertainty/rates_covariance.hpp"
+
 namespace vibrig::estimator::uncertainty {
 namespace {
 
@@ -19,6 +21,7 @@ constexpr std::size_t kMostPlaces = 40;
 constexpr Index kFirstLinear = 1;  ///< of the three linear terms
 /// With fewer rates to spare the data cannot tell one hypothesis from another.
 constexpr Index kFewestDwells = 12;
+constexpr double kLeastWeight = 1e-12;  ///< less moves no digit
 
 /// v less its mean.
 VectorXd about_mean(const VectorXd& v) { return v.array() - v.mean(); }
@@ -108,75 +111,113 @@ std::vector<Weighted> hypotheses(const GyroRates& gyro, const Drift& drift, doub
     return list;
 }
 
-/// What the kernels of all hypotheses are made of.
+/// What the covariances of all hypotheses are made of.
 struct Kernels {
     explicit Kernels(const GyroRates& gyro)
-        : s0(std::sqrt(gyro.variance.mean())),
-          time(normalised_time(gyro.time_h)),
-          walk(walk_kernel(gyro.time_h)) {}
-
-    [[nodiscard]] MatrixXd covariance(const GyroRates& gyro, const DriftHypothesis& what) const {
+        : s0(std::sqrt(gyro.variance.mean())), time(normalised_time(gyro.time_h)) {
         const Index n = gyro.dwells();
-        const double unit = s0 * s0;
-        MatrixXd cov = unit * what.walk * what.walk * walk;
-        cov.diagonal() += gyro.variance;
-        cov.diagonal().array() += unit * what.scatter * what.scatter;
-        if (what.trend > 0) cov += unit * what.trend * what.trend * time * time.transpose();
+        const double span = gyro.time_h[n - 1] - gyro.time_h[0];
+        elapsed = span > 0 ? VectorXd((gyro.time_h.array() - gyro.time_h[0]) / span)
+                           : VectorXd::Zero(n);
+        // Means of the rows of min(tau_i, tau_j).
+        walk_mean.resize(n);
+        double before = 0;
+        for (Index i = 0; i < n; ++i) {
+            before += elapsed[i];
+            walk_mean[i] =
+                (before + static_cast<double>(n - 1 - i) * elapsed[i]) / static_cast<double>(n);
+        }
+    }
+
+    /// Columns that the bias, or with `unbalance` the mass unbalance, moves along, each of unit
+    /// prior variance.
+    [[nodiscard]] MatrixXd columns(const GyroRates& gyro, const DriftHypothesis& what) const {
+        const Index n = gyro.dwells();
+        std::vector<VectorXd> list;
+        if (what.trend > 0) list.emplace_back(s0 * what.trend * time);
         if (what.unbalance != Unbalance::none) {
             const VectorXd g =
                 what.unbalance == Unbalance::trend ? time : step_after(n, what.step_after);
-            for (Index q = kFirstLinear; q < kFirstLinear + 3; ++q) {
-                const VectorXd gh = g.cwiseProduct(gyro.regressors.col(q));
-                cov += unit * kUnbalanceSize * kUnbalanceSize * gh * gh.transpose();
-            }
+            for (Index q = kFirstLinear; q < kFirstLinear + 3; ++q)
+                list.emplace_back(s0 * kUnbalanceSize * g.cwiseProduct(gyro.regressors.col(q)));
         } else if (what.step_after > 0) {
-            const VectorXd z = step_after(n, what.step_after);
-            cov += unit * kStepSize * kStepSize * z * z.transpose();
+            list.emplace_back(s0 * kStepSize * step_after(n, what.step_after));
         }
-        return cov;
+        MatrixXd out(n, static_cast<Index>(list.size()));
+        for (std::size_t c = 0; c < list.size(); ++c) out.col(static_cast<Index>(c)) = list[c];
+        return out;
+    }
+
+    [[nodiscard]] RatesCovariance covariance(const GyroRates& gyro,
+                                             const DriftHypothesis& what) const {
+        const Index n = gyro.dwells();
+        const double walk = s0 * s0 * what.walk * what.walk;
+        RatesCovariance out(gyro.variance.array() + s0 * s0 * what.scatter * what.scatter, elapsed,
+                            walk);
+        const MatrixXd more = columns(gyro, what);
+        const Index r = more.cols(), of_mean = walk > 0 ? 2 : 0;
+        MatrixXd u(n, r + of_mean);
+        MatrixXd inverse = MatrixXd::Identity(r + of_mean, r + of_mean);
+        u.leftCols(r) = more;
+        if (walk > 0) {
+            // About its mean: P K P = K - 1 k' - k 1' + mean(k) 1 1'.
+            u.col(r).setOnes();
+            u.col(r + 1) = walk_mean;
+            inverse.bottomRightCorner<2, 2>() << 0, -1, -1, -walk_mean.mean();
+            inverse.bottomRightCorner<2, 2>() /= walk;
+        }
+        out.add(u, inverse);
+        return out;
+    }
+    /// Covariance of the bias at the last dwell with that at each.
+    [[nodiscard]] VectorXd with_last(const GyroRates& gyro, const DriftHypothesis& what) const {
+        const Index last = gyro.dwells() - 1;
+        if (what.unbalance != Unbalance::none) return VectorXd::Zero(last + 1);
+        const MatrixXd more = columns(gyro, what);
+        return more * more.row(last).transpose() +
+               VectorXd(s0 * s0 * what.walk * what.walk *
+                        (elapsed - walk_mean).array() +
+                        s0 * s0 * what.walk * what.walk * (walk_mean.mean() - walk_mean[last]));
     }
 
     double s0;
-    VectorXd time;
-    MatrixXd walk;
+    VectorXd time, elapsed;  ///< from the first dwell to the last 1: about the mean, from the first
+    VectorXd walk_mean;
 };
 
 /// Generalised least squares with a prior.
 struct Fit {
-    Fit(const GyroRates& gyro, const MatrixXd& covariance) : factor(covariance) {
-        MatrixXd white(gyro.dwells(), gyro.regressors.cols() + 1);
-        white << gyro.regressors, gyro.rate;
-        factor.matrixL().solveInPlace(white);
-        const auto h = white.leftCols(gyro.regressors.cols());
-        const auto y = white.rightCols<1>();
-        information = h.transpose() * h;
+    Fit(const GyroRates& gyro, RatesCovariance of_rates) : rates(std::move(of_rates)) {
+        const Index terms = gyro.regressors.cols();
+        MatrixXd columns(gyro.dwells(), terms + 1);
+        columns << gyro.regressors, gyro.rate;
+        const MatrixXd square = rates.square(columns);
+        MatrixXd information = square.topLeftCorner(terms, terms);
         information.diagonal() += gyro.prior_information;
         const Eigen::LLT<MatrixXd> normal(information);
-        const VectorXd right = h.transpose() * y;
-        covariance_of = normal.solve(MatrixXd::Identity(information.rows(), information.cols()));
+        const VectorXd right = square.col(terms).head(terms);
+        covariance_of = normal.solve(MatrixXd::Identity(terms, terms));
         value = covariance_of * right;
-        whitened = h;
-        log_likelihood = -factor.matrixL().toDenseMatrix().diagonal().array().log().sum() -
-                         normal.matrixL().toDenseMatrix().diagonal().array().log().sum() -
-                         0.5 * (y.squaredNorm() - right.dot(value));
+        log_likelihood = -0.5 * rates.log_determinant() -
+                         normal.matrixLLT().diagonal().array().log().sum() -
+                         0.5 * (square(terms, terms) - right.dot(value));
     }
-    [[nodiscard]] MatrixXd gain() const {
-        const MatrixXd back = factor.matrixU().solve(whitened);
-        return covariance_of * back.transpose();
+    [[nodiscard]] MatrixXd gain(const GyroRates& gyro) const {
+        return covariance_of * rates.solve(gyro.regressors).transpose();
     }
     /// Estimate and variance of the amplitude of a column that the covariance holds with a prior
     /// variance.
     [[nodiscard]] std::pair<double, double> amplitude(const GyroRates& gyro, const VectorXd& z,
                                                       double prior) const {
-        const VectorXd of_z = factor.solve(z);
+        const VectorXd of_z = rates.solve(z);
         const VectorXd left =
-            of_z - factor.solve(MatrixXd(gyro.regressors *
-                                         (covariance_of * (gyro.regressors.transpose() * of_z))));
+            of_z - rates.solve(gyro.regressors *
+                               (covariance_of * (gyro.regressors.transpose() * of_z)));
         return {prior * left.dot(gyro.rate), prior - prior * prior * left.dot(z)};
     }
 
-    Eigen::LLT<MatrixXd> factor;
-    MatrixXd information, covariance_of, whitened;
+    RatesCovariance rates;
+    MatrixXd covariance_of;
     VectorXd value;
     double log_likelihood = 0;
 };
@@ -196,13 +237,8 @@ void add_to(DriftWeights& sum, const DriftHypothesis& what, double w) {
 /// The bias of a hypothesis at the last dwell, given what it says of the rates.
 std::pair<double, double> bias_now(const GyroRates& gyro, const Kernels& kernels,
                                    const DriftHypothesis& what, const Fit& fit) {
-    DriftHypothesis noise_free = what;
-    noise_free.scatter = 0;
-    MatrixXd kernel = kernels.covariance(gyro, noise_free);
-    kernel.diagonal() -= gyro.variance;
-    if (what.unbalance != Unbalance::none) kernel.setZero();
-    const VectorXd last = kernel.col(gyro.dwells() - 1);
-    const VectorXd of_last = fit.factor.solve(last);
+    const VectorXd last = kernels.with_last(gyro, what);
+    const VectorXd of_last = fit.rates.solve(last);
     const double moved = of_last.dot(gyro.rate - gyro.regressors * fit.value);
     // d(value[0] + moved) / d rates, and what the kernel leaves.
     const VectorXd row =
@@ -212,42 +248,68 @@ std::pair<double, double> bias_now(const GyroRates& gyro, const Kernels& kernels
     return {fit.value[0] + moved, std::max(0.0, variance)};
 }
 
-}  // namespace
-
-MatrixXd walk_kernel(const VectorXd& time_h) {
-    const Index n = time_h.size();
-    const double span = time_h[n - 1] - time_h[0];
-    MatrixXd k = MatrixXd::Zero(n, n);
-    if (!(span > 0)) return k;
-    for (Index i = 0; i < n; ++i) {
-        for (Index j = 0; j < n; ++j) k(i, j) = (std::min(time_h[i], time_h[j]) - time_h[0]) / span;
-    }
-    const VectorXd rows = k.rowwise().mean();
-    const double all = rows.mean();
-    k.colwise() -= rows;
-    k.rowwise() -= rows.transpose();
-    k.array() += all;
-    return k;
+double trend_of(const GyroRates& gyro, const Kernels& kernels, const DriftHypothesis& what,
+                const Fit& fit) {
+    if (!(what.trend > 0)) return 0;
+    const double size = kernels.s0 * what.trend;
+    const double span_h = gyro.time_h[gyro.dwells() - 1] - gyro.time_h[0];
+    return fit.amplitude(gyro, kernels.time, size * size).first / span_h;
 }
+
+/// Weights of the hypotheses after the rates, their sum 1.
+std::vector<double> weigh(const GyroRates& gyro, const Kernels& kernels,
+                          const std::vector<Weighted>& list) {
+    std::vector<double> weights;
+    for (const Weighted& one : list)
+        weights.push_back(Fit(gyro, kernels.covariance(gyro, one.what)).log_likelihood +
+                          std::log(one.weight));
+    const double largest = *std::max_element(weights.begin(), weights.end());
+    double sum = 0;
+    for (double& w : weights) sum += w = std::exp(w - largest);
+    for (double& w : weights) w /= sum;
+    return weights;
+}
+
+bool is_step(const DriftHypothesis& what) {
+    return what.step_after > 0 && what.unbalance == Unbalance::none;
+}
+
+/// The likeliest place of a step, with its size by the likeliest hypothesis there.
+DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
+                    const std::vector<Weighted>& list, const std::vector<double>& weights) {
+    std::vector<double> at(static_cast<std::size_t>(gyro.dwells()), 0.0);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        if (is_step(list[i].what)) at[static_cast<std::size_t>(list[i].what.step_after)] += weights[i];
+    }
+    const auto place = std::max_element(at.begin(), at.end());
+    DriftStep step;
+    if (!(*place > 0)) return step;
+    step.after_dwell = static_cast<int>(place - at.begin());
+    step.weight = *place;
+    const DriftHypothesis* best = nullptr;
+    double best_weight = -1;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        if (!is_step(list[i].what) || list[i].what.step_after != step.after_dwell ||
+            weights[i] <= best_weight)
+            continue;
+        best = &list[i].what;
+        best_weight = weights[i];
+    }
+    const Fit fit(gyro, kernels.covariance(gyro, *best));
+    const double prior = kStepSize * kStepSize * kernels.s0 * kernels.s0;
+    const auto [size, variance] =
+        fit.amplitude(gyro, step_after(gyro.dwells(), step.after_dwell), prior);
+    step.size = size;
+    step.sigma = std::sqrt(std::max(0.0, variance));
+    return step;
+}
+
+}  // namespace
 
 DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
     const Kernels kernels(gyro);
     const std::vector<Weighted> list = hypotheses(gyro, drift, kernels.s0);
-    struct Told {
-        VectorXd value;
-        double now, now_variance;
-    };
-    std::vector<double> log_weight;
-    std::vector<Fit> fits;
-    fits.reserve(list.size());
-    for (const Weighted& one : list) {
-        fits.emplace_back(gyro, kernels.covariance(gyro, one.what));
-        log_weight.push_back(fits.back().log_likelihood + std::log(one.weight));
-    }
-    const double largest = *std::max_element(log_weight.begin(), log_weight.end());
-    double sum = 0;
-    for (double& w : log_weight) sum += w = std::exp(w - largest);
-
+    const std::vector<double> weights = weigh(gyro, kernels, list);
     DriftAverage out;
     const Index terms = gyro.regressors.cols();
     out.value = VectorXd::Zero(terms);
@@ -255,67 +317,50 @@ DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
     out.gain = MatrixXd::Zero(terms, gyro.dwells());
     out.weights = {0};
     double now_square = 0;
-    std::vector<double> of_step(static_cast<std::size_t>(gyro.dwells()), 0.0);
+    std::vector<std::pair<double, VectorXd>> values;
     for (std::size_t i = 0; i < list.size(); ++i) {
-        const double w = log_weight[i] /= sum;
+        const double w = weights[i];
         add_to(out.weights, list[i].what, w);
-        if (list[i].what.step_after > 0 && list[i].what.unbalance == Unbalance::none)
-            of_step[static_cast<std::size_t>(list[i].what.step_after)] += w;
-        if (w < 1e-12) continue;  // moves no digit
-        out.value += w * fits[i].value;
-        out.gain += w * fits[i].gain();
-        const auto [now, variance] = bias_now(gyro, kernels, list[i].what, fits[i]);
+        if (w < kLeastWeight) continue;
+        const Fit fit(gyro, kernels.covariance(gyro, list[i].what));
+        out.value += w * fit.value;
+        out.covariance += w * fit.covariance_of;
+        out.gain += w * fit.gain(gyro);
+        values.emplace_back(w, fit.value);
+        const auto [now, variance] = bias_now(gyro, kernels, list[i].what, fit);
         out.bias_now += w * now;
         now_square += w * (variance + now * now);
+        out.trend_deg_h_h += w * trend_of(gyro, kernels, list[i].what, fit);
         out.likeliest.emplace_back(list[i].what, w);
     }
-    for (std::size_t i = 0; i < list.size(); ++i) {
-        if (log_weight[i] < 1e-12) continue;
-        const VectorXd off = fits[i].value - out.value;
-        out.covariance += log_weight[i] * (fits[i].covariance_of + off * off.transpose());
+    for (const auto& [w, value] : values) {
+        const VectorXd off = value - out.value;
+        out.covariance += w * off * off.transpose();
     }
     out.bias_now_sigma = std::sqrt(std::max(0.0, now_square - out.bias_now * out.bias_now));
-    std::sort(out.likeliest.begin(), out.likeliest.end(),
-              [](const auto& a, const auto& b) { return a.second > b.second; });
-
-    const auto place = std::max_element(of_step.begin(), of_step.end());
-    if (place != of_step.end() && *place > 0) {
-        out.step.after_dwell = static_cast<int>(place - of_step.begin());
-        out.step.weight = *place;
-        std::size_t best = 0;
-        for (std::size_t i = 0; i < list.size(); ++i) {
-            const DriftHypothesis& what = list[i].what;
-            if (what.step_after != out.step.after_dwell || what.unbalance != Unbalance::none)
-                continue;
-            if (list[best].what.step_after != out.step.after_dwell ||
-                log_weight[i] > log_weight[best])
-                best = i;
-        }
-        const double prior = kStepSize * kStepSize * kernels.s0 * kernels.s0;
-        const auto [size, variance] =
-            fits[best].amplitude(gyro, step_after(gyro.dwells(), out.step.after_dwell), prior);
-        out.step.size = size;
-        out.step.sigma = std::sqrt(std::max(0.0, variance));
-    }
+    std::stable_sort(out.likeliest.begin(), out.likeliest.end(),
+                     [](const auto& a, const auto& b) { return a.second > b.second; });
+    out.step = find_step(gyro, kernels, list, weights);
     return out;
 }
 
-DriftLikelihood::DriftLikelihood(const GyroRates& gyro)
-    : gyro_(gyro), walk_(walk_kernel(gyro.time_h)), s0_(std::sqrt(gyro.variance.mean())) {
-    none_ = log_likelihood(0, 0);
+namespace {
+
+double log_likelihood(const GyroRates& gyro, double scatter, double walk) {
+    return Fit(gyro, Kernels(gyro).covariance(gyro, {scatter, walk})).log_likelihood;
 }
 
-double DriftLikelihood::log_likelihood(double scatter, double walk) const {
-    MatrixXd cov = s0_ * s0_ * walk * walk * walk_;
-    cov.diagonal() += gyro_.variance;
-    cov.diagonal().array() += s0_ * s0_ * scatter * scatter;
-    return Fit(gyro_, cov).log_likelihood;
-}
+}  // namespace
+
+DriftLikelihood::DriftLikelihood(const GyroRates& gyro)
+    : gyro_(gyro), none_(log_likelihood(gyro, 0, 0)) {}
 
 double DriftLikelihood::ratio_of_scatter(double size) const {
-    return log_likelihood(size, 0) - none_;
+    return log_likelihood(gyro_, size, 0) - none_;
 }
 
-double DriftLikelihood::ratio_of_walk(double size) const { return log_likelihood(0, size) - none_; }
+double DriftLikelihood::ratio_of_walk(double size) const {
+    return log_likelihood(gyro_, 0, size) - none_;
+}
 
 }  // namespace vibrig::estimator::uncertainty

@@ -48,7 +48,7 @@ struct DriftAverage {
     Eigen::MatrixXd gain;        ///< value = gain * rates
     DriftWeights weights;
     DriftStep step;
-    double trend_deg_h_h = 0;
+    double trend_deg_h_h = 0;  ///< steady, over all hypotheses; what walks is not in it
     double bias_now = 0, bias_now_sigma = 0;                    ///< at the last dwell, deg/h
     std::vector<std::pair<DriftHypothesis, double>> likeliest;  ///< with their weights
 };
@@ -65,12 +65,7 @@ class DriftLikelihood {
 
   private:
     const GyroRates& gyro_;
-    Eigen::MatrixXd walk_;
-    double s0_ = 0, none_ = 0;
-    [[nodiscard]] double log_likelihood(double scatter, double walk) const;
+    double none_ = 0;
 };
-
-/// rates' covariance of a bias that walks by `walk_deg_h_rt_h`, about its mean over the dwells.
-[[nodiscard]] Eigen::MatrixXd walk_kernel(const Eigen::VectorXd& time_h);
 
 }  // namespace vibrig::estimator::uncertainty

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+namespace vibrig::estimator::uncertainty {
+
+/// Covariance of n rates in order of time, A + U M U': A holds noise of each rate, a diagonal, and
+/// a random walk that is zero at the first, q min(tau_i, tau_j); U a few columns more. No n x n
+/// matrix is ever formed: A is whitened as by a Kalman filter of one state, U by Woodbury's
+/// identity (docs/theory/uncertainty.md).
+class RatesCovariance {
+  public:
+    /// `elapsed`: times since the first rate, growing; `walk`: q per unit of time.
+    RatesCovariance(const Eigen::VectorXd& noise, const Eigen::VectorXd& elapsed, double walk);
+    /// Once: U and the inverse of M, which may be indefinite as long as the sum is positive.
+    void add(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& inverse_core);
+
+    /// Cov^-1 x, n x m.
+    [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& x) const;
+    /// x' Cov^-1 x for columns x.
+    [[nodiscard]] Eigen::MatrixXd square(const Eigen::MatrixXd& x) const;
+    [[nodiscard]] double log_determinant() const { return log_determinant_; }
+
+  private:
+    [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::MatrixXd& x) const;
+    [[nodiscard]] Eigen::MatrixXd whitened_back(Eigen::MatrixXd x) const;
+
+    Eigen::VectorXd gain_, deviation_;  ///< of the filter and its innovations
+    Eigen::MatrixXd columns_;           ///< U, whitened; none: no columns
+    Eigen::PartialPivLU<Eigen::MatrixXd> core_;
+    double log_determinant_ = 0;
+};
+
+}  // namespace vibrig::estimator::uncertainty
