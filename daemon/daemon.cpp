@@ -131,12 +131,15 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                excitation_.store(level == rt::Guard::excitation);
                interlock_.guard(level);
            },
-           [this] { return dwells_with_estimator_ == 0; },
+           [this] { return dwells_with_estimator_ == 0 && to_write_ == ToWrite::nothing; },
            [this] {
                planning_.abandon();  // of a campaign that was aborted
+               assessing_.abandon();
                identification_ = estimator::Identification(configuration_.estimator);
                noise_monitor_.reset();
+               verdict_told_.clear();
                const std::lock_guard lock(mutex_);
+               campaign_status_.verdict = {};
                result_ = {};
                for (const std::string& line : check_plan(configuration_))
                    log(Severity::warning, "campaign", line);
@@ -351,9 +354,9 @@ void Daemon::take_done_dwells() {
         campaign_.qualify(result);
         const std::lock_guard lock(mutex_);
         result_ = std::move(result);
+        verdict_due_ = true;
     }
-    // After the last dwell's verdict, so that the file holds it.
-    if (to_write_ != ToWrite::nothing && dwells_with_estimator_ == 0) write_result();
+    take_verdict();
 }
 
 void Daemon::control_loop() {
@@ -400,10 +403,14 @@ void Daemon::control_loop() {
             campaign_status_.noise = noise_monitor_.status();
             armed_.store(!campaign_status_.armed_by.empty());
             armed_g_.store(highest_level());
-            done = campaign_.done(now);
+            done = campaign_.done(now) && to_write_ == ToWrite::nothing;
             if (done) break;
         }
         control_waiter_->wait_until(std::min(next, now + drivers::kSecond / 2));
+    }
+    if (to_write_ != ToWrite::nothing && dwells_with_estimator_ == 0) {
+        assessing_.abandon();
+        write_result(estimator::uncertainty::assess(configuration_.estimator, result_));
     }
     give_up_arming("the daemon is shutting down");
     if (done) end_arming("the daemon has ended in order");
@@ -414,16 +421,9 @@ void Daemon::control_loop() {
     commands_.clear();
 }
 
-void Daemon::write_result() {
+void Daemon::write_result(const estimator::uncertainty::Assessment& assessed) {
     const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
-    // The dwells are over: some tens of milliseconds keep nobody waiting.
-    using estimator::uncertainty::Level;
-    const auto assessed = estimator::uncertainty::assess(configuration_.estimator, result_);
-    const Level level = assessed.verdict.level;
-    log(level == Level::not_valid  ? Severity::alarm
-        : level == Level::doubtful ? Severity::warning
-                                   : Severity::info,
-        "campaign", "result " + assessed.verdict.sentence);
+    log(severity_of(assessed.verdict.level), "campaign", "result " + assessed.verdict.sentence);
     std::string text;
     {
         const std::lock_guard lock(mutex_);

@@ -29,6 +29,7 @@
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
 #include "daemon/watch/guard_link.hpp"
+#include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig {
 
@@ -144,7 +145,12 @@ class Daemon final : public StatusSource {
                                                   const rt::EstimatorView& estimated) const;
     void take_done_dwells();
     void take_noise(estimator::DwellSummary& dwell);
-    void write_result();
+    [[nodiscard]] bool verdict_wanted();
+    /// What can be believed of the dwells so far; the verdict on all of them writes the result.
+    void take_verdict();
+    [[nodiscard]] static Severity severity_of(estimator::uncertainty::Level level);
+    void tell_verdict(const estimator::uncertainty::Assessment& assessed);
+    void write_result(const estimator::uncertainty::Assessment& assessed);
     void write_result_file(const std::string& text, bool complete);
     [[nodiscard]] std::optional<campaign::Next> next_dwell(const std::array<double, 3>& here_deg,
                                                            double elapsed_s);
@@ -232,6 +238,12 @@ class Daemon final : public StatusSource {
     std::atomic<bool> starving_{false};    ///< the proof does not let the watchdog be fed
     std::atomic<bool> excitation_{false};  ///< the campaign is between ramp and rest
     int dwells_with_estimator_ = 0;        ///< ordered, not yet reported done; control thread
+    /// Tens of milliseconds, with hundreds of dwells seconds.
+    plan::Aside<estimator::uncertainty::Assessment> assessing_{
+        [this] { control_waiter_->notify(); }};
+    bool verdict_due_ = false;  ///< on the dwells so far; control thread
+    bool concluding_ = false;   ///< the last verdict is asked for; control thread
+    std::string verdict_told_;  ///< control thread
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
     std::string imbalance_;  ///< as last looked at
     drivers::ControllerState controller_told_ = drivers::ControllerState::active;

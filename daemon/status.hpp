@@ -304,6 +304,15 @@ enum class ChannelState : std::uint8_t {
 
 /// The whole status at one instant. Filled by the daemon, read by the server; strings only here,
 /// not in real-time threads.
+/// What can be believed of the campaign so far, by the dwells up to one not long ago.
+struct VerdictStatus {
+    std::uint32_t dwells = 0;  ///< it rests on; 0: too few for any
+    int level = 0;             ///< 0 valid, 1 doubtful, 2 not valid
+    std::string word, sentence;
+    double widening = 1;    ///< of the uncertainty over that of noise alone, median
+    bool complete = false;  ///< of the whole campaign, which is over
+};
+
 struct StatusData {
     std::string version;
     std::string campaign_name;
@@ -368,6 +377,7 @@ struct StatusData {
 
     estimator::Estimate estimate;
     NoiseStatus noise;
+    VerdictStatus verdict;
     std::vector<estimator::DwellSummary> dwells;
     LevellingStatus levelling;
     ZeroStatus zeros;

@@ -277,6 +277,14 @@ void add_estimate(Families& to, const StatusData& s) {
              sigma_walks);
     to.gauge("vibrig_gyro_random_walk_in_force_degrees_per_root_hour", "N of the filter.",
              in_force);
+    if (s.verdict.dwells > 0) {
+        to.gauge("vibrig_verdict_level",
+                 "Of the campaign so far: 0 valid, 1 doubtful, 2 not valid.", s.verdict.level);
+        to.gauge("vibrig_verdict_dwells", "Dwells that the verdict rests on.", s.verdict.dwells);
+        to.gauge("vibrig_uncertainty_widening_ratio",
+                 "Uncertainty of a coefficient over that of noise alone, median.",
+                 s.verdict.widening);
+    }
     to.gauge("vibrig_noise_dwells", "Dwells the noise is known from.", s.noise.dwells);
     to.counter("vibrig_noise_alarms_total", "Dwells whose noise was not that of the earlier ones.",
                s.noise.alarms_total);

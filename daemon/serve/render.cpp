@@ -308,6 +308,7 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
         lines.push_back(labelled("clock", "MISFIT: " + status.clock_misfit()));
     lines.push_back(labelled("filter", estimate_line(estimate)));
     lines.push_back(labelled("noise", noise_line(status.noise())));
+    if (status.has_verdict()) lines.push_back(labelled("verdict", status.verdict().sentence()));
     if (status.has_guard()) {
         const v1::Guard& guard = status.guard();
         lines.push_back(labelled("guard", !guard.heard() ? "NOT HEARD, " + guard.note()

@@ -323,6 +323,15 @@ void fill(v1::Estimate& out, const estimator::Estimate& estimate) {
     out.set_dwells(estimate.dwells);
 }
 
+void fill(v1::Verdict& out, const VerdictStatus& verdict) {
+    out.set_level(verdict.level);
+    out.set_word(verdict.word);
+    out.set_sentence(verdict.sentence);
+    out.set_dwells(verdict.dwells);
+    out.set_widening(verdict.widening);
+    out.set_complete(verdict.complete);
+}
+
 void fill(v1::Noise& out, const NoiseStatus& noise) {
     namespace allan = estimator::allan;
     constexpr std::array<const char*, 3> kGyroNames{"x", "y", "z"};
@@ -493,6 +502,8 @@ void fill(v1::Status& out, const StatusData& status) {
     journal.set_dropped(status.journal.dropped);
     fill(*out.mutable_recorder(), status.recorder);
     fill(*out.mutable_noise(), status.noise);
+    if (status.verdict.dwells > 0 || status.verdict.complete)
+        fill(*out.mutable_verdict(), status.verdict);
     fill(*out.mutable_mqtt(), status.mqtt);
     fill(*out.mutable_log(), status.log);
     fill(*out.mutable_server(), status.server, status.utc_ns);

@@ -76,7 +76,7 @@ Json fit(const Assessment& a) {
 
 Json drift(const Assessment& a) {
     constexpr std::array<const char*, 3> kGyros{"x", "y", "z"};
-    Json weights = Json::array(), now = Json::array(), step = nullptr;
+    Json weights = Json::array(), now = Json::array(), trend = Json::array(), step = nullptr;
     std::size_t clearest = 0;
     for (std::size_t j = 0; j < 3; ++j) {
         const DriftAverage& gyro = a.drift[j];
@@ -87,6 +87,7 @@ Json drift(const Assessment& a) {
                            {"trend", w.trend},
                            {"step", w.step},
                            {"mass_unbalance", w.unbalance}});
+        trend.push_back(number(gyro.trend_deg_h_h));
         now.push_back({{"value", number(gyro.bias_now)}, {"sigma", number(gyro.bias_now_sigma)}});
         if (gyro.step.weight > a.drift[clearest].step.weight) clearest = j;
     }
@@ -95,9 +96,12 @@ Json drift(const Assessment& a) {
                 {"after_dwell", of.after_dwell},
                 {"size", number(of.size)},
                 {"sigma", number(of.sigma)}};
-    return {{"times", a.times_assumed ? "assumed" : "measured"},
+    constexpr std::array<const char*, 3> kModels{"auto", "constant", "walk"};
+    return {{"model", kModels[static_cast<std::size_t>(a.model)]},
+            {"times", a.times_assumed ? "assumed" : "measured"},
             {"weights", std::move(weights)},
             {"step", std::move(step)},
+            {"trend_deg_h_h", std::move(trend)},
             {"ramp_deg_h_per_100_s", numbers(a.ramps.mean)},
             {"bias_now", std::move(now)}};
 }
@@ -155,6 +159,15 @@ Json assessment_json(const Assessment& a) {
     root["sync_motion_arcsec"] = number(a.sync_arcsec);
     root["dwell_rates"] = dwell_rates(a);
     return root;
+}
+
+Json monte_carlo_json(const MonteCarlo& of) {
+    return {{"blocks", of.blocks},
+            {"digits", of.digits},
+            {"stable", of.stable},
+            {"gum_confirmed", of.gum_confirmed},
+            {"largest_difference", number(of.largest_difference)},
+            {"nonlinearity", number(of.nonlinearity)}};
 }
 
 }  // namespace vibrig::tool

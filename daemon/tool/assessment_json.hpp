@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {
 
@@ -18,5 +18,7 @@ namespace vibrig::tool {
 /// Verdict, fit, drift and all else that is not of one coefficient.
 [[nodiscard]] nlohmann::ordered_json assessment_json(
     const estimator::uncertainty::Assessment& assessed);
+
+[[nodiscard]] nlohmann::ordered_json monte_carlo_json(const estimator::uncertainty::MonteCarlo& of);
 
 }  // namespace vibrig::tool

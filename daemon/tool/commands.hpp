@@ -9,6 +9,7 @@ namespace vibrig::tool {
 /// Each adds one or several subcommands to `vibrig`. A callback that fails sets `exit_code` (1: the
 /// result says no, 2: bad usage or input) and has printed why to standard error.
 void add_identify(CLI::App& app, int& exit_code);
+void add_uncertainty(CLI::App& app, int& exit_code);
 void add_allan(CLI::App& app, int& exit_code);
 void add_plan(CLI::App& app, int& exit_code);
 void add_level(CLI::App& app, int& exit_code);

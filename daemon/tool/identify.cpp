@@ -19,6 +19,7 @@
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
+#include "daemon/tool/identified.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
@@ -202,11 +203,6 @@ estimator::Result identify(const record::Campaign& campaign, const estimator::Se
     return identification.result();
 }
 
-struct Identified {
-    estimator::Settings settings;
-    estimator::Result result;
-};
-
 Identified identify_campaign(const std::string& path, const std::string& config) {
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
@@ -217,7 +213,7 @@ Identified identify_campaign(const std::string& path, const std::string& config)
                                    "configuration in " + campaign.path, false)
             : configuration::load(config, false);
     const auto& settings = loaded.configuration.estimator;
-    return {settings, identify(campaign, settings)};
+    return {settings, identify(campaign, settings), {}};
 }
 
 /// A folder, an HDF5 file, or the name of a campaign: then there is no such file.
@@ -235,44 +231,54 @@ std::vector<RecordingRow> read(const std::string& path) {
     return proto::read_recording(path);
 }
 
-int run(const std::string& recording, const std::string& config, const std::string& instruction_set,
-        bool json, bool strict) {
-    Identified identified;
-    try {
-        estimator::use_instruction_set(instruction_set);
-        if (is_campaign(recording)) {
-            identified = identify_campaign(recording, config);
-        } else {
-            identified.settings = configuration::load(config, false).configuration.estimator;
-            identified.result = identify(read(recording), identified.settings);
-        }
-    } catch (const std::exception& error) {
-        // The room that found the fault named file, line, key and value already.
-        std::cerr << error.what() << '\n';
-        return kBadInput;
-    }
-    const auto assessed = estimator::uncertainty::assess(identified.settings, identified.result);
-    std::cout << (json ? result_json(identified.result, assessed) + "\n"
-                       : result_table(identified.result, assessed))
+struct IdentifyOptions {
+    std::string recording;
+    std::string config;
+    std::string instruction_set = "auto";
+    bool json = false;
+    bool strict = false;
+    bool monte_carlo = false;
+};
+
+/// What it throws names file, line, key and value already.
+int run(const IdentifyOptions& options) {
+    estimator::use_instruction_set(options.instruction_set);
+    const Identified identified = identify_recording(options.recording, options.config);
+    const auto& assessed = identified.assessed;
+    std::optional<estimator::uncertainty::MonteCarlo> drawn;
+    if (options.monte_carlo) drawn = draw(identified);
+    const auto* check = drawn ? &*drawn : nullptr;
+    std::cout << (options.json ? result_json(identified.result, assessed, check) + "\n"
+                               : result_table(identified.result, assessed) +
+                                     (check != nullptr ? monte_carlo_text(*check) : ""))
               << std::flush;
-    if (!std::cout) {
-        std::cerr << "standard output: cannot be written\n";
-        return kBadInput;
-    }
-    return exit_status(assessed.verdict.level, strict);
+    return exit_status(assessed.verdict.level, options.strict);
 }
 
 }  // namespace
 
+Identified identify_recording(const std::string& file, const std::string& config) {
+    Identified identified;
+    if (is_campaign(file)) {
+        identified = identify_campaign(file, config);
+    } else {
+        identified.settings = configuration::load(config, false).configuration.estimator;
+        identified.result = identify(read(file), identified.settings);
+    }
+    identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    return identified;
+}
+
+estimator::uncertainty::MonteCarlo draw(const Identified& of) {
+    Progress progress("drawing");
+    const estimator::uncertainty::MonteCarloSettings how;
+    return estimator::uncertainty::propagate_distributions(
+        of.settings, of.result, of.assessed, how,
+        [&](int blocks) { progress.show(static_cast<std::size_t>(blocks), 100); });
+}
+
 void add_identify(CLI::App& app, int& exit_code) {
-    struct Options {
-        std::string recording;
-        std::string config;
-        std::string instruction_set = "auto";
-        bool json = false;
-        bool strict = false;
-    };
-    auto options = std::make_shared<Options>();
+    auto options = std::make_shared<IdentifyOptions>();
     CLI::App* command = app.add_subcommand(
         "identify", "Gyro error coefficients from a recording (CSV, or HDF5 of vibrigd)");
     command
@@ -291,15 +297,15 @@ void add_identify(CLI::App& app, int& exit_code) {
         ->envname("VIBRIG_INSTRUCTION_SET");
     command->add_flag("--json", options->json, "print the result as JSON");
     command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
+    command->add_flag("--monte-carlo", options->monte_carlo,
+                      "draw the declared inputs (JCGM 101) to check the combined uncertainty");
     command->footer(
         "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
         "Exit codes: 0 the result is valid or doubtful (the verdict says why), 1 it is not valid, "
         "or\ncoefficients are not observable (the result names them and the combinations that are "
         "determined),\nwith --strict also when it is doubtful; 2 bad usage or input.");
-    command->callback([options, &exit_code] {
-        exit_code = run(options->recording, options->config, options->instruction_set,
-                        options->json, options->strict);
-    });
+    command->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run(*options); }); });
 }
 
 }  // namespace vibrig::tool

@@ -311,7 +311,10 @@ void add_remote(CLI::App& app, int& exit_code) {
     add_socket(watching, watch_options->at);
     watching.add_flag(
         "--until-finished", watch_options->until_finished,
-        "End with the campaign: exit code 0 when it finished, 1 when aborted or tripped");
+        "End with the campaign: exit code 0 when it finished and its result is valid or doubtful, "
+        "1 when that is not valid, or when it was aborted or tripped");
+    watching.add_flag("--strict", watch_options->strict,
+                      "With --until-finished: a doubtful result is a no as well");
     watching.add_option("--interval", watch_options->interval_s, "Time between two looks, s")
         ->check(proto::finite(0.05, 3600))
         ->capture_default_str();

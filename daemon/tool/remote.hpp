@@ -18,6 +18,7 @@ void parse_answer(const serve::Reply& reply, google::protobuf::Message& message)
 struct WatchOptions {
     serve::Address at;
     bool until_finished = false;
+    bool strict = false;  ///< a doubtful result is a no, too
     double interval_s = 1.0;
 };
 /// Returns the exit code.

@@ -139,13 +139,24 @@ class Watch {
         last_ = status;
         last_at_ = now;
         if (!options_.until_finished) return {};
-        if (state == v1::Campaign::finished) return 0;
+        if (state == v1::Campaign::finished) return finished(status);
         if (is_bad_end(state)) return kNo;
         if (lost) {
             std::cerr << "vibrig: the daemon has started anew; its campaign is over\n";
             return kNo;
         }
         return {};
+    }
+
+    /// The verdict on all dwells comes a moment after the campaign's end; older daemons have
+    /// none.
+    std::optional<int> finished(const v1::Status& status) {
+        constexpr double kPatience_s = 10;
+        if (!finished_since_) finished_since_ = Steady::now();
+        const v1::Verdict& verdict = status.verdict();
+        if (!verdict.complete() && seconds_since(*finished_since_) < kPatience_s) return {};
+        if (!verdict.sentence().empty()) std::cerr << "verdict: " << verdict.sentence() << '\n';
+        return verdict.level() >= (options_.strict ? 1 : 2) ? kNo : 0;
     }
 
     std::optional<v1::Status> ask() {
@@ -179,7 +190,7 @@ class Watch {
     std::optional<Screen> screen_;
     std::optional<v1::Status> last_;
     Steady::time_point last_at_;
-    std::optional<Steady::time_point> gone_since_;
+    std::optional<Steady::time_point> gone_since_, finished_since_;
 };
 
 }  // namespace

@@ -17,7 +17,8 @@ namespace uncertainty = estimator::uncertainty;
 
 Json number_if(bool exists, double value) { return exists ? number(value) : Json(nullptr); }
 
-Json parameters(const estimator::Result& result, const uncertainty::Assessment& assessed) {
+Json parameters(const estimator::Result& result, const uncertainty::Assessment& assessed,
+                const uncertainty::MonteCarlo* drawn) {
     Json list = Json::array();
     for (std::size_t i = 0; i < kParameters; ++i) {
         const bool observable = result.observable[i];
@@ -31,6 +32,11 @@ Json parameters(const estimator::Result& result, const uncertainty::Assessment& 
         if (assessed.done) {
             one["value_constant"] = number_if(observable, result.value[i]);
             one.update(coefficient_json(of));
+            if (drawn != nullptr) {
+                const auto& interval = drawn->coefficients[i];
+                one["interval"] = {number(interval.low), number(interval.high)};
+                one["gum_confirmed"] = interval.confirmed;
+            }
         }
         list.push_back(std::move(one));
     }
@@ -79,9 +85,10 @@ Json combinations(const estimator::Result& result) {
 
 }  // namespace
 
-std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed) {
+std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed,
+                        const uncertainty::MonteCarlo* drawn) {
     Json root;
-    root["parameters"] = parameters(result, assessed);
+    root["parameters"] = parameters(result, assessed, drawn);
     root["covariance"] = covariance(result);
     root["amplitudes"] = amplitudes(result);
     root["combinations"] = combinations(result);
@@ -97,6 +104,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
                                             {"agrees", check.agrees()}}
                                      : Json(nullptr);
     if (!assessed.verdict.sentence.empty()) root.update(assessment_json(assessed));
+    if (drawn != nullptr) root["monte_carlo"] = monte_carlo_json(*drawn);
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
     // A warning may carry bytes of a file; a broken sequence must not cost the result.

@@ -3,16 +3,17 @@
 #include <string>
 
 #include "estimator/identification.hpp"
-#include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {
 
 /// The JSON form of a result, as `vibrig identify --json` prints it and vibrigd writes it to
 /// result.json: one line, keys in fixed order, numbers that read back exactly. What is not
 /// observable or does not exist is null, never NaN. Without an assessment there is no verdict, no
-/// budget, and `value` is that of a constant bias.
+/// budget, and `value` is that of a constant bias. `drawn`: the Monte Carlo, if there was one.
 [[nodiscard]] std::string result_json(const estimator::Result& result,
-                                      const estimator::uncertainty::Assessment& assessed = {});
+                                      const estimator::uncertainty::Assessment& assessed = {},
+                                      const estimator::uncertainty::MonteCarlo* drawn = nullptr);
 
 /// True if all 30 coefficients are determined one by one.
 [[nodiscard]] bool all_observable(const estimator::Result& result);

@@ -120,6 +120,24 @@ int exit_status(estimator::uncertainty::Level level, bool strict) {
     return level == Level::not_valid || (strict && level == Level::doubtful) ? kNo : 0;
 }
 
+std::string monte_carlo_text(const estimator::uncertainty::MonteCarlo& drawn) {
+    std::string text = line(
+        "Monte Carlo (JCGM 101): %d blocks of 10000%s; the ends of the intervals agree with U "
+        "within %.2f of the tolerance (%d digit%s): %s",
+        drawn.blocks, drawn.stable ? "" : ", not yet stable", drawn.largest_difference,
+        drawn.digits, drawn.digits == 1 ? "" : "s",
+        drawn.gum_confirmed ? "confirmed" : "NOT CONFIRMED");
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto& of = drawn.coefficients[i];
+        if (of.u > 0 && !of.confirmed)
+            text += line("  %s: %.6f to %.6f", estimator::parameter_names()[i], of.low, of.high);
+    }
+    if (drawn.nonlinearity > 0.05)
+        text += line("warning: the inputs do not act linearly, by %.0f %% of their effect",
+                     100 * drawn.nonlinearity);
+    return text;
+}
+
 std::string result_table(const estimator::Result& result, const Assessment& assessed) {
     std::string text = coefficients(result, assessed) + "\nVibration on the platform (peak):\n" +
                        amplitudes(result) + "\n";

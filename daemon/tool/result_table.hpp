@@ -3,7 +3,7 @@
 #include <string>
 
 #include "estimator/identification.hpp"
-#include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {
 
@@ -15,5 +15,9 @@ namespace vibrig::tool {
 /// verdict, warnings.
 [[nodiscard]] std::string result_table(const estimator::Result& result,
                                        const estimator::uncertainty::Assessment& assessed);
+
+/// What the Monte Carlo says of the budget, in one line; with coefficients whose interval is
+/// another one.
+[[nodiscard]] std::string monte_carlo_text(const estimator::uncertainty::MonteCarlo& drawn);
 
 }  // namespace vibrig::tool

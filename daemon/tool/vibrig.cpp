@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
         "Exit codes: 0 done, 1 the result says no, 2 bad usage or input.");
     int exit_code = 0;
     vibrig::tool::add_identify(app, exit_code);
+    vibrig::tool::add_uncertainty(app, exit_code);
     vibrig::tool::add_allan(app, exit_code);
     vibrig::tool::add_plan(app, exit_code);
     vibrig::tool::add_level(app, exit_code);

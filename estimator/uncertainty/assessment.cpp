@@ -5,6 +5,7 @@
 #include <map>
 
 #include "estimator/parameters.hpp"
+#include "estimator/uncertainty/balanced_order.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/verdict.hpp"
 
@@ -178,36 +179,9 @@ void for_use(const Settings& settings, std::size_t internal, const RampFit& ramp
     c.u_use = std::sqrt(square);
 }
 
-/// Largest inflation of a coefficient's sigma when a step of the bias at one place is left free.
-double worst_step_of(const GyroRates& gyro) {
-    const Index n = gyro.dwells();
-    const VectorXd weight = gyro.variance.cwiseInverse();
-    MatrixXd information = gyro.regressors.transpose() * weight.asDiagonal() * gyro.regressors;
-    const VectorXd all = gyro.regressors.transpose() * weight;
-    information.diagonal() += gyro.prior_information;
-    const MatrixXd p = information.llt().solve(MatrixXd::Identity(10, 10));
-    const double sum = weight.sum();
-    double worst = 1, tail = 0;
-    VectorXd of_tail = VectorXd::Zero(10);
-    for (Index k = n - 1; k >= 2; --k) {
-        tail += weight[k];
-        of_tail += weight[k] * gyro.regressors.row(k).transpose();
-        if (k > n - 2) continue;
-        // A step after dwell k is 1 from there on, less its mean.
-        const double mean = static_cast<double>(n - k) / static_cast<double>(n);
-        const VectorXd hz = of_tail - mean * all;
-        const double zz = tail * (1 - 2 * mean) + mean * mean * sum;
-        const VectorXd b = p * hz;
-        const double left = std::max(zz - b.dot(hz), 1e-12 * zz);
-        for (Index i = 0; i < 10; ++i)
-            worst = std::max(worst, std::sqrt(1 + b[i] * b[i] / (left * p(i, i))));
-    }
-    return worst;
-}
-
 double worst_step(const std::array<GyroRates, 3>& gyros) {
     double worst = 1;
-    for (const GyroRates& gyro : gyros) worst = std::max(worst, worst_step_of(gyro));
+    for (const GyroRates& gyro : gyros) worst = std::max(worst, step_inflation(gyro));
     return worst;
 }
 
@@ -306,6 +280,7 @@ Assessment assess(const Settings& settings, const Result& result) {
     MatrixXd gain0;
     if (table.dwells() >= 2 && settings.method == Method::joint) {
         out.done = true;
+        out.model = settings.drift.model;
         out.times_assumed = table.times_assumed;
         const VectorXd prior = prior_information(settings);
         const std::array<GyroRates, 3> gyros = gyros_of(table, settings);
@@ -336,6 +311,7 @@ Assessment assess(const Settings& settings, const Result& result) {
         Together all = join(out.drift, fit, table.dwells());
         widen_constant(settings, out, all);
         out.gain = all.gain;
+        out.covariance_type_a = all.covariance;
         out.ramps = fit_ramps(table, all.value);
         tell_sync(table, out);
         tell_cross_axis(table, out);

@@ -80,6 +80,7 @@ struct Assessment {
     RampFit ramps;
     double birge = 1, widening = 1;
     std::vector<Evidence> evidence;  ///< the best first
+    BiasModel model = BiasModel::automatic;
     std::array<DriftAverage, 3> drift;
     double worst_step = 1;  ///< largest inflation of a sigma by one free step
     std::vector<CrossAxis> cross_axis;
@@ -87,7 +88,7 @@ struct Assessment {
     std::vector<DwellRate> rates;
     bool times_assumed = false;
     /// For the Monte Carlo: gain of the estimator and the inputs it acts on, filter order.
-    Eigen::MatrixXd gain;
+    Eigen::MatrixXd gain, covariance_type_a;
     std::vector<InputSignature> inputs;
 };
 

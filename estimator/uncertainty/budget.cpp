@@ -54,8 +54,7 @@ void each_input(const Inputs& in, const Each& each) {
                         (part == 0 ? ", cosine" : ", sine"),
                     phase, kArcsec, kArcsec,
                     [order = harmonic.order, k, part](Disturbance& d, double x) {
-                        d.resolver_order = order;
-                        d.resolver_rad[k][part] = x;
+                        d.resolver_rad(order, k, part) = x;
                     },
                     part == 0);
             }
@@ -91,7 +90,10 @@ void add_run_steps(const Inputs& inputs, const DwellTable& table,
             for (Index r = 0; r < table.dwells(); ++r) rates[3 * r + static_cast<Index>(j)] = z[r];
             list.push_back({"bias_step_between_runs",
                             std::string("after dwell ") + std::to_string(k) + ", " + kAxis[j],
-                            inputs.bias_step_between_runs, std::move(rates), false});
+                            inputs.bias_step_between_runs,
+                            std::move(rates),
+                            false,
+                            {}});
         }
     }
 }
@@ -111,7 +113,8 @@ std::vector<InputSignature> input_signatures(const Inputs& inputs, const DwellTa
                            double unit, double step, const Set& set, bool with_next) {
         if (!(declared.u > 0)) return;
         list.push_back({key, std::move(element), declared,
-                        unit * signature(table, model, set, step), with_next});
+                        unit * signature(table, model, set, step), with_next,
+                        [set, unit](Disturbance& d, double x) { set(d, unit * x); }});
     });
     add_run_steps(inputs, table, list);
     return list;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ struct InputSignature {
     Eigen::VectorXd rates;       ///< per unit, 3 n
     /// Cosine and sine of one amplitude are drawn together.
     bool with_next = false;
+    /// Gives it a size, in the unit of the key; none: it is linear.
+    std::function<void(Disturbance&, double)> set = {};
 
     /// "encoder_zero.inner", as correlations name it.
     [[nodiscard]] std::string name() const;

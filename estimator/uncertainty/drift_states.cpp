@@ -117,16 +117,9 @@ struct Kernels {
         : s0(std::sqrt(gyro.variance.mean())), time(normalised_time(gyro.time_h)) {
         const Index n = gyro.dwells();
         const double span = gyro.time_h[n - 1] - gyro.time_h[0];
-        elapsed = span > 0 ? VectorXd((gyro.time_h.array() - gyro.time_h[0]) / span)
-                           : VectorXd::Zero(n);
-        // Means of the rows of min(tau_i, tau_j).
-        walk_mean.resize(n);
-        double before = 0;
-        for (Index i = 0; i < n; ++i) {
-            before += elapsed[i];
-            walk_mean[i] =
-                (before + static_cast<double>(n - 1 - i) * elapsed[i]) / static_cast<double>(n);
-        }
+        elapsed =
+            span > 0 ? VectorXd((gyro.time_h.array() - gyro.time_h[0]) / span) : VectorXd::Zero(n);
+        walk_mean = walk_means(elapsed);
     }
 
     /// Columns that the bias, or with `unbalance` the mass unbalance, moves along, each of unit
@@ -150,24 +143,8 @@ struct Kernels {
 
     [[nodiscard]] RatesCovariance covariance(const GyroRates& gyro,
                                              const DriftHypothesis& what) const {
-        const Index n = gyro.dwells();
-        const double walk = s0 * s0 * what.walk * what.walk;
-        RatesCovariance out(gyro.variance.array() + s0 * s0 * what.scatter * what.scatter, elapsed,
-                            walk);
-        const MatrixXd more = columns(gyro, what);
-        const Index r = more.cols(), of_mean = walk > 0 ? 2 : 0;
-        MatrixXd u(n, r + of_mean);
-        MatrixXd inverse = MatrixXd::Identity(r + of_mean, r + of_mean);
-        u.leftCols(r) = more;
-        if (walk > 0) {
-            // About its mean: P K P = K - 1 k' - k 1' + mean(k) 1 1'.
-            u.col(r).setOnes();
-            u.col(r + 1) = walk_mean;
-            inverse.bottomRightCorner<2, 2>() << 0, -1, -1, -walk_mean.mean();
-            inverse.bottomRightCorner<2, 2>() /= walk;
-        }
-        out.add(u, inverse);
-        return out;
+        return drifting(gyro.variance.array() + s0 * s0 * what.scatter * what.scatter, elapsed,
+                        s0 * s0 * what.walk * what.walk, columns(gyro, what));
     }
     /// Covariance of the bias at the last dwell with that at each.
     [[nodiscard]] VectorXd with_last(const GyroRates& gyro, const DriftHypothesis& what) const {
@@ -175,8 +152,7 @@ struct Kernels {
         if (what.unbalance != Unbalance::none) return VectorXd::Zero(last + 1);
         const MatrixXd more = columns(gyro, what);
         return more * more.row(last).transpose() +
-               VectorXd(s0 * s0 * what.walk * what.walk *
-                        (elapsed - walk_mean).array() +
+               VectorXd(s0 * s0 * what.walk * what.walk * (elapsed - walk_mean).array() +
                         s0 * s0 * what.walk * what.walk * (walk_mean.mean() - walk_mean[last]));
     }
 
@@ -211,8 +187,8 @@ struct Fit {
                                                       double prior) const {
         const VectorXd of_z = rates.solve(z);
         const VectorXd left =
-            of_z - rates.solve(gyro.regressors *
-                               (covariance_of * (gyro.regressors.transpose() * of_z)));
+            of_z -
+            rates.solve(gyro.regressors * (covariance_of * (gyro.regressors.transpose() * of_z)));
         return {prior * left.dot(gyro.rate), prior - prior * prior * left.dot(z)};
     }
 
@@ -279,7 +255,8 @@ DriftStep find_step(const GyroRates& gyro, const Kernels& kernels,
                     const std::vector<Weighted>& list, const std::vector<double>& weights) {
     std::vector<double> at(static_cast<std::size_t>(gyro.dwells()), 0.0);
     for (std::size_t i = 0; i < list.size(); ++i) {
-        if (is_step(list[i].what)) at[static_cast<std::size_t>(list[i].what.step_after)] += weights[i];
+        if (is_step(list[i].what))
+            at[static_cast<std::size_t>(list[i].what.step_after)] += weights[i];
     }
     const auto place = std::max_element(at.begin(), at.end());
     DriftStep step;

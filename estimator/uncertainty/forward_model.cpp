@@ -56,6 +56,13 @@ Matrix3d level_tensor(const VibrationMoment& v) {
 
 }  // namespace
 
+double& Disturbance::resolver_rad(int order, std::size_t axis, std::size_t part) {
+    for (Resolver& one : resolvers) {
+        if (one.order == order) return one.rad[axis][part];
+    }
+    return resolvers.emplace_back(Resolver{order, {}}).rad[axis][part];
+}
+
 ForwardModel::ForwardModel(const Settings& settings, const ParameterArray& coefficients)
     : kinematics_(settings),
       model_(settings),
@@ -107,11 +114,12 @@ Vector3d ForwardModel::apparent(const DwellRow& row, const Disturbance& d) const
     Vector3d shown, measured;
     for (Eigen::Index k = 0; k < 3; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        const double n = d.resolver_order, c = std::cos(n * theta[k]), s = std::sin(n * theta[k]);
-        const double error = d.encoder_zero_rad[i] +
-                             (n > 0 ? d.resolver_rad[i][0] * c + d.resolver_rad[i][1] * s : 0.0);
-        const double slope =
-            n > 0 ? n * (-d.resolver_rad[i][0] * s + d.resolver_rad[i][1] * c) : 0.0;
+        double error = d.encoder_zero_rad[i], slope = 0;
+        for (const Disturbance::Resolver& of : d.resolvers) {
+            const double n = of.order, c = std::cos(n * theta[k]), s = std::sin(n * theta[k]);
+            error += of.rad[i][0] * c + of.rad[i][1] * s;
+            slope += n * (-of.rad[i][0] * s + of.rad[i][1] * c);
+        }
         shown[k] = theta[k] + error;
         measured[k] = rates[k] * (1.0 + slope) / (1.0 + d.time_base);
     }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <vector>
 
 #include "estimator/drift_model.hpp"
 #include "estimator/dwell_row.hpp"
@@ -16,9 +17,13 @@ struct Disturbance {
     double time_base = 0;  ///< the clock runs so much too fast
     std::array<double, 3> encoder_zero_rad{};
     std::array<double, 2> non_orthogonality_rad{};  ///< outer-inner, inner-azimuth
-    /// e cos(order theta + phase) of one resolver, as cosine and sine part.
-    int resolver_order = 0;
-    std::array<std::array<double, 2>, 3> resolver_rad{};
+    /// e cos(order theta + phase) of the three resolvers, as cosine and sine part.
+    struct Resolver {
+        int order = 1;
+        std::array<std::array<double, 2>, 3> rad{};
+    };
+    std::vector<Resolver> resolvers;
+    [[nodiscard]] double& resolver_rad(int order, std::size_t axis, std::size_t part);
     double accelerometer_gain = 0;  ///< at f over that for gravity, less 1
     std::array<double, 3> accelerometer_zero_g{};
     std::array<double, 6> accelerometer_cross{};  ///< xy, xz, yx, yz, zx, zy, rad

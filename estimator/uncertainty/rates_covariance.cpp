@@ -63,6 +63,36 @@ MatrixXd RatesCovariance::solve(const MatrixXd& x) const {
     return whitened_back(std::move(white));
 }
 
+VectorXd walk_means(const VectorXd& elapsed) {
+    const Index n = elapsed.size();
+    VectorXd means(n);
+    double before = 0;
+    for (Index i = 0; i < n; ++i) {
+        before += elapsed[i];
+        means[i] = (before + static_cast<double>(n - 1 - i) * elapsed[i]) / static_cast<double>(n);
+    }
+    return means;
+}
+
+RatesCovariance drifting(const VectorXd& noise, const VectorXd& elapsed, double walk,
+                         const MatrixXd& columns) {
+    RatesCovariance out(noise, elapsed, walk);
+    const Index r = columns.cols(), of_mean = walk > 0 ? 2 : 0;
+    MatrixXd u(noise.size(), r + of_mean);
+    MatrixXd inverse = MatrixXd::Identity(r + of_mean, r + of_mean);
+    u.leftCols(r) = columns;
+    if (walk > 0) {
+        // P K P = K - 1 k' - k 1' + mean(k) 1 1', k the means of the rows.
+        const VectorXd means = walk_means(elapsed);
+        u.col(r).setOnes();
+        u.col(r + 1) = means;
+        inverse.bottomRightCorner<2, 2>() << 0, -1, -1, -means.mean();
+        inverse.bottomRightCorner<2, 2>() /= walk;
+    }
+    out.add(u, inverse);
+    return out;
+}
+
 MatrixXd RatesCovariance::square(const MatrixXd& x) const {
     const MatrixXd white = whitened(x);
     MatrixXd out = white.transpose() * white;

@@ -32,4 +32,12 @@ class RatesCovariance {
     double log_determinant_ = 0;
 };
 
+/// Covariance of rates whose drift is a random walk about its mean over them, and moves along
+/// `columns`, each of unit prior variance: diag(noise) + walk P min(tau_i, tau_j) P + U U', P what
+/// takes the mean out.
+[[nodiscard]] RatesCovariance drifting(const Eigen::VectorXd& noise, const Eigen::VectorXd& elapsed,
+                                       double walk, const Eigen::MatrixXd& columns);
+/// Means over j of min(tau_i, tau_j).
+[[nodiscard]] Eigen::VectorXd walk_means(const Eigen::VectorXd& elapsed);
+
 }  // namespace vibrig::estimator::uncertainty

@@ -70,10 +70,7 @@ Signatures resolver(const DwellTable& table, const ForwardModel& model, int orde
     for (std::size_t k = 0; k < 3; ++k) {
         for (std::size_t part = 0; part < 2; ++part) {
             of.add(std::string(kGimbalName[k]) + (part == 0 ? " cosine" : " sine"), kArcmin / 60.0,
-                   [=](Disturbance& d, double x) {
-                       d.resolver_order = order;
-                       d.resolver_rad[k][part] = x;
-                   });
+                   [=](Disturbance& d, double x) { d.resolver_rad(order, k, part) = x; });
         }
     }
     return of.take();

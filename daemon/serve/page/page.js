@@ -68,6 +68,7 @@
     const c = s.campaign;
     set('state', c.state);
     set('reason', c.reason || (c.resume_offer ? 'to be resumed: ' + c.resume_offer : ''));
+    set('verdict', s.verdict ? `${s.verdict.dwells} dwells: ${s.verdict.sentence}` : '');
     set('campaign', c.name + (c.armed_by ? ', armed by ' + c.armed_by : ', not armed'));
     document.querySelector('header').className = kBad.includes(c.state) ? 'bad' : kCalm.includes(c.state) ? 'good' : 'active';
     const done = 100 * (c.progress || 0), broken = kBad.includes(c.state);

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include "estimator/uncertainty/monte_carlo.hpp"
+
+namespace vibrig::tool {
+
+/// What a recording gives: coefficients, and what can be believed of them.
+struct Identified {
+    estimator::Settings settings;
+    estimator::Result result;
+    estimator::uncertainty::Assessment assessed;
+};
+
+/// Identifies FILE: a CSV recording, or a campaign (folder, HDF5 file or name). `config`: a TOML
+/// file; empty: all defaults, or the campaign's own. Throws with file, line, key and value.
+[[nodiscard]] Identified identify_recording(const std::string& file, const std::string& config);
+
+/// JCGM 101 over it, with progress; throws when there is nothing to draw from.
+[[nodiscard]] estimator::uncertainty::MonteCarlo draw(const Identified& of);
+
+}  // namespace vibrig::tool

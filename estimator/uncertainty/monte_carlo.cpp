@@ -1,0 +1,253 @@
+#include "estimator/uncertainty/monte_carlo.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "estimator/parameters.hpp"
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kFewestBlocks = 2, kForLinearity = 200;
+constexpr auto kTogether = static_cast<Index>(kParameters);
+
+/// L with L L' = c; a row of zeros where nothing is uncertain.
+MatrixXd root_of(const MatrixXd& c) {
+    const MatrixXd padded = c + 1e-12 * MatrixXd(c.diagonal().asDiagonal());
+    const Eigen::LDLT<MatrixXd> factor(padded);
+    const VectorXd d = factor.vectorD().cwiseMax(0.0).cwiseSqrt();
+    return factor.transpositionsP().transpose() *
+           MatrixXd(MatrixXd(factor.matrixL()) * d.asDiagonal());
+}
+
+/// Draws the inputs, in the units of their keys.
+class InputDraws {
+  public:
+    InputDraws(const Settings& settings, const Assessment& assessed)
+        : list_(assessed.inputs),
+          covariance_(input_covariance(settings.uncertainty, list_)),
+          root_(root_of(covariance_)) {
+        MatrixXd off = covariance_;
+        off.diagonal().setZero();
+        correlated_ = off.cwiseAbs().rowwise().sum();
+    }
+
+    void draw(std::mt19937_64& random, VectorXd& out) {
+        std::normal_distribution<double> normal;
+        VectorXd xi(out.size());
+        for (double& one : xi) one = normal(random);
+        out = root_ * xi;
+        for (Index i = 0; i < out.size(); ++i) {
+            if (correlated_[i] > 0) continue;
+            const InputSignature& input = list_[static_cast<std::size_t>(i)];
+            const double u = input.declared.u;
+            if (input.with_next) {
+                const double phase = 2 * kPi * uniform_(random), a = std::sqrt(2.0) * u;
+                out[i] = a * std::cos(phase);
+                out[i + 1] = a * std::sin(phase);
+                ++i;
+                continue;
+            }
+            out[i] = u * one_of(input.declared, random);
+        }
+    }
+
+  private:
+    /// Of unit standard uncertainty.
+    double one_of(const Declared& of, std::mt19937_64& random) {
+        switch (of.shape) {
+            case Shape::rectangular:
+                return std::sqrt(3.0) * (2 * uniform_(random) - 1);
+            case Shape::triangular:
+                return std::sqrt(6.0) * (uniform_(random) + uniform_(random) - 1);
+            case Shape::arcsine:
+                return std::sqrt(2.0) * std::cos(2 * kPi * uniform_(random));
+            case Shape::normal:
+                break;
+        }
+        // JCGM 101, 6.4.9: a finite sample gives a scaled and shifted t-distribution.
+        if (std::isfinite(of.dof)) return std::student_t_distribution<double>(of.dof)(random);
+        return std::normal_distribution<double>()(random);
+    }
+
+    const std::vector<InputSignature>& list_;
+    MatrixXd covariance_, root_;
+    VectorXd correlated_;
+    std::uniform_real_distribution<double> uniform_;
+};
+
+struct DrawModel {
+    MatrixXd sensitivity;  ///< 30 x m
+    VectorXd local_g;      ///< per relative change
+    MatrixXd type_a;       ///< root of the covariance
+    VectorXd value;
+    double sync = 0;  ///< half width on the quadratic coefficients
+};
+
+DrawModel model_of(const Settings& settings, const Assessment& assessed) {
+    DrawModel m;
+    m.sensitivity.resize(kTogether, static_cast<Index>(assessed.inputs.size()));
+    for (std::size_t i = 0; i < assessed.inputs.size(); ++i)
+        m.sensitivity.col(static_cast<Index>(i)) = assessed.gain * assessed.inputs[i].rates;
+    m.type_a = root_of(assessed.covariance_type_a);
+    m.value = VectorXd::Zero(kTogether);
+    for (Index g = 0; g < static_cast<Index>(kGroups); ++g) {
+        for (Index j = 0; j < 3; ++j)
+            m.value[3 * g + j] = assessed.drift[static_cast<std::size_t>(j)].value[g];
+    }
+    m.local_g = m.value;
+    m.local_g.head<3>().setZero();
+    m.local_g.tail<18>() *= 2.0;
+    m.local_g *= settings.uncertainty.local_g.u;
+    if (settings.uncertainty.sync_motion == SyncMotionOf::platform) m.sync = assessed.sync_bound;
+    return m;
+}
+
+/// Mean, standard deviation and the ends of the symmetric interval, 30 each.
+using Block = Eigen::Matrix<double, Eigen::Dynamic, 4>;
+
+Block one_block(const DrawModel& model, InputDraws& inputs, int count, double coverage,
+                std::mt19937_64& random) {
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    MatrixXd x(count, kTogether);
+    VectorXd xi(kTogether), p(model.sensitivity.cols());
+    for (Index i = 0; i < count; ++i) {
+        for (double& one : xi) one = normal(random);
+        inputs.draw(random, p);
+        VectorXd here = model.type_a * xi + model.sensitivity * p + normal(random) * model.local_g;
+        if (model.sync > 0) {
+            for (Index k = 12; k < kTogether; ++k) here[k] += model.sync * uniform(random);
+        }
+        x.row(i) = here.transpose();
+    }
+    Block out(kTogether, 4);
+    const auto place = static_cast<std::ptrdiff_t>(0.5 * (1 - coverage) * count);
+    for (Index k = 0; k < kTogether; ++k) {
+        auto column = x.col(k);
+        const double mean = column.mean();
+        const double square = (column.array() - mean).square().sum() / (count - 1);
+        double* begin = column.data();
+        double* end = begin + count;
+        std::nth_element(begin, begin + place, end);
+        const double low = begin[place];
+        std::nth_element(begin, end - 1 - place, end);
+        out.row(k) << mean, std::sqrt(square), low, *(end - 1 - place);
+    }
+    return out;
+}
+
+/// Half a unit of the last of so many digits of u.
+double tolerance(double u, int digits) {
+    return 0.5 * std::pow(10.0, std::floor(std::log10(u)) + 1 - digits);
+}
+
+/// Relative rms of what the inputs do together over what the linear model says.
+double nonlinearity(const Settings& settings, const Result& result, const Assessment& assessed,
+                    const DrawModel& model, InputDraws& inputs, std::mt19937_64& random) {
+    const DwellTable table = dwell_table(result.rows);
+    ParameterArray coefficients{};
+    for (std::size_t i = 0; i < kParameters; ++i)
+        coefficients[i] = model.value[static_cast<Index>(i)];
+    const ForwardModel forward(settings, coefficients);
+    const auto apparent = [&](const Disturbance& d) {
+        VectorXd z(3 * table.dwells());
+        for (Index k = 0; k < table.dwells(); ++k)
+            z.segment<3>(3 * k) = forward.apparent(table.rows[static_cast<std::size_t>(k)], d);
+        return z;
+    };
+    const VectorXd none = apparent({});
+    VectorXd p(model.sensitivity.cols());
+    double off = 0, all = 0;
+    for (int draw = 0; draw < kForLinearity; ++draw) {
+        inputs.draw(random, p);
+        Disturbance together;
+        VectorXd linear = VectorXd::Zero(kTogether);
+        for (std::size_t i = 0; i < assessed.inputs.size(); ++i) {
+            const auto k = static_cast<Index>(i);
+            if (!assessed.inputs[i].set) continue;
+            assessed.inputs[i].set(together, p[k]);
+            linear += model.sensitivity.col(k) * p[k];
+        }
+        const VectorXd full = assessed.gain * (apparent(together) - none);
+        for (Index k = 0; k < kTogether; ++k) {
+            const double scale = assessed.covariance_type_a(k, k);
+            off += (full[k] - linear[k]) * (full[k] - linear[k]) / scale;
+            all += linear[k] * linear[k] / scale;
+        }
+    }
+    return all > 0 ? std::sqrt(off / all) : 0;
+}
+
+/// The standard error of the blocks' mean, twice, within the tolerance everywhere.
+bool settled(const std::vector<Block>& blocks, const Block& sum, const VectorXd& delta) {
+    const auto h = static_cast<double>(blocks.size());
+    if (blocks.size() < kFewestBlocks) return false;
+    const Block mean = sum / h;
+    Block square = Block::Zero(kTogether, 4);
+    for (const Block& block : blocks) square += (block - mean).cwiseAbs2();
+    const Block error = (square / (h * (h - 1))).cwiseSqrt();
+    for (Index k = 0; k < kTogether; ++k) {
+        if (delta[k] > 0 && 2 * error.row(k).maxCoeff() > delta[k]) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+MonteCarlo propagate_distributions(const Settings& settings, const Result& result,
+                                   const Assessment& assessed, const MonteCarloSettings& how,
+                                   const std::function<void(int)>& progress) {
+    if (!assessed.done)
+        throw SettingsError(
+            "--monte-carlo: found nothing to draw from, expected two dwells at "
+            "least and estimator.method = \"joint\"");
+    std::mt19937_64 random(how.seed);
+    InputDraws inputs(settings, assessed);
+    const DrawModel model = model_of(settings, assessed);
+    VectorXd delta = VectorXd::Zero(kTogether);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const double u = assessed.coefficients[i].u;
+        if (u > 0) delta[static_cast<Index>(internal_of(i))] = tolerance(u, how.digits);
+    }
+    MonteCarlo out;
+    out.digits = how.digits;
+    std::vector<Block> blocks;
+    Block sum = Block::Zero(kTogether, 4);
+    while (!out.stable && out.blocks < how.most_blocks) {
+        blocks.push_back(
+            one_block(model, inputs, how.block, settings.uncertainty.coverage, random));
+        sum += blocks.back();
+        out.blocks = static_cast<int>(blocks.size());
+        out.stable = settled(blocks, sum, delta);
+        if (progress) progress(out.blocks);
+    }
+    const Block mean = sum / out.blocks;
+    out.gum_confirmed = true;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const Coefficient& of = assessed.coefficients[i];
+        if (!(of.u > 0)) continue;
+        const auto k = static_cast<Index>(internal_of(i));
+        MonteCarlo::Coefficient& found = out.coefficients[i];
+        found.u = mean(k, 1);
+        found.low = of.value + mean(k, 2);
+        found.high = of.value + mean(k, 3);
+        const double off =
+            std::max(std::abs(-of.expanded - mean(k, 2)), std::abs(of.expanded - mean(k, 3))) /
+            delta[k];
+        found.confirmed = off <= 1;
+        out.largest_difference = std::max(out.largest_difference, off);
+        out.gum_confirmed = out.gum_confirmed && found.confirmed;
+    }
+    out.nonlinearity = nonlinearity(settings, result, assessed, model, inputs, random);
+    return out;
+}
+
+}  // namespace vibrig::estimator::uncertainty
