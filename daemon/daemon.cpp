@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "daemon/campaign_order.hpp"
 #include "daemon/serve/one_line.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/version.hpp"
@@ -69,7 +70,7 @@ std::int64_t utc_now() {
 }
 
 Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
-    : loaded_(std::move(loaded)),
+    : loaded_(put_in_order(std::move(loaded))),
       configuration_(loaded_.configuration),
       log_queue_(log_queue),
       memory_lock_(lock_memory()),

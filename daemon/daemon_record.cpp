@@ -28,8 +28,10 @@ std::string plan_json(const campaign::Settings& settings) {
     };
     for (const auto& stop : settings.stops) add(stop.position_deg, stop.table_g);
     if (settings.stops.empty() && !settings.adaptive) {
-        for (const double table_g : settings.table_g) {
-            for (const auto& position : settings.positions_deg) add(position, table_g);
+        const std::size_t positions = settings.positions_deg.size();
+        for (std::size_t i = 0; i < settings.table_g.size() * positions; ++i) {
+            const std::size_t at = settings.sequence.empty() ? i : settings.sequence[i];
+            add(settings.positions_deg[at % positions], settings.table_g[at / positions]);
         }
     }
     return nlohmann::ordered_json{

@@ -195,6 +195,7 @@ void Campaign::begin(const std::string& by, Time now) {
     dwells_ = std::exchange(offer_, {});
     positions_done_ = positions_before_ = dwells_.size();
     plan_stops();
+    static_cast<void>(put_first(dwells_));
     offered_stops_.clear();
     at_ = positions_done_;
     temperatures_.clear();
@@ -284,8 +285,9 @@ void Campaign::start_position(Time now) {
     const auto& angle = here().stop.position_deg;
     ports_.event(
         Severity::info,
-        fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g", here().run,
-                    runs(), here().position, positions(), angle[0], angle[1], angle[2], table_g()));
+        fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g, dwell {} of {}",
+                    here().run, runs(), here().position, positions(), angle[0], angle[1], angle[2],
+                    table_g(), at_ + 1, std::max(expected_, at_ + 1)));
     enter(State::slewing, now);
 }
 

@@ -254,6 +254,7 @@ class Campaign {
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
                                               double table_g) const;
     void plan_stops();
+    [[nodiscard]] bool put_first(const std::vector<estimator::DwellSummary>& done);
     /// Runs and positions per run of a list; of a plan the levels and all its stops.
     [[nodiscard]] std::size_t runs() const {
         return listed() ? settings_.table_g.size() : std::max<std::size_t>(levels_.size(), 1);

@@ -36,16 +36,34 @@ void Campaign::plan_stops() {
         repeats_ = done.repeats;
         used_before_s_ = done.used_s;
     }
-    if (settings_.stops.empty() && !settings_.adaptive) {
-        for (std::size_t run = 0; run < settings_.table_g.size(); ++run) {
-            for (std::size_t k = 0; k < settings_.positions_deg.size(); ++k) {
-                stops_.push_back({{settings_.positions_deg[k], settings_.table_g[run]},
-                                  static_cast<int>(run) + 1,
-                                  static_cast<int>(k) + 1});
-            }
+    if (listed()) {
+        const std::size_t positions = settings_.positions_deg.size();
+        const std::size_t all = settings_.table_g.size() * positions;
+        const bool ordered = settings_.sequence.size() == all;
+        for (std::size_t i = 0; i < all; ++i) {
+            const std::size_t at = ordered ? settings_.sequence[i] : i;
+            const std::size_t run = at / positions, k = at % positions;
+            stops_.push_back({{settings_.positions_deg[k], settings_.table_g[run]},
+                              static_cast<int>(run) + 1,
+                              static_cast<int>(k) + 1});
         }
     }
     expected_ = stops_.size();
+}
+
+/// An interrupted campaign goes on with what is left, in whatever order the first stops were: that
+/// of an earlier version, too. False: it did others.
+bool Campaign::put_first(const std::vector<estimator::DwellSummary>& done) {
+    if (done.size() > stops_.size()) return false;
+    for (std::size_t i = 0; i < done.size(); ++i) {
+        const auto from = stops_.begin() + static_cast<std::ptrdiff_t>(i);
+        const auto at = std::find_if(from, stops_.end(), [&](const NumberedStop& stop) {
+            return stop.run == done[i].run && stop.position == done[i].position;
+        });
+        if (at == stops_.end() || (at != from && !listed())) return false;
+        std::rotate(from, at, at + 1);
+    }
+    return true;
 }
 
 Campaign::Choice Campaign::choose_next(Time now) {
@@ -117,9 +135,7 @@ bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<Stop
         offered_stops_ = std::move(stops);
         plan_stops();
     }
-    bool fits = done.size() <= stops_.size();
-    for (std::size_t i = 0; fits && i < done.size(); ++i)
-        fits = done[i].run == stops_[i].run && done[i].position == stops_[i].position;
+    const bool fits = put_first(done);
     if (fits) {
         offer_ = std::move(done);
     } else {

@@ -68,14 +68,25 @@ struct LoopCheckSettings {
     double phase_tolerance_deg = 60;
 };
 
+/// In which order the positions are visited at the levels.
+enum class VisitOrder : std::uint8_t {
+    balanced,    ///< no slow change of the bias looks like a coefficient
+    sequential,  ///< level by level
+    pairs,       ///< each position at all levels at once
+    random
+};
+
 /// What the campaign does; amplitudes are peak at the table.
 struct Settings {
     double sample_s = 0;  ///< between two samples, as configured; nothing works without it
     std::string name = "campaign";
     std::vector<std::array<double, 3>> positions_deg = kTable1Positions;
     std::vector<double> table_g{9.0, 7.0};  ///< one run each
-    std::string plan;                       ///< plan file; empty: every position at every level
-    std::vector<Stop> stops;                ///< of the plan file, in its order
+    VisitOrder order = VisitOrder::balanced;
+    /// The order itself: places in the list of levels, each with all positions; empty: that list.
+    std::vector<std::size_t> sequence;
+    std::string plan;          ///< plan file; empty: every position at every level
+    std::vector<Stop> stops;   ///< of the plan file, in its order
     bool identify_all = true;  ///< refuse a campaign that cannot determine all 30 coefficients
     // Adaptive: chosen dwell by dwell until the standard errors are down to the targets (0: any).
     bool adaptive = false;

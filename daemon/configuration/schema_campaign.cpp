@@ -119,6 +119,16 @@ void add_campaign_keys(std::vector<Key>& keys) {
         "campaign.table_g", "g", {0, 1000}, kMostRuns,
         "peak acceleration at the table, one run each; 0: at rest",
         [](C & c) -> auto& { return c.campaign.table_g; }));
+    using campaign::VisitOrder;
+    keys.push_back(choice<VisitOrder>(
+        "campaign.order",
+        {{"balanced", VisitOrder::balanced},
+         {"sequential", VisitOrder::sequential},
+         {"pairs", VisitOrder::pairs},
+         {"random", VisitOrder::random}},
+        "of the positions at the levels: so that no slow change of a bias looks like a coefficient "
+        "(from 12 dwells on), level by level, all levels of a position at once, or by chance",
+        [](C & c) -> auto& { return c.campaign.order; }));
     keys.push_back(text(
         "campaign.plan", "a file",
         "plan of `vibrig plan -o`, in place of positions_deg and table_g; empty: none", path_rule,

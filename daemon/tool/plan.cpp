@@ -143,9 +143,11 @@ void add_time(CLI::App& command, Options& options) {
     command.add_option("--slew", request.slew_deg_per_s, "deg/s of the gimbals (5)")
         ->check(proto::finite(proto::kAboveZero, 1e6));
     command
-        .add_option("--order", request.order,
-                    "travel (default): little gimbal travel; random: in blocks; list")
-        ->check(CLI::IsMember({"travel", "random", "list"}));
+        .add_option(
+            "--order", request.order,
+            "travel (default): little gimbal travel; balanced: no slow change of a bias looks "
+            "like a coefficient; random: in blocks; list")
+        ->check(CLI::IsMember({"travel", "balanced", "random", "list"}));
     command.add_option("--block", request.block, "runs in a block of --order random (8)")
         ->check(CLI::Range(std::size_t{1}, std::size_t{10000}));
 }

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/tool/plan_study.hpp"
+#include "daemon/tool/uncertainty_text.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -69,6 +70,21 @@ std::string plan_json(const PlanStudy& study) {
               {"optimal_shares", std::move(shares)},
               {"optimum_gap", study.optimum_gap},
               {"warnings", study.warnings}};
+    if (study.uncertainty) {
+        const auto& merit = study.uncertainty->merit;
+        json["order_inflation"] = {{"bias", finite(merit.bias)},
+                                   {"largest", finite(merit.largest)},
+                                   {"median", finite(merit.median)},
+                                   {"step", finite(merit.step)}};
+        Json combined = Json::object(), expanded = Json::object();
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+            const auto& c = study.uncertainty->assessed.coefficients[i];
+            combined[estimator::parameter_names()[i]] = finite(c.u);
+            expanded[estimator::parameter_names()[i]] = finite(c.expanded);
+        }
+        json["combined_uncertainty"] = std::move(combined);
+        json["expanded_uncertainty"] = std::move(expanded);
+    }
     if (!study.refusal.empty()) {
         json["refusal"] = study.refusal;
         json["undetermined"] = Json::array();
@@ -132,6 +148,14 @@ std::string plan_table(const PlanStudy& study) {
         text += "  * against free directions at rest and at the highest level\n";
     }
     text += '\n' + plan::forecast_table(study.forecast);
+    if (study.uncertainty) {
+        const auto& merit = study.uncertainty->merit;
+        text += format(
+            "\norder: a bias that walks and drifts makes sigma of D_F %.2f, of the worst %.4g, of "
+            "most %.2f times as large; one that steps, %.4g\n\n",
+            merit.bias, merit.largest, merit.median, merit.step);
+        text += allowance_table(study.uncertainty->assessed);
+    }
     for (const std::string& warning : study.warnings) text += "warning: " + warning + '\n';
     return text;
 }

@@ -290,6 +290,10 @@ class Study {
         const bool as_listed = !designs() || request_.order == "list";
         if (!as_listed && request_.order == "travel") {
             order = planning::shortest_travel(visits, timing_);
+        } else if (!as_listed && request_.order == "balanced") {
+            order = estimator::uncertainty::balanced_order(
+                visits, regressors, timing_,
+                estimator::rate_variance(c_.estimator, timing_.dwell_s, period()));
         } else if (!as_listed) {
             order = planning::randomised(regressors, std::max<std::size_t>(request_.block, 1),
                                          request_.seed);
@@ -309,6 +313,20 @@ class Study {
                 out_.runs.push_back(run);
             }
         }
+    }
+
+    /// With what is declared, and of the order: a step that it cannot tell from the coefficients.
+    void judge_uncertainty() {
+        constexpr double kMostStep = 10;
+        std::vector<planning::Visit> visits;
+        for (const PlanRun& run : out_.runs) visits.insert(visits.end(), run.count, run.visit);
+        if (visits.size() < 2 || terms_ != planning::kAllTerms) return;
+        out_.uncertainty = plan_uncertainty(c_.estimator, visits, timing_, period());
+        if (out_.uncertainty->merit.step > kMostStep)
+            out_.warnings.push_back(
+                format("in this order one step of a bias makes a standard error %.3g times as "
+                       "large: --order balanced",
+                       out_.uncertainty->merit.step));
     }
 
     void judge() {
@@ -343,6 +361,7 @@ class Study {
             return;
         }
         if (!out_.forecast.warning.empty()) out_.warnings.push_back(out_.forecast.warning);
+        judge_uncertainty();
         out_.bound = planning::equivalence_bound(all, effort);
         const planning::Problem& over = candidates_.problem;
         if (!planning::evaluate(over, planning::Effort(over.size(), 1.0)).identifies_all()) {

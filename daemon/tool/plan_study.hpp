@@ -8,6 +8,7 @@
 
 #include "daemon/plan/forecast.hpp"
 #include "daemon/plan/plan_file.hpp"
+#include "daemon/tool/plan_uncertainty.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"
@@ -40,7 +41,7 @@ struct PlanRequest {
     bool time_costs = false;  ///< compare per time instead of per run
     std::optional<double> dwell_s, settle_s, ramp_s;
     double slew_deg_per_s = 5;
-    std::string order = "travel";  ///< "travel", "random", "list"
+    std::string order = "travel";  ///< "travel", "balanced", "random", "list"
     std::size_t block = 8;
     std::uint64_t seed = 1;
 };
@@ -72,6 +73,7 @@ struct PlanStudy {
     plan::Forecast forecast;
     planning::Duration duration;
     double drift_imbalance = 0;
+    std::optional<PlanUncertainty> uncertainty;  ///< of a plan that determines everything
     std::vector<VerticalAxis> vertical_axes;  ///< if a position list was given
     std::vector<std::string> warnings;
     std::string refusal;  ///< empty: the plan determines everything

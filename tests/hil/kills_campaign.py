@@ -24,7 +24,7 @@ import service_manager as stages  # noqa: E402
 
 RIGS = 4
 CAMPAIGN = {"name": "killed", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 10], [10, 0, 10]],
-            "table_g": [9.0, 7.0], "dwell_s": 2.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
+            "table_g": [9.0, 7.0], "order": "sequential", "dwell_s": 2.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
 RECORD = {"segment_s": 2.0}   # logs are closed and compressed meanwhile
 LONGEST_S = 7.0               # after the start: some positions are done by then
 KEPT_S = 1.0                  # older than that must be there

@@ -33,7 +33,7 @@ SHOTS = os.path.join(ROOT, "build", "tests", "live-page")
 POSITIONS = [[0, 0, 0], [0, 0, 45], [0, 0, 90], [0, 0, 180], [180, 0, 45], [45, 0, 0], [45, 0, 90], [90, 0, 90],
              [90, 0, 180], [180, 0, 270], [270, 0, 0], [270, 0, 90], [-45, 0, 0], [-45, 0, 90]]
 CAMPAIGN = {"name": "live", "identify": "what-it-can", "positions_deg": POSITIONS,
-            "table_g": [9.0, 7.0], "dwell_s": 20.0}
+            "table_g": [9.0, 7.0], "order": "sequential", "dwell_s": 20.0}
 # Encoders that count the other way and from elsewhere, accelerometers that are off: the page has to know.
 PLATFORM = {"encoder_sign": [1, -1, -1], "encoder_zero_deg": [10.0, 0.0, -25.0]}
 ZERO_G = [0.02, -0.03, 0.01]

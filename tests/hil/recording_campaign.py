@@ -25,7 +25,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "recorded", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [45, 0, 90], [0, 0, 90]],
-            "table_g": [9.0, 7.0], "dwell_s": 20.0}
+            "table_g": [9.0, 7.0], "order": "sequential", "dwell_s": 20.0}
 
 
 PAPERWORK = """
