@@ -8,6 +8,7 @@
 
 #include "daemon/daemon.hpp"
 #include "estimator/plan_report.hpp"
+#include "estimator/vibration_level.hpp"
 
 namespace vibrig {
 
@@ -68,11 +69,17 @@ std::vector<std::string> Daemon::check_plan(const configuration::Configuration& 
     const campaign::Settings& campaign = configuration.campaign;
     // Of a plan file and of an adaptive campaign the forecast tells.
     if (!campaign.stops.empty() || campaign.adaptive) return {};
-    return estimator::plan_warnings(estimator::report_plan(
+    auto lines = estimator::plan_warnings(estimator::report_plan(
         configuration.estimator,
         estimator::campaign_plan(configuration.estimator, campaign.positions_deg, campaign.table_g,
                                  campaign.dwell_s),
         drivers::to_seconds(configuration.assembler.sample_period)));
+    const std::string alias = estimator::VibrationLevel::aliasing(
+        configuration.estimator.frequency_hz,
+        drivers::to_seconds(configuration.assembler.sample_period),
+        configuration.estimator.level_window_s);
+    if (!alias.empty()) lines.push_back("vibration.frequency_hz: " + alias);
+    return lines;
 }
 
 }  // namespace vibrig

@@ -102,6 +102,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     };
     const double window_s =
         std::clamp(r.span_s, VibrationLevel::kFirstWindow_s, settings.level_window_s);
+    // As measured, where that is known: the nominal one may be off.
+    const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : settings.frequency_hz;
     if (r.samples == 0) {
         flag("no samples", true);
     } else if (r.level_samples <= 0) {
@@ -121,12 +123,12 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
             "rejected",
             true);
-    } else if (s.kappa > 1.0 && r.period_s > 0 &&
-               VibrationLevel::excluded(settings.frequency_hz, r.period_s, window_s, 3)) {
-        flag(
-            "vibration.frequency_hz is close to a third of the sample rate: a second harmonic of "
-            "the shaker falsifies the level",
-            false);
+    } else if (const char* alias =
+                   s.kappa > 1.0 && r.period_s > 0
+                       ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s)
+                       : "";
+               *alias != '\0') {
+        flag(alias, false);
     } else if (r.stuck > 0) {
         flag("a resolver stood still", false);
     } else if (s.rejected > kRejectedTolerance * s.samples) {

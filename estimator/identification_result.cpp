@@ -77,7 +77,8 @@ std::vector<std::string> dwell_warnings(const std::vector<DwellSummary>& dwells)
             warnings.push_back(dwell_name(d) + "normalised innovation squared is " +
                                std::to_string(d.nis_per_dof) +
                                " per degree of freedom, expected 1 within " + std::to_string(band) +
-                               ": check the noise settings");
+                               ": noise other than configured, or angles that move otherwise "
+                               "than gyros and Earth let them (the verdict names what fits)");
         }
         // Three axes a sample; 4 standard deviations of a correlation of white noise.
         const double white = std::max(0.1, 4.0 / std::sqrt(3.0 * d.used));

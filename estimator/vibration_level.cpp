@@ -138,4 +138,18 @@ bool VibrationLevel::excluded(double frequency_hz, double period_s, double windo
     return std::abs(product - m * rate) < 4.0 / window_s;
 }
 
+const char* VibrationLevel::aliasing(double frequency_hz, double period_s,
+                                     double window_s) noexcept {
+    if (excluded(frequency_hz, period_s, window_s, 3))
+        return "the vibration is close to a third of the sample rate: a second harmonic of the "
+               "shaker falsifies the level";
+    if (excluded(frequency_hz, period_s, window_s, 4))
+        return "the vibration is close to a quarter of the sample rate: a third harmonic of the "
+               "shaker falsifies the level";
+    if (excluded(frequency_hz, period_s, window_s, 5))
+        return "the vibration is close to a fifth of the sample rate: a fourth harmonic of the "
+               "shaker falsifies the level";
+    return "";
+}
+
 }  // namespace vibrig::estimator

@@ -55,6 +55,10 @@ class VibrationLevel {
     /// wrong by up to e a0^2 / kappa and e^2 a0^2 / (2 kappa) for a harmonic of relative size e.
     [[nodiscard]] static bool excluded(double frequency_hz, double period_s, double window_s,
                                        int order = 2) noexcept;
+    /// What a harmonic of the shaker does to the level at this sample period, orders 3 to 5 of
+    /// excluded(); empty: nothing. Static text.
+    [[nodiscard]] static const char* aliasing(double frequency_hz, double period_s,
+                                              double window_s) noexcept;
 
   private:
     void push(double value, bool valid) noexcept;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <optional>
 #include <utility>
 
 #include "proto/line_reader.hpp"
@@ -53,6 +53,13 @@ std::string_view trim(std::string_view text) noexcept {
     return text;
 }
 
+/// Names of columns, whatever their case.
+bool same(std::string_view name, std::string_view found) {
+    return std::equal(name.begin(), name.end(), found.begin(), found.end(), [](char a, char b) {
+        return a == (b >= 'A' && b <= 'Z' ? static_cast<char>(b - 'A' + 'a') : b);
+    });
+}
+
 std::string text_of(double value) {
     std::array<char, 32> text{};
     const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
@@ -91,22 +98,23 @@ class RecordingReader {
         }
     }
 
-    /// Splits at commas outside quotes; a field loses its quotes and the blanks around it.
+    /// Splits at separators outside quotes; a field loses its quotes and the blanks around it.
     void split(std::string_view line) {
         fields_.clear();
         for (bool more = true; more;) {
-            std::string_view rest = trim(line);
+            std::string_view rest = trimmed(line);
             std::string_view field;
             if (rest.starts_with('"')) {
                 const std::size_t end = closing_quote(rest);
                 field = rest.substr(1, end - 1);
-                rest = trim(rest.substr(end + 1));
-                if (!rest.empty() && rest.front() != ',') {
-                    fail("", "found " + quoted(rest) + " after a closing quote, expected ','");
+                rest = trimmed(rest.substr(end + 1));
+                if (!rest.empty() && rest.front() != separator_) {
+                    fail("", "found " + quoted(rest) + " after a closing quote, expected '" +
+                                 printable({&separator_, 1}) + "'");
                 }
                 more = !rest.empty();
             } else {
-                const std::size_t end = std::min(rest.find(','), rest.size());
+                const std::size_t end = std::min(rest.find(separator_), rest.size());
                 field = rest.substr(0, end);
                 rest = rest.substr(end);
                 more = !rest.empty();
@@ -127,16 +135,42 @@ class RecordingReader {
         return end;
     }
 
+    /// Without blanks at its ends; a tab that separates is none.
+    [[nodiscard]] std::string_view trimmed(std::string_view text) const noexcept {
+        if (separator_ != '\t') return trim(text);
+        while (text.starts_with(' ')) text.remove_prefix(1);
+        while (text.ends_with(' ')) text.remove_suffix(1);
+        return text;
+    }
+
+    /// Comma, semicolon or tab, by the header, which has one of them only.
+    void find_separator(std::string_view header) {
+        if (header.find('\r') != std::string_view::npos)
+            fail("", "found lines that end in a carriage return only, expected LF or CR LF");
+        std::size_t kinds = 0;
+        for (const char c : {',', ';', '\t'}) {
+            if (header.find(c) == std::string_view::npos) continue;
+            ++kinds;
+            separator_ = c;
+        }
+        // Blanks about a comma may be tabs.
+        if (kinds > 1 && header.find(',') != std::string_view::npos) separator_ = ',';
+    }
+
     void read_header() {
-        const auto line = next_line();
+        auto line = next_line();
+        while (line &&
+               (trim(*line).empty() || trim(without_byte_order_mark(*line)).starts_with('#')))
+            line = next_line();
         if (!line) {
             throw RecordingError(path_, 0, "", "found an empty file, expected a header row");
         }
+        find_separator(*line);
         split(without_byte_order_mark(*line));
         std::array<bool, kColumns.size()> seen{};
         for (const std::string_view name : fields_) {
             const auto found = std::find_if(kColumns.begin(), kColumns.end(),
-                                            [&](const Column& c) { return c.name == name; });
+                                            [&](const Column& c) { return same(c.name, name); });
             const auto index = static_cast<std::size_t>(found - kColumns.begin());
             if (index != kNone && std::exchange(seen.at(index), true)) {
                 fail(name, "found twice in the header, expected once");
@@ -158,8 +192,12 @@ class RecordingReader {
         split(line);
         const bool trailing_comma = fields_.size() == roles_.size() + 1 && fields_.back().empty();
         if (fields_.size() != roles_.size() && !trailing_comma) {
+            const bool decimal_commas =
+                separator_ == ',' && fields_.size() > roles_.size() + kColumns.size() / 2;
             fail("", "found " + std::to_string(fields_.size()) + " fields, expected " +
-                         std::to_string(roles_.size()) + " as in the header");
+                         std::to_string(roles_.size()) + " as in the header" +
+                         (decimal_commas ? " (decimal commas want ';' or a tab between the fields)"
+                                         : ""));
         }
         RecordingRow row;
         row.line = lines_.line();
@@ -194,7 +232,14 @@ class RecordingReader {
     double real(std::size_t role, std::string_view field) const {
         const Column& column = kColumns.at(role);
         double value = 0;
+        std::string with_point;
         std::string_view digits = field;
+        // Where commas do not separate, they are decimal ones.
+        if (separator_ != ',' && field.find(',') != std::string_view::npos) {
+            with_point = field;
+            with_point[field.find(',')] = '.';
+            digits = with_point;
+        }
         if (digits.starts_with('+') && !digits.starts_with("+-")) digits.remove_prefix(1);
         if (!read_number(digits, value) || !std::isfinite(value)) {
             fail(column.name, "found " + quoted(field) + ", expected a finite number");
@@ -224,28 +269,23 @@ class RecordingReader {
 
     void check_time(const RecordingRow& row, std::string_view field) {
         const std::pair<int, int> pair(row.run, row.position);
-        if (last_time_ == nullptr || pair != dwell_) {
-            const auto [entry, is_new] = last_times_.emplace(pair, row.time_s);
-            last_time_ = &entry->second;
-            dwell_ = pair;
-            if (is_new) return;
-        }
-        if (!(row.time_s > *last_time_)) {
+        if (last_time_ && pair == dwell_ && !(row.time_s > *last_time_)) {
             fail(kColumns.at(kTime).name,
                  "found " + quoted(field) + ", expected more than " + text_of(*last_time_) +
                      ", the time before it in run " + std::to_string(row.run) + ", position " +
                      std::to_string(row.position));
         }
-        *last_time_ = row.time_s;
+        last_time_ = row.time_s;
+        dwell_ = pair;
     }
 
     const std::string& path_;
     LineReader lines_;
+    char separator_ = ',';
     std::vector<std::string_view> fields_;
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
-    std::map<std::pair<int, int>, double> last_times_;
     std::pair<int, int> dwell_;
-    double* last_time_ = nullptr;  ///< of the dwell in force
+    std::optional<double> last_time_;  ///< of the dwell in force
 };
 
 }  // namespace

@@ -34,8 +34,10 @@ class RecordingError : public std::runtime_error {
 };
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
-/// ax_g, ay_g, az_g in any order; others are ignored. A (run, position) pair that comes back after
-/// another one continues its dwell, so its time must go on growing. Throws RecordingError.
+/// ax_g, ay_g, az_g in any order and any case; others are ignored. Fields are separated by commas,
+/// or by semicolons or tabs as the header says; then numbers may have decimal commas. Lines of
+/// comment (#) may come before the header. A (run, position) pair that comes back after another one
+/// begins a new dwell. Throws RecordingError.
 [[nodiscard]] std::vector<RecordingRow> read_recording(const std::string& path);
 
 /// Writes what read_recording() reads, every number with the digits that give it back exactly.

@@ -102,7 +102,9 @@ Coefficients without(const Campaign& campaign, const estimator::Settings& settin
     }
     estimator::Estimate estimate;
     identification.estimate(estimate);
-    return {estimate.value, estimate.sigma, estimate.observable, identification.covariance()};
+    return combined(
+        estimator::uncertainty::assess(settings, identification.result()),
+        {estimate.value, estimate.sigma, estimate.observable, identification.covariance()});
 }
 
 std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Settings& settings,
@@ -261,6 +263,7 @@ Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
     progress(0);
     out.replayed = record::replay(campaign, settings, {});
     out.coefficients = final_coefficients(campaign.path, out.replayed.dwells);
+    out.assessed = estimator::uncertainty::assess(settings, out.replayed.result);
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

@@ -10,6 +10,7 @@
 #include "daemon/record/replay.hpp"
 #include "daemon/report/compensation.hpp"
 #include "estimator/allan/deviation.hpp"
+#include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::report {
 
@@ -34,7 +35,8 @@ struct Innovations {
 
 struct Analysis {
     record::ReplayResult replayed;
-    Coefficients coefficients;
+    Coefficients coefficients;  ///< of a constant bias, sigma of noise alone
+    estimator::uncertainty::Assessment assessed;
     estimator::Settings settings;
     Innovations innovations;
     std::vector<HeldOut> held_out;

@@ -1,5 +1,6 @@
 #include "daemon/report/compensation.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -12,6 +13,21 @@ namespace vibrig::report {
 
 using estimator::kGroups;
 using estimator::kParameters;
+
+Coefficients combined(const estimator::uncertainty::Assessment& assessed,
+                      const Coefficients& otherwise) {
+    const bool all = std::ranges::all_of(otherwise.observable, [](bool b) { return b; });
+    if (!assessed.done || !all) return otherwise;
+    Coefficients out = otherwise;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        out.value[i] = assessed.coefficients[i].value;
+        out.sigma[i] = assessed.coefficients[i].u;
+        for (std::size_t j = 0; j < kParameters; ++j)
+            out.covariance[i * kParameters + j] = assessed.covariance_combined(
+                static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+    return out;
+}
 
 Prediction predict(const estimator::Settings& settings, const Coefficients& of,
                    const std::array<double, 3>& attitude_deg,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/identification.hpp"
+#include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::report {
 
@@ -14,6 +15,11 @@ struct Coefficients {
     std::array<bool, estimator::kParameters> observable{};
     std::vector<double> covariance;  ///< 30 x 30, row-major, order of parameter_names()
 };
+
+/// With a bias that may have moved and the declared inputs: the combined covariance, whole. Where
+/// that is not to be had, `otherwise`.
+[[nodiscard]] Coefficients combined(const estimator::uncertainty::Assessment& assessed,
+                                    const Coefficients& otherwise);
 
 /// Drift of the three gyros at one attitude under one vibration.
 struct Prediction {

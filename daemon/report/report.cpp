@@ -13,6 +13,7 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/plan_section.hpp"
+#include "daemon/report/uncertainty_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
 #include "estimator/instruction_set.hpp"
@@ -579,6 +580,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
                       const std::optional<Earlier>& earlier) {
     Page page;
     add_head(page, campaign, analysis);
+    add_uncertainty(page, analysis.assessed);
     add_coefficients(page, analysis);
     add_plan(page, campaign, analysis);
     add_held_out(page, analysis);

@@ -1,6 +1,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <exception>
@@ -29,6 +30,7 @@
 #include "estimator/kinematics.hpp"
 #include "estimator/plan/positions.hpp"
 #include "estimator/plan_report.hpp"
+#include "estimator/vibration_level.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -155,6 +157,11 @@ void tell_before(const Dwells& dwells, const estimator::Settings& settings, cons
          estimator::plan_warnings(estimator::report_plan(settings, plan, period_s))) {
         std::cerr << "before the run: " << line << '\n';
     }
+    const bool vibrating =
+        std::any_of(plan.begin(), plan.end(), [](const auto& one) { return one.kappa > 1; });
+    const std::string alias = estimator::VibrationLevel::aliasing(settings.frequency_hz, period_s,
+                                                                  settings.level_window_s);
+    if (vibrating && !alias.empty()) std::cerr << "before the run: " << alias << '\n';
 }
 
 estimator::Result identify(const std::vector<RecordingRow>& rows,

@@ -25,6 +25,7 @@
 #include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
+#include "daemon/tool/result_table.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -37,6 +38,7 @@ using estimator::kParameters;
 
 struct ReportArguments {
     std::string campaign, output = "report.html", config, compare, pdf;
+    bool strict = false;
 };
 
 struct CompensateArguments {
@@ -105,7 +107,9 @@ int make_report(const ReportArguments& arguments) {
         print_pdf(arguments.output, arguments.pdf);
         std::cerr << arguments.pdf << ": " << fs::file_size(arguments.pdf) / 1000 << " kB\n";
     }
-    return 0;
+    const auto& verdict = analysis.assessed.verdict;
+    std::cerr << "verdict: " << verdict.sentence << '\n';
+    return exit_status(verdict.level, arguments.strict);
 }
 
 Json prediction_json(const report::Prediction& predicted, const CompensateArguments& arguments,
@@ -284,12 +288,9 @@ int compensate(CompensateArguments arguments) {
     if (!arguments.config.empty()) record::forget_noise(campaign);
     report::Coefficients coefficients;
     estimator::Settings settings = report_settings(campaign, arguments.config);
-    if (arguments.config.empty()) {
-        coefficients = report::final_coefficients(campaign.path, campaign.dwells);
-    } else {
-        const auto replayed = record::replay(campaign, settings, {});
-        coefficients = report::final_coefficients(campaign.path, replayed.dwells);
-    }
+    const auto replayed = record::replay(campaign, settings, {});
+    coefficients = report::combined(estimator::uncertainty::assess(settings, replayed.result),
+                                    report::final_coefficients(campaign.path, replayed.dwells));
     check_finite(campaign.path, coefficients);
     if (arguments.table_g) level *= settings.transmission;
     const double kappa = 1 + level * level / 2;
@@ -332,7 +333,10 @@ void add_reports(CLI::App& app, int& exit_code) {
     reporting->add_option("--config", report->config,
                           "identify anew with these settings instead of the recorded ones");
     reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");
+    reporting->add_flag("--strict", report->strict, "a doubtful result is a no as well");
     reporting->footer(
+        "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
+        "doubtful), 2 bad\nusage or input.\n"
         "Example: vibrig report demo-20260301T080000Z -o report.html --pdf report.pdf");
     reporting->callback(
         [report, &exit_code] { exit_code = guarded([&] { return make_report(*report); }); });

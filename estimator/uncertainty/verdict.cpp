@@ -146,7 +146,34 @@ Effect effect_of(const Assessment& a, const Eigen::MatrixXd& gain0, const Vector
     return worst;
 }
 
-void add_patterns(const Assessment& a, const Eigen::MatrixXd& gain0, std::vector<Reason>& list) {
+/// Of a pattern whose input somebody has declared to be better known than the data say.
+std::string contradiction(const Settings& settings, const Evidence& e) {
+    const Inputs& in = settings.uncertainty;
+    const auto told = [](const char* key, const Declared& d, const char* unit) {
+        return d.declared ? text(" (uncertainty.%s declares %.3g%s)", key, d.u, unit)
+                          : std::string();
+    };
+    switch (e.pattern) {
+        case Pattern::azimuth:
+            return told("azimuth_arcsec", in.azimuth_arcsec, " arcsec");
+        case Pattern::latitude:
+            return told("latitude_arcsec", in.latitude_arcsec, " arcsec");
+        case Pattern::time_base:
+            return told("time_base", in.time_base, "");
+        case Pattern::encoder_zero:
+            return told("encoder_zero_arcsec", in.encoder_zero_arcsec[strongest(e) % 3], " arcsec");
+        case Pattern::non_orthogonality:
+            return told("non_orthogonality_arcsec", in.non_orthogonality_arcsec[strongest(e) % 2],
+                        " arcsec");
+        case Pattern::cross_axis:
+            return told("cross_axis", in.cross_axis[strongest(e) % 2], "");
+        default:
+            return {};
+    }
+}
+
+void add_patterns(const Settings& settings, const Assessment& a, const Eigen::MatrixXd& gain0,
+                  std::vector<Reason>& list) {
     std::vector<const Evidence*> structural;
     for (const Evidence& e : a.evidence) {
         if (!e.named() || e.log_odds < a.evidence.front().log_odds - kNearBest) continue;
@@ -174,6 +201,7 @@ void add_patterns(const Assessment& a, const Eigen::MatrixXd& gain0, std::vector
     take_size(*structural.front(), reason);
     reason.largest_effect_u = worst.in_u;
     reason.coefficient = parameter_names()[worst.coefficient];
+    reason.text += contradiction(settings, *structural.front());
     reason.text +=
         text(worst.in_u > 1 ? ": %s by %.1f u; correct or declare it" : ": %s by %.1f u at most",
              parameter_names()[worst.coefficient], worst.in_u);
@@ -312,7 +340,7 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     add_result(result, list);
     add_dwells(result, list);
     if (a.done) {
-        add_patterns(a, gain0, list);
+        add_patterns(settings, a, gain0, list);
         add_chi_square(a, list);
         add_sync(settings, a, list);
         add_order(settings, a, list);
