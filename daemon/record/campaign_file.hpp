@@ -32,6 +32,7 @@ struct Campaign {
     std::vector<Order> orders;
     std::vector<Dwell> dwells;
     std::vector<EstimateRow> estimates;
+    std::vector<ConditionRow> conditions;  ///< none in recordings of vibrigd 0.1.0
     std::vector<EventRecord> events;
     std::vector<Gap> gaps;
 };

@@ -85,6 +85,7 @@ void move_times(Campaign& part, Time by) {
     }
     for (auto& dwell : part.dwells) dwell.time += by;
     for (auto& row : part.estimates) row.time += by;
+    for (auto& row : part.conditions) row.time += by;
     for (auto& event : part.events) event.time += by;
     for (auto& gap : part.gaps) {
         gap.from += by;
@@ -143,6 +144,7 @@ void join(Campaign& to, Campaign part) {
     append(to.orders, part.orders);
     append(to.dwells, part.dwells);
     append(to.estimates, part.estimates);
+    append(to.conditions, part.conditions);
     append(to.events, part.events);
     append(to.gaps, part.gaps);
     to.state = part.state;
