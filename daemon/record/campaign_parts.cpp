@@ -104,6 +104,7 @@ void go_on_after_restart(Campaign& to, Campaign& part, Time last) {
     if (!part.samples.empty() && !to.samples.empty() && part.samples.front().time + shift <= last)
         shift = last + drivers::kSecond - part.samples.front().time;
     move_times(part, shift);
+    to.moved = shift;
     const std::size_t before = fed(to.dwells);
     if (before < part.head.dwells_before)
         to.incomplete = fmt::format(
@@ -126,6 +127,8 @@ void join(Campaign& to, Campaign part) {
     if (part.head.restart) {
         go_on_after_restart(to, part, last);
     } else {
+        // Of the same life of the daemon as the part before it, and so of the same clock.
+        move_times(part, to.moved);
         // The disk refused meanwhile: of what was kept for this file some may be in the other, too.
         std::erase_if(part.samples, [&](const auto& sample) {
             return !to.samples.empty() && sample.time <= last;
