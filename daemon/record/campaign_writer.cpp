@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 namespace vibrig::record {
 
@@ -77,6 +78,22 @@ void put(Table& table, const std::array<T, N>& values) {
 }
 
 std::uint8_t byte(bool value) { return value ? 1 : 0; }
+
+/// For programs that read no attributes, such as GNU Octave. Numbers of 64 bits are texts: few keep
+/// them whole.
+std::string head_json(const Head& head, const nlohmann::ordered_json& units) {
+    const nlohmann::ordered_json json{{"name", head.name},
+                                      {"started_by", head.started_by},
+                                      {"started_utc_ns", std::to_string(head.utc_ns)},
+                                      {"utc_offset_ns", std::to_string(head.utc_offset_ns)},
+                                      {"version", head.version},
+                                      {"campaign", head.campaign},
+                                      {"part", head.part},
+                                      {"restart", head.restart},
+                                      {"dwells_before", head.dwells_before},
+                                      {"units", units}};
+    return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
 
 /// Under another name until others can open it: whoever is killed meanwhile leaves nothing that
 /// looks like a recording.
@@ -156,6 +173,20 @@ void put_sample(Table& table, const drivers::Sample& sample) {
     table.put_bytes(sample.quality.data(), drivers::kChannels);
 }
 
+void write_end(File& file, const Ended& ended) {
+    file.set("/", "state", ended.state);
+    file.set("/", "reason", ended.reason);
+    file.set("/", "mark", ended.mark);
+    file.set("/", "ended_utc_ns", ended.utc_ns);
+    const nlohmann::ordered_json json{{"state", ended.state},
+                                      {"reason", ended.reason},
+                                      {"mark", ended.mark},
+                                      {"ended_utc_ns", std::to_string(ended.utc_ns)}};
+    file.write_text("/ended",
+                    json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
+                    "how it ended, JSON, as in the attributes");
+}
+
 void put_gap(Table& table, const Gap& gap) {
     table.put(gap.from).put(gap.to).put(std::string_view(gap.stream)).put(gap.lost);
     table.put(std::string_view(gap.reason));
@@ -166,8 +197,10 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
       lock_(std::make_unique<WriterLock>(file_->path())),
       interlock_rows_(head.interlock_rows) {
     write_head(head);
-    const auto table = [this](const char* name, std::vector<ColumnSpec> columns, std::size_t chunk,
-                              const char* description) {
+    nlohmann::ordered_json units;
+    const auto table = [&](const char* name, std::vector<ColumnSpec> columns, std::size_t chunk,
+                           const char* description) {
+        for (const ColumnSpec& column : columns) units[name + 1][column.name] = column.unit;
         return std::make_unique<Table>(*file_, name, std::move(columns), chunk, description);
     };
     samples_ = table("/samples", sample_columns(), 1024, "one row for each instant of the rig");
@@ -178,6 +211,7 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
     conditions_ = table("/conditions", condition_columns(interlock_rows_), 64,
                         "around the measurement, once a second");
+    file_->write_text("/head", head_json(head, units), "some of the attributes, and units, JSON");
     file_->start_swmr(path);
 }
 
@@ -285,10 +319,7 @@ void CampaignWriter::end(const Ended& ended) {
     file_->close();
     // While a file is written with readers, no attribute can be added.
     File file = File::open(path, File::Mode::write);
-    file.set("/", "state", ended.state);
-    file.set("/", "reason", ended.reason);
-    file.set("/", "mark", ended.mark);
-    file.set("/", "ended_utc_ns", ended.utc_ns);
+    write_end(file, ended);
     file.write_text("/result", ended.result_json, "final result, JSON as vibrig identify --json");
     file.close();
 }

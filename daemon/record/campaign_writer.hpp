@@ -18,6 +18,8 @@ inline constexpr std::int64_t kFormatVersion = 2;
 [[nodiscard]] std::vector<hdf5::ColumnSpec> condition_columns(std::size_t rows);
 void put_sample(hdf5::Table& table, const drivers::Sample& sample);
 void put_gap(hdf5::Table& table, const Gap& gap);
+/// How a campaign, or this file of it, ended; but for its result. Of a closed file.
+void write_end(hdf5::File& file, const Ended& ended);
 
 /// A campaign's HDF5 file while the campaign goes on: rows are kept until commit(), from then on a
 /// reader sees them. One thread; everything throws hdf5::Error.
