@@ -4,6 +4,7 @@
 #include <string>
 
 #include "daemon/report/analysis.hpp"
+#include "daemon/report/paperwork.hpp"
 
 namespace vibrig::report {
 
@@ -21,8 +22,5 @@ struct Earlier {
 /// too.
 [[nodiscard]] std::string make_page(const record::Campaign& campaign, const Analysis& analysis,
                                     const std::optional<Earlier>& earlier);
-
-/// "2026-03-01 08:00:00 UTC"
-[[nodiscard]] std::string utc_text(std::int64_t utc_ns);
 
 }  // namespace vibrig::report
