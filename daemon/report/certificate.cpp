@@ -49,9 +49,9 @@ std::string word_of(const Campaign& campaign, const Json& result,
     }
     if (replayed.compared == 0 || replayed.different != 0)
         throw Refused(campaign.path +
-                      ": found estimates that do not come out of the recording again" +
-                      (replayed.first_difference.empty() ? "" : " (" + replayed.first_difference) +
-                      (replayed.first_difference.empty() ? "" : ")") + ", expected every bit");
+                      ": found estimates that do not come out of the recording again, expected "
+                      "every bit: " +
+                      replayed.first_difference);
     return word;
 }
 

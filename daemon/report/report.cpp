@@ -561,12 +561,19 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
 
 }  // namespace
 
-Earlier earlier_of(const Campaign& earlier, const Campaign& now) {
+Earlier earlier_of(const Campaign& earlier, const Campaign& now, bool same_unit) {
     std::error_code error;
     if (std::filesystem::equivalent(earlier.path, now.path, error) ||
         (earlier.head.campaign == now.head.campaign && earlier.head.utc_ns == now.head.utc_ns))
         throw std::runtime_error(earlier.path +
                                  ": found the campaign itself, expected another one to compare");
+    for (const Campaign* campaign : {&earlier, &now}) {
+        if (!same_unit && paperwork_of(*campaign).unit_serial.empty())
+            throw std::runtime_error(
+                campaign->path +
+                ": found no serial number ([unit] serial) in its configuration, expected one to "
+                "compare a unit with itself (--same-unit: it is the same)");
+    }
     return {earlier.path, earlier.head.name, utc_text(earlier.head.utc_ns), paperwork_of(earlier),
             final_coefficients(earlier.path, earlier.dwells)};
 }
