@@ -163,6 +163,8 @@ class Daemon final : public StatusSource {
     /// The bus, by way of the recorder if there is one.
     [[nodiscard]] drivers::CanPort& sending_port() noexcept;
     void record_begin(const std::string& by, std::size_t dwells_before);
+    /// Around the measurement, as it is now. The recorder's thread.
+    [[nodiscard]] record::ConditionRow conditions() const;
     /// Instruments whose certificate has run out, for whoever arms.
     std::string tell_overdue();
     void record_dwell(const estimator::DwellSummary& summary);

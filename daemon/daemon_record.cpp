@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "daemon/daemon.hpp"
@@ -11,6 +12,8 @@
 #include "proto/text.hpp"
 
 namespace vibrig {
+
+using drivers::Time;
 
 namespace {
 
@@ -39,7 +42,74 @@ std::string plan_json(const campaign::Settings& settings) {
         .dump();
 }
 
+std::string interlock_table(const rt::Interlock& interlock) {
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    for (std::size_t i = 0; i < interlock.rows(); ++i) {
+        const rt::Rule& rule = *interlock.row(i).rule;
+        const auto& condition = rt::condition_of(rule.condition);
+        rows.push_back({{"name", rule.name},
+                        {"condition", condition.name},
+                        {"reaction", rule.reaction == rt::Reaction::abort ? "abort" : "alarm"},
+                        {"limit", condition.has_limit() ? nlohmann::ordered_json(rule.limit)
+                                                        : nlohmann::ordered_json(nullptr)},
+                        {"unit", condition.unit},
+                        {"dwell_s", rule.dwell_s}});
+    }
+    return rows.dump();
+}
+
 }  // namespace
+
+record::ConditionRow Daemon::conditions() const {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    // Each comes once a second.
+    constexpr Time kSensorDeadline = 5 * drivers::kSecond;
+    record::ConditionRow row;
+    row.time = clock_.now();
+    const auto platform = acquisition_.view().platform;
+    const auto fresh = [&](Time time, Time deadline) {
+        return time != 0 && row.time - time <= deadline;
+    };
+    const auto flag = [](bool set) { return static_cast<std::int8_t>(set ? 1 : 0); };
+    const Time deadline = configuration_.gimbal.status_deadline;
+    row.temperature_c = fresh(platform.time, deadline) ? platform.temperature_c : kNone;
+    for (std::size_t i = 0; i < platform.sensor_c.size(); ++i)
+        row.sensor_c[i] =
+            fresh(platform.sensor_time[i], kSensorDeadline) ? platform.sensor_c[i] : kNone;
+    if (fresh(platform.time, deadline)) {
+        row.ready = flag(platform.ready);
+        row.loop_closed = flag(platform.loop_closed);
+        row.gyros_at_speed = flag(platform.gyros_at_speed);
+        row.fault = flag(platform.fault);
+    }
+    if (fresh(platform.gimbal_time, deadline)) {
+        row.in_position = flag(platform.in_position);
+        row.slewing = flag(platform.slewing);
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        row.command_g = campaign_status_.command_table_g;
+        row.command_hz = campaign_status_.command_frequency_hz;
+    }
+    const auto shaker = shaker_->reading();
+    row.set_point_g = shaker.valid ? shaker.amplitude_g : kNone;
+    row.set_point_hz = shaker.valid ? shaker.frequency_hz : kNone;
+    row.measured_g = shaker.valid ? shaker.measured_g : kNone;
+    if (shaker.valid) {
+        row.shaker_state = shaker.state;
+        row.shaker_running = flag(shaker.running);
+        row.emergency_stop_open = flag(shaker.emergency_stop_open);
+    }
+    const auto seen = interlock_.seen_g();
+    row.witness_platform_g = seen[0] < 0 ? kNone : seen[0];
+    row.witness_table_g = seen[1] < 0 ? kNone : seen[1];
+    for (std::size_t i = 0; i < interlock_.rows(); ++i) {
+        const auto state = interlock_.row(i);
+        row.interlock_value.push_back(state.present);
+        row.interlock_raised.push_back(state.raised ? 1 : 0);
+    }
+    return row;
+}
 
 std::string Daemon::tell_overdue() {
     std::string told;
@@ -67,7 +137,8 @@ std::unique_ptr<record::Recorder> Daemon::make_recorder() {
     auto recorder = std::make_unique<record::Recorder>(
         settings, folder, clock_, *recorder_waiter_,
         [this](Severity severity, const std::string& text) { log(severity, "recorder", text); });
-    recorder->watch([this] { return estimator_stage_.view().estimate; });
+    recorder->watch([this] { return estimator_stage_.view().estimate; },
+                    [this] { return conditions(); });
     return recorder;
 }
 
@@ -106,6 +177,8 @@ void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {
     head.plan = plan_json(configuration_.campaign);
     head.interface =
         configuration_.can.kind == drivers::CanPortSettings::Kind::socketcan ? configuration_.can.interface : "vcan0";
+    head.interlocks = interlock_table(interlock_);
+    head.interlock_rows = interlock_.rows();
     head.restart = dwells_before > 0;
     head.dwells_before = dwells_before;
     recorder_->campaign_begun(std::move(head));

@@ -345,6 +345,13 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
         if (!value || !std::isfinite(*value) || proto::out_of_range(*s.signal, *value)) continue;
         using Field = MessagePlan::StatusField;
         const bool set = *value != 0;
+        if (s.field >= Field::temperature_case) {
+            const auto sensor = static_cast<std::size_t>(s.field) -
+                                static_cast<std::size_t>(Field::temperature_case);
+            platform.sensor_c[sensor] = *value;
+            platform.sensor_time[sensor] = frame.time;
+            continue;
+        }
         const bool gimbal = s.field == Field::in_position || s.field == Field::slewing ||
                             s.field == Field::command_echo;
         (gimbal ? platform.gimbal_time : platform.time) = frame.time;
@@ -373,6 +380,8 @@ void SampleAssembler::Impl::take_status(const MessagePlan& message,
             case Field::command_echo:
                 platform.gimbal_command_echo =
                     static_cast<std::uint8_t>(std::clamp(*value, 0.0, 255.0));
+                break;
+            default:  // temperatures, above
                 break;
         }
     }

@@ -53,6 +53,12 @@ struct SignalBindings {
                 fault = "PlatformStatus.Fault", temperature = "PlatformStatus.Temperature";
     std::string in_position = "GimbalStatus.InPosition", slewing = "GimbalStatus.Slewing",
                 command_echo = "GimbalStatus.CommandEcho";
+    /// degC. Left as they are they may be missing in the DBC: they are recorded, nothing depends
+    /// on them.
+    std::string temperature_case = "PlatformTemperatures.Case",
+                temperature_gyro_x = "PlatformTemperatures.GyroX",
+                temperature_gyro_y = "PlatformTemperatures.GyroY",
+                temperature_gyro_z = "PlatformTemperatures.GyroZ";
 };
 
 struct AssemblerSettings {

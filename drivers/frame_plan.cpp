@@ -66,7 +66,21 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
         const char* key;
         const std::string& name;
     };
-    const std::array<StatusName, 8> status{{
+    const SignalBindings usual;
+    // Few rigs have more than one temperature: what nobody asked for need not be there.
+    const auto if_there = [&](const std::string& name, const std::string& as_usual) {
+        const std::size_t dot = name.find('.');
+        const proto::Message* message = dbc_.find(std::string_view(name).substr(0, dot));
+        const bool there = message != nullptr && dot != std::string::npos &&
+                           message->find(std::string_view(name).substr(dot + 1)) != nullptr;
+        return name == as_usual && !there ? none : name;
+    };
+    const std::array<std::string, 4> sensors{
+        if_there(names.temperature_case, usual.temperature_case),
+        if_there(names.temperature_gyro_x, usual.temperature_gyro_x),
+        if_there(names.temperature_gyro_y, usual.temperature_gyro_y),
+        if_there(names.temperature_gyro_z, usual.temperature_gyro_z)};
+    const std::array<StatusName, 12> status{{
         {Field::loop_closed, "loop_closed", names.loop_closed},
         {Field::gyros_at_speed, "gyros_at_speed", names.gyros_at_speed},
         {Field::ready, "ready", names.ready},
@@ -75,6 +89,10 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
         {Field::in_position, "in_position", names.in_position},
         {Field::slewing, "slewing", names.slewing},
         {Field::command_echo, "command_echo", names.command_echo},
+        {Field::temperature_case, "temperature_case", sensors[0]},
+        {Field::temperature_gyro_x, "temperature_gyro_x", sensors[1]},
+        {Field::temperature_gyro_y, "temperature_gyro_y", sensors[2]},
+        {Field::temperature_gyro_z, "temperature_gyro_z", sensors[3]},
     }};
     for (const StatusName& s : status) {
         if (const BoundSignal bound = bind(s.key, s.name)) {
@@ -87,7 +105,7 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
     for (std::size_t i = 0; i < plans_.size(); ++i) {
         MessagePlan& plan = plans_[i];
         if (plan.count != nullptr || !plan.channels.empty()) {
-            plan.bit = std::uint64_t{1} << i;  // at most 22 names can be bound
+            plan.bit = std::uint64_t{1} << i;  // at most 26 names can be bound
             complete_ |= plan.bit;
             if (has_count_ && plan.count == nullptr)
                 plan.low = plan.message->find(names.message_sync_signal);

@@ -25,7 +25,11 @@ struct MessagePlan {
         temperature,
         in_position,
         slewing,
-        command_echo
+        command_echo,
+        temperature_case,  ///< and the others of kTemperatureSensors, in their order
+        temperature_gyro_x,
+        temperature_gyro_y,
+        temperature_gyro_z
     };
     struct StatusSignal {
         StatusField field;

@@ -50,6 +50,9 @@ struct alignas(64) Sample {
 static_assert(std::is_trivially_copyable_v<Sample>);
 static_assert(sizeof(Sample) == 128, "two cache lines per sample");
 
+/// Temperatures beside the inner element's, in the order of PlatformStatus::sensor_c.
+inline constexpr std::array<const char*, 4> kTemperatureSensors{"case", "gyro x", "gyro y",
+                                                                "gyro z"};
 /// What the platform says of itself; slower than samples. Latest value wins.
 struct PlatformStatus {
     Time time = 0;             ///< of the newest status frame; 0: none yet
@@ -62,6 +65,9 @@ struct PlatformStatus {
     bool in_position = false;
     bool slewing = false;
     std::uint8_t gimbal_command_echo = 0;  ///< counter of the last gimbal command accepted
+    /// deg C; each with the time of its newest frame, 0: none yet.
+    std::array<double, kTemperatureSensors.size()> sensor_c{};
+    std::array<Time, kTemperatureSensors.size()> sensor_time{};
 };
 static_assert(std::is_trivially_copyable_v<PlatformStatus>);
 

@@ -78,6 +78,10 @@ void add_signal_keys(std::vector<Key>& keys) {
         {"in_position", &S::in_position, "1: gimbals in position"},
         {"slewing", &S::slewing, "1: gimbals slewing"},
         {"command_echo", &S::command_echo, "counter of the last gimbal command accepted"},
+        {"temperature_case", &S::temperature_case, "degC; the default may be missing in the DBC"},
+        {"temperature_gyro_x", &S::temperature_gyro_x, "degC; as temperature_case"},
+        {"temperature_gyro_y", &S::temperature_gyro_y, "degC; as temperature_case"},
+        {"temperature_gyro_z", &S::temperature_gyro_z, "degC; as temperature_case"},
     };
     const auto at = [](std::string S::*member) -> At<std::string> {
         return [member](C& c) -> std::string& { return c.assembler.bindings.*member; };

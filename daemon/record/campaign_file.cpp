@@ -182,6 +182,58 @@ void read_estimates(const File& file, Campaign& to) {
     }
 }
 
+std::size_t width_of(const File& file, const std::string& name) {
+    const auto dimensions = file.doubles(name).dimensions;
+    return dimensions.size() == 2 ? dimensions[1] : 1;
+}
+
+/// Recordings made before there were any have none.
+void read_conditions(const File& file, Campaign& to) {
+    if (!file.has("/conditions")) return;
+    Columns c(file, "/conditions");
+    constexpr std::size_t kSensors = drivers::kTemperatureSensors.size();
+    const auto time = c.integers("time_ns"), state = c.integers("shaker_state");
+    const auto temperature = c.doubles("temperature_c"), sensor = c.doubles("sensor_c", kSensors),
+               command = c.doubles("command_g"), command_hz = c.doubles("command_hz"),
+               set_point = c.doubles("set_point_g"), set_point_hz = c.doubles("set_point_hz"),
+               measured = c.doubles("measured_g"), platform = c.doubles("witness_platform_g"),
+               table = c.doubles("witness_table_g");
+    constexpr std::array<std::int8_t ConditionRow::*, 8> kFlags{
+        &ConditionRow::shaker_running, &ConditionRow::emergency_stop_open,
+        &ConditionRow::ready,          &ConditionRow::loop_closed,
+        &ConditionRow::gyros_at_speed, &ConditionRow::fault,
+        &ConditionRow::in_position,    &ConditionRow::slewing};
+    std::vector<std::vector<std::int64_t>> flags;
+    for (const char* name : {"shaker_running", "emergency_stop_open", "ready", "loop_closed",
+                             "gyros_at_speed", "fault", "in_position", "slewing"})
+        flags.push_back(c.integers(name));
+    const bool rows = file.has("/conditions/interlock_value");
+    const std::size_t width = rows ? width_of(file, "/conditions/interlock_value") : 0;
+    const auto value = rows ? c.doubles("interlock_value", width) : std::vector<double>{};
+    const auto raised = rows ? c.integers("interlock_raised", width) : std::vector<std::int64_t>{};
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        ConditionRow at;
+        at.time = time[i];
+        at.temperature_c = temperature[i];
+        at.sensor_c = row<kSensors>(sensor, i);
+        at.command_g = command[i];
+        at.command_hz = command_hz[i];
+        at.set_point_g = set_point[i];
+        at.set_point_hz = set_point_hz[i];
+        at.measured_g = measured[i];
+        at.witness_platform_g = platform[i];
+        at.witness_table_g = table[i];
+        at.shaker_state = static_cast<std::int32_t>(state[i]);
+        for (std::size_t k = 0; k < kFlags.size(); ++k)
+            at.*kFlags[k] = static_cast<std::int8_t>(flags[k][i]);
+        for (std::size_t k = i * width; k < (i + 1) * width; ++k) {
+            at.interlock_value.push_back(value[k]);
+            at.interlock_raised.push_back(static_cast<std::uint8_t>(raised[k]));
+        }
+        to.conditions.push_back(std::move(at));
+    }
+}
+
 Severity severity_of(const std::string& word) {
     for (const Severity s : {Severity::warning, Severity::alarm, Severity::trip}) {
         if (word == name_of(s)) return s;
@@ -245,6 +297,7 @@ void read_head(const File& file, Campaign& to) {
     head.configuration = file.read_text("/configuration");
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
+    if (file.has("/interlocks")) head.interlocks = file.read_text("/interlocks");
     to.state = file.text("/", "state");
     if (to.state != "running") {
         to.reason = file.text("/", "reason");
@@ -276,6 +329,7 @@ Campaign read_part(const std::string& path) {
     read_estimates(file, campaign);
     read_events(file, campaign);
     read_gaps(file, campaign);
+    read_conditions(file, campaign);
     return campaign;
 }
 

@@ -25,6 +25,7 @@ struct Campaign {
     std::string state, reason;     ///< "running" when it was not closed
     std::string mark;              ///< why it is marked; empty: it is not
     std::string incomplete;        ///< what is missing for its result; empty: nothing
+    drivers::Time moved = 0;       ///< times of the newest part, to be those of the first one's clock
     std::size_t restarted_at = 0;  ///< dwells done when the daemon was last started
     std::int64_t ended_utc_ns = 0;
     std::string result_json;
@@ -32,6 +33,7 @@ struct Campaign {
     std::vector<Order> orders;
     std::vector<Dwell> dwells;
     std::vector<EstimateRow> estimates;
+    std::vector<ConditionRow> conditions;  ///< none in recordings of vibrigd 0.1.0
     std::vector<EventRecord> events;
     std::vector<Gap> gaps;
 };

@@ -85,6 +85,7 @@ void move_times(Campaign& part, Time by) {
     }
     for (auto& dwell : part.dwells) dwell.time += by;
     for (auto& row : part.estimates) row.time += by;
+    for (auto& row : part.conditions) row.time += by;
     for (auto& event : part.events) event.time += by;
     for (auto& gap : part.gaps) {
         gap.from += by;
@@ -103,6 +104,7 @@ void go_on_after_restart(Campaign& to, Campaign& part, Time last) {
     if (!part.samples.empty() && !to.samples.empty() && part.samples.front().time + shift <= last)
         shift = last + drivers::kSecond - part.samples.front().time;
     move_times(part, shift);
+    to.moved = shift;
     const std::size_t before = fed(to.dwells);
     if (before < part.head.dwells_before)
         to.incomplete = fmt::format(
@@ -125,6 +127,8 @@ void join(Campaign& to, Campaign part) {
     if (part.head.restart) {
         go_on_after_restart(to, part, last);
     } else {
+        // Of the same life of the daemon as the part before it, and so of the same clock.
+        move_times(part, to.moved);
         // The disk refused meanwhile: of what was kept for this file some may be in the other, too.
         std::erase_if(part.samples, [&](const auto& sample) {
             return !to.samples.empty() && sample.time <= last;
@@ -143,6 +147,7 @@ void join(Campaign& to, Campaign part) {
     append(to.orders, part.orders);
     append(to.dwells, part.dwells);
     append(to.estimates, part.estimates);
+    append(to.conditions, part.conditions);
     append(to.events, part.events);
     append(to.gaps, part.gaps);
     to.state = part.state;

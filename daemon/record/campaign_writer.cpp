@@ -1,7 +1,9 @@
 #include "daemon/record/campaign_writer.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 namespace vibrig::record {
 
@@ -78,6 +80,22 @@ void put(Table& table, const std::array<T, N>& values) {
 
 std::uint8_t byte(bool value) { return value ? 1 : 0; }
 
+/// For programs that read no attributes, such as GNU Octave. Numbers of 64 bits are texts: few keep
+/// them whole.
+std::string head_json(const Head& head, const nlohmann::ordered_json& units) {
+    const nlohmann::ordered_json json{{"name", head.name},
+                                      {"started_by", head.started_by},
+                                      {"started_utc_ns", std::to_string(head.utc_ns)},
+                                      {"utc_offset_ns", std::to_string(head.utc_offset_ns)},
+                                      {"version", head.version},
+                                      {"campaign", head.campaign},
+                                      {"part", head.part},
+                                      {"restart", head.restart},
+                                      {"dwells_before", head.dwells_before},
+                                      {"units", units}};
+    return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 /// Under another name until others can open it: whoever is killed meanwhile leaves nothing that
 /// looks like a recording.
 std::string new_file(const std::string& path) {
@@ -103,6 +121,43 @@ std::vector<ColumnSpec> sample_columns() {
              "3 flagged, 4 out of range, 5 unbound"}};
 }
 
+std::vector<ColumnSpec> condition_columns(std::size_t rows) {
+    const char* const flag = "1: yes, 0: no, -1: not known then";
+    std::vector<ColumnSpec> columns{
+        {"time_ns", Type::i64, {}, "ns", kTimeText},
+        {"temperature_c", Type::f64, {}, "degC", "platform's inner element; NaN: not known then"},
+        {"sensor_c",
+         Type::f64,
+         {drivers::kTemperatureSensors.size()},
+         "degC",
+         "case, gyros x, y, z; NaN: not known then"},
+        {"command_g", Type::f64, {}, "g", "amplitude that the campaign commands, peak at table"},
+        {"command_hz", Type::f64, {}, "Hz", "frequency that the campaign commands"},
+        {"set_point_g", Type::f64, {}, "g", "read back from the shaker, peak at table"},
+        {"set_point_hz", Type::f64, {}, "Hz", "read back from the shaker"},
+        {"measured_g", Type::f64, {}, "g", "measured by the shaker, peak at table"},
+        {"witness_platform_g", Type::f64, {}, "g", "platform's accelerometers, peak at table"},
+        {"witness_table_g", Type::f64, {}, "g", "table's accelerometer, peak at table"},
+        {"shaker_state",
+         Type::i32,
+         {},
+         "",
+         "0 idle, 1 ramping, 2 running, 3 stopping, 4 fault, -1 not known then"},
+        {"shaker_running", Type::i32, {}, "", flag},
+        {"emergency_stop_open", Type::i32, {}, "", flag}};
+    for (const char* name :
+         {"ready", "loop_closed", "gyros_at_speed", "fault", "in_position", "slewing"})
+        columns.push_back({name, Type::i32, {}, "", flag});
+    if (rows == 0) return columns;
+    columns.push_back({"interlock_value",
+                       Type::f64,
+                       {rows},
+                       "see /interlocks",
+                       "present value of each row of /interlocks; NaN: not watched then"});
+    columns.push_back({"interlock_raised", Type::u8, {rows}, "", "1: beyond its limit"});
+    return columns;
+}
+
 std::vector<ColumnSpec> gap_columns() {
     return {{"from_ns", Type::i64, {}, "ns", kTimeText},
             {"to_ns", Type::i64, {}, "ns", kTimeText},
@@ -119,6 +174,20 @@ void put_sample(Table& table, const drivers::Sample& sample) {
     table.put_bytes(sample.quality.data(), drivers::kChannels);
 }
 
+void write_end(File& file, const Ended& ended) {
+    file.set("/", "state", ended.state);
+    file.set("/", "reason", ended.reason);
+    file.set("/", "mark", ended.mark);
+    file.set("/", "ended_utc_ns", ended.utc_ns);
+    const nlohmann::ordered_json json{{"state", ended.state},
+                                      {"reason", ended.reason},
+                                      {"mark", ended.mark},
+                                      {"ended_utc_ns", std::to_string(ended.utc_ns)}};
+    file.write_text("/ended",
+                    json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
+                    "how it ended, JSON, as in the attributes");
+}
+
 void put_gap(Table& table, const Gap& gap) {
     table.put(gap.from).put(gap.to).put(std::string_view(gap.stream)).put(gap.lost);
     table.put(std::string_view(gap.reason));
@@ -126,10 +195,13 @@ void put_gap(Table& table, const Gap& gap) {
 
 CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     : file_(std::make_unique<File>(File::create(new_file(path)))),
-      lock_(std::make_unique<WriterLock>(file_->path())) {
+      lock_(std::make_unique<WriterLock>(file_->path())),
+      interlock_rows_(head.interlock_rows) {
     write_head(head);
-    const auto table = [this](const char* name, std::vector<ColumnSpec> columns, std::size_t chunk,
-                              const char* description) {
+    nlohmann::ordered_json units;
+    const auto table = [&](const char* name, std::vector<ColumnSpec> columns, std::size_t chunk,
+                           const char* description) {
+        for (const ColumnSpec& column : columns) units[name + 1][column.name] = column.unit;
         return std::make_unique<Table>(*file_, name, std::move(columns), chunk, description);
     };
     samples_ = table("/samples", sample_columns(), 1024, "one row for each instant of the rig");
@@ -138,6 +210,9 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     estimates_ = table("/estimates", estimate_columns(), 64, "the filter while it works");
     events_ = table("/events", event_columns(), 16, "what happened");
     gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
+    conditions_ = table("/conditions", condition_columns(interlock_rows_), 64,
+                        "around the measurement, once a second");
+    file_->write_text("/head", head_json(head, units), "some of the attributes, and units, JSON");
     file_->start_swmr(path);
 }
 
@@ -167,6 +242,7 @@ void CampaignWriter::write_head(const Head& head) {
     file_->set("/", "coefficients", names);
     file_->write_text("/configuration", head.configuration, "effective configuration, TOML");
     file_->write_text("/dbc", head.dbc, "signals on the bus");
+    file_->write_text("/interlocks", head.interlocks, "rows of the interlock's table, JSON");
     file_->write_text("/plan", head.plan, "positions (deg) and levels at the table (g), JSON");
 }
 
@@ -205,6 +281,26 @@ void CampaignWriter::estimate(const EstimateRow& row) {
     put(*estimates_, row.sigma);
 }
 
+void CampaignWriter::condition(const ConditionRow& row) {
+    const auto put_flag = [this](int flag) { conditions_->put(std::int32_t{flag}); };
+    conditions_->put(row.time).put(row.temperature_c);
+    put(*conditions_, row.sensor_c);
+    conditions_->put(row.command_g).put(row.command_hz).put(row.set_point_g);
+    conditions_->put(row.set_point_hz).put(row.measured_g);
+    conditions_->put(row.witness_platform_g).put(row.witness_table_g).put(row.shaker_state);
+    for (const int flag : {int{row.shaker_running}, int{row.emergency_stop_open}, int{row.ready},
+                           int{row.loop_closed}, int{row.gyros_at_speed}, int{row.fault},
+                           int{row.in_position}, int{row.slewing}})
+        put_flag(flag);
+    if (interlock_rows_ == 0) return;
+    std::vector<double> value = row.interlock_value;
+    value.resize(interlock_rows_, std::nan(""));
+    std::vector<std::uint8_t> raised = row.interlock_raised;
+    raised.resize(interlock_rows_);
+    conditions_->put_bytes(value.data(), value.size() * sizeof(double));
+    conditions_->put_bytes(raised.data(), raised.size());
+}
+
 void CampaignWriter::event(const EventRecord& event) {
     events_->put(event.time).put(event.utc_ns).put(std::string_view(name_of(event.severity)));
     events_->put(std::string_view(event.source)).put(std::string_view(event.text));
@@ -212,23 +308,20 @@ void CampaignWriter::event(const EventRecord& event) {
 
 void CampaignWriter::commit() {
     // Samples last: whoever sees a sample also sees the order that it belongs to.
-    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &samples_})
+    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
         (*table)->commit();
     file_->flush();
 }
 
 void CampaignWriter::end(const Ended& ended) {
     commit();
-    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &samples_})
+    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
         table->reset();
     const std::string path = file_->path();
     file_->close();
     // While a file is written with readers, no attribute can be added.
     File file = File::open(path, File::Mode::write);
-    file.set("/", "state", ended.state);
-    file.set("/", "reason", ended.reason);
-    file.set("/", "mark", ended.mark);
-    file.set("/", "ended_utc_ns", ended.utc_ns);
+    write_end(file, ended);
     file.write_text("/result", ended.result_json, "final result, JSON as vibrig identify --json");
     file.close();
 }

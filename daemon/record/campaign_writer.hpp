@@ -14,8 +14,12 @@ inline constexpr std::int64_t kFormatVersion = 2;
 /// Columns of the tables of a campaign's file, for writing and for mending.
 [[nodiscard]] std::vector<hdf5::ColumnSpec> sample_columns();
 [[nodiscard]] std::vector<hdf5::ColumnSpec> gap_columns();
+/// `rows`: of the interlock's table; none, no columns for them.
+[[nodiscard]] std::vector<hdf5::ColumnSpec> condition_columns(std::size_t rows);
 void put_sample(hdf5::Table& table, const drivers::Sample& sample);
 void put_gap(hdf5::Table& table, const Gap& gap);
+/// How a campaign, or this file of it, ended; but for its result. Of a closed file.
+void write_end(hdf5::File& file, const Ended& ended);
 
 /// A campaign's HDF5 file while the campaign goes on: rows are kept until commit(), from then on a
 /// reader sees them. One thread; everything throws hdf5::Error.
@@ -28,6 +32,7 @@ class CampaignWriter {
     void dwell(const Dwell& dwell);
     void estimate(const EstimateRow& row);
     void event(const EventRecord& event);
+    void condition(const ConditionRow& row);
     void gap(const Gap& gap) { put_gap(*gaps_, gap); }
 
     void commit();
@@ -43,7 +48,9 @@ class CampaignWriter {
 
     std::unique_ptr<hdf5::File> file_;
     std::unique_ptr<WriterLock> lock_;
-    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, estimates_, events_, gaps_;
+    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, estimates_, events_, gaps_,
+        conditions_;
+    std::size_t interlock_rows_ = 0;
 };
 
 }  // namespace vibrig::record

@@ -22,6 +22,7 @@ namespace {
 // In the daemon's time: a simulated rig waits for this thread as for any other.
 constexpr Time kPeriod = drivers::kSecond / 4;
 constexpr Time kEstimatePeriod = drivers::kSecond;
+constexpr Time kConditionPeriod = drivers::kSecond;
 // Rows kept until the next flush; at 1 kHz 4 s.
 constexpr std::size_t kMostRows = 4096;
 // Who armed and started it belongs to the campaign, too.
@@ -152,6 +153,7 @@ void Recorder::loop() {
         }
         drain();
         look_at_estimate();
+        look_around();
         keep_few();
         commit(std::exchange(commit_now_, false));
         show();
@@ -351,6 +353,7 @@ void Recorder::take(Head& head) {
     shown_.folder = folder_;
     shown_.recording = true;
     estimate_samples_ = 0;
+    looked_around_at_ = 0;
     // What stands there is to be read by others while it is written.
     if (open_file()) commit(true);
     if (settings_.raw && going_on > 0) append_dwells(fmt::format("{}{}\n", kRestartLine, going_on));
@@ -443,6 +446,13 @@ void Recorder::look_at_estimate() {
     estimate_at_ = newest_sample_;
     writer_->estimate({newest_sample_, e.amplitude_g, e.frequency_hz, e.kappa, e.nis_per_dof,
                        e.innovation_arcsec, e.value, e.sigma});
+}
+
+void Recorder::look_around() {
+    const Time now = clock_.now();
+    if (!head_ || !writer_ || !conditions_ || now - looked_around_at_ < kConditionPeriod) return;
+    looked_around_at_ = now;
+    writer_->condition(conditions_());
 }
 
 void Recorder::commit(bool all) {

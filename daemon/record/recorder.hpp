@@ -49,6 +49,7 @@ class Recorder {
   public:
     using Event = std::function<void(Severity, const std::string&)>;
     using Estimates = std::function<estimator::Estimate()>;
+    using Conditions = std::function<ConditionRow()>;
 
     /// `folder`: where campaigns' folders go. `on_event` is called in the recorder's thread.
     Recorder(const Settings& settings, std::string folder, const drivers::Clock& clock,
@@ -60,8 +61,12 @@ class Recorder {
     [[nodiscard]] rt::Ring<drivers::Sample>& samples() noexcept { return samples_; }
     /// ... control what it sent.
     [[nodiscard]] rt::Ring<FrameRecord>& sent() noexcept { return sent_; }
-    /// Before start(): where the state of the filter is looked at.
-    void watch(Estimates estimates) { estimates_ = std::move(estimates); }
+    /// Before start(): where the state of the filter, and what is around the measurement, are
+    /// looked at, in the recorder's thread.
+    void watch(Estimates estimates, Conditions conditions) {
+        estimates_ = std::move(estimates);
+        conditions_ = std::move(conditions);
+    }
 
     void start();
     /// Writes what there is and ends the thread.
@@ -100,6 +105,7 @@ class Recorder {
     void take(const Ended& ended);
     void take(const drivers::Sample& sample);
     void look_at_estimate();
+    void look_around();
     void commit(bool all);
     void write_rows();
     [[nodiscard]] bool open_file();
@@ -120,6 +126,7 @@ class Recorder {
     drivers::Waiter& self_;
     Event on_event_;
     Estimates estimates_;
+    Conditions conditions_;
     rt::Ring<FrameRecord> received_{65536};
     rt::Ring<FrameRecord> sent_{1024};
     rt::Ring<drivers::Sample> samples_{16384};
@@ -136,7 +143,7 @@ class Recorder {
     /// What goes into the file once it can be written: few and small, unlike the samples.
     std::deque<std::variant<Order, Dwell, EventRecord>> kept_;
     std::int64_t committed_wall_ns_ = 0, retry_wall_ns_ = 0;
-    drivers::Time newest_sample_ = 0, estimate_at_ = 0;
+    drivers::Time newest_sample_ = 0, estimate_at_ = 0, looked_around_at_ = 0;
     std::uint64_t estimate_samples_ = 0;
     Gap lost_;                   ///< samples that could not be written
     std::uint64_t at_risk_ = 0;  ///< samples given to the file since it last went to the disk

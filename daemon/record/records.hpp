@@ -28,6 +28,8 @@ struct Head {
     std::string dbc;
     std::string plan;  ///< JSON: positions and levels; empty when chosen one by one
     std::string interface;
+    std::string interlocks;  ///< JSON: rows of the interlock's table, as in ConditionRow
+    std::size_t interlock_rows = 0;
     std::string campaign;           ///< its folder's name when it began: the same in all parts
     int part = 1;                   ///< a campaign's files, in order
     bool restart = false;           ///< this part goes on after the daemon's restart
@@ -79,6 +81,24 @@ struct EstimateRow {
     double amplitude_g = 0, frequency_hz = 0, kappa = 1, nis_per_dof = 0;
     std::array<double, 3> innovation_arcsec{};
     std::array<double, estimator::kParameters> value{}, sigma{};
+};
+
+/// Around the measurement, once a second, whether samples come or not. NaN: not known then.
+struct ConditionRow {
+    drivers::Time time = 0;
+    double temperature_c = 0;  ///< inner element
+    std::array<double, drivers::kTemperatureSensors.size()> sensor_c{};
+    double command_g = 0, command_hz = 0;      ///< what the campaign wants, peak at the table
+    double set_point_g = 0, set_point_hz = 0;  ///< read back from the shaker's controller
+    double measured_g = 0;                     ///< by the controller, peak at the table
+    double witness_platform_g = 0, witness_table_g = 0;  ///< accelerometers, peak at the table
+    std::int32_t shaker_state = -1;                      ///< register, -1: not known
+    /// 1: yes, 0: no, -1: not known.
+    std::int8_t shaker_running = -1, emergency_stop_open = -1;
+    std::int8_t ready = -1, loop_closed = -1, gyros_at_speed = -1, fault = -1, in_position = -1,
+                slewing = -1;
+    std::vector<double> interlock_value;  ///< as many as Head::interlocks
+    std::vector<std::uint8_t> interlock_raised;
 };
 
 /// Something that should be in the recording and is not.

@@ -18,13 +18,6 @@ using hdf5::File;
 
 namespace {
 
-void set_end(File& file, const std::string& state, const std::string& reason, std::int64_t utc_ns) {
-    file.set("/", "state", state);
-    file.set("/", "reason", reason);
-    file.set("/", "mark", "");
-    file.set("/", "ended_utc_ns", utc_ns);
-}
-
 Time last_time(const Campaign& part) { return part.samples.empty() ? 0 : part.samples.back().time; }
 
 /// What the raw log has of this part beyond its last sample comes from the frames themselves.
@@ -68,8 +61,8 @@ void mend_last(const std::string& path) {
         put_gap(gaps, gap);
         gaps.commit();
     }
-    set_end(file, "recovered", "the recorder died before the campaign was over",
-            end + part.head.utc_offset_ns);
+    write_end(file, {"recovered", "the recorder died before the campaign was over", "", "",
+                     end + part.head.utc_offset_ns});
     file.close();
 }
 
@@ -112,8 +105,8 @@ void close_part(const std::string& path, const std::string& next) {
     const Campaign part = read_part(path);
     File file = File::open(path, File::Mode::write);
     hdf5::Table(file, "/samples", sample_columns()).keep(part.samples.size());
-    set_end(file, "continued", "the campaign goes on in " + next,
-            last_time(part) + part.head.utc_offset_ns);
+    write_end(file, {"continued", "the campaign goes on in " + next, "", "",
+                     last_time(part) + part.head.utc_offset_ns});
     file.close();
 }
 

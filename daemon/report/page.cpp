@@ -34,9 +34,11 @@ pre{font-size:.75rem;overflow-x:auto;background:var(--band);padding:.8rem;border
 summary{cursor:pointer;color:var(--link)}
 .sign{display:grid;grid-template-columns:1fr 1fr;gap:3rem;margin-top:3.5rem}
 .sign div{border-top:1px solid var(--ink);padding-top:.3rem;color:var(--soft);font-size:.86rem}
-@page{size:A4;margin:16mm 14mm}
+.mark{position:fixed;inset:0;z-index:9;pointer-events:none;display:flex;align-items:center;justify-content:center;overflow:hidden}
+.mark span{transform:rotate(-35deg);font:700 min(17vw,9rem)/1 system-ui,sans-serif;letter-spacing:.06em;color:var(--bad);opacity:.13}
+@page{size:A4;margin:16mm 14mm 18mm;@bottom-right{content:"page " counter(page) " of " counter(pages);font:8pt sans-serif}}
 @media print{:root{--ink:#000;--paper:#fff;--soft:#444;--rule:#bbb;--band:#f4f4f4;--bad:#900;--link:#000}
-body{max-width:none;padding:0;font-size:10pt}nav,details{display:none}figure,tr{break-inside:avoid}h2{break-after:avoid}
+body{max-width:none;padding:0;font-size:10pt}nav,details{display:none}figure,tr{break-inside:avoid}tbody tr:nth-child(-n+3){break-before:avoid}tbody tr:nth-last-child(-n+3){break-before:avoid}h2{break-after:avoid}
 table{font-size:7.6pt}th,td{padding:.12rem .4rem}.wide{overflow:visible}}
 )";
 
@@ -74,15 +76,20 @@ void Page::details(const std::string& summary, const std::string& preformatted) 
              "</pre></details>\n";
 }
 
-std::string Page::html(const std::string& title) const {
+void Page::mark(const std::string& word) {
+    mark_ = "<div class=\"mark\" role=\"note\"><span>" + xml_text(word) + "</span></div>\n";
+}
+
+std::string Page::html(const std::string& title, const std::vector<std::string>& signatures) const {
+    std::string signs;
+    for (const auto& who : signatures) signs += "<div>" + xml_text(who) + "</div>";
     const std::size_t head = body_.find("<h2");
     return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
            "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
-           xml_text(title) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
-           xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ + "</nav>\n" +
-           (head == std::string::npos ? "" : body_.substr(head)) +
-           "<div class=\"sign\"><div>Operator, date</div><div>Approved by, date</div></div>\n"
-           "</body></html>\n";
+           xml_text(title) + "</title>\n<style>" + kStyle + "</style></head><body>\n" + mark_ +
+           "<h1>" + xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ +
+           "</nav>\n" + (head == std::string::npos ? "" : body_.substr(head)) +
+           "<div class=\"sign\">" + signs + "</div>\n</body></html>\n";
 }
 
 }  // namespace vibrig::report

@@ -14,10 +14,15 @@ class Page {
     void table(const std::vector<std::vector<std::string>>& rows, const std::string& kind = "");
     void figure(const std::string& svg, const std::string& caption);
     void details(const std::string& summary, const std::string& preformatted);
-    [[nodiscard]] std::string html(const std::string& title) const;
+    /// Across every page, such as "SIMULATED".
+    void mark(const std::string& word);
+    /// `signatures`: who signs below.
+    [[nodiscard]] std::string html(const std::string& title,
+                                   const std::vector<std::string>& signatures = {
+                                       "Operator, date", "Approved by, date"}) const;
 
   private:
-    std::string body_, contents_;
+    std::string body_, contents_, mark_;
 };
 
 }  // namespace vibrig::report

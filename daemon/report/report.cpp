@@ -1,6 +1,5 @@
 #include "daemon/report/report.hpp"
 
-#include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -9,9 +8,10 @@
 #include <fstream>
 #include <numbers>
 
-#include "daemon/configuration/configuration.hpp"
 #include "daemon/record/digest.hpp"
+#include "daemon/report/conditions_section.hpp"
 #include "daemon/report/page.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "daemon/report/plan_section.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
@@ -31,6 +31,7 @@ namespace {
 
 constexpr double k95 = 1.959963984540054;
 constexpr std::array<const char*, 3> kGyro{"x", "y", "z"};
+constexpr std::array<Look, 3> kLooks{Look::line, Look::dashed, Look::dots};
 constexpr std::size_t kMostPoints = 300;
 
 std::string num(double value, int digits) {
@@ -52,18 +53,6 @@ std::string position_text(const Campaign& campaign, const record::RecordedDwell&
     return text;
 }
 
-record::Paperwork paperwork_of(const Campaign& campaign) {
-    return configuration::parse(record::identification_sections(campaign.head.configuration),
-                                "configuration in " + campaign.path, false)
-        .configuration.paperwork;
-}
-
-std::string or_dash(const std::string& text) { return text.empty() ? "not stated" : text; }
-
-std::string unit_text(const record::Paperwork& unit) {
-    return or_dash(unit.unit_type) + ", serial number " + or_dash(unit.unit_serial);
-}
-
 void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
     const auto& head = campaign.head;
     const auto observable =
@@ -74,6 +63,10 @@ void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
         "determined by the data.",
         head.name, utc_text(head.utc_ns), campaign.state, a.replayed.dwells.size(),
         campaign.samples.size(), observable));
+}
+
+void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
+    const auto& head = campaign.head;
     page.section("campaign", "Campaign");
     const auto unit = paperwork_of(campaign);
     std::vector<std::vector<std::string>> rows{
@@ -157,7 +150,12 @@ void add_coefficients(Page& page, const Analysis& a) {
     chart.title = "Correlation of the coefficients";
     chart.x = Axis("coefficient, in the order of the table");
     chart.y = Axis("coefficient");
-    for (Axis* axis : {&chart.x, &chart.y}) axis->exact = true;
+    for (Axis* axis : {&chart.x, &chart.y}) {
+        axis->exact = true;
+        // As many names as there is room for.
+        for (std::size_t i = 0; i < kParameters; i += axis == &chart.x ? 5 : 2)
+            axis->named.emplace_back(static_cast<double>(i + 1), estimator::parameter_names()[i]);
+    }
     tool::plot::HeatMap map;
     map.label = "absolute correlation";
     for (std::size_t i = 0; i <= kParameters; ++i) {
@@ -173,7 +171,7 @@ void add_coefficients(Page& page, const Analysis& a) {
         }
     }
     chart.maps.push_back(std::move(map));
-    page.figure(chart.svg(), "1 to 10 gyro x, 11 to 20 gyro y, 21 to 30 gyro z.");
+    page.figure(chart.svg(), "In the order of the table: gyro x, y, z.");
 }
 
 void add_held_out(Page& page, const Analysis& a) {
@@ -259,6 +257,8 @@ void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
             // The best and the worst of a gyro; all between them.
             Curve curve;
             curve.name = std::string("gyro ") + kGyro[gyro];
+            // One term each is the same for all three, often: none may hide another.
+            if (group.of.size() == 1) curve.look = kLooks[gyro];
             for (std::size_t i = 0; i < rows.size(); i += every) {
                 double least = std::numeric_limits<double>::infinity(), most = 0, log_sum = 0;
                 for (const std::size_t k : group.of) {
@@ -269,6 +269,7 @@ void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
                 }
                 curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
                 curve.y.push_back(std::exp(log_sum / static_cast<double>(group.of.size())));
+                if (group.of.size() == 1) continue;
                 curve.low.push_back(least);
                 curve.high.push_back(most);
             }
@@ -561,17 +562,19 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
 
 }  // namespace
 
-std::string utc_text(std::int64_t utc_ns) {
-    return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
-                       fmt::gmtime(static_cast<std::time_t>(utc_ns / drivers::kSecond)));
-}
-
-Earlier earlier_of(const Campaign& earlier, const Campaign& now) {
+Earlier earlier_of(const Campaign& earlier, const Campaign& now, bool same_unit) {
     std::error_code error;
     if (std::filesystem::equivalent(earlier.path, now.path, error) ||
         (earlier.head.campaign == now.head.campaign && earlier.head.utc_ns == now.head.utc_ns))
         throw std::runtime_error(earlier.path +
                                  ": found the campaign itself, expected another one to compare");
+    for (const Campaign* campaign : {&earlier, &now}) {
+        if (!same_unit && paperwork_of(*campaign).unit_serial.empty())
+            throw std::runtime_error(
+                campaign->path +
+                ": found no serial number ([unit] serial) in its configuration, expected one to "
+                "compare a unit with itself (--same-unit: it is the same)");
+    }
     return {earlier.path, earlier.head.name, utc_text(earlier.head.utc_ns), paperwork_of(earlier),
             final_coefficients(earlier.path, earlier.dwells)};
 }
@@ -579,14 +582,17 @@ Earlier earlier_of(const Campaign& earlier, const Campaign& now) {
 std::string make_page(const Campaign& campaign, const Analysis& analysis,
                       const std::optional<Earlier>& earlier) {
     Page page;
+    if (simulated(campaign)) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
     add_uncertainty(page, analysis.assessed);
     add_coefficients(page, analysis);
+    add_campaign(page, campaign, analysis);
     add_plan(page, campaign, analysis);
     add_held_out(page, analysis);
     add_convergence(page, campaign, analysis);
     add_innovations(page, analysis);
     add_vibration(page, campaign, analysis);
+    add_conditions(page, campaign);
     add_noise(page, campaign, analysis);
     add_rest(page, campaign, analysis, earlier);
     return page.html("Vibration test of " + campaign.head.name);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "daemon/report/analysis.hpp"
+#include "daemon/report/paperwork.hpp"
 
 namespace vibrig::report {
 
@@ -14,15 +15,14 @@ struct Earlier {
     Coefficients coefficients;
 };
 
-/// Of a recorded campaign; throws for the campaign that it is to be compared with itself.
-[[nodiscard]] Earlier earlier_of(const record::Campaign& earlier, const record::Campaign& now);
+/// Of a recorded campaign; throws for the campaign that it is to be compared with itself, and
+/// unless both state the unit's serial number or somebody says that it is the `same_unit`.
+[[nodiscard]] Earlier earlier_of(const record::Campaign& earlier, const record::Campaign& now,
+                                 bool same_unit);
 
 /// One page that needs nothing else: HTML with its plots as inline SVG, light and dark, for print
 /// too.
 [[nodiscard]] std::string make_page(const record::Campaign& campaign, const Analysis& analysis,
                                     const std::optional<Earlier>& earlier);
-
-/// "2026-03-01 08:00:00 UTC"
-[[nodiscard]] std::string utc_text(std::int64_t utc_ns);
 
 }  // namespace vibrig::report

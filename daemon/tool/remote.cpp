@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "daemon/serve/render.hpp"
+#include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
 #include "proto/option_value.hpp"
@@ -77,6 +78,19 @@ int width_of_output() {
     return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsual;
 }
 
+/// What somebody has to see first.
+std::string painted(const std::string& line, bool head, v1::Campaign::State state) {
+    if (head)
+        return state == v1::Campaign::tripped || state == v1::Campaign::aborted
+                   ? colour::bad(line)
+                   : colour::strong(line);
+    const auto has = [&line](const char* words) { return line.find(words) != std::string::npos; };
+    if (line.starts_with("latched") || has("FAULT") || has("MISFIT") || has("NOT HEARD"))
+        return colour::bad(line);
+    if (line.starts_with("why: ") || has("SILENT") || has(": DOWN, ")) return colour::warning(line);
+    return line;
+}
+
 int show_status(const StatusOptions& options) {
     serve::Client client(options.at);
     if (options.json) {
@@ -93,15 +107,19 @@ int show_status(const StatusOptions& options) {
     const v1::Status status = ask_status(client);
     const double wall_s = std::chrono::duration<double>(Steady::now() - began).count();
     const serve::Rates rates = serve::rates_between(before, status, wall_s);
-    for (const std::string& line : serve::render_table(status, rates, width_of_output())) {
-        std::cout << line << '\n';
-    }
+    const auto lines = serve::render_table(status, rates, width_of_output());
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        std::cout << painted(lines[i], i == 0, status.campaign().state()) << '\n';
     return 0;
+}
+
+std::string mark_of(bool passed) {
+    return passed ? colour::good("  ok    ") : colour::bad("  NOT   ");
 }
 
 void show_rows(const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& rows) {
     for (const auto& row : rows) {
-        std::cout << (row.passed() ? "  ok    " : "  NOT   ") << row.name() << ": " << row.value()
+        std::cout << mark_of(row.passed()) << row.name() << ": " << row.value()
                   << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low()
                   << " to " << row.high() << '\n';
     }
@@ -160,10 +178,12 @@ int self_test(const TestOptions& options) {
         std::cout << reply.body << '\n';
     } else {
         for (const v1::Readiness::Check& check : found.checks()) {
-            std::cout << (check.passed() ? "  ok    " : "  NOT   ")
+            std::cout << mark_of(check.passed())
                       << serve::clipped(check.name() + ": " + check.text(), 200) << '\n';
         }
-        std::cout << (found.ready() ? "ready for a campaign" : "not ready for a campaign") << '\n';
+        std::cout << (found.ready() ? colour::good("ready for a campaign")
+                                    : colour::bad("not ready for a campaign"))
+                  << '\n';
     }
     return found.ready() ? 0 : kNo;
 }

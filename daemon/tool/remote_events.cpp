@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/serve/render.hpp"
+#include "daemon/tool/colour.hpp"
 #include "daemon/tool/remote.hpp"
 
 namespace vibrig::tool {
@@ -16,7 +17,13 @@ constexpr const char* kStream = "/api/v1/stream?status=false&rate_hz=10&after=";
 
 void print(const v1::Event& event, bool json) {
     if (!json) {
-        std::cout << serve::render_event(event) << '\n';
+        const std::string line = serve::render_event(event);
+        const auto severity = event.severity();
+        const bool bad = severity == v1::Event::alarm || severity == v1::Event::trip;
+        std::cout << (bad                              ? colour::bad(line)
+                      : severity == v1::Event::warning ? colour::warning(line)
+                                                       : line)
+                  << '\n';
         return;
     }
     google::protobuf::util::JsonPrintOptions options;

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "daemon/serve/render.hpp"
+#include "daemon/tool/colour.hpp"
 #include "daemon/tool/remote.hpp"
 
 namespace vibrig::tool {
@@ -68,7 +69,7 @@ class Screen {
         out += '\r';
         for (std::size_t i = 0; i < shown; ++i) {
             const bool stress = i == 0;
-            if (stress) out += loud ? "\x1b[7;1m" : "\x1b[1m";
+            if (stress) out += loud ? (colour::wanted() ? "\x1b[7;1;31m" : "\x1b[7;1m") : "\x1b[1m";
             out += lines[i];
             if (stress) out += "\x1b[0m";
             out += "\x1b[K\n";

@@ -1,7 +1,4 @@
 // vibrig report and vibrig compensate.
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -9,7 +6,6 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -24,6 +20,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
 #include "daemon/tool/plot/chart.hpp"
+#include "daemon/tool/print_pdf.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_table.hpp"
 #include "proto/text.hpp"
@@ -39,6 +36,7 @@ using estimator::kParameters;
 struct ReportArguments {
     std::string campaign, output = "report.html", config, compare, pdf;
     bool strict = false;
+    bool same_unit = false;
 };
 
 struct CompensateArguments {
@@ -58,31 +56,6 @@ estimator::Settings report_settings(const record::Campaign& campaign, const std:
                           : configuration::load(config, false).configuration.estimator;
 }
 
-/// Chromium prints it; HOME elsewhere, so that nothing is left behind.
-void print_pdf(const std::string& html, const std::string& pdf) {
-    char folder[] = "/tmp/vibrig-print.XXXXXX";
-    if (::mkdtemp(folder) == nullptr) throw std::runtime_error("/tmp: no temporary folder");
-    const std::string profile = std::string("--user-data-dir=") + folder;
-    const std::string to = "--print-to-pdf=" + fs::absolute(pdf).string();
-    const std::string from = "file://" + fs::absolute(html).string();
-    const pid_t child = ::fork();
-    if (child == 0) {
-        if (std::freopen("/dev/null", "w", stderr) == nullptr) ::_exit(127);
-        for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
-            ::execlp(name, name, "--headless", "--no-sandbox", "--disable-gpu",
-                     "--no-pdf-header-footer", profile.c_str(), to.c_str(), from.c_str(), nullptr);
-        ::_exit(127);
-    }
-    int status = -1;
-    ::waitpid(child, &status, 0);
-    std::error_code ignored;
-    fs::remove_all(folder, ignored);
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || !fs::exists(pdf))
-        throw std::runtime_error(pdf + (WIFEXITED(status) && WEXITSTATUS(status) == 127
-                                            ? ": found no chromium, expected it to print"
-                                            : ": chromium could not print it"));
-}
-
 int make_report(const ReportArguments& arguments) {
     keep_recordings(arguments.output);
     keep_recordings(arguments.pdf);
@@ -91,7 +64,8 @@ int make_report(const ReportArguments& arguments) {
     const auto settings = report_settings(campaign, arguments.config);
     std::optional<report::Earlier> earlier;
     if (!arguments.compare.empty()) {
-        earlier = report::earlier_of(read_named_campaign(arguments.compare), campaign);
+        earlier = report::earlier_of(read_named_campaign(arguments.compare), campaign,
+                                     arguments.same_unit);
         std::cerr << "compared with " << earlier->path << " of " << earlier->when << '\n';
     }
     report::Analysis analysis;
@@ -330,6 +304,10 @@ void add_reports(CLI::App& app, int& exit_code) {
                           "HTML file to write (default report.html)");
     reporting->add_option("--compare", report->compare,
                           "an earlier campaign of the same unit: repeatability and E_n");
+    reporting
+        ->add_flag("--same-unit", report->same_unit,
+                   "compare though a campaign states no serial number")
+        ->needs("--compare");
     reporting->add_option("--config", report->config,
                           "identify anew with these settings instead of the recorded ones");
     reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");

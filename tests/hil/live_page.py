@@ -181,15 +181,17 @@ def check_prometheus(checks, address, folder, seen):
         time.sleep(0.5)
     checks.check(query("up{job='vibrig'} == 1"), "a real Prometheus scrapes it", server.text()[-2000:])
     checks.check(query("rate(vibrig_samples_total[10s]) > 0"), "and sees samples come in")
-    with open(os.path.join(ROOT, "systemd", "prometheus", "vibrig-dashboard.json"), encoding="utf-8") as file:
-        dashboard = json.load(file)
+    panels = []
+    for name in ("vibrig-dashboard.json", "vibrig-fleet-dashboard.json"):
+        with open(os.path.join(ROOT, "systemd", "prometheus", name), encoding="utf-8") as file:
+            panels += json.load(file)["panels"]
     known = {line.split()[2] for line in seen.splitlines() if line.startswith("# TYPE")}
     known |= {name + part for name in known for part in ("_bucket", "_sum", "_count")}
-    used = [target["expr"] for panel in dashboard["panels"] for target in panel.get("targets", [])]
+    used = [target["expr"] for panel in panels for target in panel.get("targets", [])]
     with open(rules, encoding="utf-8") as file:
         used += re.findall(r"expr: (.*)", file.read())
     # That one is there with a broker only: tests/hil/mqtt.py.
-    missing = {name for text in used for name in re.findall(r"\bvibrig_\w+", text)} - known - {"vibrig_mqtt_up", "vibrig_guard_up", "vibrig_guard_finding"}
+    missing = {name for text in used for name in re.findall(r"\bvibrig_\w+", text)} - known - {"vibrig_mqtt_up", "vibrig_annunciator_confirms", "vibrig_guard_up", "vibrig_guard_finding"}
     checks.check(used and not missing, "every metric of the Grafana dashboard and the alert rules is there", str(sorted(missing)))
     server.end()
 

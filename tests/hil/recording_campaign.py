@@ -436,8 +436,20 @@ def report(checks, rig, folder):
                         ("warning of another unit", "Warning: this is another unit")):
         checks.check(words in page, f"the report has its {what}")
     axes = page[page.index("Correlation of the coefficients"):]
-    axes = re.findall(r">(\d+)</text>", axes[:axes.index("</svg>")])
-    checks.check("30" in axes and "35" not in axes and "0" not in axes[:12], "its correlations are of 30 coefficients", str(axes))
+    axes = re.findall(r">(D_[A-Za-z]+)</text>", axes[:axes.index("</svg>")])
+    checks.check({"D_Fx", "D_ISz", "D_OOy"} <= set(axes), "its correlations are of coefficients that have names", str(axes))
+    with h5py().File(os.path.join(rig.folder, "earlier.h5"), "r+") as file:
+        text = file["configuration"][()].decode().replace('"0018"', '""')
+        del file["configuration"]
+        file["configuration"] = text.encode()
+    unknown = offline(rig, "report", folder, "-o", "unknown.html", "--compare", "earlier.h5")
+    checks.check(unknown.returncode == 2 and "found no serial number" in unknown.stderr,
+                 "a unit without a serial number is not compared", unknown.stderr)
+    checks.equal(offline(rig, "report", folder, "-o", "same.html", "--compare", "earlier.h5", "--same-unit").returncode, 0,
+                 "unless somebody says that it is the same")
+    checks.check(page.count('class="mark"') == 1 and ">SIMULATED<" in page, "a simulated rig's report says so across it")
+    checks.check(page.index('id="coefficients"') < page.index('id="campaign"'), "it leads with the coefficients")
+    checks.check("Shaker: command and read-back" in page and "Temperatures" in page, "it has the conditions")
     level = page[page.index("Accelerometer zeros in force"):]
     level = level[:level.index("Comparison with an earlier")]
     checks.check("do not determine" not in level and "No levelling" in level, "of levelling it says what there was", level[:500])

@@ -68,6 +68,20 @@ double Axis::place(double value) const {
 
 std::vector<double> Axis::ticks() const {
     std::vector<double> at;
+    for (const auto& [value, name] : named) at.push_back(value);
+    if (!at.empty()) return at;
+    // Between two powers of ten an axis would have one label, or none.
+    if (log && std::log10(high / low) < 2 - 1e-9) {
+        const bool wide = std::log10(high / low) > 1 - 1e-9;
+        for (double decade = std::pow(10.0, std::floor(std::log10(low))); decade <= high * 1.001;
+             decade *= 10) {
+            for (const double k : wide ? std::vector{1.0, 3.0} : std::vector{1.0, 2.0, 3.0, 5.0}) {
+                const double tick = k * decade;
+                if (tick >= low * (1 - 1e-9) && tick <= high * (1 + 1e-9)) at.push_back(tick);
+            }
+        }
+        return at;
+    }
     if (log) {
         const double first = std::ceil(std::log10(low) - 1e-9);
         const double last = std::floor(std::log10(high) + 1e-9);
@@ -100,6 +114,9 @@ std::vector<double> Axis::minor() const {
 }
 
 std::string Axis::text_of(double tick) const {
+    for (const auto& [value, name] : named) {
+        if (value == tick) return name;
+    }
     std::array<char, 32> text{};
     // As many digits as tell one tick from the next.
     int digits = 6;

@@ -18,6 +18,8 @@ class Axis {
     double low = 0;
     double high = 0;
     bool exact = false;  ///< keeps its range; else it is rounded to ticks
+    /// Ticks with words instead of numbers, from left to right; empty: numbers.
+    std::vector<std::pair<double, std::string>> named;
 
     void include(double value);                       ///< widens the range; log: only if > 0
     void settle();                                    ///< makes the range one to be drawn

@@ -287,6 +287,30 @@ TEST_F(Assembler, CountsTheGapOfASilence) {
     expect_closed();
 }
 
+TEST_F(Assembler, KnowsEachTemperatureAndWhenItCame) {
+    // GIVEN a platform that tells one temperature after the other
+    constexpr std::array<const char*, 4> kNames{"Case", "GyroX", "GyroY", "GyroZ"};
+    const auto temperature = [&](std::size_t sensor, Time time, double value) {
+        assembler_->feed(
+            frame_of(rig_dbc(), "PlatformTemperatures", time,
+                     {{"Sensor", static_cast<double>(sensor)}, {kNames[sensor], value}}));
+    };
+    // WHEN three of four have come, one of them twice
+    temperature(0, 5 * kSecond, 20.5);
+    temperature(2, 6 * kSecond, -3.25);
+    temperature(3, 7 * kSecond, 61);
+    temperature(2, 8 * kSecond, -3.5);
+    // THEN each is known with its time, and the platform's own status has not come
+    const PlatformStatus& p = assembler_->platform();
+    EXPECT_NEAR(p.sensor_c[0], 20.5, 1e-9);
+    EXPECT_NEAR(p.sensor_c[2], -3.5, 1e-9);
+    EXPECT_NEAR(p.sensor_c[3], 61, 1e-9);
+    EXPECT_EQ(p.sensor_time, (std::array<Time, 4>{5 * kSecond, 0, 8 * kSecond, 7 * kSecond}));
+    EXPECT_EQ(p.time, 0);
+    EXPECT_EQ(assembler_->counters().unknown, 0u);
+    expect_closed();
+}
+
 TEST_F(Assembler, FollowsThePlatformAndItsGimbals) {
     EXPECT_EQ(assembler_->platform().time, 0);
     assembler_->feed(frame_of(rig_dbc(), "PlatformStatus", 5 * kSecond,
@@ -391,6 +415,17 @@ TEST(AssemblerBindings, NameTheKeyTheValueAndWhatThereIs) {
                 }),
                 HasSubstr("at least one measured channel"));
     EXPECT_EQ(message_of([](auto&) {}), "no error");
+}
+
+TEST(AssemblerBindings, DoNotAskForTemperaturesThatNobodyNamed) {
+    // GIVEN a DBC without the message of the temperatures
+    proto::Dbc dbc = rig_dbc();
+    std::erase_if(dbc.messages, [](const auto& m) { return m.name == "PlatformTemperatures"; });
+    AssemblerSettings settings;
+    // THEN it is bound without them, unless one is named
+    EXPECT_NO_THROW(SampleAssembler(dbc, settings, {}));
+    settings.bindings.temperature_case = "Temperatures.Case";
+    EXPECT_THROW(SampleAssembler(dbc, settings, {}), BindingError);
 }
 
 TEST(AssemblerBindings, NameAllThatIsMissingAtOnce) {

@@ -142,6 +142,25 @@ TEST_F(Parts, AfterADiskThatRefusedHoldWhatWasKeptOnce) {
     EXPECT_EQ(recorded_dwells(campaign).size(), 3U);
 }
 
+TEST_F(Parts, AfterARestartAndADiskThatRefusedAreInOneTime) {
+    // GIVEN a campaign that died, went on in the time of another boot, and had its disk refuse then
+    write(head(1), 5000 * kSecond, {1}, 1, "running");
+    Head after = head(2, true, 1);
+    after.utc_offset_ns += 9000 * kSecond;
+    write(after, 1 * kSecond, {2, 3}, 1, "continued");
+    Head third = after;
+    third.part = 3;
+    third.restart = false;
+    third.dwells_before = 0;
+    write(third, 1 * kSecond + 400 * kStep, {4}, 1);
+    // WHEN it is read
+    const Campaign campaign = read_campaign(folder_.string());
+    // THEN the newest file is not before the oldest, and nothing of it is taken for a copy
+    EXPECT_EQ(campaign.samples.size(), 1200U);
+    EXPECT_TRUE(std::ranges::is_sorted(campaign.samples, {}, &drivers::Sample::time));
+    EXPECT_EQ(campaign.dwells.size(), 3U);
+}
+
 TEST_F(Parts, AreRefusedByNameWhenOneIsMissing) {
     for (const int part : {1, 2, 3})
         write(head(part), part * 100 * kSecond, {part}, 1, part == 3 ? "finished" : "continued");

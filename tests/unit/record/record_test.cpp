@@ -125,6 +125,53 @@ TEST_F(Recording, ComesBackToTheLastBitWhileItIsWrittenAndAfterwards) {
     }
 }
 
+TEST_F(Recording, HasWhatWasAroundTheMeasurement) {
+    // GIVEN a campaign with an interlock of three rows, and a look at what is around it
+    const std::string path = (folder_ / "campaign.h5").string();
+    Head with_rows = head();
+    with_rows.interlocks = R"([{"name":"a"},{"name":"b"},{"name":"c"}])";
+    with_rows.interlock_rows = 3;
+    ConditionRow row;
+    row.time = 17 * drivers::kSecond;
+    row.temperature_c = 44.5;
+    row.sensor_c = {21, 22, std::nan(""), 24};
+    row.command_g = 9;
+    row.set_point_g = 8.5;
+    row.measured_g = std::nan("");
+    row.shaker_state = 2;
+    row.shaker_running = 1;
+    row.ready = 1;
+    row.fault = 0;
+    row.interlock_value = {0.25, std::nan(""), -1};
+    row.interlock_raised = {0, 1, 0};
+    CampaignWriter writer(path, with_rows);
+    for (const auto& sample : samples(10, 0)) writer.sample(sample);
+    writer.condition(row);
+    writer.commit();
+    // WHEN it is read
+    const Campaign read = read_campaign(path);
+    // THEN it is there, and what was not known is not zero
+    EXPECT_EQ(read.head.interlocks, with_rows.interlocks);
+    ASSERT_EQ(read.conditions.size(), 1U);
+    const ConditionRow& found = read.conditions[0];
+    EXPECT_EQ(found.time, row.time);
+    EXPECT_EQ(found.temperature_c, 44.5);
+    EXPECT_EQ(found.sensor_c[1], 22);
+    EXPECT_TRUE(std::isnan(found.sensor_c[2]));
+    EXPECT_EQ(found.command_g, 9);
+    EXPECT_EQ(found.set_point_g, 8.5);
+    EXPECT_TRUE(std::isnan(found.measured_g));
+    EXPECT_EQ(found.shaker_state, 2);
+    EXPECT_EQ(found.shaker_running, 1);
+    EXPECT_EQ(found.ready, 1);
+    EXPECT_EQ(found.fault, 0);
+    EXPECT_EQ(found.slewing, -1);
+    ASSERT_EQ(found.interlock_value.size(), 3U);
+    EXPECT_EQ(found.interlock_value[2], -1);
+    EXPECT_TRUE(std::isnan(found.interlock_value[1]));
+    EXPECT_EQ(found.interlock_raised, (std::vector<std::uint8_t>{0, 1, 0}));
+}
+
 TEST_F(Recording, OfAWriterThatDiedIsMendedOnce) {
     // GIVEN what is on the disk while a campaign is written
     const std::string path = (folder_ / "campaign.h5").string();

@@ -209,5 +209,34 @@ TEST_F(Tool, FollowsEventsAcrossARestart) {
     waitpid(follower, nullptr, 0);
 }
 
+/// On a terminal, as a person has it.
+Outcome on_terminal(const std::string& environment, const std::string& arguments) {
+    const std::string command = "TERM=xterm " + environment + " script -qec '" + VIBRIG_PROGRAM +
+                                ' ' + arguments + "' /dev/null </dev/null 2>&1";
+    FILE* const pipe = popen(command.c_str(), "r");
+    Outcome outcome;
+    std::array<char, 4096> block{};
+    while (const std::size_t got = std::fread(block.data(), 1, block.size(), pipe))
+        outcome.output.append(block.data(), got);
+    pclose(pipe);
+    return outcome;
+}
+
+TEST_F(Tool, HasColoursOnATerminalThatWantsThem) {
+    const StatusServer server(source, path);
+    for (const char* command : {"status", "selftest"}) {
+        SCOPED_TRACE(command);
+        const std::string line = command + at;
+        EXPECT_NE(on_terminal("", line).output.find("\x1b["), std::string::npos);
+        for (const char* none : {"NO_COLOR=1", "NO_COLOR=1 FORCE_COLOR=1"})
+            EXPECT_EQ(on_terminal(none, line).output.find("\x1b["), std::string::npos);
+        EXPECT_NE(on_terminal("NO_COLOR=", line).output.find("\x1b["), std::string::npos)
+            << "empty is as not set";
+        EXPECT_EQ(vibrig(line).output.find("\x1b["), std::string::npos) << "into a pipe";
+        EXPECT_EQ(on_terminal("NO_COLOR=1", line + " --json").output.find("\x1b["),
+                  std::string::npos);
+    }
+}
+
 }  // namespace
 }  // namespace vibrig::serve

@@ -32,6 +32,39 @@ TEST(Axis, LabelsTellOneTickFromTheNext) {
     EXPECT_EQ(plain.text_of(plain.ticks().back()), "0.7");
 }
 
+TEST(Axis, OfLessThanADecadeHasLabels) {
+    // GIVEN data that span a half, two thirds, a little less and more than a decade, anywhere
+    for (const double span : {1.01, 2.0, 4.6, 9.9, 10.0, 30.0}) {
+        for (double low = 1.1e-5; low < 10; low *= 1.37) {
+            Axis axis("deg/h", true);
+            axis.include(low);
+            axis.include(low * span);
+            axis.settle();
+            // THEN there are labels to read a value by, within the axis, each once
+            const auto ticks = axis.ticks();
+            std::set<std::string> labels;
+            for (const double tick : ticks) {
+                EXPECT_GE(tick, axis.low * 0.999);
+                EXPECT_LE(tick, axis.high * 1.001);
+                labels.insert(axis.text_of(tick));
+            }
+            EXPECT_GE(labels.size(), 2U) << low << " to " << low * span;
+            EXPECT_EQ(labels.size(), ticks.size());
+        }
+    }
+}
+
+TEST(Axis, WithNamesHasThem) {
+    Axis axis("coefficient");
+    axis.exact = true;
+    axis.include(0.5);
+    axis.include(3.5);
+    axis.named = {{1, "D_Fx"}, {3, "D_Ox"}};
+    axis.settle();
+    EXPECT_EQ(axis.ticks(), (std::vector<double>{1, 3}));
+    EXPECT_EQ(axis.text_of(3), "D_Ox");
+}
+
 TEST(Axis, ThatIsExactKeepsItsRange) {
     Axis axis("coefficient");
     axis.exact = true;

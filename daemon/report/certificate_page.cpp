@@ -1,0 +1,151 @@
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "daemon/report/certificate.hpp"
+#include "daemon/report/page.hpp"
+#include "daemon/report/paperwork.hpp"
+
+namespace vibrig::report {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+/// Digits that two of the uncertainty's leave (JCGM 100, 7.2.6).
+int digits_of(double expanded) {
+    return std::clamp(1 - static_cast<int>(std::floor(std::log10(expanded))), 0, 12);
+}
+
+std::string fixed(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
+
+std::string text(const Json& of, const char* name) { return or_dash(of.value(name, "")); }
+
+std::string number_or(const Json& value, const char* none) {
+    return value.is_number() ? fmt::format("{:g}", value.get<double>()) : none;
+}
+
+void add_who(Page& page, const Json& c) {
+    const auto &lab = c["laboratory"], &customer = c["customer"], &item = c["item"],
+               &dates = c["dates"];
+    page.section("about", "Laboratory, customer, item");
+    page.table({{"", ""},
+                {"Laboratory", text(lab, "name") + ", " + text(lab, "address")},
+                {"Accreditation", text(lab, "accreditation")},
+                {"Customer", text(customer, "name") + ", " + text(customer, "address")},
+                {"Item", item.value("what", "") + ", " + text(item, "type") + ", serial number " +
+                             text(item, "serial")},
+                {"Received", text(item, "received") + ", condition: " + text(item, "condition")},
+                {"Calibrated", dates.value("begun", "") + " to " + dates.value("ended", "")},
+                {"Issued", dates.value("issued", "") + " by " + text(c, "issued_by")},
+                {"Performed by", text(c, "performed_by") + ", campaign " + text(c, "campaign")}},
+               "words");
+}
+
+void add_results(Page& page, const Json& c) {
+    page.section("results", "Results");
+    const auto& verdict = c["verdict"];
+    if (verdict.value("word", "") != "valid") {
+        page.paragraph("The result is DOUBTFUL:");
+        for (const auto& reason : verdict["reasons"])
+            page.paragraph("- " + reason.value("text", ""));
+    }
+    if (!c.value("mark", "").empty()) page.paragraph("Marked: " + c.value("mark", ""));
+    Rows rows{{"coefficient", "value", "U", "k", "unit"}};
+    for (const auto& r : c["results"]) {
+        const double expanded = r["expanded"];
+        const int digits = digits_of(expanded);
+        rows.push_back({r["name"], fixed(r["value"], digits), fixed(expanded, digits),
+                        fixed(r["k"], 2), r["unit"]});
+    }
+    page.table(rows);
+    page.paragraph(c["coverage"]);
+}
+
+void add_statements(Page& page, const Json& c) {
+    if (c["statements"].empty()) return;
+    page.section("conformity", "Statement of conformity");
+    Rows rows{{"coefficient", "from", "to", "unit", "statement"}};
+    for (const auto& s : c["statements"]) {
+        const std::string word = s["statement"];
+        rows.push_back({s["coefficient"], number_or(s["low"], "-"), number_or(s["high"], "-"),
+                        s["unit"], (word == "passes" ? "" : "!") + word});
+    }
+    page.table(rows);
+    page.paragraph("Decision rule: " + c["decision_rule"].value("words", ""));
+}
+
+void add_method(Page& page, const Json& c) {
+    page.section("method", "Method and conditions");
+    page.paragraph(c["method"]);
+    page.paragraph(c["equation"]);
+    Rows rows{{"condition", "least", "mean", "greatest", "unit"}};
+    for (const auto& r : c["conditions"])
+        rows.push_back({r["what"], fixed(r["least"], 2), fixed(r["mean"], 2),
+                        fixed(r["greatest"], 2), r["unit"]});
+    if (rows.size() > 1) {
+        page.table(rows);
+    } else {
+        page.paragraph("Environmental conditions: none were recorded.");
+    }
+    page.section("traceability", "Traceability");
+    Rows instruments{{"Instrument", "Serial number", "Certificate", "Due", ""}};
+    for (const auto& i : c["traceability"])
+        instruments.push_back({i["name"], text(i, "serial"), text(i, "certificate"), text(i, "due"),
+                               i.value("overdue", false) ? "!overdue at the time" : ""});
+    if (instruments.size() > 1) {
+        page.table(instruments, "words");
+    } else {
+        page.paragraph("No instruments are stated.");
+    }
+}
+
+void add_annex(Page& page, const Json& c) {
+    const auto& annex = c["annex"];
+    page.section("annex", "Annex");
+    page.paragraph("Replay: " + annex.value("replay", ""));
+    Rows rows{{"What", "SHA-256"}};
+    for (const auto& file : annex["recording"]) rows.push_back({file["file"], file["sha256"]});
+    rows.push_back({"configuration", annex["configuration_sha256"]});
+    rows.push_back({"result", annex["result_sha256"]});
+    page.table(rows, "words hashes");
+    Rows budget{{"coefficient", "input", "contribution"}};
+    for (const auto& [name, inputs] : annex["budget"].items()) {
+        for (const auto& input : inputs)
+            budget.push_back({name, input.value("input", ""),
+                              number_or(input.value("contribution", Json()), "-")});
+    }
+    if (budget.size() > 1) {
+        page.paragraph("Contributions to u, in the coefficient's unit:");
+        page.table(budget);
+    }
+    page.paragraph("Recorded by " + annex.value("recorded_by", "") + ", issued with " +
+                   annex.value("issued_with", "") + ".");
+}
+
+}  // namespace
+
+std::string certificate_page(const Json& certificate) {
+    Page page;
+    if (certificate.value("simulated", false)) {
+        page.mark("SIMULATED");
+    } else if (certificate["verdict"].value("word", "") != "valid") {
+        page.mark("DOUBTFUL");
+    }
+    page.paragraph("Number " + certificate.value("number", "") + ". " +
+                   text(certificate["laboratory"], "name"));
+    add_who(page, certificate);
+    add_results(page, certificate);
+    add_statements(page, certificate);
+    add_method(page, certificate);
+    page.section("remarks", "Remarks");
+    for (const auto& remark : certificate["remarks"]) page.paragraph(remark);
+    add_annex(page, certificate);
+    return page.html(certificate.value("title", ""), {"Performed by, date", "Authorised by, date"});
+}
+
+}  // namespace vibrig::report

@@ -1,0 +1,65 @@
+#include "daemon/report/conditions_section.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "daemon/tool/plot/chart.hpp"
+
+namespace vibrig::report {
+
+using tool::plot::Axis;
+using tool::plot::Chart;
+using tool::plot::Curve;
+using tool::plot::Look;
+
+namespace {
+constexpr std::array<Look, 3> kSensorLooks{Look::dashed, Look::dots, Look::line};
+constexpr std::size_t kMostRows = 600;
+}  // namespace
+
+void add_conditions(Page& page, const record::Campaign& campaign) {
+    page.section("conditions", "Conditions");
+    const auto& rows = campaign.conditions;
+    if (rows.size() < 2 || campaign.samples.empty())
+        return page.paragraph("None were recorded beside the samples.");
+    const double origin = drivers::to_seconds(campaign.samples.front().time);
+    const std::size_t every = std::max<std::size_t>(1, rows.size() / (kMostRows));
+    const auto curve = [&](const char* name, Look look, const auto& value) {
+        Curve made;
+        made.name = name;
+        made.look = look;
+        for (std::size_t i = 0; i < rows.size(); i += every) {
+            made.x.push_back(drivers::to_seconds(rows[i].time) - origin);
+            made.y.push_back(value(rows[i]));
+        }
+        return made;
+    };
+    const auto known = [](const Curve& c) {
+        return std::ranges::any_of(c.y, [](double y) { return std::isfinite(y); });
+    };
+    Chart temperature;
+    temperature.title = "Temperatures";
+    temperature.x = Axis("time, s");
+    temperature.y = Axis("degC");
+    temperature.curves = {
+        curve("inner element", Look::line, [](const auto& r) { return r.temperature_c; })};
+    for (std::size_t k = 0; k < drivers::kTemperatureSensors.size(); ++k)
+        temperature.curves.push_back(curve(drivers::kTemperatureSensors[k], kSensorLooks[k % 3],
+                                           [k](const auto& r) { return r.sensor_c[k]; }));
+    std::erase_if(temperature.curves, [&](const Curve& c) { return !known(c); });
+    if (!temperature.curves.empty())
+        page.figure(temperature.svg(), "As the platform told them; holes: it did not.");
+    Chart shaker;
+    shaker.title = "Shaker: command and read-back";
+    shaker.x = Axis("time, s");
+    shaker.y = Axis("peak at the table, g");
+    shaker.curves = {
+        curve("commanded", Look::line, [](const auto& r) { return r.command_g; }),
+        curve("set-point read back", Look::dashed, [](const auto& r) { return r.set_point_g; }),
+        curve("measured by the controller", Look::dots,
+              [](const auto& r) { return r.measured_g; })};
+    page.figure(shaker.svg(), "Once a second.");
+}
+
+}  // namespace vibrig::report

@@ -1,0 +1,58 @@
+function [drift, residual, determined] = compensation(campaign, attitude_deg, varargin)
+%COMPENSATION  What the gyros drift at an attitude under vibration, and what compensation leaves.
+%
+%   [drift, residual, determined] = vibrig.compensation(c, [45 0 90], 'table_g', 9)
+%
+%   ATTITUDE_DEG are encoder angles outer, inner, azimuth; 'table_g' or 'platform_g' the peak of the vibration, neither:
+%   at rest. DRIFT and RESIDUAL (1 sigma) are deg/h about the input axes of gyros x, y, z (3 x 1), as `vibrig compensate`
+%   gives them: h.D and sqrt(h'Ph) of Tang et al. 2009, eqs 8-9 with k1 = 1, k2 = 1 + a^2 / 2.
+if numel(attitude_deg) ~= 3 || ~all(isfinite(attitude_deg))
+  error('vibrig:argument', 'attitude_deg: expected three angles, deg');
+end
+level = 0;
+for i = 1:2:numel(varargin)
+  switch varargin{i}
+    case 'table_g', level = varargin{i + 1} * value_of(campaign, 'vibration.transmission');
+    case 'platform_g', level = varargin{i + 1};
+    otherwise, error('vibrig:argument', 'found %s, expected table_g or platform_g', varargin{i});
+  end
+end
+if ~(level >= 0 && level <= 1000)
+  error('vibrig:argument', 'level: found %g, expected 0 to 1000 g', level);
+end
+kappa = 1 + level^2 / 2;
+turned = value_of(campaign, 'platform.encoder_sign') .* (attitude_deg(:)' - value_of(campaign, 'platform.encoder_zero_deg'));
+a = turned(1); b = turned(2); g = turned(3);
+rx = [1 0 0; 0 cosd(a) -sind(a); 0 sind(a) cosd(a)];
+ry = [cosd(b) 0 sind(b); 0 1 0; -sind(b) 0 cosd(b)];
+rz = [cosd(g) -sind(g) 0; sind(g) cosd(g) 0; 0 0 1];
+up = rz * ry * rx * axis_of(value_of(campaign, 'platform.up'));
+of = campaign.coefficients;
+% What is not determined counts nothing here; `determined` says where it would.
+value = of.value; value(~of.observable) = 0;
+covariance = of.covariance; covariance(isnan(covariance)) = 0;
+drift = zeros(3, 1); residual = zeros(3, 1); determined = true(3, 1);
+gyros = 'xyz';
+for gyro = 1:3
+  names = value_of(campaign, ['platform.gyro_' gyros(gyro) '_axes']);
+  i = axis_of(names{1})' * up; o = axis_of(names{2})' * up; s = axis_of(names{3})' * up;
+  h = [1; i; o; s; kappa * [i^2; o^2; s^2; i * o; i * s; o * s]];
+  own = 10 * (gyro - 1) + (1:10);
+  determined(gyro) = all(of.observable(own) | abs(h) <= 1e-9);
+  drift(gyro) = h' * value(own);
+  residual(gyro) = sqrt(max(0, h' * covariance(own, own) * h));
+end
+end
+
+function value = value_of(campaign, key)
+% Of the effective configuration, a line for each key.
+line = regexp(campaign.configuration, ['(^|\n)' strrep(key, '.', '\.') '\s*=\s*([^#\n]*)'], 'tokens', 'once');
+if isempty(line), error('vibrig:format', '%s: found nothing in the configuration, expected a value', key); end
+value = jsondecode(strtrim(line{end}));
+if isnumeric(value), value = value(:)'; end
+end
+
+function axis = axis_of(name)
+axis = zeros(3, 1);
+axis('xyz' == name(2)) = 1 - 2 * (name(1) == '-');
+end

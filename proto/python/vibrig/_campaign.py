@@ -1,0 +1,447 @@
+"""A recorded campaign: its HDF5 files (campaign.h5, campaign-2.h5 ...) joined, as `vibrig` itself joins them."""
+from __future__ import annotations
+
+import json
+import os
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Iterator, Mapping, Sequence, Union
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from vibrig._coefficients import NAMES, Coefficients, Drift, up_in_platform
+
+try:
+    import tomllib
+except ImportError:  # before Python 3.11
+    tomllib = None  # type: ignore[assignment]
+
+FORMAT_VERSION = 2
+UNWRITTEN = np.iinfo(np.int64).min  # a row that never reached the disk
+SECOND = 10**9
+TABLES = ("samples", "orders", "dwells", "estimates", "conditions", "events", "gaps")
+TIMES = {"time_ns", "announced_ns", "from_ns", "to_ns"}
+LABELS: dict[str, Sequence[str]] = {
+    "angle_rad": ("outer", "inner", "azimuth"), "innovation_arcsec": ("outer", "inner", "azimuth"),
+    "force_g": "xyz", "zero_g": "xyz", "noise_walk": "xyz", "sensor_c": ("case", "gyro_x", "gyro_y", "gyro_z"),
+    "quality": ("outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table"),
+    "value": NAMES, "sigma": NAMES, "observable": NAMES}
+
+PathLike = Union[str, "os.PathLike[str]"]
+
+
+class FormatError(ValueError):
+    """A file that is not what was expected: place, what was found, what was expected."""
+
+
+@dataclass
+class _Segment:
+    """Rows of one file's table; its times move by `shift_ns` to those of the first file."""
+
+    path: Path
+    rows: int
+    keep: npt.NDArray[np.bool_]
+    shift_ns: int = 0
+
+
+class Table(Mapping[str, npt.NDArray[Any]]):
+    """Columns by name, (rows, ...) each, read when asked for. Times are those of the campaign's first file.
+
+    `units` and `descriptions`: by column, as the file states them.
+    """
+
+    def __init__(self, name: str, utc_offset_ns: int, labels: Mapping[str, Sequence[str]]) -> None:
+        self.name = name
+        self.units: dict[str, str] = {}
+        self.descriptions: dict[str, str] = {}
+        self._segments: list[_Segment] = []
+        self._utc_offset_ns = utc_offset_ns
+        self._labels = labels
+        self._read: dict[str, npt.NDArray[Any]] = {}
+
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
+        if column not in self.units:
+            raise KeyError(f"{self.name}: found no column {column!r}, expected one of {', '.join(self.units)}")
+        if column not in self._read:
+            parts = []
+            for segment in self._segments:
+                with _open_file(segment.path) as file:
+                    values = file[self.name][column][:segment.rows][segment.keep]
+                if values.dtype.kind == "S":
+                    values = np.array([v.decode("utf-8", "replace") for v in values], dtype=object)
+                parts.append(values + segment.shift_ns if column in TIMES else values)
+            self._read[column] = np.concatenate(parts)
+        return self._read[column]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.units)
+
+    def __len__(self) -> int:
+        return len(self.units)
+
+    def __repr__(self) -> str:
+        return f"<vibrig.Table {self.name}: {self.rows} rows of {', '.join(self.units)}>"
+
+    @property
+    def rows(self) -> int:
+        return int(sum(np.count_nonzero(segment.keep) for segment in self._segments))
+
+    def utc(self, column: str = "") -> npt.NDArray[np.datetime64]:
+        """Times of a column as UTC, datetime64[ns]; without a name those of the table's first column of times."""
+        column = column or next((name for name in ("time_ns", "from_ns") if name in self.units), "")
+        stamps: npt.NDArray[np.datetime64] = (self[column] + self._utc_offset_ns).astype("datetime64[ns]")
+        return stamps
+
+    def frame(self) -> Any:
+        """A pandas.DataFrame, index UTC. Columns of several numbers become several, as angle_rad_outer; matrices, such
+        as the dwells' covariance, stay out."""
+        import pandas
+
+        columns: dict[str, Any] = {}
+        for name in self.units:
+            values = self[name]
+            if values.ndim == 1:
+                columns[name] = values
+            elif values.ndim == 2:
+                labels = self._labels.get(name, range(values.shape[1]))
+                for label, one in zip(labels, values.T):
+                    columns[f"{name}_{label}"] = one
+        return pandas.DataFrame(columns, index=pandas.DatetimeIndex(self.utc(), tz="UTC", name="utc"))
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """All parts of a recorded campaign. Made by `vibrig.open`."""
+
+    folder: Path
+    parts: tuple[Path, ...]
+    name: str
+    started_by: str
+    state: str
+    """finished, aborted, ...; "running": not closed."""
+    reason: str
+    mark: str
+    """Why the campaign is marked; empty: it is not."""
+    utc_offset_ns: int
+    """UTC minus the times of the tables, ns."""
+    started_utc: np.datetime64
+    version: str
+    """Of the vibrigd that recorded it."""
+    configuration_text: str
+    """Effective configuration, TOML."""
+    dbc: str
+    plan: Mapping[str, Any]
+    result: Mapping[str, Any]
+    """As result.json; empty while the campaign runs, or without one."""
+    interlocks: Sequence[Mapping[str, Any]]
+    """Rows of the interlock's table: name, condition, unit, limit; the second dimension of
+    conditions["interlock_value"]."""
+    tables: Mapping[str, Table] = field(repr=False, default_factory=dict)
+
+    @property
+    def samples(self) -> Table:
+        return self.tables["samples"]
+
+    @property
+    def orders(self) -> Table:
+        """Dwells as they were ordered."""
+        return self.tables["orders"]
+
+    @property
+    def dwells(self) -> Table:
+        """Dwells done, with coefficients and covariance after each."""
+        return self.tables["dwells"]
+
+    @property
+    def estimates(self) -> Table:
+        """The filter while it works, once a second."""
+        return self.tables["estimates"]
+
+    @property
+    def conditions(self) -> Table:
+        """Temperatures, shaker, platform and interlock, once a second. Empty in recordings made before there were
+        any."""
+        return self.tables["conditions"]
+
+    @property
+    def events(self) -> Table:
+        return self.tables["events"]
+
+    @property
+    def gaps(self) -> Table:
+        """What is missing in the recording."""
+        return self.tables["gaps"]
+
+    @property
+    def configuration(self) -> Mapping[str, Any]:
+        """The effective configuration, parsed. Raises ImportError before Python 3.11."""
+        if tomllib is None:
+            raise ImportError("tomllib: found Python before 3.11, expected 3.11; configuration_text has the text")
+        return tomllib.loads(self.configuration_text)
+
+    @property
+    def verdict(self) -> Mapping[str, Any] | None:
+        """Level, word and reasons as in result.json; None: the result has none."""
+        verdict: Mapping[str, Any] | None = self.result.get("verdict")
+        return verdict
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """After the last dwell. Raises ValueError when there is none."""
+        dwells = self.dwells
+        if dwells.rows == 0:
+            raise ValueError(f"{self.parts[0]}: found no finished dwell, expected one")
+        return Coefficients(dwells["value"][-1], dwells["sigma"][-1], dwells["covariance"][-1],
+                            dwells["observable"][-1] != 0)
+
+    def compensation(self, attitude_deg: Sequence[float], *, table_g: float | None = None,
+                     platform_g: float | None = None) -> Drift:
+        """What the gyros drift at an attitude under vibration, and what compensation leaves; as `vibrig compensate`.
+
+        `attitude_deg`: encoder angles outer, inner, azimuth; peak at the table or at the platform, g, neither: at rest.
+        Raises ValueError.
+        """
+        if table_g is not None and platform_g is not None:
+            raise ValueError("table_g: found it beside platform_g, expected one of them")
+        if len(attitude_deg) != 3 or not np.all(np.isfinite(attitude_deg)):
+            raise ValueError(f"attitude_deg: found {attitude_deg!r}, expected three angles, deg")
+        settings = self.configuration
+        level = platform_g or (table_g or 0.0) * settings["vibration"]["transmission"]
+        if not 0 <= level <= 1000:
+            raise ValueError(f"level: found {level:g}, expected 0 to 1000 g")
+        platform = settings["platform"]
+        up = up_in_platform(attitude_deg, platform["up"], platform["encoder_sign"], platform["encoder_zero_deg"])
+        return self.coefficients.drift(up, 1 + level**2 / 2, [platform[f"gyro_{g}_axes"] for g in "xyz"])
+
+    def of_dwell(self, index: int) -> slice:
+        """Rows of `samples` that belong to a finished dwell (0 is the first), by its order's times and, where it was
+        cut short, by the samples that the filter saw. Raises IndexError."""
+        return self._dwell_rows()[index]
+
+    def _dwell_rows(self) -> list[slice]:
+        times, orders, dwells = self.samples["time_ns"], self.orders, self.dwells
+        begin = np.searchsorted(times, orders["from_ns"])
+        end = np.searchsorted(times, orders["to_ns"])
+        found: list[slice] = []
+        for i in range(orders.rows):
+            done = len(found)
+            if orders["cancel"][i] or done == dwells.rows:
+                continue
+            if (dwells["run"][done], dwells["position"][done]) != (orders["run"][i], orders["position"][i]):
+                continue
+            count = int(end[i] - begin[i])
+            if i + 1 < orders.rows and orders["cancel"][i + 1]:
+                count = min(count, int(dwells["samples"][done]))
+            found.append(slice(int(begin[i]), int(begin[i]) + count))
+        return found
+
+
+def _open_file(path: Path) -> h5py.File:
+    """Of one that is being written, too."""
+    try:
+        return h5py.File(path, "r", swmr=True)
+    except (OSError, ValueError) as error:
+        raise FormatError(f"{path}: found no HDF5 file that can be read ({error}), expected a campaign's; after a "
+                          "crash `vibrig recover` mends it") from error
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def part_name(part: int) -> str:
+    return "campaign.h5" if part == 1 else f"campaign-{part}.h5"
+
+
+def _part_files(folder: Path) -> dict[int, Path]:
+    parts = {}
+    for path in folder.iterdir():
+        number = re.fullmatch(r"campaign(?:-([2-9]|[1-9][0-9]+))?\.h5", path.name)
+        if number:
+            parts[int(number[1] or 1)] = path
+    return dict(sorted(parts.items()))
+
+
+def _parts_of(argument: Path) -> list[Path]:
+    if not argument.exists():
+        raise FileNotFoundError(f"{argument}: found nothing, expected a campaign's HDF5 file or its folder")
+    folder = argument if argument.is_dir() else argument.parent
+    parts = _part_files(folder)
+    if argument.is_dir():
+        if not parts:
+            inside = sorted(path for path in argument.iterdir() if path.is_dir() and _part_files(path))
+            if len(inside) == 1:
+                return _parts_of(inside[0])
+            found = "several: " + ", ".join(path.name for path in inside) if inside else "none"
+            raise FileNotFoundError(f"{argument}: found {found}, expected one campaign.h5")
+    elif argument not in parts.values():
+        return [argument]  # a file of another name stands for itself
+    missing = [part_name(i) for i in range(1, max(parts) + 1) if i not in parts]
+    if missing:
+        raise FileNotFoundError(f"{folder}: missing {', '.join(missing)}, expected all {max(parts)} parts")
+    return list(parts.values())
+
+
+@dataclass
+class _Part:
+    path: Path
+    attributes: dict[str, Any]
+    texts: dict[str, str]
+    segments: dict[str, _Segment]
+    columns: dict[str, dict[str, tuple[str, str]]]
+    """Of each table, by name: unit, description."""
+    few: dict[str, dict[str, npt.NDArray[Any]]]
+    """What joining needs."""
+
+    def move(self, by_ns: int) -> None:
+        for segment in self.segments.values():
+            segment.shift_ns = by_ns
+
+
+def _rows_of(group: h5py.Group) -> int:
+    """Of a group that may be growing: what every column has."""
+    rows = min((column.shape[0] for column in group.values()), default=0)
+    for column in group.values():
+        if column.dtype == np.int64 and rows:
+            unwritten = np.flatnonzero((column[:rows] == UNWRITTEN).reshape(rows, -1).any(axis=1))
+            rows = int(unwritten[0]) if len(unwritten) else rows
+    return int(rows)
+
+
+def _read_part(path: Path) -> _Part:
+    with _open_file(path) as file:
+        attributes = {name: _text(v) if isinstance(v, bytes) else v for name, v in file.attrs.items()}
+        if attributes.get("format") != "vibrig-campaign":
+            raise FormatError(f"{path}: attribute format: found {attributes.get('format', 'nothing')}, expected "
+                              "vibrig-campaign")
+        if attributes["format_version"] != FORMAT_VERSION:
+            raise FormatError(f"{path}: format_version: found {attributes['format_version']}, expected "
+                              f"{FORMAT_VERSION}")
+        texts = {name: _text(file[name][()]) if name in file else ""
+                 for name in ("configuration", "dbc", "plan", "result", "interlocks")}
+        segments, columns = {}, {}
+        for table in TABLES:
+            group = file.get(table)
+            rows = _rows_of(group) if group is not None else 0
+            segments[table] = _Segment(path, rows, np.ones(rows, dtype=bool))
+            columns[table] = {name: (_text(column.attrs.get("unit", "")), _text(column.attrs.get("description", "")))
+                              for name, column in (group.items() if group is not None else ())}
+        few = {table: {name: file[table][name][:segments[table].rows] for name in names} for table, names in
+               (("samples", ("time_ns",)), ("orders", ("announced_ns", "cancel", "run", "position")),
+                ("dwells", ("time_ns", "samples", "run", "position")))}
+    return _Part(path, attributes, texts, segments, columns, few)
+
+
+def _cut_back(parts: list[_Part], dwells_before: int) -> None:
+    """Forgets the dwells, and their orders, behind the first ones that the filter went on with after a restart."""
+    kept = left = 0
+    dwells = [(part, i) for part in parts for i in np.flatnonzero(part.segments["dwells"].keep)]
+    while kept < len(dwells) and left < dwells_before:
+        part, i = dwells[kept]
+        left += int(part.few["dwells"]["samples"][i] > 0)
+        kept += 1
+    for part, i in dwells[kept:]:
+        part.segments["dwells"].keep[i] = False
+    orders = [(part, i) for part in parts for i in np.flatnonzero(part.segments["orders"].keep)]
+    last = done = 0
+    for at, (part, i) in enumerate(orders):
+        if done == kept:
+            break
+        own, (of, k) = part.few["orders"], dwells[done]
+        if own["cancel"][i] or any(own[c][i] != of.few["dwells"][c][k] for c in ("run", "position")):
+            continue
+        done, last = done + 1, at + 1
+        if last < len(orders) and orders[last][0].few["orders"]["cancel"][orders[last][1]]:
+            last += 1
+    for part, i in orders[last:]:
+        part.segments["orders"].keep[i] = False
+
+
+def _kept_times(part: _Part, table: str, column: str) -> npt.NDArray[np.int64]:
+    segment = part.segments[table]
+    times: npt.NDArray[np.int64] = part.few[table][column][segment.keep] + segment.shift_ns
+    return times
+
+
+def _join(parts: list[_Part], part: _Part) -> None:
+    """`part` behind those that are there, as daemon/record/campaign_parts.cpp does it."""
+    before = np.concatenate([_kept_times(p, "samples", "time_ns") for p in parts])
+    last = int(before[-1]) if len(before) else 0
+    own = part.few["samples"]["time_ns"]
+    if part.attributes["restart"]:
+        shift = int(part.attributes["utc_offset_ns"]) - int(parts[0].attributes["utc_offset_ns"])
+        # UTC may have been set back meanwhile; dwells only know differences.
+        if len(own) and len(before) and int(own[0]) + shift <= last:
+            shift = last + SECOND - int(own[0])
+        part.move(shift)
+        _cut_back(parts, int(part.attributes["dwells_before"]))
+    else:
+        # The disk refused meanwhile: of what was kept for this file some may be in the other, too. It is of the same
+        # life of the daemon, so its clock is the same.
+        part.move(parts[-1].segments["samples"].shift_ns)
+        if len(before):
+            part.segments["samples"].keep &= _kept_times(part, "samples", "time_ns") > last
+        known = {(int(t), bool(c)) for p in parts for t, c in zip(
+            _kept_times(p, "orders", "announced_ns"), p.few["orders"]["cancel"][p.segments["orders"].keep])}
+        orders = part.few["orders"]
+        part.segments["orders"].keep &= np.array([(int(t), bool(c)) not in known for t, c in zip(
+            _kept_times(part, "orders", "announced_ns"), orders["cancel"])], dtype=bool)
+        done = np.concatenate([_kept_times(p, "dwells", "time_ns") for p in parts])
+        if len(done):
+            part.segments["dwells"].keep &= _kept_times(part, "dwells", "time_ns") > done[-1]
+    parts.append(part)
+
+
+def _json(text: str, what: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except ValueError as error:
+        raise FormatError(f"{what}: {error}, expected JSON") from error
+
+
+def open_campaign(path: PathLike) -> Campaign:
+    """Opens a campaign's folder (or the folder around it, or one of its files): all parts, in their order.
+
+    While it is written, too; then it is what there is at this moment. Raises FileNotFoundError, FormatError.
+    """
+    argument = Path(path)
+    parts: list[_Part] = []
+    for number, file in enumerate(_parts_of(argument), start=1):
+        part = _read_part(file)
+        if parts and (part.attributes["part"] != number
+                      or part.attributes["campaign"] != parts[0].attributes["campaign"]):
+            raise FormatError(f"{file}: found part {part.attributes['part']} of {part.attributes['campaign']}, expected "
+                              f"part {number} of {parts[0].attributes['campaign']}")
+        if parts:
+            _join(parts, part)
+        else:
+            parts.append(part)
+    return _made_of(parts)
+
+
+def _made_of(parts: list[_Part]) -> Campaign:
+    first, last = parts[0], parts[-1]
+    head, offset = first.attributes, int(first.attributes["utc_offset_ns"])
+    interlocks = _json(first.texts["interlocks"], f"{first.path}: interlocks") or []
+    rows = [str(row["name"]) for row in interlocks]
+    labels: dict[str, Sequence[str]] = {**LABELS, "interlock_value": rows, "interlock_raised": rows}
+    tables = {}
+    for name in TABLES:
+        table = tables[name] = Table(name, offset, labels)
+        # A part recorded by an older vibrigd may lack a table: then there is less of it, not nothing.
+        there = [part for part in parts if part.columns[name]]
+        common = [c for c in (there[0].columns[name] if there else ()) if all(c in p.columns[name] for p in there)]
+        for column in common:
+            table.units[column], table.descriptions[column] = there[0].columns[name][column]
+        table._segments = [part.segments[name] for part in there]
+    return Campaign(
+        folder=first.path.parent, parts=tuple(part.path for part in parts), name=head["name"],
+        started_by=head["started_by"], state=last.attributes["state"], reason=last.attributes.get("reason", ""),
+        mark=last.attributes.get("mark", ""), utc_offset_ns=offset,
+        started_utc=np.datetime64(int(head["started_utc_ns"]), "ns"), version=head["version"],
+        configuration_text=first.texts["configuration"], dbc=first.texts["dbc"],
+        plan=_json(first.texts["plan"], f"{first.path}: plan") or {},
+        result=_json(last.texts["result"], f"{last.path}: result") or {}, interlocks=interlocks, tables=tables)

@@ -1,0 +1,146 @@
+"""vibrig.open on recordings, good and bad."""
+import pathlib
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+import vibrig
+from conftest import SECOND, STEP
+
+ROOT = pathlib.Path(__file__).parents[2]
+
+
+def test_version_is_that_of_the_project():
+    project = re.search(r"project\(vibrig VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())
+    assert vibrig.__version__ == project[1]
+
+
+def test_arrays_have_shapes_and_units(campaign):
+    assert campaign.samples["force_g"].shape == (400, 3)
+    assert campaign.samples.units["force_g"] == "g"
+    assert campaign.samples.descriptions["force_g"] == "what force_g is"
+    assert campaign.events["text"][0] == "Umlaut \xe4"
+    assert campaign.conditions["interlock_value"].shape == (10, len(campaign.interlocks))
+    assert campaign.state == "finished" and campaign.verdict is None
+    with pytest.raises(KeyError, match="found no column 'force', expected one of"):
+        campaign.samples["force"]
+
+
+def test_frames_have_utc_and_a_column_for_each_number(campaign):
+    frame = campaign.conditions.frame()
+    assert list(frame.columns) == ["interlock_value_hot", "interlock_value_stuck", "temperature_c", "time_ns"]
+    assert str(frame.index[0]) == "2023-11-14 22:13:30+00:00"
+    assert {"force_g_x", "force_g_y", "force_g_z"} <= set(campaign.samples.frame().columns)
+    assert "value_D_OSz" in campaign.dwells.frame().columns
+
+
+def test_coefficients_with_covariance(campaign):
+    found = campaign.coefficients
+    assert found["D_Fx"] == vibrig.Coefficient("D_Fx", -1.0, found.sigma[0], "deg/h", True)
+    assert not found["D_OSz"].observable and np.isnan(found["D_OSz"].value)
+    assert np.all(np.isnan(found.covariance[29])) and np.all(np.isnan(found.covariance[:, 29]))
+    assert np.allclose(np.diag(found.correlation)[:29], 1)
+    assert found.frame().loc["D_IIy", "unit"] == "deg/h/g^2"
+    with pytest.raises(KeyError, match="expected one of D_Fx"):
+        found["D_t"]
+
+
+def test_compensation_by_hand(campaign):
+    # Levelled, gyro x: the vertical is its output axis (+y).
+    value, covariance = campaign.dwells["value"][-1], campaign.dwells["covariance"][-1]
+    level = 9 * 0.6667
+    h = np.zeros(10)
+    h[[0, 2, 5]] = 1, 1, 1 + level**2 / 2
+    drift = campaign.compensation([0, 0, 0], table_g=9)
+    assert drift.drift_dph[0] == pytest.approx(h @ value[:10])
+    assert drift.residual_dph[0] == pytest.approx(np.sqrt(h @ covariance[:10, :10] @ h))
+    assert drift.determined.all()
+    # D_OSz is not determined; it counts only where output and spin axis of gyro z are both inclined.
+    assert not campaign.compensation([30, 30, 45], platform_g=6).determined[2]
+    with pytest.raises(ValueError, match="expected one of them"):
+        campaign.compensation([0, 0, 0], table_g=9, platform_g=6)
+    for wrong in ([0, 0], [0, 0, float("nan")]):
+        with pytest.raises(ValueError, match="expected three angles"):
+            campaign.compensation(wrong)
+    with pytest.raises(ValueError, match="expected 0 to 1000 g"):
+        campaign.compensation([0, 0, 0], table_g=float("nan"))
+
+
+def test_rows_of_a_dwell(campaign):
+    assert campaign.of_dwell(0) == slice(0, 100)
+    assert campaign.of_dwell(1) == slice(100, 200)
+    with pytest.raises(IndexError):
+        campaign.of_dwell(2)
+
+
+def test_a_restart_takes_the_place_of_what_was_not_finished(recording):
+    # The second dwell was not in the journal, and the clock that of another boot.
+    recording.part(1, 10 * SECOND, [1, 2, 3], 2, state="running")
+    recording.part(2, SECOND, [2, 3], 2, restart=True, before=1, offset_s=1_700_002_000)
+    joined = vibrig.open(recording.folder.parent)
+    assert [p.name for p in joined.parts] == ["campaign.h5", "campaign-2.h5"]
+    assert list(joined.dwells["position"]) == [1, 2, 3] and list(joined.orders["position"]) == [1, 2, 3]
+    times = joined.samples["time_ns"]
+    assert len(times) == 800 and np.all(np.diff(times) > 0) and times[400] == 2001 * SECOND
+    assert joined.of_dwell(1) == slice(400, 500)
+    assert joined.state == "finished"
+
+
+def test_a_disk_that_refused_after_a_restart(recording):
+    recording.part(1, 5000 * SECOND, [1], 1, state="running")
+    recording.part(2, SECOND, [2, 3], 1, state="continued", restart=True, before=1, offset_s=1_700_009_000)
+    recording.part(3, SECOND + 400 * STEP, [4], 1, offset_s=1_700_009_000)
+    joined = vibrig.open(recording.folder)
+    assert np.all(np.diff(joined.samples["time_ns"]) > 0) and joined.samples.rows == 1200
+    assert list(joined.dwells["position"]) == [1, 2, 4]
+
+
+def test_what_both_files_have_is_there_once(recording):
+    recording.part(1, 10 * SECOND, [1, 2], 1, state="continued")
+    recording.part(2, 10 * SECOND + 100 * STEP, [2, 3], 2)
+    joined = vibrig.open(recording.folder)
+    assert joined.samples.rows == 500
+    assert list(joined.orders["position"]) == [1, 2, 3] and list(joined.dwells["position"]) == [1, 2, 3]
+
+
+def test_older_recordings_have_no_conditions(recording):
+    recording.part(1, 0, [1], 1, conditions=False)
+    assert vibrig.open(recording.folder).conditions.rows == 0
+
+
+def test_rows_that_never_reached_the_disk_are_left_out(recording):
+    path = recording.part(1, 0, [1], 1, state="running")
+    with h5py.File(path, "r+") as file:
+        file["samples/time_ns"][390:] = np.iinfo(np.int64).min
+    assert vibrig.open(path).samples["force_g"].shape == (390, 3)
+
+
+def test_what_is_missing_or_foreign_is_named(recording, tmp_path):
+    with pytest.raises(FileNotFoundError, match="found nothing, expected a campaign's"):
+        vibrig.open(tmp_path / "nowhere")
+    with pytest.raises(FileNotFoundError, match="found none, expected one campaign.h5"):
+        vibrig.open(recording.folder)
+    recording.part(2, 0, [1], 1)
+    with pytest.raises(FileNotFoundError, match="missing campaign.h5, expected all 2 parts"):
+        vibrig.open(recording.folder)
+    recording.part(1, 0, [1], 1, campaign="other-1")
+    with pytest.raises(vibrig.FormatError, match="found part 2 of test-1, expected part 2 of other-1"):
+        vibrig.open(recording.folder)
+    for name, content in {"empty.h5": b"", "foreign.h5": b"time_s,run\n",
+                          "cut.h5": (recording.folder / "campaign.h5").read_bytes()[:2000]}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(vibrig.FormatError, match=f"{name}: found no HDF5 file that can be read"):
+            vibrig.open(tmp_path / name)
+    path = recording.part(1, 0, [1], 1)
+    with h5py.File(path, "r+") as file:
+        file.attrs["format_version"] = 9
+    with pytest.raises(vibrig.FormatError, match="format_version: found 9, expected 2"):
+        vibrig.open(path)
+
+
+def test_a_campaign_without_a_finished_dwell_has_no_coefficients(recording):
+    recording.part(1, 0, [1], 0, state="aborted")
+    with pytest.raises(ValueError, match="found no finished dwell"):
+        vibrig.open(recording.folder).coefficients
