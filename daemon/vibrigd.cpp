@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstring>
@@ -11,14 +12,19 @@
 #include <sstream>
 
 #include "daemon/campaign_forecast.hpp"
+#include "daemon/configuration/forms.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/log/log_sink.hpp"
 #include "daemon/rig_lock.hpp"
+#include "daemon/serve/openapi.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/upgrade.hpp"
 #include "daemon/version.hpp"
 #include "daemon/watchdog.hpp"
 #include "estimator/instruction_set.hpp"
+#include "proto/command_tree.hpp"
+#include "proto/dbc.hpp"
+#include "proto/shipped_text.hpp"
 
 namespace {
 
@@ -174,6 +180,35 @@ int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
     return signal == 0 ? vibrig::kStartAgain : 0;
 }
 
+/// What is only printed: a flag for each.
+struct Print {
+    const char* flag;
+    const char* text;
+    std::string (*words)();
+    bool asked = false;
+};
+
+std::array<Print, 6> prints() {
+    return {{{"--schema", "print every key with type, unit, default and bounds, and end",
+              vibrig::configuration::format_schema},
+             {"--json-schema", "print the JSON Schema of the configuration file, for editors",
+              vibrig::configuration::format_json_schema},
+             {"--init", "print a commented configuration of the keys that a rig needs, with blanks",
+              vibrig::configuration::format_essentials},
+             {"--print-dbc", "print the built-in rig.dbc: the messages of the bus",
+              [] { return std::string(vibrig::proto::rig_dbc_text()); }},
+             {"--print-proto", "print vibrig.proto: status and commands on the wire",
+              [] { return std::string(vibrig::proto::vibrig_proto_text()); }},
+             {"--print-openapi", "print the OpenAPI description of the HTTP interface",
+              [] { return vibrig::serve::openapi_json() + "\n"; }}}};
+}
+
+constexpr std::initializer_list<vibrig::proto::Exit> kExits{
+    {0, "ended cleanly, rest measured; or what was asked for is printed"},
+    {1, "ended without rest measured: the log says what moves"},
+    {2, "bad usage or configuration, or another daemon has this rig"},
+    {75, "ended at rest for an upgrade; the service manager starts the new version"}};
+
 }  // namespace
 
 // NOLINTNEXTLINE(bugprone-exception-escape): before anything runs only memory can be short
@@ -183,16 +218,19 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", vibrig::kVersion);
     std::string path;
     bool check = false;
-    bool schema = false;
     app.add_option("--config", path, "configuration file (TOML); all defaults without one");
     app.add_flag("--check", check,
                  "validate, print the effective configuration with units and origins, and end");
-    app.add_flag("--schema", schema,
-                 "print every key with type, unit, default and bounds, and end");
+    auto printable = prints();
+    for (Print& print : printable) app.add_flag(print.flag, print.asked, print.text);
     std::string instruction_set = "auto";
     app.add_option("--instruction-set", instruction_set,
                    "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
+    if (vibrig::proto::asks_for_command_tree(argc, argv)) {
+        std::cout << vibrig::proto::command_tree_json(app, kExits);
+        return 0;
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -210,9 +248,10 @@ int main(int argc, char** argv) {
 
     try {
         vibrig::estimator::use_instruction_set(instruction_set);
-        if (schema) {
-            std::cout << vibrig::configuration::format_schema();
-            return 0;
+        for (const Print& print : printable) {
+            if (!print.asked) continue;
+            std::cout << print.words() << std::flush;
+            return std::cout ? 0 : 2;
         }
         auto loaded = vibrig::configuration::load(path, true);
         if (check) {

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/forms.hpp"
 #include "daemon/configuration/nearest.hpp"
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
@@ -43,7 +44,10 @@ class Reader {
                 read(*node.as_table(), key + ".");
             } else if (known != keys_.end()) {
                 places_[key] = place_of(node.source());
-                known->second->read(node, configuration_, problems_);
+                if (node.value<std::string_view>() == kBlank)
+                    blank(*known->second, places_[key]);
+                else
+                    known->second->read(node, configuration_, problems_);
             } else if (section) {
                 problems_.add(place_of(node.source()), key, describe(node), "a table");
             } else {
@@ -58,6 +62,12 @@ class Reader {
     [[nodiscard]] const std::map<std::string, Place>& places() const { return places_; }
 
   private:
+    /// What `vibrigd --init` left for a person, who has not filled it in.
+    void blank(const Key& key, Place place) {
+        const std::string unit = key.unit.empty() ? "" : " " + key.unit;
+        problems_.add(place, key.name, std::string("\"") + kBlank + "\"",
+                      key.bounds + unit + ": " + key.doc);
+    }
     [[nodiscard]] bool is_section(const std::string& key) const {
         const auto next = keys_.lower_bound(key + ".");
         return next != keys_.end() && next->first.compare(0, key.size() + 1, key + ".") == 0;

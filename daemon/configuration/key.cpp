@@ -31,8 +31,8 @@ Key converted(std::string name, std::string unit, Range range, std::string doc,
         }
     };
     auto write = [get = std::move(get)](Configuration& c) { return write_number(get(c)); };
-    return {std::move(name), "number", std::move(unit), bounds_of(range),
-            std::move(doc),  read,     std::move(write)};
+    return {std::move(name), "number", std::move(unit),  bounds_of(range),
+            std::move(doc),  read,     std::move(write), schema_of(range)};
 }
 
 Key number(std::string name, std::string unit, Range range, std::string doc, At<double> at) {
@@ -70,8 +70,10 @@ Key integer(std::string name, std::string unit, int low, int high, std::string d
         set(c, static_cast<int>(whole->get()));
     };
     auto write = [get = std::move(get)](Configuration& c) { return std::to_string(get(c)); };
-    return {std::move(name), "integer", std::move(unit), bounds,
-            std::move(doc),  read,      std::move(write)};
+    const std::string json = R"({"type":"integer","minimum":)" + std::to_string(low) +
+                             R"(,"maximum":)" + std::to_string(high) + '}';
+    return {std::move(name), "integer", std::move(unit),  bounds,
+            std::move(doc),  read,      std::move(write), json};
 }
 
 Key integer(std::string name, std::string unit, int low, int high, std::string doc, At<int> at) {
@@ -130,7 +132,16 @@ Key choice(std::string name, std::vector<std::string> words, std::string doc,
     auto write = [get = std::move(get), words](Configuration& c) {
         return write_text(words.at(get(c)));
     };
-    return {std::move(name), "choice", "", bounds, std::move(doc), read, std::move(write)};
+    std::string json;
+    for (const std::string& word : words) json += (json.empty() ? "\"" : ",\"") + word + '"';
+    return {std::move(name),
+            "choice",
+            "",
+            bounds,
+            std::move(doc),
+            read,
+            std::move(write),
+            R"({"enum":[)" + json + "]}"};
 }
 
 Key sign(std::string name, std::string doc, At<int> at) {
@@ -143,7 +154,8 @@ Key sign(std::string name, std::string doc, At<int> at) {
         at(c) = static_cast<int>(whole->get());
     };
     auto write = [at](Configuration& c) { return std::to_string(at(c)); };
-    return {std::move(name), "integer", "", "1 or -1", std::move(doc), read, std::move(write)};
+    return {std::move(name),  "integer",           "", "1 or -1", std::move(doc), read,
+            std::move(write), R"({"enum":[1,-1]})"};
 }
 
 }  // namespace vibrig::configuration

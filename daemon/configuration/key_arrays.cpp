@@ -13,6 +13,7 @@ namespace {
 /// divides by cos beta).
 constexpr Range kInner{-80, 80};
 constexpr Range kFullTurn{-360, 360};
+constexpr const char* kAxisSchema = R"({"enum":["+x","-x","+y","-y","+z","-z"]})";
 
 std::string element(const std::string& key, std::size_t i) {
     return key + "[" + std::to_string(i) + "]";
@@ -53,7 +54,8 @@ Key triple(std::string name, std::string unit, Range range, std::string doc,
     };
     auto write = [at](Configuration& c) { return write_triple(at(c)); };
     const std::string bounds = "3 x " + plain(range.low) + " to " + plain(range.high);
-    return {std::move(name), "numbers", std::move(unit), bounds, std::move(doc), read, write};
+    return {std::move(name), "numbers", std::move(unit), bounds,
+            std::move(doc),  read,      write,           schema_of_array(schema_of(range), 3, 3)};
 }
 
 Key signs(std::string name, std::string doc, At<std::array<int, 3>> at) {
@@ -74,7 +76,8 @@ Key signs(std::string name, std::string doc, At<std::array<int, 3>> at) {
         return "[" + std::to_string(value[0]) + ", " + std::to_string(value[1]) + ", " +
                std::to_string(value[2]) + "]";
     };
-    return {std::move(name), "integers", "", "3 x 1 or -1", std::move(doc), read, write};
+    return {std::move(name), "integers", "",    "3 x 1 or -1",
+            std::move(doc),  read,       write, schema_of_array(R"({"enum":[1,-1]})", 3, 3)};
 }
 
 Key matrix(std::string name, std::string doc, At<std::array<std::array<double, 3>, 3>> at) {
@@ -106,7 +109,14 @@ Key matrix(std::string name, std::string doc, At<std::array<std::array<double, 3
         return "[" + write_triple(m[0]) + ", " + write_triple(m[1]) + ", " + write_triple(m[2]) +
                "]";
     };
-    return {std::move(name), "matrix", "", "3 x 3, invertible", std::move(doc), read, write};
+    return {std::move(name),
+            "matrix",
+            "",
+            "3 x 3, invertible",
+            std::move(doc),
+            read,
+            write,
+            schema_of_array(schema_of_array(schema_of({-10, 10}), 3, 3), 3, 3)};
 }
 
 Key axis(std::string name, std::string doc, At<estimator::SignedAxis> at) {
@@ -116,7 +126,8 @@ Key axis(std::string name, std::string doc, At<estimator::SignedAxis> at) {
         }
     };
     auto write = [at](Configuration& c) { return write_axis(at(c)); };
-    return {std::move(name), "axis", "", R"("+x" ... "-z")", std::move(doc), read, write};
+    return {std::move(name), "axis", "",    R"("+x" ... "-z")",
+            std::move(doc),  read,   write, kAxisSchema};
 }
 
 Key axes(std::string name, std::string doc, At<std::array<estimator::SignedAxis, 3>> at) {
@@ -150,7 +161,8 @@ Key axes(std::string name, std::string doc, At<std::array<estimator::SignedAxis,
         return "[" + write_axis(value[0]) + ", " + write_axis(value[1]) + ", " +
                write_axis(value[2]) + "]";
     };
-    return {std::move(name), "axes", "", "x, y and z once each", std::move(doc), read, write};
+    return {std::move(name), "axes", "",    "x, y and z once each",
+            std::move(doc),  read,   write, schema_of_array(kAxisSchema, 3, 3)};
 }
 
 Key numbers(std::string name, std::string unit, Range range, std::size_t at_most, std::string doc,
@@ -181,7 +193,9 @@ Key numbers(std::string name, std::string unit, Range range, std::size_t at_most
     };
     const std::string bounds = "1 to " + std::to_string(at_most) + " numbers from " +
                                plain(range.low) + " to " + plain(range.high);
-    return {std::move(name), "numbers", std::move(unit), bounds, std::move(doc), read, write};
+    return {
+        std::move(name), "numbers", std::move(unit), bounds,
+        std::move(doc),  read,      write,           schema_of_array(schema_of(range), 1, at_most)};
 }
 
 Key positions(std::string name, std::size_t at_most, std::string doc,
@@ -212,7 +226,11 @@ Key positions(std::string name, std::size_t at_most, std::string doc,
     };
     const std::string bounds = "1 to " + std::to_string(at_most) +
                                " x [outer, inner, azimuth], |inner| <= " + plain(kInner.high);
-    return {std::move(name), "positions", "deg", bounds, std::move(doc), read, write};
+    return {
+        std::move(name), "positions",
+        "deg",           bounds,
+        std::move(doc),  read,
+        write,           schema_of_array(schema_of_array(schema_of(kFullTurn), 3, 3), 1, at_most)};
 }
 
 }  // namespace vibrig::configuration

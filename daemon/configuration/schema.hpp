@@ -23,6 +23,8 @@ struct Key {
     std::function<void(const toml::node&, Configuration&, Problems&)> read;
     /// As TOML; empty: the key does not apply to this configuration.
     std::function<std::string(Configuration&)> write;
+    /// JSON Schema of the value, one object; empty: what follows from the type.
+    std::string json{};
 };
 
 /// All keys, in the order in which they are shown.

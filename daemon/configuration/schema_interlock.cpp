@@ -209,13 +209,29 @@ std::string write_interlock(Configuration& c) {
     return "[" + text + "]";
 }
 
+/// JSON Schema of the rows; what limit a condition takes is read_interlock's to say.
+std::string interlock_schema() {
+    std::string names;
+    for (const rt::Condition& condition : rt::kConditions) {
+        if (condition.trip == rt::Trip::none) continue;
+        names += (names.empty() ? "\"" : ",\"") + std::string(condition.name) + '"';
+    }
+    return R"({"type":"array","items":{"type":"object","required":["name"],)"
+           R"("additionalProperties":false,"properties":{"name":{"type":"string"},)"
+           R"("condition":{"enum":[)" +
+           names +
+           R"(]},"reaction":{"enum":["off","alarm","abort"]},"limit":{"type":"number"},)"
+           R"("dwell_s":{"type":"number","minimum":0,"maximum":3600},)"
+           R"("latched":{"type":"boolean"}}}})";
+}
+
 }  // namespace
 
 void add_interlock_keys(std::vector<Key>& keys) {
     keys.push_back({kInterlock, "tables", "", "rows by name: conditions " + condition_names(),
                     "what is watched: over its limit for dwell_s, it alarms or aborts; a row takes "
                     "the place of the one of its name",
-                    read_interlock, write_interlock});
+                    read_interlock, write_interlock, interlock_schema()});
 }
 
 }  // namespace vibrig::configuration

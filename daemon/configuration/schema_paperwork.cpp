@@ -9,6 +9,11 @@ namespace {
 
 constexpr std::size_t kMostInstruments = 50;
 constexpr std::size_t kLongestText = 120;
+// A date has no type of its own in JSON.
+constexpr const char* kInstrumentSchema =
+    R"({"type":"array","maxItems":50,"items":{"type":"object","required":["name"],)"
+    R"("additionalProperties":false,"properties":{"name":{"type":"string"},)"
+    R"("serial":{"type":"string"},"certificate":{"type":"string"},"due":{}}}})";
 
 std::string short_text_rule(const std::string& text) {
     for (const char c : text) {
@@ -100,7 +105,7 @@ void add_paperwork_keys(std::vector<Key>& keys) {
         [](Configuration & c) -> auto& { return c.paperwork.unit_serial; }));
     keys.push_back({"instrument", "tables", "", "rows: name, serial, certificate, due (a date)",
                     "what it is measured with, for the report; an overdue one warns before arming",
-                    read_instruments, write_instruments});
+                    read_instruments, write_instruments, kInstrumentSchema});
 }
 
 }  // namespace vibrig::configuration

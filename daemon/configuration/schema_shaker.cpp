@@ -138,7 +138,8 @@ void add_watchdog_keys(std::vector<Key>& keys) {
                      c.shaker.registers.watchdog.reset();
                  }
              },
-             [](C&) { return std::string("false"); }};
+             [](C&) { return std::string("false"); },
+             R"({"const":false})"};
     show_if_watchdog(none, false);
     keys.push_back(std::move(none));
     const std::size_t first = keys.size();

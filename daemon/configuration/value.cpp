@@ -132,4 +132,14 @@ std::optional<std::array<double, 3>> read_triple(const toml::node& node, const s
     return good ? std::optional(value) : std::nullopt;
 }
 
+std::string schema_of(Range range) {
+    return R"({"type":"number","minimum":)" + write_number(range.low) + R"(,"maximum":)" +
+           write_number(range.high) + '}';
+}
+
+std::string schema_of_array(const std::string& element, std::size_t low, std::size_t high) {
+    return R"({"type":"array","items":)" + element + R"(,"minItems":)" + std::to_string(low) +
+           R"(,"maxItems":)" + std::to_string(high) + '}';
+}
+
 }  // namespace vibrig::configuration

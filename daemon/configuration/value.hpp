@@ -37,6 +37,11 @@ namespace vibrig::configuration {
 [[nodiscard]] std::string write_number(double value);
 [[nodiscard]] std::string write_triple(const std::array<double, 3>& value);
 [[nodiscard]] std::string write_text(const std::string& value);
+/// JSON Schema of one number.
+[[nodiscard]] std::string schema_of(Range range);
+/// JSON Schema of an array of `low` to `high` elements.
+[[nodiscard]] std::string schema_of_array(const std::string& element, std::size_t low,
+                                          std::size_t high);
 /// A bound as a person would write it: no ".0".
 [[nodiscard]] std::string plain(double value);
 /// For people: five significant digits are plenty for a limit.

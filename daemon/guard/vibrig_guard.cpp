@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "daemon/guard/guard.hpp"
+#include "proto/command_tree.hpp"
 
 namespace {
 
@@ -73,6 +74,15 @@ int main(int argc, char** argv) {
     bool check = false;
     app.add_option("--config", path, "vibrigd's configuration file (TOML)")->required();
     app.add_flag("--check", check, "print what the guard takes from it, and end");
+    if (vibrig::proto::asks_for_command_tree(argc, argv)) {
+        std::cout << vibrig::proto::command_tree_json(
+            app, {{0, "ended, or the configuration is good"},
+                  {1,
+                   "what may be over with a later start: a name that is not resolved yet, a "
+                   "place that another guard still has"},
+                  {2, "bad usage or configuration"}});
+        return 0;
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "daemon/tool/commands.hpp"
+#include "proto/command_tree.hpp"
 
 namespace {
 
@@ -36,6 +37,11 @@ int main(int argc, char** argv) {
     vibrig::tool::add_certificate(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
     vibrig::tool::add_pki(app, exit_code);
+    if (vibrig::proto::asks_for_command_tree(argc, argv)) {
+        std::cout << vibrig::proto::command_tree_json(
+            app, {{0, "done"}, {1, "the result says no"}, {kBadUsage, "bad usage or input"}});
+        return 0;
+    }
     // Of a word that it does not know CLI11 says only that there should be a command.
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
     const auto is_named = [&](const CLI::App* command) { return command->check_name(argv[1]); };

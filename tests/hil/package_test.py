@@ -393,6 +393,20 @@ def package(checks, build, folder, version):
     return path
 
 
+def is_complete(checks, package_file):
+    status, said = output("lintian", "--allow-root", "--fail-on", "error,warning", package_file)
+    checks.check(status == 0, "lintian finds neither errors nor warnings", said[-2000:])
+    files = output("dpkg-deb", "-c", package_file)[1]
+    missing = [name for name in ("man/man1/vibrig.1.gz", "man/man1/vibrig-plant.1.gz", "man/man5/vibrigd.toml.5.gz",
+                                 "man/man8/vibrigd.8.gz", "man/man8/vibrig-guard.8.gz", "vibrig/rig.dbc", "vibrig/vibrig.proto",
+                                 "vibrig/vibrigd.schema.json", "bash-completion/completions/vibrig",
+                                 "zsh/vendor-completions/_vibrig", "fish/vendor_completions.d/vibrig.fish",
+                                 "doc/vibrig/operating.md", "doc/vibrig/reference/keys.md", "doc/vibrig/changelog.gz")
+               if f"./usr/share/{name}\n" not in files + "\n"]
+    checks.equal(missing, [], "manual pages, completion, pages, rig.dbc, vibrig.proto and the schema are in the package")
+    checks.equal(output("dpkg-deb", "-f", package_file, "Suggests")[1], "chromium", "chromium is suggested")
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     soak = "--soak" in sys.argv
@@ -404,6 +418,7 @@ def main():
     with tempfile.TemporaryDirectory(dir=build) as folder:   # a booting system empties /tmp
         installs_below_a_prefix(checks, build, folder)
         packages = [package(checks, build, folder, version) for version in VERSIONS]
+        is_complete(checks, packages[0])
         limit = 14000 if soak else 240
         run = subprocess.run([os.path.join(HERE, "run-in-uml"), "--systemd", "-t", str(limit), "--", os.path.abspath(__file__),
                               programs, "--inside", *packages, *(["--soak"] if soak else [])], stdin=subprocess.DEVNULL,

@@ -3,8 +3,11 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "proto/command_tree.hpp"
+#include "proto/dbc.hpp"
 #include "tests/plant/commands.hpp"
 
 int main(int argc, char** argv) {
@@ -19,6 +22,21 @@ int main(int argc, char** argv) {
     vibrig::plant::add_run_command(app, exit_code);
     vibrig::plant::add_record_command(app, exit_code);
     vibrig::plant::add_judge_command(app, exit_code);
+    bool print_dbc = false;
+    app.add_flag("--print-dbc", print_dbc, "print the built-in rig.dbc, and end");
+    if (vibrig::proto::asks_for_command_tree(argc, argv)) {
+        std::fputs(vibrig::proto::command_tree_json(
+                       app, {{0, "done; judge: all coefficients within the limit"},
+                             {1, "judge: not so"},
+                             {2, "bad usage or input"}})
+                       .c_str(),
+                   stdout);
+        return 0;
+    }
+    if (argc == 2 && std::string_view(argv[1]) == "--print-dbc") {
+        const auto text = vibrig::proto::rig_dbc_text();
+        return std::fwrite(text.data(), 1, text.size(), stdout) == text.size() ? 0 : 2;
+    }
     try {
         // "vibrig-plant --can ..." means run.
         std::vector<std::string> arguments(argv + 1, argv + argc);
