@@ -41,6 +41,7 @@ std::optional<plan::AdaptivePlan> adaptive_plan(const configuration::Configurati
     settings.timing.ramp_s = c.campaign.ramp_s;
     const campaign::StageTimes stages = campaign::stage_times(c.campaign);
     settings.levelling_s = stages.levelling_s;
+    settings.timing.look_s = stages.look_s;
     settings.closing_s = stages.closing_s;
     settings.time_limit_s = c.campaign.time_limit_s;
     settings.period_s = period_s(c);

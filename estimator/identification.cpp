@@ -357,6 +357,7 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
         }
     }
     verdict.summary.noise = noise;
+    verdict.summary.left_out = verdict.rejected;
     samples += verdict.summary.samples;
     used += verdict.summary.used;
     rejected += verdict.summary.rejected;

@@ -135,6 +135,7 @@ struct DwellSummary {
     const char* reason = "";  ///< static text; empty when not flagged
     NoiseLevels noise;        ///< that the filter took in this dwell
     bool followed = false;    ///< flagged, but the estimate loses nothing by it
+    bool left_out = false;    ///< rejected as a whole: the estimate takes nothing of it
 };
 
 /// Fixed-size state of the identification for displays; copied without allocation.

@@ -508,9 +508,8 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
         const double sigma = zero_->level_sigma(here().stop.position_deg);
         level_variances_.emplace_back(summary.run, sigma * sigma);
     }
-    const bool rejected = summary.flagged && !summary.followed;
-    rejected_in_a_row_ = rejected ? rejected_in_a_row_ + 1 : 0;
-    if (rejected) rejected_for_ = summary.reason;
+    rejected_in_a_row_ = summary.left_out ? rejected_in_a_row_ + 1 : 0;
+    if (summary.left_out) rejected_for_ = summary.reason;
     if (summary.flagged) {
         ports_.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
                                                     summary.position, summary.reason));

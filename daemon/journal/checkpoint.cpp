@@ -100,10 +100,19 @@ std::string words(const estimator::NoiseLevels& levels) {
                        walk[1], walk[2]);
 }
 
+// One byte in the file; what an earlier program wrote as kFlagged may have been left out as well.
+enum Flag : char { kClean = 0, kFlagged = 1, kFollowed = 2, kLeftOut = 3 };
+
+Flag flag_of(const estimator::DwellSummary& summary) {
+    if (!summary.flagged) return kClean;
+    if (summary.left_out) return kLeftOut;
+    return summary.followed ? kFollowed : kFlagged;
+}
+
 std::string numbers_of(const estimator::DwellSummary& summary) {
     std::string bytes;
     each_number(summary, [&bytes](const auto& value) { put(bytes, value); });
-    bytes.push_back(!summary.flagged ? '\0' : summary.followed ? '\2' : '\1');
+    bytes.push_back(flag_of(summary));
     return bytes;
 }
 
@@ -168,8 +177,9 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     each_number(dwell.summary, [&reader](auto& value) { reader.get(value); });
     char flagged = 0;
     reader.get(flagged);
-    dwell.summary.flagged = flagged != 0;
-    dwell.summary.followed = flagged == 2;
+    dwell.summary.flagged = flagged != kClean;
+    dwell.summary.followed = flagged == kFollowed;
+    dwell.summary.left_out = flagged == kLeftOut;
     dwell.noise_known = version >= 2;
     if (dwell.noise_known) {
         each_level(dwell.summary.noise, [&reader](double& value) { reader.get(value); });
@@ -221,6 +231,7 @@ std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to) {
         estimator::DwellSummary summary = dwell.summary;
         if (dwell.measurements.empty()) {  // the filter never heard of it
             summary.reason = "no samples";
+            summary.left_out = true;
         } else {
             to.identification.begin_dwell(dwell.info);
             rt::DwellOrder order;
@@ -237,6 +248,8 @@ std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to) {
             blocks.consume([&to](const rt::BlockRecord& block) { to.noise.add(block); }, 256);
         }
         to.noise.conclude(summary, to.identification);
+        // An earlier program kept left out as flagged; what is left out has no sample in use.
+        if (dwell.summary.flagged) dwell.summary.left_out = summary.left_out;
         if (numbers_of(summary) != numbers_of(dwell.summary))
             return where + " does not come out as it did";
         dwell.summary = summary;

@@ -58,7 +58,7 @@ AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSe
 
 double AdaptivePlan::time_of(const PlannedRun& run, const std::array<double, 3>& here_deg) const {
     return planning::slew_s(here_deg, run.position_deg, adaptive_.timing) + adaptive_.levelling_s +
-           adaptive_.timing.settle_s + adaptive_.timing.dwell_s +
+           adaptive_.timing.look_s + adaptive_.timing.settle_s + adaptive_.timing.dwell_s +
            (run.table_g > 0 ? 2 * adaptive_.timing.ramp_s : 0);
 }
 

@@ -94,7 +94,7 @@ void EstimatorStage::finish() noexcept {
     } else {
         done.summary.run = current_.dwell.run;
         done.summary.position = current_.dwell.position;
-        done.summary.flagged = true;
+        done.summary.flagged = done.summary.left_out = true;
         done.summary.reason = "no samples";
         done.summary.noise = identification_.noise();
     }

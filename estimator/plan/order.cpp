@@ -42,7 +42,7 @@ Duration duration(const std::vector<Visit>& visits, const Order& order, const Ti
         const double slew = slew_s(here, visit.position_deg, timing);
         const double rest = timing.settle_s + timing.dwell_s;
         result.slewing_s += slew;
-        result.total_s += slew + rest;
+        result.total_s += slew + timing.look_s + rest;
         if (visit.level_g > 0) {
             result.total_s += 2 * timing.ramp_s;
             result.vibrating_s += rest + 2 * timing.ramp_s;

@@ -14,6 +14,7 @@ struct Timing {
     double settle_s = 3;
     double ramp_s = 2;          ///< up, and down again; none at rest
     double slew_deg_per_s = 5;  ///< each gimbal, all at once
+    double look_s = 1.5;        ///< gravity against the encoders, before the ramp: 1 to 2 s
 };
 
 struct Visit {

@@ -22,6 +22,7 @@ import tempfile
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import hard_times  # noqa: E402
 import modbus_proxy  # noqa: E402
 import rig as r  # noqa: E402
 import shaker_lies  # noqa: E402
@@ -190,6 +191,8 @@ class FaultRig(r.Rig):
         self.configure(CAMPAIGN, shaker=shaker, **{"record": {"enabled": False}, **tables})
         with open(self.configuration, "a", encoding="utf-8") as file:
             file.write(interlock)
+        with open(self.configuration, encoding="utf-8") as file:
+            self.configuration_text = file.read()
         self.modbus_port = plant_port
         self.start_daemon()
 
@@ -359,6 +362,7 @@ def matrix(checks, rig, pattern=""):
         if re.search(pattern, row[0]):
             fault(checks, rig, row)
     shaker_lies.rows(checks, rig, pattern)
+    hard_times.rows(checks, rig, pattern)
     if pattern:
         return
     one_acknowledgement(checks, rig, "emergency stop", plant("estop"), 2, plant_is_well)

@@ -2,7 +2,7 @@
 // calls that write.
 //   SICK_FOLDER   what lies below it is on that disk
 //   SICK_CONTROL  one byte: '-' healthy, 'e' every write fails with EIO, 's' fsync takes
-//   SICK_SECONDS
+//   SICK_SECONDS, 't' it takes 1 MB/s of all writers together, as a disk does that nothing caches
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/types.h>
@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 
 namespace {
 
@@ -46,6 +47,14 @@ void wait(int file) {
         ::sleep(static_cast<unsigned>(std::atoi(seconds)));
 }
 
+/// One after the other, as long as so many bytes take.
+void take_time(int file, size_t size) {
+    static std::mutex disk;
+    if (!on_the_disk(file) || state() != 't') return;
+    const std::lock_guard one(disk);
+    ::usleep(static_cast<useconds_t>(size));  // 1 MB/s: 1 us a byte
+}
+
 template <typename Function>
 Function real(const char* name) {
     return reinterpret_cast<Function>(::dlsym(RTLD_NEXT, name));
@@ -57,14 +66,17 @@ extern "C" {
 
 ssize_t write(int file, const void* bytes, size_t size) {
     static const auto next = real<ssize_t (*)(int, const void*, size_t)>("write");
+    take_time(file, size);
     return fails(file) ? -1 : next(file, bytes, size);
 }
 ssize_t pwrite(int file, const void* bytes, size_t size, off_t at) {
     static const auto next = real<ssize_t (*)(int, const void*, size_t, off_t)>("pwrite");
+    take_time(file, size);
     return fails(file) ? -1 : next(file, bytes, size, at);
 }
 ssize_t pwrite64(int file, const void* bytes, size_t size, off_t at) {
     static const auto next = real<ssize_t (*)(int, const void*, size_t, off_t)>("pwrite64");
+    take_time(file, size);
     return fails(file) ? -1 : next(file, bytes, size, at);
 }
 int fsync(int file) {

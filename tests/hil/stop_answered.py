@@ -193,10 +193,15 @@ def sick_disks(checks, rig, folder):
         rig.configure(CAMPAIGN, record={"folder": disk.folder, "segment_s": 3.0, "keep_free_mb": 0, "flush_s": 0.5}, **r.PATIENT)
         start(rig, disk.environment())
         for what, ill, well in (("disk full", disk.fill, disk.make_room), ("disk slow", lambda: disk.set("s"), lambda: disk.set("-")),
+                                ("disk of 1 MB/s", lambda: disk.set("t"), lambda: disk.set("-")),
                                 ("disk dead", lambda: disk.set("e"), lambda: disk.set("-"))):
             shake(checks, rig, what)
             ill()
             time.sleep(2)
+            if what == "disk of 1 MB/s":
+                status = rig.status()
+                checks.check(status["recorder"].get("good") and r.number(status["recorder"].get("samples_lost", 0)) == 0,
+                             f"{what}: everything is recorded", status["recorder"])
             stops(checks, rig, what)
             well()
         checks.check(rig.daemon.end(timeout=60) in (0, 1), "sick disks: it ends")

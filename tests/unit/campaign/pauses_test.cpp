@@ -51,7 +51,7 @@ struct WatchedCampaign : testing::Test {
     std::string unfit;
     estimator::Settings truth;  ///< of the rig
     double gravity = 1;
-    bool watched = false, all_rejected = false;
+    bool watched = false, all_rejected = false, all_flagged = false;
     std::size_t reported = 0;
     drivers::Time now = drivers::kSecond;
     std::unique_ptr<Campaign> campaign;
@@ -127,8 +127,9 @@ struct WatchedCampaign : testing::Test {
             estimator::DwellSummary summary;
             summary.run = orders.back().dwell.run;
             summary.position = orders.back().dwell.position;
-            summary.flagged = all_rejected;
-            summary.reason = all_rejected ? "mean force" : "";
+            summary.flagged = all_rejected || all_flagged;
+            summary.left_out = all_rejected;
+            summary.reason = all_rejected ? "mean force" : all_flagged ? "noise" : "";
             campaign->on_dwell_done(summary);
         }
         campaign->step(now);
@@ -215,6 +216,15 @@ TEST_F(WatchedCampaign, TwoRejectedDwellsInARowPauseAtRestWithTheCause) {
     // somebody who takes that upon himself goes on; the state stays finished
     ASSERT_TRUE(command(Kind::resume).accepted);
     EXPECT_TRUE(run_until(CampaignState::finished, 300));
+    EXPECT_EQ(orders.size(), 4U);
+}
+
+TEST_F(WatchedCampaign, DwellsThatAreFlaggedButUsedDoNotPause) {
+    // Another noise than in the earlier dwells, samples left out: the estimate takes them.
+    all_flagged = true;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
     EXPECT_EQ(orders.size(), 4U);
 }
 

@@ -73,7 +73,7 @@ TEST(Identification, TakesWhatAShortDwellHas) {
     feed(identification, 0, 40);
     const DwellSummary summary = identification.end_dwell();
     EXPECT_EQ(summary.used, 40U);
-    EXPECT_FALSE(summary.flagged) << summary.reason;
+    EXPECT_FALSE(summary.flagged || summary.left_out) << summary.reason;
     EXPECT_NEAR(summary.kappa, 19, 0.05);
     // and an empty one is no more than flagged
     identification.begin_dwell({});
@@ -176,6 +176,7 @@ TEST(Identification, ADwellWhoseGravityIsWrongIsTakenOutAgain) {
     identification.estimate(after);
     // THEN it leaves no trace but its counts
     EXPECT_TRUE(summary.flagged);
+    EXPECT_TRUE(summary.left_out);
     EXPECT_NEAR(summary.mean_force_g, 1.03, 1e-3);
     EXPECT_EQ(summary.used, 0U);
     EXPECT_EQ(before.value, after.value);

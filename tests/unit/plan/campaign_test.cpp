@@ -209,7 +209,8 @@ TEST(AdaptivePlan, EndsBeforeItsTimeLimitWithLevellingAndWhatComesAfterTheLastDw
     for (std::size_t i = 0; i < kParameters; ++i) covariance[i * kParameters + i] = 100;
     const auto run = plan.next(covariance, here, 0).run;
     const double dwell_s = planning::slew_s(here, run.position_deg, adaptive.timing) +
-                           adaptive.timing.settle_s + adaptive.timing.dwell_s +
+                           adaptive.timing.look_s + adaptive.timing.settle_s +
+                           adaptive.timing.dwell_s +
                            (run.table_g > 0 ? 2 * adaptive.timing.ramp_s : 0);
     // THEN the next dwell is begun only if it and the zeroing will be over in time
     const auto verdict = [&](double elapsed_s) {

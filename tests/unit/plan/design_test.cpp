@@ -314,9 +314,9 @@ TEST(Plan, OrdersSaveTravelOrBalanceDrift) {
     }
     EXPECT_LT(duration(visits, travel, {}).slewing_s, duration(visits, listed, {}).slewing_s);
     EXPECT_LT(drift_imbalance(rows, random), 0.2);
-    const Duration d = duration({visits[0], visits[1]}, {0, 1}, {100, 3, 2, 5});
+    const Duration d = duration({visits[0], visits[1]}, {0, 1}, {100, 3, 2, 5, 1.5});
     const double slew = slew_s({}, visits[0].position_deg, {});
-    EXPECT_NEAR(d.total_s, slew + 2 * 103 + 4, 1e-9) << "one at rest, one with ramps";
+    EXPECT_NEAR(d.total_s, slew + 2 * 104.5 + 4, 1e-9) << "one at rest, one with ramps";
     EXPECT_NEAR(d.vibrating_s, 107, 1e-9);
 }
 

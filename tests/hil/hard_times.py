@@ -1,0 +1,298 @@
+"""Rows of the fault matrix that are no fault of the bus: what is already true at the start and when it is armed again, the
+safe-state proof against a controller that lies, and an operating system that makes it hard."""
+import ctypes
+import json
+import mmap
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import rig as r
+import shaker_lies as lies
+
+ARM_S = 10          # for a refusal or a trip after arming and starting
+PROOF_S = 120       # "about a minute"
+TIMEOUT_S, STOP_S, RING_DOWN_S = lies.WATCHDOG_S, lies.STOP_S, 3.0
+ABORT_S = 0.2       # to the answer to an abort, under every fault
+
+
+# ---- already true: at the start, and when it is armed again
+
+def orders(*words):
+    return lambda rig: [rig.order(word) for word in words]
+
+
+def link(*words):
+    return lambda rig: subprocess.run(["ip", "link", *words], check=True, stdin=subprocess.DEVNULL)
+
+
+def broken(how):
+    return lambda rig: rig.proxy.break_with(how)
+
+
+def row_of(condition, limit=None):
+    limits = "" if limit is None else f"limit = {limit}\n"
+    return f'\n[[interlock]]\nname = "tested"\ncondition = "{condition}"\nreaction = "abort"\n{limits}'
+
+
+# Name of the condition; what makes it true and ends it; what stands in the configuration besides.
+TRUE_ALREADY = [
+    ("emergency_stop", orders("estop open"), orders("estop close"), ""),
+    ("shaker_fault", orders("fault latched-fault"), orders("clear"), ""),
+    ("platform_fault", orders("fault platform-fault"), orders("clear"), ""),
+    ("loop_open", orders("fault loop-open"), orders("clear"), ""),
+    ("stale_channel", orders("fault flag:x"), orders("clear"), ""),
+    ("stale_platform", orders("fault bus-silent=100000"), orders("clear"), ""),
+    ("can_lost", link("set", "vcan0", "down"), link("set", "vcan0", "up"), ""),
+    ("shaker_link_lost", broken("refuse"), broken(None), ""),
+    ("watchdog_changed", orders("fault timeout-register=0"), orders("clear"), ""),
+    ("read_back_mismatch", orders("fault modbus-wrong=value"), orders("clear"), ""),
+    ("uncommanded", orders("table 0.4"), orders("table own"), ""),
+    ("stop_disobeyed", orders("fault stuck-contactor", "table 0.4"), orders("clear", "table own"), ""),
+    ("amplitude_witness", orders("fault amplitude-scaled=2"), orders("clear"), ""),
+    ("over_armed_level", orders("fault amplitude-scaled=1.5"), orders("clear"), ""),
+    ("over_amplitude", orders("fault amplitude-scaled=3"), orders("clear"), ""),
+    ("stuck", orders("fault stuck:y"), orders("clear"), ""),
+    ("frame_loss", orders("fault lose=0.3"), orders("clear"), row_of("frame_loss", 1)),
+    ("gimbal_not_in_position", orders("fault spike=30,1"), orders("clear"), row_of("gimbal_not_in_position", 1)),
+    ("amplitude_off_command", orders("fault amplitude-scaled=1.3"), orders("clear"), row_of("amplitude_off_command", 1)),
+    ("temperature", orders(), orders(), row_of("temperature", 20)),
+    ("disk", orders(), orders(), row_of("disk", 9000000)),
+    ("guard_lost", orders(), orders(), row_of("guard_lost")),
+    ("annunciator_silent", orders(), orders(), row_of("annunciator_silent")),
+]
+OUTSIDE = {"guard_lost": {"guard": {"socket": "/tmp/nobody-guards.sock"}},
+           "annunciator_silent": {"annunciator": {"modbus": {"host": "127.0.0.1", "port": 9, "horn_coil": 1}}}}
+
+
+def try_to_shake(rig):
+    """Arms and starts whatever it says; what came of it. Acknowledges first what can be."""
+    status = rig.status()
+    if status is not None and status["campaign"]["state"] == "tripped":
+        rig.command("acknowledge", "trip")
+    said = [rig.command(kind) for kind in ("arm", "start")]
+    end = time.monotonic() + ARM_S
+    while time.monotonic() < end:
+        status = rig.status()
+        if status is None or status["campaign"]["state"] in ("recording", "tripped", "aborted", "idle", "paused"):
+            break
+        time.sleep(0.1)
+    return status, said
+
+
+def accepted(said):
+    return said is not None and said.get("accepted", False)
+
+
+def held_back(checks, rig, text, most_g):
+    status, said = try_to_shake(rig)
+    state = r.state_of(status)
+    recorded = status is None or any(r.number(dwell.get("samples", 0)) for dwell in status["campaign"]["dwells"])
+    checks.check(not recorded and status["campaign"]["state"] != "recording",
+                 f"{text}: nothing is recorded, it is refused or trips", f"{state} {said}\n{rig.logs()}")
+    took = lies.seconds_until(lambda: lies.table_g(rig) <= most_g, STOP_S + lies.SLACK_S)
+    checks.check(took is not None, f"{text}: the table is at rest within {STOP_S} s", f"{lies.table_g(rig)} g")
+
+
+def already_true(checks, rig, name, begin, undo, rows):
+    """True before the daemon starts; then it is armed again and again while it stays true; then it is over."""
+    rig.daemon.end(timeout=30)
+    before = rig.configuration_text
+    changed = before + rows
+    for table, keys in OUTSIDE.get(name, {}).items():
+        changed += "\n" + r.toml({table: {k: v for k, v in keys.items() if not isinstance(v, dict)}})
+        for key, value in keys.items():
+            if isinstance(value, dict):
+                changed += f"{key} = {{ {', '.join(f'{k} = {json.dumps(v)}' for k, v in value.items())} }}\n"
+    write(rig.configuration, changed)
+    # The rig's own table moves by itself only where the condition is just that.
+    moves = "table 0.4" if name in ("uncommanded", "stop_disobeyed") else ""
+    begin(rig)
+    rig.start_daemon()
+    rig.wait_for(lambda s: True, 30)
+    time.sleep(2)
+    most_g = 0.41 if moves else 0
+    held_back(checks, rig, f"already true at the start: {name}", most_g)
+    rig.wait_for(lambda s: not s["shaker"].get("stop_pending"), 5)
+    held_back(checks, rig, f"still true when armed again: {name}", most_g)
+    undo(rig)
+    rig.daemon.end(timeout=30)
+    write(rig.configuration, before)
+    rig.start_daemon()
+    rig.wait_for(lambda s: True, 30)
+    rested = rig.rest()
+    checks.check(rested is not None and rested["campaign"]["state"] in ("idle", "aborted", "finished"),
+                 f"over: {name} holds nobody up any more", r.state_of(rested))
+
+
+def write(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+# ---- the proof against a controller that lies
+
+# Truth, a word of the verdict; whether nothing but the emergency stop ends it.
+PROVED = [
+    ("honest", [], None, False),
+    ("ack-without-stop", ["ack-without-stop"], "not obeyed", False),
+    ("timeout-ignored", ["timeout-ignored"], "watchdog", False),
+    ("timeout-scaled", ["timeout-scaled=10"], "watchdog", False),
+    ("amplitude-scaled", ["amplitude-scaled=1.8"], "amplitude", False),
+    ("readback-echo of a dead table", ["dead-table", "readback-echo"], "amplitude", False),
+    ("stuck-contactor", ["stuck-contactor"], "not obeyed", True),
+    ("slow-ramp", ["slow-ramp=10"], "shaker", False),
+    ("unit-rms", ["unit-rms"], "rms", False),
+]
+
+
+def seconds_of(proof, name):
+    return next((row.get("value") for row in proof.get("rows", []) if row["name"] == name), None)
+
+
+def proved(checks, rig, name, faults, word, by_hand):
+    text = f"proof: {name}"
+    rig.rest()
+    rig.wait_for(lambda s: s["platform"].get("ready"), 60)
+    lies.lie(rig, *faults)
+    before = (rig.status() or {}).get("proof", {}).get("utc_ns", "0")
+    began = time.monotonic()
+    said = rig.command("selftest")
+    if not checks.check(accepted(said), f"{text}: begins", said):
+        return
+    end = began + PROOF_S
+    highest = 0.0
+    while time.monotonic() < end and (status := rig.status())["proof"].get("utc_ns", "0") == before:
+        highest = max(highest, lies.table_g(rig))
+        time.sleep(0.2)
+    proof = status["proof"]
+    checks.check(proof.get("utc_ns", "0") != before, f"{text}: over within {PROOF_S} s", r.state_of(status) + rig.logs())
+    if word is None:
+        good = proof.get("passed") and 0 < seconds_of(proof, "stop, table") <= STOP_S and \
+            0 < seconds_of(proof, "stop, platform") <= STOP_S + RING_DOWN_S and \
+            TIMEOUT_S / 2 <= seconds_of(proof, "watchdog, rest") <= TIMEOUT_S + STOP_S
+        checks.check(good, f"{text}: passes, with the times of the table", proof)
+    else:
+        found = json.dumps(proof) + " ".join(row["name"] for row in status["loop_check"].get("rows", []) if not row["passed"])
+        checks.check(not proof.get("passed") and word in found, f"{text}: does not pass, and says why", proof)
+    checks.check(highest <= 1.0, f"{text}: never more than 1 g at the table", f"{highest} g")
+    if by_hand:
+        took = lies.seconds_until(lambda: lies.tripped_by(rig, ("stop_disobeyed",)), STOP_S + RING_DOWN_S + lies.SLACK_S)
+        checks.check(took is not None, f"{text}: a disobeyed stop is said in its time", r.state_of(rig.status()))
+        rig.order("estop open")
+    took = lies.seconds_until(lambda: lies.table_g(rig) == 0, TIMEOUT_S + STOP_S + lies.SLACK_S)
+    checks.check(took is not None, f"{text}: at rest within {TIMEOUT_S + STOP_S} s of its end", f"{lies.table_g(rig)} g")
+    if by_hand:
+        rig.order("estop close")
+
+
+# ---- a hard time for the daemon: it goes on, and an abort is answered
+
+class Timex(ctypes.Structure):
+    _fields_ = [("modes", ctypes.c_uint), ("offset", ctypes.c_long), ("freq", ctypes.c_long), ("maxerror", ctypes.c_long),
+                ("esterror", ctypes.c_long), ("status", ctypes.c_int), ("more", ctypes.c_long * 24)]
+
+
+def leap_second(rig):
+    """Inserted by the kernel at midnight: 23:59:59 comes twice."""
+    day = 86400
+    time.clock_settime(time.CLOCK_REALTIME, (int(time.time()) // day + 1) * day - 3)
+    order = Timex(modes=0x10, status=0x10)   # ADJ_STATUS, STA_INS
+    if ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.byref(order)) < 0:
+        raise OSError(ctypes.get_errno(), "adjtimex")
+    before, steady = time.time(), time.monotonic()
+    time.sleep(8)
+    rig.leapt_s = (time.monotonic() - steady) - (time.time() - before)
+
+
+def no_leap_second(_):
+    order = Timex(modes=0x10, status=0)
+    ctypes.CDLL(None).adjtimex(ctypes.byref(order))
+
+
+def interrupted(rig):
+    """Stopped and continued 2000 times: epoll_wait(), sigtimedwait(), ppoll() of every thread come back with EINTR."""
+    pid = rig.daemon.process.pid
+    for _ in range(2000):
+        os.kill(pid, signal.SIGSTOP)
+        os.kill(pid, signal.SIGCONT)
+        time.sleep(0.002)
+
+
+def memory_short(rig):
+    """All but 24 MB of the machine's memory is somebody else's, touched and locked."""
+    with open("/proc/meminfo", encoding="ascii") as file:
+        free_kb = int(re.search(r"MemAvailable: +(\d+)", file.read())[1])
+    rig.memory_hog = subprocess.Popen([sys.executable, os.path.abspath(__file__), "hog", str(max(0, free_kb - 24 * 1024))],
+                                      stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, preexec_fn=r.die_with_parent)
+    rig.memory_hog.stdout.readline()
+
+
+def memory_free(rig):
+    rig.memory_hog.kill()
+    rig.memory_hog.wait()
+
+
+def hog(kilobytes):
+    write("/proc/self/oom_score_adj", "1000")
+    held = mmap.mmap(-1, kilobytes * 1024 or 1, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | mmap.MAP_POPULATE)
+    print("holds", flush=True)
+    while True:
+        for at in range(0, len(held), 4096):
+            held[at] = held[at] + 1 & 0xFF
+        time.sleep(0.1)
+
+
+def nothing(_):
+    pass
+
+
+HARD = [
+    ("EINTR storm", interrupted, nothing),
+    ("memory short", memory_short, memory_free),
+    ("leap second", leap_second, no_leap_second),
+]
+
+
+def gone_through(checks, rig, name, begin, undo):
+    shaking, found = rig.shake()
+    if not checks.check(shaking, f"{name}: the table shakes before", found + "\n" + rig.logs()):
+        return
+    first, state = len(rig.proxy.writes), None
+    begin(rig)
+    time.sleep(3)
+    state = rig.status()
+    checks.check(state is not None and state["campaign"]["state"] == "recording", f"{name}: it goes on",
+                 r.state_of(state) + "\n" + rig.logs())
+    writes = rig.proxy.writes[first:]
+    checks.check(not any(address < 5 for _, address, _ in writes), f"{name}: nothing is written but feeds", writes[:20])
+    if name == "leap second":
+        checks.check(0.9 < rig.leapt_s < 1.1, "leap second: the wall clock showed a second twice", rig.leapt_s)
+    for stage, received, accounted in r.balances(rig.status() or state):
+        checks.check(received == accounted, f"{name}: the loss balance closes: {stage}", f"{received} {accounted}")
+    began = time.monotonic()
+    answer = rig.command("abort")
+    took = time.monotonic() - began
+    checks.check(accepted(answer) and took < ABORT_S, f"{name}: an abort is answered within {ABORT_S} s", f"{took:.3f} s {answer}")
+    undo(rig)
+    rested = rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest", 20)
+    checks.check(rested["shaker"].get("rest") == "at rest", f"{name}: and ends at rest", rested["shaker"])
+
+
+def rows(checks, rig, pattern=""):
+    for name, *more in HARD:
+        if re.search(pattern, name):
+            gone_through(checks, rig, name, *more)
+    for name, *more in PROVED:
+        if re.search(pattern, "proof: " + name):
+            proved(checks, rig, name, *more)
+    for name, *more in TRUE_ALREADY:
+        if re.search(pattern, "already true: " + name):
+            already_true(checks, rig, name, *more)
+
+
+if __name__ == "__main__":
+    hog(int(sys.argv[2]))
