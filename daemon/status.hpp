@@ -74,6 +74,13 @@ struct JournalStatus {
     bool running = false;                               ///< false: the disk refuses; entries wait
     std::string note;                                   ///< what the disk says
     std::uint64_t taken = 0, written = 0, dropped = 0;  ///< entries; taken = written + waiting
+    std::string public_key;                             ///< its head is signed with, Ed25519, hex
+    std::string head;        ///< the newest entry of its chain, signed: journal::SignedHead::line
+    std::string proof_head;  ///< likewise the newest safe-state proof's entry; empty: none
+    std::uint64_t entries = 0;  ///< of the chain
+    bool verified = false;      ///< it is what was written into it, as looked at since the start
+    double verified_part = 0;   ///< so much of it
+    std::string not_watched;    ///< why it cannot be looked at just now; empty: it can
 };
 
 /// Recording of the present campaign, or of the last one.

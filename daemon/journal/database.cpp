@@ -2,15 +2,40 @@
 
 #include <sqlite3.h>
 
+#include <cstring>
+#include <filesystem>
+
 namespace vibrig::journal {
 
 namespace {
 constexpr int kBusyTimeout_ms = 2000;  // a person may be reading the file
+
+/// As a URI: nothing in a path may look like a query.
+std::string uri_of(const std::string& path) {
+    std::string uri = "file:";
+    for (const char c : path) {
+        if (c == '%' || c == '?' || c == '#') {
+            constexpr const char* kDigits = "0123456789abcdef";
+            uri += {'%', kDigits[c >> 4], kDigits[c & 0xf]};
+        } else {
+            uri += c;
+        }
+    }
+    return uri;
 }
+
+template <typename Number>
+void append_bytes(std::string& bytes, Number number) {
+    char raw[sizeof number];
+    std::memcpy(raw, &number, sizeof number);
+    bytes.append(raw, sizeof number);
+}
+}  // namespace
 
 bool DatabaseError::damaged() const noexcept {
     const int primary = code_ & 0xff;
-    return primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB;
+    // SQLITE_ERROR: a table or a column is not there.
+    return primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB || primary == SQLITE_ERROR;
 }
 
 void Database::Close::operator()(sqlite3* database) const noexcept { sqlite3_close_v2(database); }
@@ -18,14 +43,22 @@ void Database::Finalize::operator()(sqlite3_stmt* statement) const noexcept {
     sqlite3_finalize(statement);
 }
 
-Database::Database(const std::string& path) : path_(path) {
+Database::Database(const std::string& path, Mode mode) : path_(path) {
     sqlite3* opened = nullptr;
-    const int result = sqlite3_open_v2(
-        path.c_str(), &opened, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_EXRESCODE,
-        nullptr);
+    std::error_code none;
+    // Without a log beside it nobody writes, and what only reads should make none.
+    const bool alone = mode == Mode::read && !std::filesystem::exists(path + "-wal", none);
+    const std::string uri = uri_of(path) + (alone ? "?immutable=1" : "");
+    const int result =
+        sqlite3_open_v2(uri.c_str(), &opened,
+                        SQLITE_OPEN_URI | SQLITE_OPEN_EXRESCODE |
+                            (mode == Mode::read ? SQLITE_OPEN_READONLY
+                                                : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE),
+                        nullptr);
     database_.reset(opened);
     if (result != SQLITE_OK) fail("open");
     sqlite3_busy_timeout(opened, kBusyTimeout_ms);
+    if (mode == Mode::read) return;
     execute("PRAGMA journal_mode = WAL");
     execute("PRAGMA synchronous = FULL");
     execute("PRAGMA foreign_keys = ON");
@@ -94,6 +127,45 @@ std::vector<Row> Database::ask(const char* sql, const std::vector<Value>& values
                             static_cast<std::size_t>(sqlite3_column_bytes(statement.get(), i)));
             }
         }
+    }
+}
+
+std::string Database::row_bytes(const std::string& table, std::int64_t row) {
+    const std::string sql = "SELECT * FROM " + table + " WHERE rowid = ?";
+    const Statement statement = prepare(sql.c_str(), {row});
+    const int result = sqlite3_step(statement.get());
+    if (result == SQLITE_DONE) return {};
+    if (result != SQLITE_ROW) fail("read");
+    std::string bytes;
+    for (int i = 0; i < sqlite3_column_count(statement.get()); ++i) {
+        const int type = sqlite3_column_type(statement.get(), i);
+        bytes += static_cast<char>(type);
+        if (type == SQLITE_INTEGER) {
+            append_bytes(bytes, std::int64_t{sqlite3_column_int64(statement.get(), i)});
+        } else if (type == SQLITE_FLOAT) {
+            append_bytes(bytes, sqlite3_column_double(statement.get(), i));
+        } else if (type != SQLITE_NULL) {
+            const void* const column = sqlite3_column_blob(statement.get(), i);
+            const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement.get(), i));
+            append_bytes(bytes, std::uint64_t{size});
+            if (size > 0) bytes.append(static_cast<const char*>(column), size);
+        }
+    }
+    return bytes;
+}
+
+void Database::end_when(const std::atomic<bool>& stop) {
+    constexpr int kSteps = 10'000;  // of SQLite's machine, some 0.1 ms
+    sqlite3_progress_handler(
+        database_.get(), kSteps,
+        [](void* flag) { return static_cast<const std::atomic<bool>*>(flag)->load() ? 1 : 0; },
+        const_cast<std::atomic<bool>*>(&stop));
+}
+
+Snapshot::~Snapshot() {
+    try {
+        database_.execute("COMMIT");
+    } catch (const DatabaseError&) {  // it has ended by itself
     }
 }
 

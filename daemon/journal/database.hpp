@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <stdexcept>
@@ -38,7 +39,9 @@ struct Row {
 /// One SQLite file: WAL, synchronous FULL. One thread at a time. Everything throws DatabaseError.
 class Database {
   public:
-    explicit Database(const std::string& path);
+    /// read: changes nothing, and makes no files beside it.
+    enum class Mode : std::uint8_t { write, read };
+    explicit Database(const std::string& path, Mode mode = Mode::write);
     ~Database();
     Database(const Database&) = delete;
     Database& operator=(const Database&) = delete;
@@ -47,6 +50,10 @@ class Database {
     void run(const char* sql, const std::vector<Value>& values);
     [[nodiscard]] std::vector<Row> ask(const char* sql, const std::vector<Value>& values = {});
     [[nodiscard]] std::int64_t last_id() const noexcept;
+    /// A row as bytes, with the types of its columns; empty: there is no such row.
+    [[nodiscard]] std::string row_bytes(const std::string& table, std::int64_t row);
+    /// What takes long ends with a DatabaseError once `stop` is true.
+    void end_when(const std::atomic<bool>& stop);
 
   private:
     struct Close {
@@ -61,6 +68,18 @@ class Database {
 
     std::string path_;
     std::unique_ptr<sqlite3, Close> database_;
+};
+
+/// A picture of the file that no writer changes, as long as it lives.
+class Snapshot {
+  public:
+    explicit Snapshot(Database& database) : database_(database) { database_.execute("BEGIN"); }
+    ~Snapshot();
+    Snapshot(const Snapshot&) = delete;
+    Snapshot& operator=(const Snapshot&) = delete;
+
+  private:
+    Database& database_;
 };
 
 }  // namespace vibrig::journal

@@ -18,50 +18,13 @@ namespace {
 constexpr auto kPeriod = std::chrono::milliseconds(200);
 constexpr auto kRetry = std::chrono::seconds(1);
 
-constexpr const char* kSchema = R"(
-CREATE TABLE campaign (id INTEGER PRIMARY KEY, name TEXT NOT NULL, started_by TEXT NOT NULL,
-    started_utc_ns INTEGER NOT NULL, configuration_hash INTEGER NOT NULL,
-    state TEXT NOT NULL, reason TEXT NOT NULL DEFAULT '', ended_utc_ns INTEGER,
-    result_json TEXT);
-CREATE TABLE dwell (campaign INTEGER NOT NULL REFERENCES campaign(id), run INTEGER NOT NULL,
-    position INTEGER NOT NULL, samples INTEGER NOT NULL, used INTEGER NOT NULL,
-    rejected INTEGER NOT NULL, flagged INTEGER NOT NULL, reason TEXT NOT NULL,
-    checkpoint BLOB NOT NULL, PRIMARY KEY (campaign, run, position));
-CREATE TABLE event (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL, time_ns INTEGER NOT NULL,
-    severity TEXT NOT NULL, source TEXT NOT NULL, text TEXT NOT NULL);
-CREATE TABLE command (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL, kind TEXT NOT NULL,
-    person TEXT NOT NULL, argument TEXT NOT NULL, accepted INTEGER NOT NULL,
-    answer TEXT NOT NULL);
-)";
-
-// Later than version 1, whose readers leave it alone; made with the first check.
-constexpr const char* kLoopCheckTable = R"(
-CREATE TABLE IF NOT EXISTS loop_check (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
-    person TEXT NOT NULL, out_of_band TEXT NOT NULL);
-)";
-
-constexpr const char* kProofTable = R"(
-CREATE TABLE IF NOT EXISTS proof (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
-    person TEXT NOT NULL, record TEXT NOT NULL);
-)";
 constexpr std::size_t kProofsKept = 200;  // read back at the start
-constexpr const char* kSafetyTable = R"(
-CREATE TABLE IF NOT EXISTS safety (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
-    what TEXT NOT NULL, name TEXT NOT NULL, person TEXT NOT NULL, text TEXT NOT NULL,
-    two_persons INTEGER NOT NULL);
-)";
-// What stands in it.
+// What stands in the table safety.
 constexpr const char* kArmed = "armed";
 constexpr const char* kDisarmed = "disarmed";
 constexpr const char* kLatched = "latched";
 constexpr const char* kFirst = "acknowledged by the first";
 constexpr const char* kOver = "acknowledged";
-
-std::int64_t utc_now() {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(
-               std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
 
 const char* word_of(CommandRequest::Kind kind) {
     using Kind = CommandRequest::Kind;
@@ -84,67 +47,46 @@ const char* word_of(CommandRequest::Kind kind) {
     return "unknown";
 }
 
-/// The file and what SQLite keeps beside it.
-void put_aside(const std::string& path, const std::string& suffix) {
-    std::error_code error;
-    for (const char* part : {"", "-wal", "-shm"})
-        std::filesystem::rename(path + part, path + suffix + part, error);
+std::string joined(const std::vector<std::string>& words) {
+    std::string all;
+    for (const std::string& one : words) all += (all.empty() ? "" : "; ") + one;
+    return all;
 }
 
 }  // namespace
 
 Journal::Journal(const std::string& path, std::uint64_t configuration_hash,
-                 std::function<void(double)> on_space)
-    : path_(path), configuration_hash_(configuration_hash), on_space_(std::move(on_space)) {
-    const std::string aside = fmt::format(".{}", utc_now() / 1'000'000'000);
-    try {
-        open();
-        recover();
-    } catch (const DatabaseError& error) {
-        if (!error.damaged()) throw;
-        database_.reset();
-        recovery_ = {};
-        put_aside(path_, ".damaged" + aside);
-        recovery_.refused.push_back(
-            fmt::format("{}; put aside as {}.damaged{}: cold start", error.what(), path_, aside));
-        open();
-    }
+                 std::function<void(double)> on_space, std::vector<Anchor> anchors, Pace pace)
+    : path_(path),
+      configuration_hash_(configuration_hash),
+      on_space_(std::move(on_space)),
+      file_(path, std::move(anchors)),
+      watch_(path, pace) {
     status_.path = path_;
     status_.running = true;
+    open();
+    recover();
+    show();
 }
 
 Journal::~Journal() { stop(); }
 
 void Journal::open() {
-    database_ = std::make_unique<Database>(path_);
-    auto version = database_->ask("PRAGMA user_version").at(0).numbers.at(0);
-    if (version > kSchemaVersion) {
-        database_.reset();
-        const std::string suffix = fmt::format(".version-{}", version);
-        put_aside(path_, suffix);
-        recovery_.refused.push_back(
-            fmt::format("{}: found version {}, newer than {}; put aside as {}{}: cold start", path_,
-                        version, kSchemaVersion, path_, suffix));
-        database_ = std::make_unique<Database>(path_);
-        version = 0;
+    const auto found = file_.open();
+    if (!found.empty()) {
+        begin_anew(found);
+        recovery_.refused.push_back(take_found().front() + ": cold start");
+    } else if (file_.begins().find("taken over") != std::string::npos) {
+        recovery_.begins = fmt::format("{}: its chain begins {}", path_, file_.begins());
     }
-    if (const auto check = database_->ask("PRAGMA quick_check(1)");
-        check.empty() || check.front().texts.at(0) != "ok") {
-        throw DatabaseError(path_ + ": damaged", 11);  // SQLITE_CORRUPT
-    }
-    if (version == 0) {
-        database_->execute("BEGIN IMMEDIATE");
-        database_->execute(kSchema);
-        database_->execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
-        database_->execute("COMMIT");
-    }
+    watch_.begin({file_.newest(), file_.public_key(), file_.verified(), file_.intact()});
 }
 
 void Journal::recover() {
     recover_loop_check();
     recover_proofs();
     recover_safety();
-    const auto found = database_->ask(
+    const auto found = database().ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
         "ORDER BY id DESC LIMIT 1");
     if (found.empty() || found.front().texts.at(4) != "running") return;
@@ -161,54 +103,75 @@ void Journal::recover() {
 }
 
 void Journal::recover_loop_check() {
-    if (database_->ask("SELECT name FROM sqlite_master WHERE name = 'loop_check'").empty()) return;
     const auto newest =
-        database_->ask("SELECT out_of_band FROM loop_check ORDER BY id DESC LIMIT 1");
+        database().ask("SELECT out_of_band FROM loop_check ORDER BY id DESC LIMIT 1");
     if (!newest.empty()) recovery_.out_of_band = newest.front().texts.at(0);
 }
 
 void Journal::recover_proofs() {
-    if (database_->ask("SELECT name FROM sqlite_master WHERE name = 'proof'").empty()) return;
-    const auto rows = database_->ask(
+    const auto rows = database().ask(
         fmt::format("SELECT record FROM proof ORDER BY id DESC LIMIT {}", kProofsKept).c_str());
     for (auto row = rows.rbegin(); row != rows.rend(); ++row)
         recovery_.proofs.push_back(row->texts.at(0));
+    note_proof(database().ask("SELECT max(id) FROM proof").at(0).numbers.at(0));
+}
+
+void Journal::note_proof(std::int64_t row) {
+    const auto head = row == 0 ? std::optional<SignedHead>() : file_.head_of("proof", row);
+    proof_head_ = head ? head->line() : "";
+}
+
+void Journal::follow(const Safety& safety) {
+    const std::string_view what = safety.what;
+    if (what == kArmed) {
+        arming_ = safety;
+    } else if (what == kDisarmed) {
+        arming_ = {};
+    } else if (what == kLatched) {
+        latches_.add(
+            {safety.name, safety.text, safety.person, {}, safety.two_persons, safety.utc_ns});
+    } else if (what == kFirst || what == kOver) {
+        static_cast<void>(latches_.acknowledge(safety.name, safety.person));
+    }
+}
+
+void Journal::read_safety(Database& from) {
+    for (const Row& row :
+         from.ask("SELECT utc_ns, what, name, person, text, two_persons FROM safety ORDER BY id")) {
+        for (const char* what : {kArmed, kDisarmed, kLatched, kFirst, kOver}) {
+            if (row.texts[1] == what)
+                follow({what, row.texts[2], row.texts[3], row.texts[4], row.numbers[5] != 0,
+                        row.numbers[0]});
+        }
+    }
 }
 
 void Journal::recover_safety() {
-    database_->execute(kSafetyTable);
-    Latches latches;
-    Safety arming;
-    for (const Row& row : database_->ask(
-             "SELECT utc_ns, what, name, person, text, two_persons FROM safety ORDER BY id")) {
-        const std::string &what = row.texts[1], &name = row.texts[2], &person = row.texts[3];
-        if (what == kArmed) {
-            arming = {kArmed, name, person, row.texts[4], false, row.numbers[0]};
-        } else if (what == kDisarmed) {
-            arming = {};
-        } else if (what == kLatched) {
-            latches.add({name, row.texts[4], person, {}, row.numbers[5] != 0, row.numbers[0]});
-        } else if (what == kFirst || what == kOver) {
-            static_cast<void>(latches.acknowledge(name, person));
-        }
-    }
-    recovery_.latches = latches.open();
-    if (*arming.what == '\0') return;
+    latches_ = {};
+    arming_ = {};
+    read_safety(database());
+    recovery_.latches = latches_.open();
+    if (*arming_.what == '\0') return;
     // Before anything else is written, and as one: killed again, the next start finds the same.
     const Latch died{
         kDiedArmed,
-        fmt::format("the daemon ended while armed by {}: {}", arming.person, arming.text),
-        arming.person,
+        fmt::format("the daemon ended while armed by {}: {}", arming_.person, arming_.text),
+        arming_.person,
         {},
         false,
         utc_now()};
     recovery_.latches.push_back(died);
     latched(died);
-    disarmed(arming.person, "died");
+    disarmed(arming_.person, "died");
+}
+
+std::vector<std::string> Journal::take_found() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(found_, {});
 }
 
 void Journal::recover_dwells(Unfinished& campaign) {
-    const auto rows = database_->ask(
+    const auto rows = database().ask(
         "SELECT run, position, checkpoint FROM dwell WHERE campaign = ? ORDER BY rowid",
         {campaign.id});
     int without_noise = 0;
@@ -237,8 +200,10 @@ void Journal::recover_dwells(Unfinished& campaign) {
 }
 
 void Journal::start() {
+    started_ = true;
     thread_ = std::thread([this] { loop(); });
     ::pthread_setname_np(thread_.native_handle(), "journal");
+    watch_.start();
 }
 
 void Journal::stop() noexcept {
@@ -248,6 +213,7 @@ void Journal::stop() noexcept {
         changed_.notify_all();
     }
     if (thread_.joinable()) thread_.join();
+    watch_.stop();
 }
 
 std::uint64_t Journal::put(Entry entry) {
@@ -314,6 +280,7 @@ JournalStatus Journal::status() const {
 void Journal::loop() {
     std::deque<Entry> at_work;
     for (;;) {
+        look();
         std::deque<Entry> taken;
         bool last = false;
         {
@@ -337,6 +304,91 @@ void Journal::loop() {
     }
 }
 
+/// What is no longer what was written is put aside at once; what waits goes into the new file.
+void Journal::look() {
+    const auto report = watch_.report();
+    if (to_replace_.empty()) to_replace_ = report.found;
+    try {
+        if (to_replace_.empty() && file_.changed_by_others()) watch_.changed_by_others();
+        if (!to_replace_.empty()) {
+            begin_anew(to_replace_);
+            to_replace_.clear();
+            watch_.begin({file_.newest(), file_.public_key(), file_.verified(), file_.intact()});
+            if (on_written_) on_written_();
+        }
+    } catch (const DatabaseError& error) {
+        file_.roll_back();
+        if (error.damaged() && to_replace_.empty()) to_replace_ = {error.what()};
+        const std::lock_guard lock(mutex_);
+        status_.running = false;
+        status_.note = error.what();
+        return;
+    }
+    show();
+}
+
+/// For the status.
+void Journal::show() {
+    const auto report = watch_.report();
+    const std::lock_guard lock(mutex_);
+    status_.verified = report.verified;
+    status_.verified_part = report.verified ? 1 : report.part;
+    status_.not_watched = report.cannot;
+    status_.public_key = file_.public_key();
+    status_.head = file_.head().line();
+    status_.proof_head = proof_head_;
+    status_.entries = static_cast<std::uint64_t>(file_.newest().entry);
+}
+
+void Journal::begin_anew(const std::vector<std::string>& found) {
+    std::vector<Row> campaign;
+    try {
+        if (started_) {  // what is latched and armed is known
+            campaign = database().ask(
+                "SELECT id, name, started_by, started_utc_ns, configuration_hash FROM campaign "
+                "WHERE id = ?",
+                {campaign_});
+        } else {
+            read_safety(database());
+        }
+    } catch (const DatabaseError&) {  // without it
+    }
+    const std::string why = joined(found);
+    file_.replace(found, [&] {
+        carry_over(why);
+        carry_campaign(campaign);
+    });
+    campaign_ = campaign.empty() ? 0 : campaign_;
+    proof_head_.clear();
+    follow({kLatched, kJournalLatch, {}, why, false, utc_now()});
+    const std::lock_guard lock(mutex_);
+    found_.push_back(
+        file_.aside().empty() ? why : fmt::format("{}; put aside as {}", why, file_.aside()));
+}
+
+/// What is latched and armed stands in the new file before anything else, and why there is one.
+void Journal::carry_over(const std::string& why) {
+    for (const Latch& latch : latches_.open()) {
+        write_one(Safety{kLatched, latch.name, latch.armed_by, latch.cause, latch.two_persons,
+                         latch.utc_ns});
+        if (!latch.first.empty())
+            write_one(Safety{kFirst, latch.name, latch.first, {}, false, utc_now()});
+    }
+    write_one(Safety{kLatched, kJournalLatch, {}, why, false, utc_now()});
+    if (*arming_.what != '\0') write_one(arming_);
+}
+
+void Journal::carry_campaign(const std::vector<Row>& campaign) {
+    if (campaign.empty()) return;
+    const Row& row = campaign.front();
+    database().run(
+        "INSERT INTO campaign (id, name, started_by, started_utc_ns, configuration_hash, state) "
+        "VALUES (?, ?, ?, ?, ?, 'running')",
+        {row.numbers[0], std::string_view(row.texts[1]), std::string_view(row.texts[2]),
+         row.numbers[3], row.numbers[4]});
+    chained("campaign");
+}
+
 void Journal::take_fed() {
     constexpr std::size_t kMostCollected = 8;
     while (fed_.consume([this](const rt::Fed& fed) {
@@ -353,18 +405,21 @@ bool Journal::write(const std::deque<Entry>& entries) {
     const std::int64_t campaign = campaign_;
     std::string why;
     try {
-        database_->execute("BEGIN IMMEDIATE");
+        file_.begin();
         for (const Entry& entry : entries) {
             std::visit([this](const auto& one) { write_one(one); }, entry);
         }
-        database_->execute("COMMIT");
+        file_.commit();
+        for (const Entry& entry : entries) {
+            if (const auto* safety = std::get_if<Safety>(&entry)) follow(*safety);
+            if (std::holds_alternative<Proved>(entry))
+                note_proof(database().ask("SELECT max(id) FROM proof").at(0).numbers.at(0));
+        }
     } catch (const DatabaseError& error) {
         why = error.what();
         campaign_ = campaign;
-        try {
-            database_->execute("ROLLBACK");
-        } catch (const DatabaseError&) {  // SQLite has rolled back by itself
-        }
+        file_.roll_back();
+        if (error.damaged()) to_replace_ = {why};
     }
     {
         const std::lock_guard lock(mutex_);
@@ -373,7 +428,17 @@ bool Journal::write(const std::deque<Entry>& entries) {
         if (why.empty()) status_.written += entries.size();
     }
     if (on_written_) on_written_();
+    if (why.empty()) publish();
     return why.empty();
+}
+
+/// After it was told that the entries are on disk: nobody waits for the head, which may lag behind.
+void Journal::publish() {
+    const auto why = file_.publish();
+    watch_.wrote(file_.newest(), why.empty() ? file_.newest() : Link{});
+    if (why.empty()) return;
+    const std::lock_guard lock(mutex_);
+    status_.note = "its signed head: " + why;
 }
 
 void Journal::write_one(const Begun& begun) {
@@ -381,13 +446,17 @@ void Journal::write_one(const Begun& begun) {
         campaign_ = begun.resumed_id;
         return;
     }
-    database_->run("UPDATE campaign SET state = 'given up' WHERE state = 'running'", {});
-    database_->run(
+    for (const Row& row : database().ask("SELECT id FROM campaign WHERE state = 'running'")) {
+        database().run("UPDATE campaign SET state = 'given up' WHERE id = ?", {row.numbers[0]});
+        file_.chained("campaign", row.numbers[0]);
+    }
+    database().run(
         "INSERT INTO campaign (name, started_by, started_utc_ns, configuration_hash, state) "
         "VALUES (?, ?, ?, ?, 'running')",
         {std::string_view(begun.name), std::string_view(begun.by), begun.utc_ns,
          static_cast<std::int64_t>(configuration_hash_)});
-    campaign_ = database_->last_id();
+    campaign_ = database().last_id();
+    chained("campaign");
 }
 
 void Journal::write_one(const Done& done) {
@@ -404,60 +473,69 @@ void Journal::write_one(const Done& done) {
     // Measurements that were lost on the way would give another filter.
     const bool whole = dwell.measurements.size() == done.summary.samples;
     const std::string bytes = whole ? encode(dwell, configuration_hash_) : std::string{};
-    database_->run("INSERT OR REPLACE INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                   {campaign_, std::int64_t{done.info.run}, std::int64_t{done.info.position},
-                    std::int64_t{done.summary.samples}, std::int64_t{done.summary.used},
-                    std::int64_t{done.summary.rejected}, std::int64_t{done.summary.flagged},
-                    std::string_view(done.summary.reason), Blob{bytes}});
+    const auto row = database().ask(
+        "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) "
+        "ON CONFLICT (campaign, run, position) DO UPDATE SET samples = excluded.samples, "
+        "used = excluded.used, rejected = excluded.rejected, flagged = excluded.flagged, "
+        "reason = excluded.reason, checkpoint = excluded.checkpoint RETURNING rowid",
+        {campaign_, std::int64_t{done.info.run}, std::int64_t{done.info.position},
+         std::int64_t{done.summary.samples}, std::int64_t{done.summary.used},
+         std::int64_t{done.summary.rejected}, std::int64_t{done.summary.flagged},
+         std::string_view(done.summary.reason), Blob{bytes}});
+    file_.chained("dwell", row.front().numbers[0]);
 }
 
 void Journal::write_one(const Ended& ended) {
     if (campaign_ == 0) return;
-    database_->run(
+    database().run(
         "UPDATE campaign SET state = ?, reason = ?, ended_utc_ns = ?, result_json = ? "
         "WHERE id = ?",
         {std::string_view(ended.state), std::string_view(ended.reason), ended.utc_ns,
          std::string_view(ended.result), campaign_});
+    file_.chained("campaign", campaign_);
     campaign_ = 0;
     collected_.clear();
 }
 
 void Journal::write_one(const EventRecord& event) {
-    database_->run(
+    database().run(
         "INSERT INTO event (utc_ns, time_ns, severity, source, text) VALUES (?, ?, ?, ?, ?)",
         {event.utc_ns, event.time, std::string_view(name_of(event.severity)),
          std::string_view(event.source), std::string_view(event.text)});
+    chained("event");
 }
 
 void Journal::write_one(const Commanded& commanded) {
-    database_->run(
+    database().run(
         "INSERT INTO command (utc_ns, kind, person, argument, accepted, answer) "
         "VALUES (?, ?, ?, ?, ?, ?)",
         {commanded.utc_ns, std::string_view(word_of(commanded.request.kind)),
          std::string_view(commanded.request.by), std::string_view(commanded.request.argument),
          std::int64_t{commanded.reply.accepted}, std::string_view(commanded.reply.message)});
+    chained("command");
 }
 
 void Journal::write_one(const LoopChecked& checked) {
-    database_->execute(kLoopCheckTable);
-    database_->run(
+    database().run(
         "INSERT INTO loop_check (utc_ns, person, out_of_band) VALUES (?, ?, ?)",
         {checked.utc_ns, std::string_view(checked.by), std::string_view(checked.out_of_band)});
+    chained("loop_check");
 }
 
 void Journal::write_one(const Proved& proved) {
-    database_->execute(kProofTable);
-    database_->run("INSERT INTO proof (utc_ns, person, record) VALUES (?, ?, ?)",
+    database().run("INSERT INTO proof (utc_ns, person, record) VALUES (?, ?, ?)",
                    {proved.utc_ns, std::string_view(proved.by), std::string_view(proved.record)});
+    chained("proof");
 }
 
 void Journal::write_one(const Safety& safety) {
-    database_->run(
+    database().run(
         "INSERT INTO safety (utc_ns, what, name, person, text, two_persons) "
         "VALUES (?, ?, ?, ?, ?, ?)",
         {safety.utc_ns, std::string_view(safety.what), std::string_view(safety.name),
          std::string_view(safety.person), std::string_view(safety.text),
          std::int64_t{safety.two_persons}});
+    chained("safety");
 }
 
 }  // namespace vibrig::journal

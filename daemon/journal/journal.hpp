@@ -13,15 +13,15 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/journal/chained_file.hpp"
 #include "daemon/journal/checkpoint.hpp"
 #include "daemon/journal/latches.hpp"
+#include "daemon/journal/watch.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
 #include "daemon/status.hpp"
 
 namespace vibrig::journal {
-
-class Database;
 
 /// A campaign that was not ended in order, as far as its positions are done.
 struct Unfinished {
@@ -35,6 +35,7 @@ struct Recovery {
     std::optional<Unfinished> campaign;
     /// Why what was there is not used: a cold start, in words. Empty: nothing was refused.
     std::vector<std::string> refused;
+    std::string begins;               ///< how its chain begins, where rows were taken over
     std::string assumed;              ///< of what an older version did not keep; empty: nothing
     std::string out_of_band;          ///< what the newest loop check found so; empty: nothing
     std::vector<std::string> proofs;  ///< of the safe state, as they were kept, oldest first
@@ -46,10 +47,12 @@ struct Recovery {
 /// and who commanded what. SQLite on a thread of its own; whoever writes never waits for the disk.
 class Journal {
   public:
-    /// Opens or makes the file and reads what an earlier life left. A damaged or newer file is put
-    /// aside. Throws DatabaseError when there can be no journal at all.
+    /// Opens or makes the file and reads what an earlier life left. What is not what was written
+    /// into it is put aside, and latches kJournalLatch. `anchors`: its signed heads that are kept
+    /// elsewhere. Throws DatabaseError when there can be no journal at all.
     Journal(const std::string& path, std::uint64_t configuration_hash,
-            std::function<void(double free_mb)> on_space = {});
+            std::function<void(double free_mb)> on_space = {}, std::vector<Anchor> anchors = {},
+            Pace pace = {});
     ~Journal();
 
     [[nodiscard]] Recovery& recovery() noexcept { return recovery_; }
@@ -86,9 +89,11 @@ class Journal {
     void command(const CommandRequest& request, const CommandReply& reply, std::int64_t utc_ns);
 
     [[nodiscard]] JournalStatus status() const;
+    /// What was found missing or changed since this was last asked, in words; the file was put
+    /// aside and kJournalLatch is in the new one. Control thread.
+    [[nodiscard]] std::vector<std::string> take_found();
 
     static constexpr std::size_t kMostWaiting = 10'000;
-    static constexpr std::int64_t kSchemaVersion = 1;
 
   private:
     struct Begun {
@@ -133,11 +138,22 @@ class Journal {
     void recover_loop_check();
     void recover_proofs();
     void recover_safety();
+    void read_safety(Database& from);
+    void follow(const Safety& safety);
+    void note_proof(std::int64_t row);
+    void look();
+    void begin_anew(const std::vector<std::string>& found);
+    void carry_over(const std::string& why);
+    void carry_campaign(const std::vector<Row>& campaign);
+    void show();
+    [[nodiscard]] Database& database() { return file_.database(); }
+    void chained(std::string_view table) { file_.chained(table, database().last_id()); }
     void recover_dwells(Unfinished& campaign);
     /// The number of the entry; 0: dropped.
     std::uint64_t put(Entry entry);
     void loop();
     void take_fed();
+    void publish();
     [[nodiscard]] bool write(const std::deque<Entry>& entries);
     void write_one(const Begun& begun);
     void write_one(const Done& done);
@@ -152,17 +168,24 @@ class Journal {
     const std::uint64_t configuration_hash_;
     std::function<void(double)> on_space_;
     std::function<void()> on_written_;
-    std::unique_ptr<Database> database_;
+    ChainedFile file_;
+    Watch watch_;
     Recovery recovery_;
     rt::Ring<rt::Fed> fed_{16384};
 
     // The journal's thread.
     std::int64_t campaign_ = 0;              ///< the one in progress; 0: none
+    Latches latches_;                        ///< as the file has them
+    Safety arming_;                          ///< as the file has it; its `what` is empty: none
+    std::vector<std::string> to_replace_;    ///< why the file is to be put aside; empty: it is not
+    std::string proof_head_;                 ///< signed, of the newest proof's entry
+    bool started_ = false;                   ///< the thread runs
     std::deque<DwellCheckpoint> collected_;  ///< dwells being fed or not yet written
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::deque<Entry> waiting_;
+    std::vector<std::string> found_;
     JournalStatus status_;
     bool stop_ = false;
     std::thread thread_;

@@ -87,6 +87,18 @@ struct JournalTest : testing::Test {
         for (int p = 1; p <= positions; ++p) feed(journal, dwell(filter, p));
         journal.stop();
     }
+    /// As if the daemon had kept these bytes.
+    void keep_checkpoint(std::int64_t position, std::string_view bytes) const {
+        ChainedFile file(path, {});
+        ASSERT_THAT(file.open(), IsEmpty());
+        file.begin();
+        file.database().run("UPDATE dwell SET checkpoint = ? WHERE position = ?",
+                            {Blob{bytes}, position});
+        const auto row =
+            file.database().ask("SELECT rowid FROM dwell WHERE position = ?", {position});
+        file.chained("dwell", row.at(0).numbers.at(0));
+        file.commit();
+    }
     [[nodiscard]] std::vector<Row> ask(const char* sql) const { return Database(path).ask(sql); }
 };
 
@@ -239,8 +251,7 @@ TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
     EXPECT_EQ(decode(good, kHash + 1, out), "of another configuration");
     // WHEN one such stands in the journal
     leave_unfinished();
-    Database(path).run("UPDATE dwell SET checkpoint = ? WHERE position = 2",
-                       {Blob{std::string_view(good).substr(0, 500)}});
+    keep_checkpoint(2, std::string_view(good).substr(0, 500));
     // THEN nothing is offered, with the place and the reason
     Journal journal(path, kHash);
     EXPECT_FALSE(journal.recovery().campaign);
@@ -365,10 +376,7 @@ std::string version_1(const DwellCheckpoint& dwell) {
 TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {
     leave_unfinished();
     estimator::Identification filter{estimator::Settings{}};
-    for (int p = 1; p <= 2; ++p) {
-        Database(path).run("UPDATE dwell SET checkpoint = ? WHERE position = ?",
-                           {Blob{version_1(dwell(filter, p))}, std::int64_t{p}});
-    }
+    for (int p = 1; p <= 2; ++p) keep_checkpoint(p, version_1(dwell(filter, p)));
     Journal journal(path, kHash);
     ASSERT_TRUE(journal.recovery().campaign);
     EXPECT_THAT(journal.recovery().assumed, HasSubstr("2 checkpoints of version 1"));
@@ -383,8 +391,10 @@ TEST_F(JournalTest, PutsADamagedOrNewerFileAside) {
         Journal journal(path, kHash);
         EXPECT_FALSE(journal.recovery().campaign);
         ASSERT_THAT(journal.recovery().refused, SizeIs(1));
-        EXPECT_THAT(journal.recovery().refused[0], HasSubstr("version 7, newer than 1"));
-        EXPECT_TRUE(std::filesystem::exists(path + ".version-7"));
+        EXPECT_THAT(journal.recovery().refused[0], HasSubstr("version 7, newer than 2"));
+        EXPECT_THAT(journal.recovery().refused[0], HasSubstr("put aside as " + path + ".aside."));
+        ASSERT_THAT(journal.recovery().latches, SizeIs(1));
+        EXPECT_EQ(journal.recovery().latches[0].name, kJournalLatch);
     }
     std::ofstream(path, std::ios::trunc) << std::string(10'000, 'x');
     Journal journal(path, kHash);

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace vibrig::journal {
+
+class Database;
+
+/// 1: without a chain.
+inline constexpr std::int64_t kSchemaVersion = 2;
+
+/// Tables whose rows are chained: all that say something.
+inline constexpr std::array kChained{"origin",  "campaign",   "dwell",  "event",
+                                     "command", "loop_check", "safety", "proof"};
+
+/// Those that are not there yet.
+void make_tables(Database& database);
+[[nodiscard]] bool has_table(Database& database, const char* name);
+/// What the file has beside its tables, a trigger for example, by name.
+[[nodiscard]] std::vector<std::string> strange_objects(Database& database);
+
+}  // namespace vibrig::journal
