@@ -69,10 +69,15 @@ void check_settings(const CalibrationSettings& s) {
 }  // namespace
 
 struct Calibration::Impl {
-    explicit Impl(const CalibrationSettings& s) : settings(s) {}
+    explicit Impl(const CalibrationSettings& s) : settings(s) {
+        const Observability seen = observability(s.plan.segments_deg(), s.site);
+        for (std::size_t i = 0; i < 3; ++i)
+            told_apart[i] = seen.degree[static_cast<std::size_t>(kAccelerometer) + i] > 0;
+    }
 
     CalibrationSettings settings;
     std::optional<ZeroFilter> filter;
+    std::array<bool, 3> told_apart{true, true, true};  ///< from tilt, by the plan
     std::vector<CalibrationTrace> trace;
     std::array<std::optional<double>, 3> converged_s;
     std::array<double, 3> movement{};
@@ -421,6 +426,12 @@ struct Calibration::Impl {
                 AxisResult& axis = r.axis[i];
                 axis.zero_mg = filter->zero()[k] * to_mg();
                 axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                if (!told_apart[i]) {
+                    // Not told from tilt: as unsure as before, and by what the filter makes of it.
+                    r.covariance_mg2[i][i] = settings.initial.zero_mg * settings.initial.zero_mg +
+                                             axis.zero_mg * axis.zero_mg;
+                    axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                }
                 r.filter_covariance_mg2[i] = r.covariance_mg2[i];
                 // Each accelerometer shows what it sees of 1 g along the axis of the slews too.
                 r.covariance_mg2[i][i] += share_mg[i] * share_mg[i];

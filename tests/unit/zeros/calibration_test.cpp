@@ -373,7 +373,12 @@ TEST(ZeroCalibration, AtRestItCannotTellZerosFromTilt) {
     const CalibrationResult result = simulate(s, {}, kPeriod, 10).result();
     // THEN it does not call the zeros found, and they are milligrams wrong
     expect_words(all(result.problems), {"x has not converged", "y has not converged"});
-    EXPECT_GT(std::hypot(result.axis[0].zero_mg - 5, result.axis[1].zero_mg + 5), 1);
+    const double off = std::hypot(result.axis[0].zero_mg - 5, result.axis[1].zero_mg + 5);
+    EXPECT_GT(off, 1);
+    // AND its sigma says so
+    EXPECT_LT(off, 3 * result.axis[0].sigma_mg);
+    EXPECT_GE(result.axis[0].sigma_mg, 5);
+    EXPECT_GE(result.axis[1].sigma_mg, 5);
 }
 
 /// Off-diagonals of 1 sigma `cross`, gains of 1 sigma `gain`.
