@@ -236,7 +236,9 @@ struct ZeroStatus {
     std::array<double, 3> zero_mg{}, sigma_mg{};
     std::array<std::array<double, 3>, 3> covariance_mg2{};
     double scale_z = 0, scale_z_sigma = 0;  ///< 0: not separated
-    bool repeated = false;                  ///< at the end of the campaign
+    /// Of x and y towards the axis of the slews as the gyros see it, rad; sigma 0: not separated.
+    std::array<double, 2> misalignment{}, misalignment_sigma{};
+    bool repeated = false;  ///< at the end of the campaign
     std::array<double, 3> change_mg{}, change_sigma_mg{};
     std::string mark;  ///< why the campaign is marked; empty: it is not
     std::string message;

@@ -31,8 +31,8 @@ void PaperLevel::add(double time_s, double square) noexcept {
     // eq. 13: c1, s1 = 2/n sum S cos, 2/n sum S sin; a0 = sqrt(c1^2 + s1^2) / 2
     const double amplitude = std::hypot(cosine_, sine_) / static_cast<double>(n_);
     if (!has_start_) {
-        start_ = amplitude;
-        has_start_ = true;
+        blended_ = amplitude;
+        return;
     }
     // eq. 18: a2(n) = lambda^n a2 + (1 - lambda^n) a2'(n)
     power_ *= forgetting_;

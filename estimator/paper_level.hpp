@@ -11,8 +11,7 @@ class PaperLevel {
   public:
     PaperLevel(double frequency_hz, double forgetting) noexcept;
 
-    /// Without a start value the first sample's own amplitude is the start (eq. 17 divides by zero
-    /// at rest).
+    /// Plain eq. 13: the first run, and wherever eq. 17 has nothing to start from.
     void begin() noexcept;
     /// Start value a1 * a(2) / a(1): amplitude of the same position in the first run, scaled by the
     /// commanded levels.

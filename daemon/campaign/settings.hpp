@@ -43,8 +43,10 @@ struct LevellingSettings {
 /// vertical.
 struct ZeroingSettings {
     double duration_s = 180;
-    double slew_deg_per_s = 5;   ///< what the gimbals do; the filter checks it
-    bool both_ways = false;      ///< z down too: zero and scale of the z accelerometer apart
+    double slew_deg_per_s = 5;  ///< what the gimbals do; the filter checks it
+    /// z down too: the zeros apart from what an accelerometer shows of 1 g along z, by misalignment
+    /// or scale.
+    bool both_ways = true;
     double scale_factor = 1e-4;  ///< of the accelerometers, not known better, 1 sigma
     /// How still the platform stands, 1 sigma at most.
     double velocity_reference_mps = 0.005, position_reference_m = 0.01;

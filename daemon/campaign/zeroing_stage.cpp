@@ -16,6 +16,7 @@ namespace zeros = estimator::zeros;
 namespace {
 
 constexpr double kRadian = std::numbers::pi / 180;
+constexpr double kArcsec = kRadian / 3600;
 constexpr double kSureness = 3;  // standard deviations
 // The gimbals take the shorter way round, and of half a turn neither way is the shorter: what a
 // slew ends beside its target would decide. 2 deg short of it at either end, it is decided.
@@ -32,6 +33,7 @@ zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
     s.plan.duration_s = settings_.duration_s;
     s.inverted = down;
     s.noise.scale_factor = settings_.scale_factor;
+    s.noise.misalignment = rig_.accelerometer_cross;
     s.noise.velocity_reference = settings_.velocity_reference_mps;
     s.noise.position_reference = settings_.position_reference_m;
     s.noise.reference_is_bound = true;
@@ -175,16 +177,19 @@ std::string ZeroingStage::finish(bool at_end) {
         now.sigma_mg[i] = r.axis[i].sigma_mg;
     }
     if (up_result_) {
-        const auto z = zeros::separate(up_result_->axis[2], result_.axis[2]);
-        found.zero_mg[2] = z.zero_mg;
-        found.filter_sigma_mg[2] = now.sigma_mg[2] = z.zero_sigma_mg;
-        now.scale_z = z.scale;
-        now.scale_z_sigma = z.scale_sigma;
-        now.covariance_mg2[2] = {0, 0, z.zero_sigma_mg * z.zero_sigma_mg};
-        now.covariance_mg2[0][2] = now.covariance_mg2[1][2] = 0;
+        const auto apart = zeros::separate(*up_result_, result_);
+        found.zero_mg = apart.zero_mg;
+        now.covariance_mg2 = apart.covariance_mg2;
+        for (std::size_t i = 0; i < 3; ++i)
+            found.filter_sigma_mg[i] = now.sigma_mg[i] = std::sqrt(apart.covariance_mg2[i][i]);
+        now.misalignment = {apart.share[0], apart.share[1]};
+        now.misalignment_sigma = {apart.share_sigma[0], apart.share_sigma[1]};
+        now.scale_z = apart.share[2];
+        now.scale_z_sigma = apart.share_sigma[2];
     }
     now.zero_mg = found.zero_mg;
     now.known = true;
+    last_ = now;
     now.mark = present_.mark;
     if (at_end && first_) {
         now.repeated = true;
@@ -214,15 +219,15 @@ std::string ZeroingStage::finish(bool at_end) {
 std::string ZeroingStage::words() const {
     std::string text = fmt::format("zeros after {:.0f} s:", time_s());
     for (std::size_t i = 0; i < 3; ++i) {
-        const auto& axis = (up_result_ ? *up_result_ : result_).axis[i];
         text += fmt::format("{} {} {:+.4f} mg (sigma {:.4f})", i == 0 ? "" : ",", "xyz"[i],
-                            axis.zero_mg, axis.sigma_mg);
+                            last_.zero_mg[i], last_.sigma_mg[i]);
     }
     if (up_result_) {
-        text += fmt::format("; z apart: zero {:+.4f} mg, scale {:+.1f} ppm", present_.zero_mg[2],
-                            1e6 * present_.scale_z);
+        text += fmt::format(
+            "; apart from them: misalignment {:+.1f} and {:+.1f} arcsec, scale of z {:+.1f} ppm",
+            last_.misalignment[0] / kArcsec, last_.misalignment[1] / kArcsec, 1e6 * last_.scale_z);
     } else {
-        text += "; z: zero + 1 g x scale error";
+        text += "; x and y: zero + 1 g x misalignment; z: zero + 1 g x scale error";
     }
     for (const auto& note : result_.notes) text += "; " + note;
     return text;

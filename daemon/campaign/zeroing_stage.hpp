@@ -74,6 +74,7 @@ class ZeroingStage {
     drivers::Time first_time_ = 0, last_time_ = 0;
     std::optional<Found> first_;  ///< of the campaign's start
     ZeroStatus present_;
+    ZeroStatus last_;  ///< what the last calibration found, in force or not
     std::string failure_;
 };
 

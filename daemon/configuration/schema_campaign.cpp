@@ -45,12 +45,12 @@ void add_zeroing_keys(std::vector<Key>& keys) {
                               [member](C& c) -> double& { return c.campaign.zero.*member; }));
     };
     using Z = campaign::ZeroingSettings;
-    zero("duration_s", "s", {60, 7200}, "of the azimuth slews 0, 90, -90, 90 deg and so on",
+    zero("duration_s", "s", {60, 7200}, "of the azimuth slews 0, 88, -88, 88 deg and so on",
          &Z::duration_s);
     zero("slew_deg_per_s", "deg/s", {0.1, 25}, "rate of the azimuth gimbal, checked",
          &Z::slew_deg_per_s);
     keys.push_back(boolean("zeroing.both_ways",
-                           "platform z down too: zero and scale of the z accelerometer apart",
+                           "platform z down too: zeros apart from misalignment and scale error",
                            [](C& c) -> bool& { return c.campaign.zero.both_ways; }));
     zero("scale_factor", "", {0, 0.1}, "of the accelerometers, not known better, 1 sigma",
          &Z::scale_factor);

@@ -94,7 +94,7 @@ int run(Options& options) {
         std::cerr << "refused: " << result.refusal << '\n';
         return kNo;
     }
-    return 0;
+    return result.beyond_limits ? kNo : 0;
 }
 
 void add_candidates(CLI::App& command, Options& options) {
@@ -185,8 +185,8 @@ void add_plan(CLI::App& app, int& exit_code) {
     command->add_flag("--json", options->json, "print the plan as JSON");
     command->footer(
         "Example: vibrig plan --runs 20 --levels 0,6 -o plan.json --plot sphere.svg\n"
-        "Exit codes: 0 done, 1 the plan does not determine all coefficients or misses its targets, "
-        "2 bad\nusage or input.");
+        "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
+        "asks for\nmore than the shaker's limits, 2 bad usage or input.");
     command->callback([options, &exit_code] { exit_code = planner::run(*options); });
 }
 

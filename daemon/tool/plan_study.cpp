@@ -120,6 +120,7 @@ class Study {
                                         key + ")";
             if (!request_.config.empty()) throw std::runtime_error("levels: found " + message);
             out_.warnings.push_back(message);
+            out_.beyond_limits = true;
         };
         check(table, c_.campaign.max_acceleration_g, "g", "shaker.limits.acceleration_g");
         check(mps2 / omega, c_.campaign.max_velocity_mps, "m/s", "shaker.limits.velocity_mps");

@@ -76,7 +76,8 @@ struct PlanStudy {
     std::optional<PlanUncertainty> uncertainty;  ///< of a plan that determines everything
     std::vector<VerticalAxis> vertical_axes;  ///< if a position list was given
     std::vector<std::string> warnings;
-    std::string refusal;  ///< empty: the plan determines everything
+    bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
+    std::string refusal;         ///< empty: the plan determines everything
     double transmission = 0, frequency_hz = 0, dwell_s = 0;
 };
 

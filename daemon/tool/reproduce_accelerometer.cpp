@@ -78,6 +78,13 @@ void add_ranks(Reproduction& table) {
                           words("rank %d, %.2g: %.0f times smaller than at 5 deg/s", slow.rank,
                                 slow.singular[14], fast.singular[14] / slow.singular[14]),
                           {}});
+    const int one_way = rank_with_shares({0, 90, -90}, false, site);
+    const int both_ways = rank_with_shares({0, 90, -90}, true, site);
+    table.rows.push_back({"rank with 1 g x misalignment of x, y and x scale of z, z up only",
+                          "-",
+                          words("%d of 18: they are in the zeros", one_way),
+                          {}});
+    table.rows.push_back({"the same, z down too", "-", words("%d of 18", both_ways), {}});
 }
 
 void add_residuals(Reproduction& table, std::size_t seeds) {

@@ -39,6 +39,7 @@ struct Options {
     zeros::CalibrationSettings calibration;
     double latitude_deg = 45.75;
     double scale_ppm = 100;
+    double misalignment_arcsec = 50;
     std::vector<double> slews{0, 90, -90, 90};
     std::vector<double> lever_arm{0, 0, 0};
     bool json = false;
@@ -48,6 +49,7 @@ struct Options {
     // simulate
     std::vector<double> zero_mg{5, -5, 5};
     std::vector<double> real_scale_ppm{0, 0, 0};
+    std::vector<double> real_misalignment_arcsec{0, 0};
     double period_s = 0.01;
     double vibration_g = 0;
     std::uint64_t seed = 1;
@@ -68,6 +70,7 @@ zeros::CalibrationSettings settings_of(const Options& options) {
     zeros::CalibrationSettings s = options.calibration;
     s.site.latitude_rad = options.latitude_deg * kDegree;
     s.noise.scale_factor = options.scale_ppm * 1e-6;
+    s.noise.misalignment = options.misalignment_arcsec * kArcsec;
     s.plan.targets_deg = options.slews;
     for (std::size_t i = 0; i < 3; ++i) s.lever_arm_m[i] = options.lever_arm[i];
     return s;
@@ -89,9 +92,14 @@ plot::Chart chart_of(const std::vector<zeros::CalibrationTrace>& trace) {
         }
         chart.curves.push_back(curve);
     }
-    chart.notes.emplace_back("Bands: 1 sigma of the filter. z: zero plus scale error times 1 g.");
+    chart.notes.emplace_back(
+        "Bands: 1 sigma of the filter. x, y: zero + 1 g x misalignment, z: zero + 1 g x scale "
+        "error.");
     return chart;
 }
+
+constexpr std::array kWhat{"zero + 1 g x misalignment", "zero + 1 g x misalignment",
+                           "zero + 1 g x scale error"};
 
 Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& seen) {
     Json axes = Json::array();
@@ -99,7 +107,8 @@ Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& 
         const zeros::AxisResult& axis = r.axis[i];
         axes.push_back(
             {{"axis", kAxisLetters[i]},
-             {"what", i == 2 ? "zero + 1 g x scale error" : "zero"},
+             {"what", kWhat[i]},
+             {"observable", false},
              {"zero_mg", number(axis.zero_mg)},
              {"sigma_mg", number(axis.sigma_mg)},
              {"filter_sigma_mg", number(axis.filter_sigma_mg)},
@@ -142,8 +151,13 @@ std::string result_table(const zeros::CalibrationResult& r, const zeros::Observa
                     axis.sigma_mg, axis.zero_mg * 1e-3 / kDegree * 60,
                     axis.converged_s ? line("%.0f s", *axis.converged_s).c_str() : "no");
     }
-    out += line("z is zero + 1 g x scale error; of its sigma the filter's share is %.5f mg\n",
-                r.axis[2].filter_sigma_mg);
+    out += line(
+        "x and y are zero + 1 g x misalignment, z is zero + 1 g x scale error; of their "
+        "sigma the filter's share is %.5f, %.5f, %.5f mg\n",
+        r.axis[0].filter_sigma_mg, r.axis[1].filter_sigma_mg, r.axis[2].filter_sigma_mg);
+    if (r.gyro_gain) {
+        out += line("vertical gyro against the azimuth read-out: %+.1f ppm\n", *r.gyro_gain * 1e6);
+    }
     out += line("gyro biases %.4f, %.4f, %.4f deg/h (1 sigma %.2g, %.2g, %.2g)\n",
                 r.gyro_bias_deg_h[0], r.gyro_bias_deg_h[1], r.gyro_bias_deg_h[2],
                 r.gyro_sigma_deg_h[0], r.gyro_sigma_deg_h[1], r.gyro_sigma_deg_h[2]);
@@ -162,8 +176,36 @@ std::string result_table(const zeros::CalibrationResult& r, const zeros::Observa
     return out;
 }
 
+Json apart_json(const zeros::ZerosApart& apart) {
+    Json json = Json::array();
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double unit = i == 2 ? 1e-6 : kArcsec;
+        const std::string share = i == 2 ? "scale_ppm" : "misalignment_arcsec";
+        json.push_back({{"axis", kAxisLetters[i]},
+                        {"what", "zero"},
+                        {"observable", true},
+                        {"zero_mg", apart.zero_mg[i]},
+                        {"sigma_mg", std::sqrt(apart.covariance_mg2[i][i])},
+                        {share, apart.share[i] / unit},
+                        {share + "_sigma", apart.share_sigma[i] / unit}});
+    }
+    return json;
+}
+
+std::string apart_table(const zeros::ZerosApart& apart) {
+    std::string out = "with z down as well\n";
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double unit = i == 2 ? 1e-6 : kArcsec;
+        out += line("%-4s zero %.5f +- %.5f mg, %s %.3f +- %.3f %s\n", kAxisLetters[i],
+                    apart.zero_mg[i], std::sqrt(apart.covariance_mg2[i][i]),
+                    i == 2 ? "scale error" : "misalignment", apart.share[i] / unit,
+                    apart.share_sigma[i] / unit, i == 2 ? "ppm" : "arcsec");
+    }
+    return out;
+}
+
 int report(const Options& options, const zeros::Calibration& run,
-           const std::optional<zeros::ZeroAndScale>& apart) {
+           const std::optional<zeros::ZerosApart>& apart) {
     const zeros::CalibrationSettings s = settings_of(options);
     const zeros::CalibrationResult result = run.result();
     const zeros::Observability seen = zeros::observability(s.plan.segments_deg(), s.site);
@@ -173,19 +215,13 @@ int report(const Options& options, const zeros::Calibration& run,
     if (options.json) {
         Json json = result_json(result, seen);
         if (apart) {
-            json["z_apart"] = {{"zero_mg", apart->zero_mg},
-                               {"zero_sigma_mg", apart->zero_sigma_mg},
-                               {"scale_ppm", apart->scale * 1e6},
-                               {"scale_sigma_ppm", apart->scale_sigma * 1e6}};
+            json["apart"] = apart_json(*apart);
         }
         std::cout << json.dump() << '\n';
     } else {
         std::cout << result_table(result, seen);
         if (apart) {
-            std::cout << line(
-                "with z down as well: zero %.5f +- %.5f mg, scale error %.3f +- %.3f "
-                "ppm\n",
-                apart->zero_mg, apart->zero_sigma_mg, apart->scale * 1e6, apart->scale_sigma * 1e6);
+            std::cout << apart_table(*apart);
         }
     }
     return result.valid ? 0 : kNo;
@@ -256,6 +292,8 @@ int run_simulate(const Options& options) {
         errors.zero_mg[i] = options.zero_mg[i];
         errors.scale[i] = options.real_scale_ppm[i] * 1e-6;
     }
+    for (std::size_t i = 0; i < 2; ++i)
+        errors.accelerometer_cross[i][2] = options.real_misalignment_arcsec[i] * kArcsec;
     errors.vibration_g = options.vibration_g;
     if (!options.write.empty()) {
         (void)zeros::Calibration(s);  // refuses what cannot work
@@ -263,12 +301,12 @@ int run_simulate(const Options& options) {
         return 0;
     }
     const zeros::Calibration up = zeros::simulate(s, errors, options.period_s, options.seed);
-    std::optional<zeros::ZeroAndScale> apart;
+    std::optional<zeros::ZerosApart> apart;
     if (options.both_ways) {
         s.inverted = true;
         const zeros::Calibration down =
             zeros::simulate(s, errors, options.period_s, options.seed + 1);
-        apart = zeros::separate(up.result().axis[2], down.result().axis[2]);
+        apart = zeros::separate(up.result(), down.result());
     }
     return report(options, up, apart);
 }
@@ -305,6 +343,10 @@ void add_common(CLI::App& command, Options& o) {
     command
         .add_option("--scale-uncertainty", o.scale_ppm, "of the vertical accelerometer, ppm (100)")
         ->check(proto::finite(0, 1e6));
+    command
+        .add_option("--misalignment-uncertainty", o.misalignment_arcsec,
+                    "of x and y against the gyros, arcsec (50)")
+        ->check(proto::finite(0, 1e5));
     command
         .add_option("--vibration-limit", s.vibration_limit_g,
                     "g, standard deviation within 1 s (0.01)")
@@ -344,13 +386,19 @@ void add_zero(CLI::App& app, int& exit_code) {
         ->expected(3)
         ->delimiter(',')
         ->check(proto::finite(-1e5, 1e5));
+    simulate
+        ->add_option("--misalignment", options->real_misalignment_arcsec,
+                     "of x and y towards z, arcsec (0,0)")
+        ->expected(2)
+        ->delimiter(',')
+        ->check(proto::finite(-1e4, 1e4));
     simulate->add_option("--period", options->period_s, "of the increments, s (0.01)")
         ->check(proto::finite(1e-4, 0.1));
     simulate->add_option("--vibration", options->vibration_g, "peak at 15 Hz, g (0)")
         ->check(proto::finite(0, 10));
     simulate->add_option("--seed", options->seed, "of the noise (1)")->check(proto::whole());
     simulate->add_flag("--both-ways", options->both_ways,
-                       "a second run with z down, for zero and scale apart");
+                       "a second run with z down, for zeros apart from misalignment and scale");
     simulate->add_option("--write", options->write,
                          "write the increments to this CSV file instead");
     simulate->footer("Example: vibrig zero simulate --scale 0,0,100 --both-ways");

@@ -10,6 +10,8 @@ namespace vibrig::estimator::levelling {
 namespace {
 
 constexpr double kLeastTolerance = 0.05 * kArcmin;
+constexpr double kLargestTolerance =
+    5 * kArcmin;  // that the noise may ask for; beyond is not level
 constexpr double kLargestTilt = 5 * kPi / 180;
 constexpr int kMissingAllowed = 3;
 constexpr double kSureness = 4;  // standard deviations
@@ -85,8 +87,9 @@ Leveller::Leveller(const LevellerSettings& settings)
                                                  (settings.earth.gravity_mps2 * std::sqrt(n)));
     rate_noise_ = per_w * std::hypot(budget_.velocity, settings.noise.reference_mps / std::sqrt(n));
     if (tolerance_ == 0) {
-        tolerance_ = std::max(kLeastTolerance, tolerance_needed());
-    } else if (tolerance_ < tolerance_needed()) {
+        tolerance_ = std::clamp(tolerance_needed(), kLeastTolerance, kLargestTolerance);
+    }
+    if (tolerance_ < tolerance_needed()) {
         // A whole hold time within fewer standard deviations does not come about.
         verdict_ = Verdict::cannot_settle;
         note(Trouble::tolerance_below_noise, 0, tolerance_);

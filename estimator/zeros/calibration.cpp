@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/zeros/azimuth_gain.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/units.hpp"
 #include "estimator/zeros/zero_filter.hpp"
@@ -18,6 +19,7 @@ constexpr double kRateTolerance = 0.1;
 constexpr double kSlowest_deg_s = 0.1;  // below it the read-out's noise hides the rate
 constexpr double kLargestZero_mg = 10;
 constexpr std::size_t kBlock = 60;
+constexpr double kLargestGain = 0.02;  // of a gyro; beyond it is another fault
 constexpr std::array kAxisNames{"x", "y", "z"};
 
 /// Wilson and Hilferty; z in standard deviations.
@@ -47,7 +49,8 @@ void check_settings(const CalibrationSettings& s) {
                                       std::pair{"velocity random walk", n.velocity_random_walk},
                                       std::pair{"gyro drift", n.gyro_drift},
                                       std::pair{"accelerometer drift", n.accelerometer_drift},
-                                      std::pair{"scale factor uncertainty", n.scale_factor}}) {
+                                      std::pair{"scale factor uncertainty", n.scale_factor},
+                                      std::pair{"misalignment", n.misalignment}}) {
         require(value >= 0 && std::isfinite(value), name, value, "0 or more");
     }
     for (const double value : s.lever_arm_m) {
@@ -66,10 +69,15 @@ void check_settings(const CalibrationSettings& s) {
 }  // namespace
 
 struct Calibration::Impl {
-    explicit Impl(const CalibrationSettings& s) : settings(s) {}
+    explicit Impl(const CalibrationSettings& s) : settings(s) {
+        const Observability seen = observability(s.plan.segments_deg(), s.site);
+        for (std::size_t i = 0; i < 3; ++i)
+            told_apart[i] = seen.degree[static_cast<std::size_t>(kAccelerometer) + i] > 0;
+    }
 
     CalibrationSettings settings;
     std::optional<ZeroFilter> filter;
+    std::array<bool, 3> told_apart{true, true, true};  ///< from tilt, by the plan
     std::vector<CalibrationTrace> trace;
     std::array<std::optional<double>, 3> converged_s;
     std::array<double, 3> movement{};
@@ -84,6 +92,8 @@ struct Calibration::Impl {
     // within the update interval
     double turned_rad = 0, interval_s = 0, azimuth_rad = 0, azimuth_before = 0;
     bool has_azimuth = false;
+    std::optional<AzimuthGain> gain;  ///< while there is a read-out
+    double turned_in_all_rad = 0, gain_turned_rad = 0;
     std::size_t count = 0;
     Eigen::Vector3d force_sum = Eigen::Vector3d::Zero(), force_squares = Eigen::Vector3d::Zero();
     double rate_before = 0, still_since_s = 0;
@@ -111,6 +121,7 @@ struct Calibration::Impl {
             has_azimuth ? in.azimuth_rad : settings.plan.targets_deg.front() * kDeg;
         filter.emplace(settings, azimuth);
         azimuth_rad = azimuth_before = azimuth;
+        if (has_azimuth) gain.emplace(settings.initial.gyro_bias_deg_h * kDegPerHour);
         begin_s = last_s = still_since_s = in.time_s;
         update_at_s = begin_s + settings.update_s;
         samples = 1;
@@ -140,6 +151,8 @@ struct Calibration::Impl {
             const double part = period_s > 0 ? gap_s / period_s : 1;
             filter->advance(last_turn * part, last_velocity * part, gap_s);
             const double turn = settings.plan.rate_deg_s * kDeg * gap_s;
+            turned_in_all_rad += (settings.inverted ? -1 : 1) * last_turn[2] * part;
+            if (gain) gain->loosen(turn);
             if (gap_s > kLongestGap_s) {
                 filter->loosen(settings.initial.tilt_deg * kDeg + turn,
                                settings.initial.velocity_mps, settings.initial.position_m);
@@ -232,7 +245,22 @@ struct Calibration::Impl {
         in_block = 0;
     }
 
+    /// What a wrong gain of the vertical gyro has made of the azimuth is taken off it. The gain
+    /// comes from whole sweeps, so that a read-out that is late by some samples does no harm.
+    void correct_azimuth(double now_s) {
+        if (!gain) return;
+        turned_in_all_rad += turned_rad;
+        const double time_s = now_s - begin_s;
+        const double sign = settings.inverted ? -1 : 1;
+        gain->add({time_s, turned_in_all_rad - earth_rate(settings.site)[2] * time_s, azimuth_rad,
+                   sign * last_turn[2] / period_s});
+        const double off = gain->value() * gain->read_rad();
+        filter->turn_back(off - gain_turned_rad);
+        gain_turned_rad = off;
+    }
+
     bool update(double now_s) {
+        correct_azimuth(now_s);
         if (!watch_motion(now_s) || !watch_vibration(now_s)) return false;
         account(filter->update(reference_velocity, reference_position));
         ++updates;
@@ -345,6 +373,12 @@ struct Calibration::Impl {
                       : "lengthen the run until a whole sweep has passed, and wait for the unit to "
                         "be warm"));
         }
+        if (!given_up && gain && std::abs(gain->value()) > kLargestGain) {
+            r.problems.push_back(text(
+                "the vertical gyro turns by %.4g times the azimuth read-out, expected 1 within "
+                "%.0f %%: sign, axes or unit of the increments",
+                1 + gain->value(), 100 * kLargestGain));
+        }
         const InnovationStatistic& v = innovation;
         const bool last_outside = v.blocks > 0 && outside(v);
         if (!last_outside && v.outside < 2) return;
@@ -376,7 +410,10 @@ struct Calibration::Impl {
         r.gaps = gaps;
         r.notes = notes;
         r.time_s = last_s - begin_s;
-        const double scale_mg = settings.noise.scale_factor * 1e3;
+        if (gain) r.gyro_gain = gain->value();
+        const Noise& noise = settings.noise;
+        const Triple share_mg{1e3 * noise.misalignment, 1e3 * noise.misalignment,
+                              1e3 * noise.scale_factor};
         if (filter) {
             for (std::size_t i = 0; i < 3; ++i) {
                 const auto k = static_cast<Eigen::Index>(i);
@@ -389,8 +426,15 @@ struct Calibration::Impl {
                 AxisResult& axis = r.axis[i];
                 axis.zero_mg = filter->zero()[k] * to_mg();
                 axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
-                // At rest the vertical accelerometer shows its zero plus 1 g times its scale error.
-                if (i == 2) r.covariance_mg2[2][2] += scale_mg * scale_mg;
+                if (!told_apart[i]) {
+                    // Not told from tilt: as unsure as before, and by what the filter makes of it.
+                    r.covariance_mg2[i][i] = settings.initial.zero_mg * settings.initial.zero_mg +
+                                             axis.zero_mg * axis.zero_mg;
+                    axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                }
+                r.filter_covariance_mg2[i] = r.covariance_mg2[i];
+                // Each accelerometer shows what it sees of 1 g along the axis of the slews too.
+                r.covariance_mg2[i][i] += share_mg[i] * share_mg[i];
                 axis.sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
                 axis.movement_mg = movement[i];
                 axis.converged_s = converged_s[i];
@@ -416,13 +460,18 @@ bool Calibration::given_up() const noexcept { return impl_->given_up; }
 CalibrationResult Calibration::result() const { return impl_->result(); }
 const std::vector<CalibrationTrace>& Calibration::trace() const noexcept { return impl_->trace; }
 
-ZeroAndScale separate(const AxisResult& up, const AxisResult& down) noexcept {
+ZerosApart separate(const CalibrationResult& up, const CalibrationResult& down) noexcept {
     // Up shows b + s g, down b - s g.
-    ZeroAndScale r;
-    r.zero_mg = 0.5 * (up.zero_mg + down.zero_mg);
-    r.scale = 0.5e-3 * (up.zero_mg - down.zero_mg);
-    r.zero_sigma_mg = 0.5 * std::hypot(up.filter_sigma_mg, down.filter_sigma_mg);
-    r.scale_sigma = 1e-3 * r.zero_sigma_mg;
+    ZerosApart r;
+    for (std::size_t i = 0; i < 3; ++i) {
+        r.zero_mg[i] = 0.5 * (up.axis[i].zero_mg + down.axis[i].zero_mg);
+        r.share[i] = 0.5e-3 * (up.axis[i].zero_mg - down.axis[i].zero_mg);
+        for (std::size_t j = 0; j < 3; ++j) {
+            r.covariance_mg2[i][j] =
+                0.25 * (up.filter_covariance_mg2[i][j] + down.filter_covariance_mg2[i][j]);
+        }
+        r.share_sigma[i] = 1e-3 * std::sqrt(r.covariance_mg2[i][i]);
+    }
     return r;
 }
 

@@ -13,6 +13,7 @@
 namespace vibrig::estimator::zeros {
 
 inline constexpr double kMicro = 1e-6;
+inline constexpr double kDeclaredCross = 2.4e-4;  ///< rad, 50 arcsec
 using Triple = std::array<double, 3>;
 
 struct Noise {
@@ -25,6 +26,9 @@ struct Noise {
     double gyro_drift = 0;               ///< of the biases, deg/h per sqrt(h)
     double accelerometer_drift = 0;      ///< of the zeros, mg per sqrt(h)
     double scale_factor = 100 * kMicro;  ///< of the vertical accelerometer, not known better
+    /// Of the horizontal accelerometers towards the axis of the slews as the gyros see it, rad, not
+    /// known better: 1 g of it is in x and y as long as z has been up only.
+    double misalignment = kDeclaredCross;
 };
 
 /// Before the first update, 1 sigma.
@@ -32,6 +36,7 @@ struct Initial {
     double tilt_deg = 1, azimuth_deg = 1;
     double velocity_mps = 0.1, position_m = 1;
     double gyro_bias_deg_h = 0.2, zero_mg = 5;
+    double cross = 1e-3;  ///< of what an accelerometer shows of x and y, its gain included, 1
 };
 
 struct CalibrationSettings {
@@ -53,14 +58,14 @@ struct Increment {
     double time_s = 0;
     Triple turn_rad{};
     Triple velocity_mps{};
-    double azimuth_rad = 0;           ///< read-out, positive about up; NaN: none
+    double azimuth_rad = 0;           ///< read-out, positive about up; NaN: none. It may be late.
     Triple reference_velocity_mps{};  ///< of the azimuth axis, east north up; 0 on the rig
     Triple reference_position_m{};
 };
 
 struct AxisResult {
-    double zero_mg = 0;   ///< z: zero plus scale error times 1 g
-    double sigma_mg = 0;  ///< of what is called zero, z: with the scale's share
+    double zero_mg = 0;   ///< x, y: zero plus misalignment, z: zero plus scale error, times 1 g
+    double sigma_mg = 0;  ///< of what is called zero: with the share of what is not told apart
     double filter_sigma_mg = 0;
     double movement_mg = 0;  ///< of the estimate within the last sweep
     std::optional<double> converged_s;
@@ -77,7 +82,10 @@ struct CalibrationResult {
     std::array<AxisResult, 3> axis;
     Triple gyro_bias_deg_h{};
     Triple gyro_sigma_deg_h{};
-    std::array<Triple, 3> covariance_mg2{};  ///< of the zeros, z with the scale's share
+    std::array<Triple, 3> covariance_mg2{};         ///< of the zeros, with what is not told apart
+    std::array<Triple, 3> filter_covariance_mg2{};  ///< without
+    /// Of the vertical gyro against the azimuth read-out, 1; none without a read-out.
+    std::optional<double> gyro_gain;
     InnovationStatistic innovation;
     double time_s = 0;
     std::size_t updates = 0, gaps = 0;
@@ -113,11 +121,17 @@ class Calibration {
     std::unique_ptr<Impl> impl_;
 };
 
-/// Two runs, z up and z down: zero and scale of the z accelerometer apart.
-struct ZeroAndScale {
-    double zero_mg = 0, zero_sigma_mg = 0;
-    double scale = 0, scale_sigma = 0;  ///< 1
+/// Two runs, z up and z down: what an accelerometer shows of 1 g changes its sign, its zero does
+/// not.
+struct ZerosApart {
+    Triple zero_mg{};
+    std::array<Triple, 3> covariance_mg2{};
+    /// x, y: misalignment towards the axis of the slews as the gyros see it, rad; z: scale
+    /// error, 1.
+    Triple share{};
+    Triple share_sigma{};
 };
-[[nodiscard]] ZeroAndScale separate(const AxisResult& up, const AxisResult& down) noexcept;
+[[nodiscard]] ZerosApart separate(const CalibrationResult& up,
+                                  const CalibrationResult& down) noexcept;
 
 }  // namespace vibrig::estimator::zeros

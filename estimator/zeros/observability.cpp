@@ -120,6 +120,44 @@ Observability observability(const std::vector<double>& azimuths_deg, const Site&
     return result;
 }
 
+int rank_with_shares(const std::vector<double>& azimuths_deg, bool both_ways, const Site& site) {
+    constexpr int kAll = kStates + 3;
+    using Square = Eigen::Matrix<double, kAll, kAll>;
+    Eigen::Matrix<double, kAll, 1> scale;
+    scale << scales(site), 1e-3, 1e-3, 1e-3;
+    Eigen::Matrix<double, 6, kAll> h = Eigen::Matrix<double, 6, kAll>::Zero();
+    h.leftCols<kStates>() = measurement_matrix(site);
+    h = (h * scale.asDiagonal()).eval();
+    const int ways = both_ways ? 2 : 1;
+    Eigen::MatrixXd som(6 * kAll * ways * static_cast<Eigen::Index>(azimuths_deg.size()), kAll);
+    Eigen::Index row = 0;
+    for (int way = 0; way < ways; ++way) {
+        for (const double azimuth : azimuths_deg) {
+            const double psi = azimuth * kPi / 180;
+            const double up = way == 0 ? 1 : -1;
+            Eigen::Matrix3d c;
+            c << std::cos(psi), -up * std::sin(psi), 0, std::sin(psi), up * std::cos(psi), 0, 0, 0,
+                up;
+            Square a = Square::Zero();
+            a.topLeftCorner<kStates, kStates>() =
+                error_dynamics(c, {0, 0, site.gravity_mps2}, site);
+            a.block<3, 3>(kVelocity, kStates) = up * site.gravity_mps2 * c;
+            a = (kTimeScale_s * (scale.cwiseInverse().asDiagonal() * a * scale.asDiagonal()))
+                    .eval();
+            Eigen::Matrix<double, 6, kAll> power = h;
+            for (int i = 0; i < kAll; ++i) {
+                som.middleRows<6>(row) = power;
+                row += 6;
+                power = (power * a).eval();
+            }
+        }
+    }
+    const auto [s, v] = linear_algebra::right_singular(som);
+    int rank = 0;
+    for (Eigen::Index i = 0; i < kAll; ++i) rank += s[i] > kRankLimit * s[0] ? 1 : 0;
+    return rank;
+}
+
 void check_observable(const SlewPlan& plan, const Site& site) {
     plan.check();
     const Observability found = observability(plan.segments_deg(), site);

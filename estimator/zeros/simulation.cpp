@@ -73,8 +73,10 @@ struct UnitSimulation::Impl {
             2 * w.cross(0.5 * (v1 + velocity)) * period_s;
         const Eigen::Matrix3d middle = rotation(-0.5 * period_s * w) * c * rotation(0.5 * turn);
         Eigen::Vector3d dv = middle.transpose() * in_navigation;
-        dv += vector(errors.scale).cwiseProduct(dv) +
-              vector(errors.zero_mg) * (1e-3 * site.gravity_mps2 * period_s);
+        const Eigen::Vector3d seen =
+            vector(errors.scale).cwiseProduct(dv) + matrix(errors.accelerometer_cross) * dv;
+        dv += seen + vector(errors.zero_mg) * (1e-3 * site.gravity_mps2 * period_s);
+        turn += (matrix(errors.gyro_cross) * turn).eval();
         turn += vector(errors.gyro_bias_deg_h) * (kDeg / 3600 * period_s);
         const double root = std::sqrt(period_s);
         turn += noise(settings.noise.angle_random_walk * kDeg / 60 * root);

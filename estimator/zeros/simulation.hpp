@@ -12,6 +12,8 @@ namespace vibrig::estimator::zeros {
 struct UnitErrors {
     Triple zero_mg{5, -5, 5};
     Triple scale{};  ///< of the accelerometers, 1
+    /// Row i: what the instrument on axis i shows of x, y, z besides; gains on the diagonal; 1.
+    std::array<Triple, 3> accelerometer_cross{}, gyro_cross{};
     Triple gyro_bias_deg_h{0.1, -0.1, 0.1};
     double tilt_east_deg = 0.1, tilt_north_deg = -0.1, azimuth_deg = 0.5;  ///< wrongly assumed
     double vibration_g = 0;  ///< peak, along the vertical, at 15 Hz

@@ -28,23 +28,26 @@ ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
     : settings_(settings),
       lever_(vector(settings.lever_arm_m)),
       strapdown_(settings.site, level_attitude(azimuth_rad, settings.inverted),
-                 level_attitude(azimuth_rad, settings.inverted) * lever_),
-      h_(measurement_matrix(settings.site)) {
+                 level_attitude(azimuth_rad, settings.inverted) * lever_) {
+    h_.leftCols<kStates>() = measurement_matrix(settings.site);
     const Initial& start = settings.initial;
     const Site& site = settings.site;
     const double metre = start.position_m / site.radius_m;
-    StateVector sigma;
+    FilterVector sigma;
     sigma << start.tilt_deg * kDeg, start.tilt_deg * kDeg, start.azimuth_deg * kDeg,
         Eigen::Vector3d::Constant(start.velocity_mps), metre, metre / std::cos(site.latitude_rad),
         start.position_m, Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
-        Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2);
+        Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2),
+        Eigen::Matrix<double, 6, 1>::Constant(start.cross);
     p_ = sigma.cwiseAbs2().asDiagonal();
 }
 
 void ZeroFilter::advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& velocity,
                          double dt_s) {
     const Eigen::Vector3d true_turn = turn - gyro_bias_ * dt_s;
-    const Eigen::Vector3d true_velocity = velocity - zero_ * dt_s;
+    // What of its own tilt the unit shows on the wrong axis, or too large.
+    const Eigen::Vector3d level = strapdown_.c().row(2) * settings_.site.gravity_mps2;
+    const Eigen::Vector3d true_velocity = velocity - (zero_ + cross_ * level.head<2>()) * dt_s;
     const Eigen::Matrix3d before = strapdown_.c();
     strapdown_.advance(true_turn, true_velocity, dt_s);
     rate_ = true_turn / dt_s;
@@ -63,8 +66,16 @@ void ZeroFilter::propagate() {
     // The specific force of the standing axis, not the measured one: what a wrong attitude makes of
     // that would pass for information on states that cannot be observed.
     const Eigen::Vector3d f(0, 0, settings_.site.gravity_mps2);
-    const StateMatrix a = part_s_ * error_dynamics(mean_c_ / part_s_, f, settings_.site);
-    const StateMatrix step = StateMatrix::Identity() + a + 0.5 * a * a;
+    const Eigen::Matrix3d c = mean_c_ / part_s_;
+    FilterMatrix a = FilterMatrix::Zero();
+    a.topLeftCorner<kStates, kStates>() = error_dynamics(c, f, settings_.site);
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 2; ++j) {
+            a.block<3, 1>(kVelocity, kCross + 2 * i + j) = c.col(i) * (c(2, j) * f[2]);
+        }
+    }
+    a *= part_s_;
+    const FilterMatrix step = FilterMatrix::Identity() + a + 0.5 * a * a;
     phi_ = (step * phi_).eval();
     since_update_s_ += part_s_;
     part_s_ = 0;
@@ -74,12 +85,12 @@ void ZeroFilter::propagate() {
 void ZeroFilter::loosen(double tilt, double velocity, double position) {
     propagate();
     const double metre = position / settings_.site.radius_m;
-    StateVector sigma = StateVector::Zero();
+    FilterVector sigma = FilterVector::Zero();
     sigma.segment<3>(kPhi).setConstant(tilt);
     sigma.segment<3>(kVelocity).setConstant(velocity);
     sigma.segment<3>(kPosition) << metre, metre / std::cos(settings_.site.latitude_rad), position;
     // Errors of now, seen from the last update: the propagation is near enough to identity.
-    p_ += StateMatrix(sigma.cwiseAbs2().asDiagonal());
+    p_ += FilterMatrix(sigma.cwiseAbs2().asDiagonal());
 }
 
 ZeroFilter::Innovation ZeroFilter::update(const Eigen::Vector3d& velocity,
@@ -91,13 +102,13 @@ ZeroFilter::Innovation ZeroFilter::update(const Eigen::Vector3d& velocity,
     const double force = noise.velocity_random_walk * settings_.site.gravity_mps2;
     const double gyro = noise.gyro_drift * kDegPerHour / 60;
     const double zero = noise.accelerometer_drift * 1e-3 * settings_.site.gravity_mps2 / 60;
-    StateVector q = StateVector::Zero();
+    FilterVector q = FilterVector::Zero();
     q.segment<3>(kPhi).setConstant(turn * turn * t);
     q.segment<3>(kVelocity).setConstant(force * force * t);
     q.segment<3>(kGyro).setConstant(gyro * gyro * t);
     q.segment<3>(kAccelerometer).setConstant(zero * zero * t);
     p_ = (phi_ * p_ * phi_.transpose()).eval();
-    p_ += StateMatrix(q.asDiagonal());
+    p_ += FilterMatrix(q.asDiagonal());
     phi_.setIdentity();
     since_update_s_ = 0;
 
@@ -111,17 +122,17 @@ ZeroFilter::Innovation ZeroFilter::update(const Eigen::Vector3d& velocity,
     r << Eigen::Vector3d::Constant(noise.velocity_reference * noise.velocity_reference),
         Eigen::Vector3d::Constant(noise.position_reference * noise.position_reference);
     using Square = Eigen::Matrix<double, 6, 6>;
-    const Eigen::Matrix<double, kStates, 6> ph = p_ * h_.transpose();
+    const Eigen::Matrix<double, kFilterStates, 6> ph = p_ * h_.transpose();
     Square s = h_ * ph;
     s.diagonal() += r;
     const Eigen::LLT<Square> llt(s);
-    const Eigen::Matrix<double, kStates, 6> gain = llt.solve(ph.transpose()).transpose();
+    const Eigen::Matrix<double, kFilterStates, 6> gain = llt.solve(ph.transpose()).transpose();
     Innovation innovation;
     innovation.nis = z.dot(llt.solve(z));
     innovation.ratio = z.cwiseAbs2().cwiseQuotient(s.diagonal());
-    const StateVector x = gain * z;
+    const FilterVector x = gain * z;
     // Joseph's form keeps the covariance symmetric and positive.
-    const StateMatrix rest = StateMatrix::Identity() - gain * h_;
+    const FilterMatrix rest = FilterMatrix::Identity() - gain * h_;
     p_ = (rest * p_ * rest.transpose()).eval() + gain * r.asDiagonal() * gain.transpose();
     p_ = (0.5 * (p_ + p_.transpose())).eval();
 
@@ -131,6 +142,9 @@ ZeroFilter::Innovation ZeroFilter::update(const Eigen::Vector3d& velocity,
                         x[kPosition] * radius, x[kPosition + 2]});
     gyro_bias_ += x.segment<3>(kGyro);
     zero_ += x.segment<3>(kAccelerometer);
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 2; ++j) cross_(i, j) += x[kCross + 2 * i + j];
+    }
     return innovation;
 }
 

@@ -5,6 +5,12 @@
 
 namespace vibrig::estimator::zeros {
 
+/// Besides the 15 states: what each accelerometer shows of x and y besides its own axis, gains
+/// included. A unit that is not level has some of them in its zeros.
+inline constexpr int kCross = kStates, kFilterStates = kStates + 6;
+using FilterMatrix = Eigen::Matrix<double, kFilterStates, kFilterStates>;
+using FilterVector = Eigen::Matrix<double, kFilterStates, 1>;
+
 /// The Kalman filter on the error model around a strapdown mechanisation, in closed loop: after
 /// each update the state is taken off attitude, velocity, position and biases.
 class ZeroFilter {
@@ -12,6 +18,8 @@ class ZeroFilter {
     ZeroFilter(const CalibrationSettings& settings, double azimuth_rad);
 
     void advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& velocity, double dt_s);
+    /// The azimuth is so much too large, rad.
+    void turn_back(double azimuth) { strapdown_.correct({0, 0, -azimuth}, {0, 0, 0}, {0, 0, 0}); }
     /// Forgets attitude, velocity and position to this extent (1 sigma): rad, m/s, m.
     void loosen(double tilt, double velocity, double position);
 
@@ -24,7 +32,7 @@ class ZeroFilter {
 
     [[nodiscard]] const Eigen::Vector3d& gyro_bias() const noexcept { return gyro_bias_; }
     [[nodiscard]] const Eigen::Vector3d& zero() const noexcept { return zero_; }
-    [[nodiscard]] const StateMatrix& covariance() const noexcept { return p_; }
+    [[nodiscard]] const FilterMatrix& covariance() const noexcept { return p_; }
 
   private:
     void propagate();
@@ -35,10 +43,11 @@ class ZeroFilter {
     Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();  ///< rad/s
     Eigen::Vector3d zero_ = Eigen::Vector3d::Zero();       ///< m/s^2
     Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();       ///< last, rad/s
-    StateMatrix p_, phi_ = StateMatrix::Identity();
+    FilterMatrix p_, phi_ = FilterMatrix::Identity();
     Eigen::Matrix3d mean_c_ = Eigen::Matrix3d::Zero();
+    Eigen::Matrix<double, 3, 2> cross_ = Eigen::Matrix<double, 3, 2>::Zero();
     double part_s_ = 0, since_update_s_ = 0;
-    MeasurementMatrix h_;
+    Eigen::Matrix<double, 6, kFilterStates> h_ = Eigen::Matrix<double, 6, kFilterStates>::Zero();
 };
 
 }  // namespace vibrig::estimator::zeros

@@ -98,12 +98,14 @@ def zero_failures(checks, programs):
 
 
 def both_ways(checks, programs):
-    """Levelled first, then z up and z down: zero and scale of z apart."""
-    zero_g, scale = [0.004, -0.003, 0.002], 2e-4
+    """Levelled first, then z up and z down: zeros, misalignments and scale of z apart."""
+    zero_g, scale, cross = [0.004, -0.003, 0.002], 2e-4, [100, -50]
     matrix = [[1 / (1 + scale) if i == k else 0 for k in range(3)] for i in range(3)]  # raw to platform axes
+    for i, arcsec in enumerate(cross):
+        matrix[i][2] = -math.radians(arcsec / 3600)
     run = Run(programs, {**LEVELLING, "zeroing": True, "positions_deg": [[0, 0, 0]]},
               {"platform": {"slew_error_deg": 0.2}, "accelerometer": {"zero_g": zero_g, "matrix": matrix}},
-              zeroing={"both_ways": True, "scale_factor": 1e-3})
+              zeroing={"scale_factor": 1e-3})
     if not run.ended(checks, "finished", "a campaign with both stages, z up and z down, finishes"):
         return
     story = [word for line in run.text.splitlines() for word in ("level", "zeros") if word + " after" in line]
@@ -111,9 +113,11 @@ def both_ways(checks, programs):
                  "each run of the zeros is levelled first, before and after the position")
     zeros = run.last["campaign"]["zeros"]
     off = [abs(z - 1e3 * b) / s for z, b, s in zip(zeros["zero_mg"], zero_g, zeros["sigma_mg"])]
-    checks.check(max(off) <= 5 and max(zeros["sigma_mg"]) <= 0.02, "the zeros come out, z without its scale", zeros)
+    checks.check(max(off) <= 5 and max(zeros["sigma_mg"]) <= 0.02, "the zeros come out, without misalignment and scale", zeros)
     checks.check(abs(zeros["scale_z_ppm"] - 1e6 * scale) <= 5 * zeros["scale_z_sigma_ppm"] <= 100,
                  "the scale of z comes out beside it", zeros)
+    found = zip(zeros["misalignment_arcsec"], cross, zeros["misalignment_sigma_arcsec"])
+    checks.check(all(abs(m - c) <= 5 * s <= 10 for m, c, s in found), "and the misalignments of x and y", zeros)
     checks.check(zeros["repeated_at_end"] and not zeros.get("mark"), "nothing has moved at the end", zeros)
 
 
@@ -131,9 +135,9 @@ def seeds(checks, programs, count):
         zeros = run.last["campaign"]["zeros"]
         checks.check(not zeros.get("mark"), f"seed {seed}: not marked", zeros)
         squares += sum(((z - 1e3 * b) / s) ** 2 for z, b, s in
-                       zip(zeros["zero_mg"][:2], zero_g[:2], zeros["sigma_mg"][:2]))
-    # chi-square of 2 per campaign, 99.9 % point (Wilson and Hilferty); the stillness of the platform is a bound
-    n = 2 * count
+                       zip(zeros["zero_mg"], zero_g, zeros["sigma_mg"]))
+    # chi-square of 3 per campaign, 99.9 % point (Wilson and Hilferty); the stillness of the platform is a bound
+    n = 3 * count
     limit = n * (1 - 2 / (9 * n) + 3.09 * math.sqrt(2 / (9 * n))) ** 3
     checks.check(squares <= limit, f"zeros of {count} campaigns within their sigma", f"{squares:.1f}, limit {limit:.1f}")
 

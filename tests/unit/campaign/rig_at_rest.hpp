@@ -51,6 +51,14 @@ class RigAtRest {
         return stage.failure();
     }
 
+    /// Both ways, where the stage asks for them; begun before.
+    std::string zero_all(ZeroingStage& stage, LevellingStage* levelling) {
+        auto why = zero(stage, levelling);
+        if (!why.empty() || !stage.another()) return why;
+        stage.begin_other_way();
+        return zero(stage, levelling);
+    }
+
     /// One run, begun before.
     std::string zero(ZeroingStage& stage, LevellingStage* levelling) {
         slew(stage.target_deg(), plant::GimbalMode::slew);

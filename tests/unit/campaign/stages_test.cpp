@@ -405,14 +405,18 @@ estimator::Settings rig_of_the_unit() {
 }
 
 TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
-    // GIVEN scale errors of 200 ppm, twice what they are said to be
+    // GIVEN scale errors of 200 ppm, twice what they are said to be, and misalignments of 100 and
+    // -50 arcsec
     const estimator::Settings rig = rig_of_the_unit();
     const RigFrame frame(rig);
     estimator::zeros::UnitErrors errors;
     errors.zero_mg = {5, -3, 2};
     errors.scale = {2e-4, 2e-4, 2e-4};
+    constexpr double kArcsec = kRadPerDeg / 3600;
+    errors.accelerometer_cross = {{{0, 0, 100 * kArcsec}, {0, 0, -50 * kArcsec}, {0, 0, 0}}};
     errors.azimuth_deg = 0;
     ZeroingSettings settings;
+    settings.both_ways = false;
     ZeroingStage one_way(settings, rig, kSample_s);
     one_way.begin();
     EXPECT_FALSE(one_way.another());
@@ -423,6 +427,10 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_GT(one_way.status().sigma_mg[2], 0.1);
     EXPECT_EQ(one_way.status().scale_z, 0);
     EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x scale error"));
+    // AND 1 g of misalignment within x and y, which is declared as 50 arcsec
+    EXPECT_NEAR(one_way.status().zero_mg[0], 5 + 0.485, 0.02);
+    EXPECT_NEAR(one_way.status().sigma_mg[0], 0.24, 0.01);
+    EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x misalignment"));
     // WHEN both runs are made
     settings.both_ways = true;
     ZeroingStage stage(settings, rig, kSample_s);
@@ -443,8 +451,12 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_NEAR(found.scale_z, 2e-4, 5 * found.scale_z_sigma);
     EXPECT_NEAR(found.zero_mg[0], 5, 5 * found.sigma_mg[0]);
     EXPECT_NEAR(found.zero_mg[1], -3, 5 * found.sigma_mg[1]);
-    EXPECT_EQ(found.covariance_mg2[2][2], found.sigma_mg[2] * found.sigma_mg[2]);
-    EXPECT_THAT(stage.words(), HasSubstr("z apart: zero "));
+    EXPECT_LT(found.sigma_mg[0], 0.01);
+    EXPECT_NEAR(found.misalignment[0], 100 * kArcsec, 5 * found.misalignment_sigma[0]);
+    EXPECT_NEAR(found.misalignment[1], -50 * kArcsec, 5 * found.misalignment_sigma[1]);
+    EXPECT_DOUBLE_EQ(found.covariance_mg2[2][2], found.sigma_mg[2] * found.sigma_mg[2]);
+    EXPECT_THAT(stage.words(), HasSubstr("misalignment +"));
+    EXPECT_THAT(stage.words(), HasSubstr("scale of z +"));
     // AND the level of a dwell is then as sure as that
     EXPECT_NEAR(stage.level_sigma({90, 0, 0}), 1e-3 * found.sigma_mg[2], 1e-9);
     EXPECT_GT(one_way.level_sigma({90, 0, 0}), 1e-4);
@@ -473,7 +485,9 @@ TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     const RigFrame frame(rig);
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, false))[2], 1, 1e-12);
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, true))[2], -1, 1e-12);
-    ZeroingStage stage({}, rig, kSample_s);
+    ZeroingSettings one_way;
+    one_way.both_ways = false;
+    ZeroingStage stage(one_way, rig, kSample_s);
     feed_unit(stage, frame, 5, 1);
     ASSERT_EQ(stage.finish(false), "");
     const Vector found = stage.raw_zero_g();

@@ -303,6 +303,24 @@ TEST(PaperLevel, IsExactOverWholeBlocksAndBlendsItsStart) {
     EXPECT_NEAR(level.kappa(), 19, 1e-8);
 }
 
+TEST(PaperLevel, WithoutAStartItIsPlainEq13) {
+    // GIVEN the crest of the vibration as the first sample
+    std::mt19937_64 random(29);
+    Signal signal;
+    signal.harmonic = signal.noise = 0;
+    signal.phase = kPi / 2;
+    PaperLevel level(15, 0.95);
+    level.begin();
+    for (int n = 1; n <= 80; ++n) {
+        const double f = signal.at((n - 1) * kPeriod, random);
+        level.add((n - 1) * kPeriod, f * f);
+        // THEN whole blocks are exact from the first on: nothing of the first sample is left
+        if (n % 8 == 0) {
+            ASSERT_NEAR(level.amplitude_g(), 6, 1e-9) << n;
+        }
+    }
+}
+
 TEST(PaperLevel, MissesByWhatThePaperMissesBetweenBlocks) {
     std::mt19937_64 random(28);
     Signal signal;

@@ -69,6 +69,12 @@ TEST_F(LevelCommand, DesignsGainsWithTheirNoise) {
     EXPECT_NE(out.find("cannot settle"), std::string::npos);
 }
 
+TEST_F(LevelCommand, ANoiseThatAsksForMoreThanFiveArcminutesIsNoLevel) {
+    EXPECT_EQ(vibrig("level simulate --reference-noise 5"), 1);
+    EXPECT_NE(out.find("cannot settle"), std::string::npos) << out;
+    EXPECT_NE(out.find("mostly reference velocity"), std::string::npos) << out;
+}
+
 TEST_F(LevelCommand, SimulatesAStart) {
     const std::string drift = " --drift 2,-3 --zero 0.1,0 --seed 4 --duration 400";
     const Json result = json("level simulate --tolerance 0.2" + drift, 0);

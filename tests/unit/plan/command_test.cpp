@@ -139,6 +139,7 @@ TEST_F(PlanCommand, KeepsLimitsCostsAndTargets) {
     }
     EXPECT_LE(json()["run_count"], 20);
     EXPECT_EQ(vibrig("plan --levels 0,6 --targets 0.0001,0,0 --runs 12"), 1) << "out of reach";
+    EXPECT_EQ(vibrig("plan --levels 0,60 --runs 12"), 1) << "beyond the shaker's limits";
     // Both orders
     for (const char* order : {"travel", "random"}) {
         ASSERT_EQ(vibrig(std::string("plan --runs 20 --json --order ") + order), 0) << error;

@@ -22,7 +22,7 @@ CalibrationSettings thirty_degrees_north(double duration_s = 180) {
     CalibrationSettings s;
     s.site.latitude_rad = 30 * kDegree;
     s.plan.duration_s = duration_s;
-    s.noise.scale_factor = 0;
+    s.noise.scale_factor = s.noise.misalignment = 0;
     return s;
 }
 
@@ -74,6 +74,12 @@ TEST(ZeroObservability, RanksAndSingularValuesAreThoseOfTheErrorModel) {
                          observability({0, 5.0 / 3600 * 30}, site).singular[14];
     EXPECT_GT(ratio, 20);
     EXPECT_LT(ratio, 60);
+}
+
+TEST(ZeroObservability, MisalignmentAndScaleAreInTheZerosUnlessZIsTakenDownToo) {
+    const Site site = thirty_degrees_north().site;
+    EXPECT_EQ(rank_with_shares({0, 90, -90}, false, site), 15);
+    EXPECT_EQ(rank_with_shares({0, 90, -90}, true, site), 18);
 }
 
 TEST(ZeroObservability, RefusesPlansThatCannotWork) {
@@ -201,10 +207,10 @@ TEST(ZeroCalibration, OfZItSaysZeroPlusScaleAndBothWaysSeparatesThem) {
     s.inverted = true;
     const CalibrationResult down = simulate(s, errors, kPeriod, 4).result();
     EXPECT_TRUE(down.valid) << all(down.problems);
-    const ZeroAndScale apart = separate(up.axis[2], down.axis[2]);
-    EXPECT_NEAR(apart.zero_mg, errors.zero_mg[2], 5 * apart.zero_sigma_mg);
-    EXPECT_NEAR(apart.scale, 100e-6, 5 * apart.scale_sigma);
-    EXPECT_LT(apart.scale_sigma, 10e-6);
+    const ZerosApart apart = separate(up, down);
+    EXPECT_NEAR(apart.zero_mg[2], errors.zero_mg[2], 5 * std::sqrt(apart.covariance_mg2[2][2]));
+    EXPECT_NEAR(apart.share[2], 100e-6, 5 * apart.share_sigma[2]);
+    EXPECT_LT(apart.share_sigma[2], 10e-6);
 }
 
 TEST(ZeroCalibration, ALeverArmIsTakenIntoAccount) {
@@ -367,7 +373,89 @@ TEST(ZeroCalibration, AtRestItCannotTellZerosFromTilt) {
     const CalibrationResult result = simulate(s, {}, kPeriod, 10).result();
     // THEN it does not call the zeros found, and they are milligrams wrong
     expect_words(all(result.problems), {"x has not converged", "y has not converged"});
-    EXPECT_GT(std::hypot(result.axis[0].zero_mg - 5, result.axis[1].zero_mg + 5), 1);
+    const double off = std::hypot(result.axis[0].zero_mg - 5, result.axis[1].zero_mg + 5);
+    EXPECT_GT(off, 1);
+    // AND its sigma says so
+    EXPECT_LT(off, 3 * result.axis[0].sigma_mg);
+    EXPECT_GE(result.axis[0].sigma_mg, 5);
+    EXPECT_GE(result.axis[1].sigma_mg, 5);
 }
+
+/// Off-diagonals of 1 sigma `cross`, gains of 1 sigma `gain`.
+std::array<Triple, 3> drawn(std::mt19937_64& generator, double cross, double gain) {
+    std::normal_distribution<double> normal;
+    std::array<Triple, 3> rows{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t j = 0; j < 3; ++j)
+            rows[i][j] = (i == j ? gain : cross) * normal(generator);
+    }
+    return rows;
+}
+
+/// z-rms of the zeros of units with the base tilted by 10', gains of 1e-3 and this misalignment of
+/// one triad: all axes one way; x and y, and z, both ways.
+struct Honesty {
+    double one_way = 0, level = 0, z = 0;
+};
+
+Honesty honesty(double arcsec, bool of_gyros, std::uint64_t seeds) {
+    Honesty sum;
+    const double n = static_cast<double>(seeds);
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+        std::mt19937_64 generator(1000 * seed + static_cast<std::uint64_t>(arcsec));
+        UnitErrors errors;
+        std::uniform_real_distribution<double> zero(-5, 5);
+        for (double& b : errors.zero_mg) b = zero(generator);
+        errors.tilt_east_deg = errors.tilt_north_deg = 10.0 / 60 / std::sqrt(2.0);
+        const double cross = arcsec * kDegree / 3600;
+        errors.accelerometer_cross = drawn(generator, of_gyros ? 0 : cross, 1e-3);
+        errors.gyro_cross = drawn(generator, of_gyros ? cross : 0, 1e-3);
+        CalibrationSettings s = thirty_degrees_north();
+        s.noise.scale_factor = 1e-3;
+        s.noise.misalignment = kDeclaredCross;
+        const CalibrationResult up = simulate(s, errors, kPeriod, 2 * seed).result();
+        EXPECT_TRUE(up.valid) << "seed " << seed << ": " << all(up.problems);
+        s.inverted = true;
+        const CalibrationResult down = simulate(s, errors, kPeriod, 2 * seed + 1).result();
+        EXPECT_TRUE(down.valid) << "seed " << seed << ": " << all(down.problems);
+        const ZerosApart apart = separate(up, down);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double off = up.axis[i].zero_mg - errors.zero_mg[i];
+            sum.one_way += std::pow(off / up.axis[i].sigma_mg, 2) / (3 * n);
+            const double apart_off = apart.zero_mg[i] - errors.zero_mg[i];
+            const double square = std::pow(apart_off, 2) / apart.covariance_mg2[i][i];
+            (i < 2 ? sum.level : sum.z) += square / (i < 2 ? 2 * n : n);
+        }
+    }
+    return {std::sqrt(sum.one_way), std::sqrt(sum.level), std::sqrt(sum.z)};
+}
+
+void expect_honest(std::uint64_t seeds) {
+    // 3.29 standard deviations of the rms of that many normal numbers.
+    const double slack = 3.29 / std::sqrt(4 * static_cast<double>(seeds));
+    for (const bool of_gyros : {false, true}) {
+        for (const double arcsec : {0.0, 10.0, 50.0, 200.0}) {
+            const Honesty found = honesty(arcsec, of_gyros, seeds);
+            const auto what = testing::Message()
+                              << arcsec << " arcsec of the "
+                              << (of_gyros ? "gyros" : "accelerometers") << ", seeds 1 to " << seeds
+                              << ": " << found.one_way << ' ' << found.level << ' ' << found.z;
+            // THEN both ways the zeros are as sure as they say, whatever the misalignment
+            EXPECT_NEAR(found.level, 1, slack) << what;
+            // (z less: how much of the tilt it sees is taken for as unknown as 1e-3)
+            EXPECT_LT(found.z, 1 + std::sqrt(2.0) * slack) << what;
+            // AND one way they are not surer than they are, up to the size declared
+            if (arcsec <= 50) {
+                EXPECT_LT(found.one_way, 1 + slack) << what;
+            }
+        }
+    }
+}
+
+TEST(ZeroMisalignment, BothWaysTheZerosArePureAndOneWayTheirSigmaKnowsWhatIsInThem) {
+    expect_honest(5);
+}
+
+TEST(ZeroMisalignmentSoak, AHundredUnitsOfEachMisalignment) { expect_honest(100); }
 
 }  // namespace

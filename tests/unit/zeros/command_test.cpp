@@ -56,8 +56,13 @@ TEST_F(ZeroCommand, SimulatesAndExplains) {
     EXPECT_EQ(result["zeros"][2]["what"], "zero + 1 g x scale error");
     EXPECT_GT(result["zeros"][2]["sigma_mg"], 0.1);
     EXPECT_NEAR(result["zeros"][0]["level_arcmin"], 5 * 3.438, 0.2);
-    EXPECT_NEAR(result["z_apart"]["scale_ppm"], 100, 10);
-    EXPECT_NEAR(result["z_apart"]["zero_mg"], 5, 0.01);
+    EXPECT_EQ(result["zeros"][0]["what"], "zero + 1 g x misalignment");
+    EXPECT_NEAR(result["zeros"][0]["sigma_mg"], 0.242, 0.003);  // 50 arcsec
+    EXPECT_EQ(result["zeros"][0]["observable"], false);
+    EXPECT_EQ(result["apart"][0]["observable"], true);
+    EXPECT_NEAR(result["apart"][2]["scale_ppm"], 100, 10);
+    EXPECT_NEAR(result["apart"][2]["zero_mg"], 5, 0.01);
+    EXPECT_NEAR(result["apart"][0]["zero_mg"], 5, 5 * result["apart"][0]["sigma_mg"].get<double>());
     EXPECT_EQ(vibrig("zero simulate"), 0) << error;
     EXPECT_NE(out.find("rank 15 of 15"), std::string::npos) << out;
     EXPECT_EQ(vibrig("zero simulate --vibration 1"), 1);
