@@ -373,7 +373,11 @@ std::vector<estimator::DwellSummary> done(std::size_t count) {
 
 TEST_F(CampaignTest, GoesOnAfterARestartWhereItWasAndOnlyOnCommand) {
     // GIVEN three positions of four done before a restart
-    EXPECT_FALSE(campaign->offer({done(3)[1]})) << "not the first";
+    estimator::DwellSummary foreign;
+    foreign.run = 3;
+    foreign.position = 1;
+    EXPECT_FALSE(campaign->offer({foreign})) << "no such position";
+    EXPECT_FALSE(campaign->offer({done(1)[0], done(1)[0]})) << "the same twice";
     EXPECT_TRUE(campaign->offer(done(3)));
     EXPECT_EQ(status().resume_offer, "3 of 4 positions done");
     // WHEN nobody does anything, or resumes without arming, THEN nothing moves
@@ -401,6 +405,25 @@ TEST_F(CampaignTest, GoesOnAfterARestartWhereItWasAndOnlyOnCommand) {
     EXPECT_TRUE(complete);
     EXPECT_EQ(positions_done, 1);
     EXPECT_EQ(status().resume_offer, "");
+}
+
+TEST_F(CampaignTest, GoesOnWithWhatIsLeftOfAnotherOrder) {
+    // GIVEN a restart after the second position of run 2 and the first of run 1
+    const auto all = done(4);
+    ASSERT_TRUE(campaign->offer({all[3], all[0]}));
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    // THEN the two others follow, in their order
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    ASSERT_EQ(orders.size(), 2U);
+    EXPECT_EQ(orders[0].dwell.run, 1);
+    EXPECT_EQ(orders[0].dwell.position, 2);
+    EXPECT_EQ(orders[1].dwell.run, 2);
+    EXPECT_EQ(orders[1].dwell.position, 1);
+    // AND dwells know when they began, since the first of this life
+    EXPECT_EQ(orders[0].dwell.begin_s, 0);
+    EXPECT_NEAR(orders[1].dwell.begin_s, drivers::to_seconds(orders[1].from - orders[0].from),
+                1e-9);
 }
 
 TEST_F(CampaignTest, EndsAResumedCampaignThatHadOnlyItsEndToCome) {

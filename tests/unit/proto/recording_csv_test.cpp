@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -193,12 +194,32 @@ TEST_F(Recording, MayStartTimeAnewInANewDwell) {
         3U);
 }
 
-TEST_F(Recording, ContinuesADwellThatComesBackIfItsTimeGoesOn) {
+TEST_F(Recording, BeginsANewDwellWhereAPairComesBack) {
     const std::string text = std::string(kHeader) + "5,1,1,0,0,0,0,0,0\n6,1,2,0,0,0,0,0,0\n";
     EXPECT_EQ(read(text + "7,1,1,0,0,0,0,0,0\n").size(), 3U);
-    EXPECT_EQ(error(text + "4,1,1,0,0,0,0,0,0\n"),
-              ":4: column time_s: found '4', expected more than 5, the time before it in run 1, "
-              "position 1");
+    EXPECT_EQ(read(text + "4,1,1,0,0,0,0,0,0\n").size(), 3U);
+}
+
+TEST_F(Recording, ReadsOtherSeparatorsAndDecimalCommasWhereTheyAreUnambiguous) {
+    const std::string header = "Time_s;run;position;alpha_deg;beta_deg;gamma_deg;ax_g;ay_g;az_g\n";
+    const auto rows = read("# written by a spreadsheet\n" + header + "0,5;1;2;10,25;0;-3;0;1;0\n");
+    ASSERT_EQ(rows.size(), 1U);
+    EXPECT_EQ(rows[0].time_s, 0.5);
+    EXPECT_EQ(rows[0].angle_deg, (std::array<double, 3>{10.25, 0, -3}));
+    EXPECT_EQ(rows[0].line, 3U);
+    std::string tabs = header + "0.5;1;2;10.25;0;-3;0;1;0\n";
+    std::replace(tabs.begin(), tabs.end(), ';', '\t');
+    EXPECT_EQ(read(tabs)[0].angle_deg, rows[0].angle_deg);
+}
+
+TEST_F(Recording, NamesDecimalCommasAmongCommasAndLinesThatEndInACarriageReturn) {
+    EXPECT_EQ(row_error("0,5,1,2,10,25,0,0,-3,0,0,0,1,0,0,0"),
+              ":3: found 16 fields, expected 9 as in the header (decimal commas want ';' or a tab "
+              "between the fields)");
+    std::string text = std::string(kHeader) + "0,1,1,0,0,0,0,0,0\n";
+    std::replace(text.begin(), text.end(), '\n', '\r');
+    EXPECT_EQ(error(text),
+              ":1: found lines that end in a carriage return only, expected LF or CR LF");
 }
 
 TEST_F(Recording, RefusesWhatIsNoText) {
