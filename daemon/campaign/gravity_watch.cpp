@@ -12,13 +12,13 @@ namespace vibrig::campaign {
 
 namespace {
 
-constexpr double kDegree = 180 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 constexpr std::size_t kMostLooks = 8, kMostSuspects = 3;
 constexpr std::array kGimbals{"outer", "inner", "azimuth"};
 
 double angle_deg(const Vector& a, const Vector& b) {
     const Vector across = cross(a, b);
-    return std::atan2(std::sqrt(dot(across, across)), dot(a, b)) * kDegree;
+    return std::atan2(std::sqrt(dot(across, across)), dot(a, b)) * kDegreesPerRadian;
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);
 
-constexpr double kDegree = 180.0 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 constexpr std::array<const char*, drivers::kChannels> kChannelNames{
     "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
 
@@ -249,7 +249,7 @@ v1::Channel::Quality wire_state(ChannelState state) {
 }
 
 double channel_value(const drivers::Sample& sample, std::size_t channel) {
-    if (channel < 3) return sample.angle[channel] * kDegree;
+    if (channel < 3) return sample.angle[channel] * kDegreesPerRadian;
     if (channel < 6) return sample.force[channel - 3];
     return sample.table_accel;
 }
