@@ -182,7 +182,7 @@ def check_examples(checks, campaign):
         if os.path.exists(path):
             os.remove(path)
         run = subprocess.run([sys.executable, "-c", code, str(campaign.folder)], capture_output=True, text=True, timeout=120, cwd=PICTURES,
-                             env={**os.environ, "PYTHONPATH": PACKAGE, "MPLBACKEND": "svg", "PYTHONDONTWRITEBYTECODE": "1"})
+                             env={**os.environ, "PYTHONPATH": PACKAGE, "MPLBACKEND": "agg", "PYTHONDONTWRITEBYTECODE": "1"})
         checks.check(run.returncode == 0 and os.path.exists(path) and os.path.getsize(path) > 5000, f"its example makes {picture}",
                      run.stderr[-1500:])
 
