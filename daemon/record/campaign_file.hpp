@@ -22,10 +22,10 @@ struct Campaign {
     std::vector<Part> parts;
     std::string folder;  ///< where it and its raw log are
     Head head;
-    std::string state, reason;     ///< "running" when it was not closed
-    std::string mark;              ///< why it is marked; empty: it is not
-    std::string incomplete;        ///< what is missing for its result; empty: nothing
-    drivers::Time moved = 0;       ///< times of the newest part, to be those of the first one's clock
+    std::string state, reason;  ///< "running" when it was not closed
+    std::string mark;           ///< why it is marked; empty: it is not
+    std::string incomplete;     ///< what is missing for its result; empty: nothing
+    drivers::Time moved = 0;    ///< times of the newest part, to be those of the first one's clock
     std::size_t restarted_at = 0;  ///< dwells done when the daemon was last started
     std::int64_t ended_utc_ns = 0;
     std::string result_json;

@@ -20,7 +20,7 @@ void add_remote(
     CLI::App& app,
     int& exit_code);  ///< status, selftest, watch, events, arm, start, pause, resume, abort, ack
 void add_replay(CLI::App& app, int& exit_code);
-void add_reports(CLI::App& app, int& exit_code);     ///< report, compensate
+void add_reports(CLI::App& app, int& exit_code);  ///< report, compensate
 void add_certificate(CLI::App& app, int& exit_code);
 void add_recordings(CLI::App& app, int& exit_code);  ///< export, recover
 

@@ -2,7 +2,9 @@
 import {createInterface} from 'node:readline';
 import {createRequire} from 'node:module';
 
-const {chromium} = createRequire(process.env.VIBRIG_BROWSER_NPM + '/')('playwright-core');
+const installed = createRequire(process.env.VIBRIG_BROWSER_NPM + '/');
+const {chromium} = installed('playwright-core');
+const axe = installed('axe-core');
 const browser = await chromium.launch({executablePath: process.env.VIBRIG_CHROMIUM || '/usr/bin/chromium', headless: true,
   args: ['--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage']});
 const errors = [];
@@ -41,6 +43,16 @@ const commands = {
     return page.evaluate(() => [...document.querySelectorAll('button, [role=img], section, progress, [tabindex="0"]')]
       .filter(e => !(e.getAttribute('aria-label') || e.getAttribute('aria-labelledby') || e.textContent.trim()))
       .map(e => e.outerHTML.slice(0, 80)));
+  },
+  async axe({width, height, scheme}) {   // WCAG 2.2 AA as axe-core checks it: rule, how many, the first with its cause
+    await page.setViewportSize({width, height});
+    await page.emulateMedia({colorScheme: scheme});
+    await page.waitForTimeout(300);
+    await page.evaluate(axe.source);
+    const tags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'];
+    const found = await page.evaluate(tags => window.axe.run(document, {runOnly: tags}), tags);
+    return {checked: found.passes.length, violations: found.violations.map(v =>
+      `${v.id} (${v.nodes.length}): ${v.nodes[0].html.slice(0, 120)}: ${v.nodes[0].failureSummary}`.replace(/\s+/g, ' '))};
   },
   async errors() { return errors; },
 };

@@ -91,6 +91,16 @@ def free_port():
             return probe.getsockname()[1]
 
 
+def check_accessible(checks, page, when):
+    """WCAG 2.2 AA, contrast among it, by axe-core."""
+    for name, width, height, scheme in (("wall", 1920, 1080, "dark"), ("desktop", 1400, 1000, "light"),
+                                        ("phone", 390, 844, "light"), ("phone", 390, 844, "dark")):
+        found = page.ask("axe", width=width, height=height, scheme=scheme)
+        value = found.get("value") or {}
+        checks.check(value.get("checked", 0) >= 10 and not value["violations"],
+                     f"{when}, {name}, {scheme}: axe-core finds no breach of WCAG AA", "\n".join(value.get("violations", [str(found)])))
+
+
 def check_description(checks, rig, address):
     """Every path of the OpenAPI description answers as it says."""
     status, _, text = get(address, "/api/v1/openapi.json")
@@ -357,6 +367,7 @@ def check_page(checks, rig, page, address, control, remote, pki):
             if name == "wall":
                 tall = page.ask("evaluate", script="document.documentElement.scrollHeight").get("value", 10**6)
                 checks.check(tall <= height, f"{name}, {scheme}: one screen, without scrolling", f"{tall} of {height} pixels")
+    check_accessible(checks, page, "while it records")
     seen = get(address, "/metrics")[2]
     rig.daemon.process.send_signal(signal.SIGSTOP)
     until("data that no longer come are said to be stale", "document.getElementById('alert').textContent.startsWith('STALE')")
@@ -382,6 +393,7 @@ def check_page(checks, rig, page, address, control, remote, pki):
     until("the position that was interrupted is not done, and no time is left", "document.querySelectorAll('#stops li.cut.now').length === 1 && "
           "!document.querySelector('#stops li.cut').classList.contains('done') && /interrupted$/.test(document.getElementById('left').textContent)")
     checks.equal(rig.status()["campaign"].get("remaining_s", 0), 0, "nor in the status")
+    check_accessible(checks, page, "after a trip")
     page.ask("shot", file=os.path.join(SHOTS, "tripped-wall.png"), width=1920, height=1080, scheme="dark")
     page.ask("shot", file=os.path.join(SHOTS, "tripped-desktop.png"), width=1400, height=1000, scheme="light")
     page.ask("shot", file=os.path.join(SHOTS, "tripped-phone.png"), width=390, height=844, scheme="dark")

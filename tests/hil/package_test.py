@@ -390,6 +390,9 @@ def package(checks, build, folder, version):
                           timeout=120)
     path = os.path.join(folder, f"vibrig_{version}_amd64.deb")
     checks.check(status == 0 and os.path.exists(path), f"cpack makes the package {version}", said[-1500:])
+    desk = os.path.join(folder, f"python3-vibrig_{version}_all.deb")
+    checks.check(os.path.exists(desk) and "./usr/lib/python3/dist-packages/vibrig/__init__.py" in output("dpkg-deb", "-c", desk)[1],
+                 "and python3-vibrig beside it", str(os.listdir(folder)))
     return path
 
 

@@ -44,6 +44,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.end_headers()
             self.wfile.write(self.frames)
             self.close_connection = True
+            # What the client says meanwhile is read: else closing would take back what was written.
+            self.connection.shutdown(socket.SHUT_WR)
+            with contextlib.suppress(OSError):
+                while self.connection.recv(4096):
+                    pass
             return
         status, body = {"/api/v1/status": (200, {"campaign": {"state": "idle"}}),
                         "/api/v1/plan": (200, [1]),
@@ -85,9 +90,9 @@ def streamed(client, limit=50):
 
 def test_status_and_history(client, server):
     assert client.status()["campaign"]["state"] == "idle"
-    curves = client.history("temperature_c", from_s=2)
+    curves = client.history("temperature_c", "measured_g", from_s=2)
     assert list(curves["temperature_c"][:1]) == [2] and curves["temperature_c_max"][1] != curves["temperature_c_max"][1]
-    assert server.asked[1] == "/api/v1/history?channel=temperature_c&from=2.0"
+    assert server.asked[1] == "/api/v1/history?channel=temperature_c,measured_g&from=2.0"
 
 
 def test_refusals_have_the_words_of_the_daemon(client):

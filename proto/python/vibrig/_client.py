@@ -144,7 +144,7 @@ class Client:
         s of the daemon's clock, units as /api/v1/history states them. At most 1200 steps.
         """
         query = {"channel": ",".join(channels), **({} if from_s is None else {"from": repr(float(from_s))})}
-        answer = self._object("/api/v1/history?" + urllib.parse.urlencode(query))
+        answer = self._object("/api/v1/history?" + urllib.parse.urlencode(query, safe=","))
         curves = {"time_s": np.array(answer["time_s"], dtype=float)}
         for channel in answer["channels"]:
             for of, name in (("mean", channel["name"]), ("min", channel["name"] + "_min"),

@@ -76,6 +76,11 @@ function to = behind(to, more)
 if isempty(fieldnames(to)), to = more; return, end
 if isempty(fieldnames(more)), return, end
 for name = fieldnames(to)'
-  if isfield(more, name{1}), to.(name{1}) = [to.(name{1}); more.(name{1})]; end
+  if ~isfield(more, name{1}) || size(more.(name{1}), 1) == 0, continue, end
+  if size(to.(name{1}), 1) == 0
+    to.(name{1}) = more.(name{1});
+  else
+    to.(name{1}) = [to.(name{1}); more.(name{1})];
+  end
 end
 end

@@ -45,11 +45,18 @@ end
 
 function table = table_of(raw)
 % HDF5's first dimension comes last. A table that grows meanwhile is as long as its shortest column.
-table = struct(); rows = Inf;
+table = struct(); rows = Inf; one = false;
+for name = {'time_ns', 'from_ns'}
+  if isfield(raw, name{1}), one = numel(raw.(name{1})) == 1; end
+end
 for name = fieldnames(raw)'
   values = raw.(name{1});
   if ischar(values) || iscell(values)
     values = texts_of(values);
+  elseif one && isvector(values)
+    values = values(:).';
+  elseif one   % of a single row the last dimension is gone
+    values = permute(values, [3 2 1]);
   elseif ~isvector(values) && ~isempty(values)
     values = permute(values, ndims(values):-1:1);
   else

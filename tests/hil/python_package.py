@@ -1,0 +1,287 @@
+#!/usr/bin/python3
+"""The Python package, and the reader for MATLAB in Octave, on a rig that runs and on what it records; the examples of
+docs/python.md with their pictures; a certificate. On the seqpacket bus and the rig's clock.
+
+usage: python_package.py PROGRAMS      PROGRAMS: build/PRESET/bin
+"""
+import json
+import os
+import random
+import re
+import shutil
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+PACKAGE = os.path.join(ROOT, "proto", "python")
+MATLAB = os.path.join(ROOT, "proto", "matlab")
+PICTURES = os.path.join(ROOT, "build", "tests", "python")
+sys.path.insert(0, PACKAGE)
+import numpy as np   # noqa: E402  Debian's, as h5py
+import h5py   # noqa: E402
+import vibrig   # noqa: E402
+
+CAMPAIGN = {"name": "python", "identify": "what-it-can", "table_g": [9.0, 7.0], "dwell_s": 20.0}
+
+
+def run_pytest(checks, folder):
+    report = os.path.join(folder, "pytest.xml")
+    run = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--junitxml", report,
+                          os.path.join(ROOT, "tests", "python")], capture_output=True, text=True, timeout=300,
+                         env={**os.environ, "PYTHONPATH": PACKAGE, "PYTHONDONTWRITEBYTECODE": "1"})
+    cases = list(xml.etree.ElementTree.parse(report).getroot().iter("testcase")) if os.path.exists(report) else []
+    checks.check(len(cases) >= 24 and run.returncode == 0, "pytest runs to its end", run.stdout[-2000:] + run.stderr[-500:])
+    for case in cases:
+        checks.check(case.find("failure") is None and case.find("error") is None, "pytest: " + case.get("name"))
+
+
+def look_live(checks, rig, where, client):
+    status = client.status()
+    checks.equal(status["campaign"]["name"], "python", f"{where}: status")
+    checks.check("site.latitude_deg" in client.configuration() and len(client.plan()["stops"]) == 28, f"{where}: configuration, plan")
+    checks.check("vibrig_uptime_seconds" in client.metrics(), f"{where}: metrics")
+    curves = client.history("temperature_c", "measured_g")
+    checks.check(len(curves["time_s"]) == len(curves["temperature_c_max"]) > 0, f"{where}: history", str(curves)[:300])
+    events = client.events()
+    later = client.events(after=int(events[0]["id"]))
+    checks.check(len(events) - 1 == len(later) or len(later) > 0, f"{where}: events from a number on", str(len(events)))
+    updates = []
+    for update in client.stream(10):
+        updates.append(update)
+        if len(updates) >= 4:
+            break
+    times = [float(u.status["time_s"]) for u in updates if u.status]
+    checks.check(len(times) >= 2 and times == sorted(times), f"{where}: the stream goes on", str(times))
+    try:
+        client.history("nothing")
+        checks.check(False, f"{where}: a refusal has the daemon's words")
+    except vibrig.Answer as answer:
+        checks.check(answer.status == 400 and "expected one or more" in answer.detail, f"{where}: a refusal has the daemon's words",
+                     str(answer))
+
+
+def check_live(checks, rig, keys, port):
+    page = next(line.split("live page: ")[1].strip() for line in rig.daemon.text().splitlines() if "live page: " in line)
+    with vibrig.Client(rig.socket) as client:
+        look_live(checks, rig, "socket", client)
+    with vibrig.Client(page=page) as client:
+        look_live(checks, rig, "page", client)
+    with vibrig.Client(host=f"localhost:{port}", identity=os.path.join(keys, "wall")) as client:
+        look_live(checks, rig, "TLS", client)
+    try:
+        vibrig.Client(host=f"127.0.0.1:{port}", identity=os.path.join(keys, "wall"), timeout_s=3).status()
+        checks.check(False, "TLS: a rig of another name is refused")
+    except OSError as error:
+        checks.check("CERTIFICATE_VERIFY_FAILED" in str(error), "TLS: a rig of another name is refused", str(error))
+
+
+def check_recording(checks, rig, folder):
+    campaign = vibrig.open(folder)
+    c = campaign.conditions
+    checks.check(c.rows > 300 and np.all(np.diff(c["time_ns"]) > 0), "conditions come once a second", str(c.rows))
+    checks.check(np.isfinite(c["temperature_c"]).mean() > 0.95 and np.isfinite(c["sensor_c"][10:]).mean() > 0.95,
+                 "with temperatures of all sensors")
+    dwell = (c["shaker_state"] == 2) & (c["command_g"] > 6.9)
+    checks.check(dwell.sum() > 100 and np.allclose(c["set_point_g"][dwell], c["command_g"][dwell], rtol=0.01) and
+                 np.median(np.abs(c["measured_g"][dwell] / c["command_g"][dwell] - 1)) < 0.05,
+                 "the shaker's read-back follows its command", str(dwell.sum()))
+    names = [row["name"] for row in campaign.interlocks]
+    checks.check(len(names) > 20 and c["interlock_value"].shape[1] == len(names), "interlocks have names and values", str(names))
+    hot = c["interlock_value"][:, names.index("temperature_alarm")]
+    checks.check(np.nanmax(np.abs(hot - c["temperature_c"])) < 0.5, "an interlock's value is what it watches")
+    checks.check(all(c.units[n] == u for n, u in (("temperature_c", "degC"), ("measured_g", "g"), ("set_point_hz", "Hz"))),
+                 "they have units")
+    checks.check((c["ready"][10:] == 1).all() and set(np.unique(c["fault"])) <= {-1, 0}, "the platform's own status is there")
+    status_unknown = int(rig_counter(rig, "unknown"))
+    received = int(rig_counter(rig, "received"))
+    checks.check(status_unknown < 0.002 * received, "of a rig's frames none is unknown", f"{status_unknown} of {received}")
+    table = json.loads(tool(rig, "compensate", folder, "--json", "--attitude", "45,10,90", "--table-g", "9").stdout)
+    found = campaign.compensation([45, 10, 90], table_g=9)
+    gyros = table["prediction"]["gyros"]
+    checks.check(np.allclose(found.drift_dph, [g["drift_dph"] for g in gyros], rtol=1e-12) and
+                 np.allclose(found.residual_dph, [g["residual_sigma_dph"] for g in gyros], rtol=1e-9), "compensation as vibrig's",
+                 f"{found} {gyros}")
+    exported = os.path.join(rig.folder, "x.csv")
+    tool(rig, "export", folder, "--to", "csv", "-o", exported)
+    with open(exported, encoding="utf-8") as file:
+        rows = sum(1 for _ in file) - 1
+    counted = sum(s.stop - s.start for s in (campaign.of_dwell(i) for i in range(campaign.dwells.rows)))
+    checks.equal(counted, rows, "rows of the dwells as vibrig exports them")
+    return campaign
+
+
+def tool(rig, *arguments, timeout=300):
+    return subprocess.run([rig.program("vibrig"), *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                          timeout=timeout, cwd=rig.folder)
+
+
+def rig_counter(rig, name):
+    return rig.last["assembler"][name]
+
+
+def check_octave(checks, rig, campaign):
+    drift = campaign.compensation([45, 10, 90], table_g=9)
+    script = f"""addpath('{MATLAB}'); c = vibrig.open(getenv('RECORDING'));
+[d, u, ok] = vibrig.compensation(c, [45 10 90], 'table_g', 9);
+printf('%d %d %d %s %s %d\\n', rows(c.samples.force_g), columns(c.samples.force_g), rows(c.dwells.covariance), c.state, ...
+       c.units.conditions.temperature_c, numel(c.interlocks));
+printf('%.17g ', d, u, c.coefficients.value, mean(c.samples.force_g), c.conditions.temperature_c(end), all(ok));
+try, vibrig.open('/nonexistent'); catch e, printf('\\n%s', e.message); end"""
+    run = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval", script], capture_output=True, text=True, timeout=120,
+                         env={**os.environ, "RECORDING": str(campaign.folder)})
+    lines = run.stdout.splitlines() + ["", "", ""]
+    checks.equal(lines[0], f"{campaign.samples.rows} 3 {campaign.dwells.rows} finished degC {len(campaign.interlocks)}",
+                 "Octave opens the recording with its reader")
+    expected = [*drift.drift_dph, *drift.residual_dph, *campaign.coefficients.value, *campaign.samples["force_g"].mean(axis=0),
+                campaign.conditions["temperature_c"][-1], 1]
+    found = [float(x) for x in lines[1].split()]
+    checks.check(len(found) == len(expected) and np.allclose(found, expected, rtol=1e-9), "with the same numbers", run.stdout + run.stderr)
+    checks.check("expected a campaign's HDF5 file or its folder" in lines[2], "and says what it did not find", run.stderr)
+
+
+def check_parts_in_octave(checks, folder):
+    """Of parts made for the purpose: as Python joins them, so does Octave."""
+    sys.path.insert(0, os.path.join(ROOT, "tests", "python"))
+    import pathlib
+    import conftest
+    made = conftest.Recording(pathlib.Path(folder) / "parts" / "test-1")
+    second = conftest.SECOND
+    for part, arguments in ((1, dict(start=5000 * second, orders=[1, 2], done=2, state="running")),
+                            (2, dict(start=second, orders=[2, 3], done=1, restart=True, before=1, offset_s=1_700_009_000)),
+                            (3, dict(start=second + 400 * conftest.STEP, orders=[3, 4], done=2, offset_s=1_700_009_000))):
+        path = made.part(part, **arguments)
+        with h5py.File(path, "r+") as file:
+            file["head"] = np.bytes_(json.dumps({
+                "name": "test", "campaign": "test-1", "part": part, "restart": bool(arguments.get("restart")), "units": {},
+                "dwells_before": arguments.get("before", 0), "utc_offset_ns": str(file.attrs["utc_offset_ns"])}))
+    joined = vibrig.open(made.folder)
+    script = f"""addpath('{MATLAB}'); c = vibrig.open('{made.folder}');
+printf('%d %d %s %s', rows(c.samples.force_g), all(diff(double(c.samples.time_ns)) > 0), mat2str(double(c.dwells.position')), ...
+       num2str(c.samples.time_ns(end), '%d'));"""
+    run = subprocess.run(["octave-cli", "--quiet", "--no-init-file", "--eval", script], capture_output=True, text=True, timeout=60)
+    positions = "[" + " ".join(str(p) for p in joined.dwells["position"]) + "]"
+    checks.equal(run.stdout, f"{joined.samples.rows} 1 {positions} {joined.samples['time_ns'][-1]}",
+                 "Octave joins parts as Python does")
+    checks.note(run.stderr[-500:])
+
+
+def check_examples(checks, campaign):
+    """The code of docs/python.md, as it stands there."""
+    with open(os.path.join(ROOT, "docs", "python.md"), encoding="utf-8") as file:
+        blocks = re.findall(r"```python\n(# example: (\S+)\n.*?)```", file.read(), re.S)
+    checks.equal(len(blocks), 3, "docs/python.md has three examples")
+    os.makedirs(PICTURES, exist_ok=True)
+    for code, picture in blocks:
+        path = os.path.join(PICTURES, picture)
+        if os.path.exists(path):
+            os.remove(path)
+        run = subprocess.run([sys.executable, "-c", code, str(campaign.folder)], capture_output=True, text=True, timeout=120, cwd=PICTURES,
+                             env={**os.environ, "PYTHONPATH": PACKAGE, "MPLBACKEND": "agg", "PYTHONDONTWRITEBYTECODE": "1"})
+        checks.check(run.returncode == 0 and os.path.exists(path) and os.path.getsize(path) > 5000, f"its example makes {picture}",
+                     run.stderr[-1500:])
+
+
+def check_certificate(checks, rig, campaign):
+    paper = os.path.join(rig.folder, "C-17.toml")
+    text = """number = "C-17"
+[laboratory]
+name = "Rig Lab"
+[customer]
+name = "Customer & Sons"
+[[limit]]
+coefficient = "D_Fx"
+low = 0.0
+high = 2.0
+"""
+    with open(paper, "w", encoding="utf-8") as file:
+        file.write(text)
+    issue = ["--paper", paper, "--by", "A. Person", "-o", "C-17"]
+    refused = tool(rig, "certificate", str(campaign.folder), *issue)
+    with_verdict = "verdict" in campaign.result
+    if not with_verdict:
+        checks.check(refused.returncode == 1 and "without a verdict" in refused.stderr, "without a verdict no certificate", refused.stderr)
+    # The result as it is with a combined uncertainty.
+    path = str(campaign.parts[0])
+    shutil.copy(path, path + ".kept")
+    result = json.loads(json.dumps(campaign.result))
+    result["verdict"] = {"word": "valid", "reasons": []}
+    for p in result["parameters"]:
+        p.update(u=2 * p["sigma"], k=2.0, expanded=4 * p["sigma"], budget=[{"input": "noise", "contribution": p["sigma"]}])
+
+    def with_result(value):
+        with h5py.File(path, "r+") as file:
+            del file["result"]
+            file["result"] = np.bytes_(json.dumps(value))
+    with_result(result)
+    made = tool(rig, "certificate", str(campaign.folder), *issue)
+    checks.check(made.returncode == 0, "a certificate is issued", made.stderr)
+    pdf, page = os.path.join(rig.folder, "C-17.pdf"), os.path.join(rig.folder, "C-17.html")
+    certificate = json.load(open(os.path.join(rig.folder, "C-17.json"), encoding="utf-8"))
+    checks.check(certificate["statements"][0]["statement"] == "passes" and len(certificate["results"]) == 30 and certificate["simulated"],
+                 "with the results and a statement", str(certificate)[:500])
+    content = open(page, encoding="utf-8").read()
+    checks.check("Customer &amp; Sons" in content and ">SIMULATED<" in content and "last bit" in content, "and on its page")
+    import hashlib
+    digest = hashlib.sha256(open(pdf, "rb").read()).hexdigest()
+    with sqlite3.connect(os.path.join(rig.results, "journal.sqlite3")) as journal:
+        rows = journal.execute("SELECT number, person, pdf_sha256 FROM certificate").fetchall()
+    checks.equal(rows, [("C-17", "A. Person", digest)], "the journal has the PDF's SHA-256")
+    again = tool(rig, "certificate", str(campaign.folder), *issue)
+    checks.check(again.returncode == 2 and "issued already" in again.stderr, "a number is given once", again.stderr)
+    result["verdict"] = {"word": "not valid", "reasons": [{"text": "the fit contradicts"}]}
+    with_result(result)
+    no = tool(rig, "certificate", str(campaign.folder), "--paper", paper, "--by", "A", "--no-journal", "-o", "no")
+    checks.check(no.returncode == 1 and "the fit contradicts" in no.stderr and not os.path.exists(os.path.join(rig.folder, "no.pdf")),
+                 "what is not valid is refused", no.stderr)
+    for wrong, words in ((text.replace("C-17", ""), "number"), (text.replace("D_Fx", "D_t"), "expected one such as D_Fx"),
+                         (text + "colour = 1\n", "unknown key colour"), (text.replace("high = 2.0", "high = -1"), "low not below high"),
+                         ("number = ", "C-17.toml:1"), (text.replace("[customer]", "[costumer]"), "unknown key costumer")):
+        with open(paper, "w", encoding="utf-8") as file:
+            file.write(wrong)
+        bad = tool(rig, "certificate", str(campaign.folder), *issue, "--no-journal")
+        checks.check(bad.returncode == 2 and words in bad.stderr, f"a paper that is wrong is named: {words}", bad.stderr)
+    shutil.move(path + ".kept", path)
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory(prefix="vibrig-python.") as folder:
+        run_pytest(checks, folder)
+        check_parts_in_octave(checks, folder)
+        rig = r.Rig(programs, "seqpacket", "rig", folder)
+        try:
+            keys = os.path.join(folder, "vibrig-pki")
+            port = random.randrange(20000, 32000)   # below those that the kernel gives out
+            tool(rig, "pki", "init", "--host", "localhost", "--viewer", "wall")
+            rig.start_plant("--seed", "3")
+            rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": "0017"},
+                          server={"page": "127.0.0.1:0", "remote": f"127.0.0.1:{port}", "certificate": os.path.join(keys, "server.crt"),
+                                  "key": os.path.join(keys, "server.key"), "clients_ca": os.path.join(keys, "authority.crt")})
+            rig.start_daemon()
+            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            for command in ("arm", "start"):
+                rig.tool(command, "--by", "A. Person")
+            check_live(checks, rig, keys, port)
+            rig.last = rig.wait_for_state(("finished", "aborted", "tripped"), 300)
+            checks.check(rig.last is not None and rig.last["campaign"]["state"] == "finished", "the campaign finishes",
+                         r.state_of(rig.last) + rig.logs())
+            rig.stop()
+            recording = next(os.path.join(rig.results, name) for name in os.listdir(rig.results) if name.startswith("python-"))
+            campaign = check_recording(checks, rig, recording)
+            check_octave(checks, rig, campaign)
+            check_examples(checks, campaign)
+            check_certificate(checks, rig, campaign)
+        finally:
+            rig.stop()
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
