@@ -13,6 +13,7 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/plan_section.hpp"
+#include "daemon/report/proof_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
 #include "estimator/instruction_set.hpp"
@@ -586,6 +587,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     add_innovations(page, analysis);
     add_vibration(page, campaign, analysis);
     add_noise(page, campaign, analysis);
+    add_proof(page, campaign);
     add_rest(page, campaign, analysis, earlier);
     return page.html("Vibration test of " + campaign.head.name);
 }
