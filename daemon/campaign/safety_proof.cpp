@@ -208,9 +208,9 @@ std::string SafetyProof::advice(std::int64_t utc_ns) const {
 }
 
 std::string SafetyProof::trend() const {
-    constexpr std::size_t kFewest = 5;       // earlier ones
-    constexpr double kLeast_s = 0.1;         // a poll of the controller, a part of a rest window
-    constexpr double kDeviations = 4;        // robust: 1.4826 times the median distance
+    constexpr std::size_t kFewest = 5;  // earlier ones
+    constexpr double kLeast_s = 0.1;    // a poll of the controller, a part of a rest window
+    constexpr double kDeviations = 4;   // robust: 1.4826 times the median distance
     if (history_.empty() || !history_.back().passed) return {};
     const ProofRecord& newest = history_.back();
     std::string words;

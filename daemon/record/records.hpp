@@ -25,7 +25,7 @@ struct Head {
     std::string configuration;  ///< effective, TOML
     std::string configuration_hash;
     std::string dbc;
-    std::string plan;  ///< JSON: positions and levels; empty when chosen one by one
+    std::string plan;   ///< JSON: positions and levels; empty when chosen one by one
     std::string proof;  ///< JSON: of the safe state, before the campaign; empty: none
     std::string interface;
     std::string campaign;           ///< its folder's name when it began: the same in all parts

@@ -57,11 +57,11 @@ void add_trend(Page& page, const json& proof) {
         if (curve.x.size() > 1) chart.curves.push_back(std::move(curve));
     }
     const std::string trend = proof.at("trend");
-    page.paragraph(!trend.empty()           ? "Warning: " + trend + "."
-                   : chart.curves.empty()   ? "This is the only proof so far: there is no trend."
-                                            : fmt::format("No stop takes clearly longer than in the "
-                                                          "{} proofs before.",
-                                                          history.size() - 1));
+    page.paragraph(!trend.empty()         ? "Warning: " + trend + "."
+                   : chart.curves.empty() ? "This is the only proof so far: there is no trend."
+                                          : fmt::format("No stop takes clearly longer than in the "
+                                                        "{} proofs before.",
+                                                        history.size() - 1));
     if (!chart.curves.empty())
         page.figure(chart.svg(), "Each dot is one proof; a contactor that wears rises.");
 }
@@ -70,8 +70,7 @@ void add_trend(Page& page, const json& proof) {
 
 void add_proof(Page& page, const record::Campaign& campaign) {
     page.section("safe-state", "Proof of the safe state");
-    if (campaign.head.proof.empty())
-        return page.paragraph("None was made before this campaign.");
+    if (campaign.head.proof.empty()) return page.paragraph("None was made before this campaign.");
     try {
         const json proof = json::parse(campaign.head.proof);
         const json& newest = proof.at("newest");

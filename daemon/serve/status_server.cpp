@@ -225,8 +225,7 @@ struct StatusServer::Impl {
         return {address.front() == '[' ? AF_INET6 : AF_INET, IPPROTO_TCP};
     }
     std::string open_tcp(Door door, const TcpListener& opened) {
-        Listener& made =
-            listeners.emplace_back(io, door, tcp(opened.address), opened.descriptor);
+        Listener& made = listeners.emplace_back(io, door, tcp(opened.address), opened.descriptor);
         made.told.address = (door == Door::remote ? "https://" : "http://") + opened.address + '/';
         made.address = opened.address;
         made.probe.emplace(opened.address);
@@ -237,9 +236,8 @@ struct StatusServer::Impl {
     void look_at_tcp(Listener& listener) {
         constexpr int kMisses = 2;
         ServerStatus::Door& told = listener.told;
-        const std::string door =
-            std::string(kDoorNames[static_cast<std::size_t>(listener.door)]) + " door " +
-            told.address;
+        const std::string door = std::string(kDoorNames[static_cast<std::size_t>(listener.door)]) +
+                                 " door " + told.address;
         const std::string wrong = listener.paused ? "" : listener.probe->problem();
         if (!wrong.empty()) {
             if (++listener.misses >= kMisses) make_tcp_anew(listener, door, wrong);
