@@ -174,6 +174,7 @@ void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {
     } catch (const std::exception& error) {
         log(Severity::warning, "recorder", configuration_.dbc + ": " + error.what());
     }
+    head.proof = campaign_.proofs_json();
     head.plan = plan_json(configuration_.campaign);
     head.interface =
         configuration_.can.kind == drivers::CanPortSettings::Kind::socketcan ? configuration_.can.interface : "vcan0";

@@ -295,8 +295,12 @@ struct ProofStatus {
         std::int64_t utc_ns = 0;
         bool passed = false;
         double stop_s = 0, watchdog_s = 0;  ///< to rest; 0: not measured
+        double table_s = 0;                 ///< of the table alone
     };
     std::vector<Past> history;  ///< oldest first
+    std::string keys_sha256;    ///< of what the newest covers
+    double table_g = 0;
+    std::string trend;  ///< which stop takes longer than it did; empty: none
 };
 /// Quality of a channel as it stands now: that of the newest sample while there is one within its
 /// deadline.

@@ -44,7 +44,8 @@ std::string words_of(const vibrig::StatusData& status) {
     if (status.position > 0)
         words += fmt::format(", run {} of {}, position {} of {}", status.run, status.runs,
                              status.position, status.positions);
-    return words;
+    // The package's scripts read this.
+    return words + "; table " + status.rest.state;
 }
 
 /// Throws configuration::ConfigurationError where the campaign cannot determine what is asked.

@@ -36,6 +36,7 @@ class ZeroingStage;
 struct StageTimes {
     double levelling_s = 0;  ///< before each position
     double closing_s = 0;    ///< after the last one: zeros again
+    double look_s = 1.5;     ///< before each ramp a whole still second, wherever seconds begin
 };
 [[nodiscard]] StageTimes stage_times(const Settings& settings);
 [[nodiscard]] rt::StageFeedSettings stage_feed_settings(const Settings& settings);
@@ -146,6 +147,8 @@ class Campaign {
     /// What is not at rest, or cannot be told to be; empty: nothing.
     [[nodiscard]] std::string what_moves(drivers::Time now) const { return stop_.what_moves(now); }
     void fill(StatusData& status, drivers::Time now) const;
+    /// What has been proved of stopping, for the recording; JSON, empty: nothing.
+    [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// Why the campaign is marked; empty: it is not.
@@ -273,7 +276,8 @@ class Campaign {
     }
     /// Of one position, from levelling to rest.
     [[nodiscard]] double nominal_stop_s() const {
-        return times_.levelling_s + settings_.dwell_s + settings_.settle_s + 2 * settings_.ramp_s;
+        return times_.levelling_s + times_.look_s + settings_.dwell_s + settings_.settle_s +
+               2 * settings_.ramp_s;
     }
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
     /// Of the dwell that is being done.

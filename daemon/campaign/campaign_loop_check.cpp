@@ -106,8 +106,10 @@ Time Campaign::check_loop(Time now) {
     } else if (check_ == Check::measure && since >= from_seconds(settings_.loop.measure_s)) {
         loop_->finish(reading.measured_g);
         if (ports_.loop_checked) ports_.loop_checked(armed_by_, loop_->out_of_band());
-        if (ports_.transmission && loop_->out_of_band().empty())
-            ports_.transmission(loop_->transmission());
+        if (loop_->out_of_band().empty()) {
+            proof_.record().transmission = loop_->transmission();
+            if (ports_.transmission) ports_.transmission(loop_->transmission());
+        }
         proof_.row("loop check in band", loop_->out_of_band().empty());
         order_proved_stop(now);
     } else if (check_ == Check::stop) {

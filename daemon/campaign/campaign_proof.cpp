@@ -62,6 +62,13 @@ void Campaign::keep_ring_down() {
 void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
     proof_.take_over(std::move(history));
     stop_.pads(proof_.pads());
+    // The witnesses go on with what was measured; a key that has changed since asks for a new one.
+    const auto transmission = proof_.transmission();
+    if (!transmission || !ports_.transmission) return;
+    ports_.transmission(*transmission);
+    ports_.event(Severity::info, fmt::format("transmission {:.4g}, as the loop check of the newest "
+                                             "proof measured it",
+                                             *transmission));
 }
 
 void Campaign::order_proved_stop(Time now) {
@@ -198,6 +205,8 @@ void Campaign::conclude_proof(const std::string& why) {
     ports_.event(record.passed ? Severity::info : Severity::alarm,
                  record.passed ? "the safe state is proved"
                                : "the safe state is not proved: " + record.message);
+    if (const auto trend = proof_.trend(); !trend.empty())
+        ports_.event(Severity::warning, "proof: " + trend);
     if (ports_.proved) ports_.proved(record);
 }
 

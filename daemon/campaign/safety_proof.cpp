@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -27,6 +29,20 @@ std::map<std::string, std::string> lines_of(const std::string& keys) {
     }
     return found;
 }
+
+double value_of(const ProofRecord& record, std::string_view name) {
+    const auto row = std::ranges::find(record.rows, name, &ProofRow::name);
+    return row == record.rows.end() ? 0 : row->value;
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle);
+    return *middle;
+}
+
+// Stops that are timed in every proof.
+constexpr std::array<const char*, 3> kTimedStops{"stop, table", "stop, platform", "watchdog, rest"};
 
 /// "shaker.port is 503, was proved with 502; ..."
 std::string changes(const std::string& then, const std::string& now) {
@@ -88,6 +104,7 @@ std::string to_json(const ProofRecord& r) {
                   {"rate_per_s", r.pads.rate_per_s},
                   {"frequency_hz", r.pads_hz},
                   {"damping", r.pads_damping}}},
+                {"transmission", r.transmission},
                 {"keys", r.keys},
                 {"keys_sha256", r.keys_sha256}}
         .dump();
@@ -110,6 +127,7 @@ std::optional<ProofRecord> proof_from_json(const std::string& text) {
         r.pads = {pads.at("level_g"), pads.at("time_s"), pads.at("rate_per_s")};
         r.pads_hz = pads.at("frequency_hz");
         r.pads_damping = pads.at("damping");
+        r.transmission = json.value("transmission", 0.0);  // earlier records have none
         r.keys = json.at("keys");
         r.keys_sha256 = json.at("keys_sha256");
         return r;
@@ -189,6 +207,49 @@ std::string SafetyProof::advice(std::int64_t utc_ns) const {
            ": vibrig selftest --by NAME --emergency-stop";
 }
 
+std::string SafetyProof::trend() const {
+    constexpr std::size_t kFewest = 5;  // earlier ones
+    constexpr double kLeast_s = 0.1;    // a poll of the controller, a part of a rest window
+    constexpr double kDeviations = 4;   // robust: 1.4826 times the median distance
+    if (history_.empty() || !history_.back().passed) return {};
+    const ProofRecord& newest = history_.back();
+    std::string words;
+    for (const char* name : kTimedStops) {
+        std::vector<double> earlier, distance;
+        for (auto it = history_.begin(); it != std::prev(history_.end()); ++it) {
+            const bool like = it->passed && std::abs(it->table_g - newest.table_g) < 1e-9;
+            if (const double time_s = value_of(*it, name); like && time_s > 0)
+                earlier.push_back(time_s);
+        }
+        const double now_s = value_of(newest, name);
+        if (earlier.size() < kFewest || now_s <= 0) continue;
+        const double usual_s = median(earlier);
+        for (const double time_s : earlier) distance.push_back(std::abs(time_s - usual_s));
+        if (now_s <= usual_s + std::max(kLeast_s, kDeviations * 1.4826 * median(distance)))
+            continue;
+        words += fmt::format("{}{} takes longer: {:.2f} s, {:.2f} s in the median of {} earlier",
+                             words.empty() ? "" : "; ", name, now_s, usual_s, earlier.size());
+    }
+    return words;
+}
+
+std::string SafetyProof::recording_json() const {
+    if (history_.empty()) return {};
+    Json past = Json::array();
+    for (const ProofRecord& record : history_) {
+        Json times;
+        for (const char* name : kTimedStops) {
+            if (const double time_s = value_of(record, name); time_s > 0) times[name] = time_s;
+        }
+        past.push_back({{"utc_ns", record.utc_ns}, {"passed", record.passed}, {"times_s", times}});
+    }
+    return Json{{"demanded", settings_.demanded},
+                {"trend", trend()},
+                {"newest", Json::parse(to_json(history_.back()))},
+                {"history", past}}
+        .dump();
+}
+
 void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
     constexpr std::size_t kShown = 50;
     status.demanded = settings_.demanded;
@@ -205,16 +266,23 @@ void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
     for (const ProofRow& row : newest.rows)
         status.rows.push_back({row.name, row.unit, row.value, row.low, row.high, row.passed()});
     status.history.clear();
-    const auto of = [](const ProofRecord& record, std::string_view name) {
-        const auto row = std::ranges::find(record.rows, name, &ProofRow::name);
-        return row == record.rows.end() ? 0 : row->value;
-    };
     for (std::size_t i = history_.size() - std::min(history_.size(), kShown); i < history_.size();
          ++i) {
-        status.history.push_back({history_[i].utc_ns, history_[i].passed,
-                                  of(history_[i], "stop, platform"),
-                                  of(history_[i], "watchdog, rest")});
+        const ProofRecord& record = history_[i];
+        status.history.push_back({record.utc_ns, record.passed, value_of(record, "stop, platform"),
+                                  value_of(record, "watchdog, rest"),
+                                  value_of(record, "stop, table")});
     }
+    status.keys_sha256 = newest.keys_sha256;
+    status.table_g = newest.table_g;
+    status.trend = trend();
+}
+
+std::optional<double> SafetyProof::transmission() const {
+    if (history_.empty()) return std::nullopt;
+    const ProofRecord& newest = history_.back();
+    if (!(newest.transmission > 0) || newest.keys_sha256 != keys_sha256_) return std::nullopt;
+    return newest.transmission;
 }
 
 PadRingDown SafetyProof::pads() const {

@@ -38,6 +38,7 @@ struct ProofRecord {
     std::vector<ProofRow> rows;
     PadRingDown pads;
     double pads_hz = 0, pads_damping = 0;
+    double transmission = 0;  ///< platform over table, of a loop check in band; 0: not measured
     std::string keys, keys_sha256;  ///< as in ProofSettings
 };
 
@@ -85,8 +86,17 @@ class SafetyProof {
     [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
     /// What is to be told although nothing is refused: a button that nobody pressed for long.
     [[nodiscard]] std::string advice(std::int64_t utc_ns) const;
+    /// Which stop of the newest proof takes clearly longer than those before it took: a contactor
+    /// that wears. Empty: none, or too few to tell.
+    [[nodiscard]] std::string trend() const;
+    /// For a recording and its report: the newest record whole, of the others times and verdict,
+    /// JSON. Empty: there is none.
+    [[nodiscard]] std::string recording_json() const;
     void fill(ProofStatus& status, std::int64_t utc_ns) const;
     [[nodiscard]] const std::vector<ProofRecord>& history() const { return history_; }
+    /// As the newest loop check in band has measured it with the configuration as it is; nothing
+    /// otherwise: then the configuration's holds.
+    [[nodiscard]] std::optional<double> transmission() const;
     /// Of the newest that passed; a documented allowance without one.
     [[nodiscard]] PadRingDown pads() const;
 

@@ -298,6 +298,7 @@ void read_head(const File& file, Campaign& to) {
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
     if (file.has("/interlocks")) head.interlocks = file.read_text("/interlocks");
+    if (file.has("/proof")) head.proof = file.read_text("/proof");
     to.state = file.text("/", "state");
     if (to.state != "running") {
         to.reason = file.text("/", "reason");

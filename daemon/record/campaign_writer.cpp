@@ -243,6 +243,7 @@ void CampaignWriter::write_head(const Head& head) {
     file_->write_text("/configuration", head.configuration, "effective configuration, TOML");
     file_->write_text("/dbc", head.dbc, "signals on the bus");
     file_->write_text("/interlocks", head.interlocks, "rows of the interlock's table, JSON");
+    file_->write_text("/proof", head.proof, "proofs of the safe state before the campaign, JSON");
     file_->write_text("/plan", head.plan, "positions (deg) and levels at the table (g), JSON");
 }
 

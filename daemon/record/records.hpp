@@ -26,7 +26,8 @@ struct Head {
     std::string configuration;  ///< effective, TOML
     std::string configuration_hash;
     std::string dbc;
-    std::string plan;  ///< JSON: positions and levels; empty when chosen one by one
+    std::string plan;   ///< JSON: positions and levels; empty when chosen one by one
+    std::string proof;  ///< JSON: of the safe state, before the campaign; empty: none
     std::string interface;
     std::string interlocks;  ///< JSON: rows of the interlock's table, as in ConditionRow
     std::size_t interlock_rows = 0;

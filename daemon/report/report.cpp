@@ -13,6 +13,7 @@
 #include "daemon/report/page.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/report/plan_section.hpp"
+#include "daemon/report/proof_section.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
@@ -594,6 +595,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     add_vibration(page, campaign, analysis);
     add_conditions(page, campaign);
     add_noise(page, campaign, analysis);
+    add_proof(page, campaign);
     add_rest(page, campaign, analysis, earlier);
     return page.html("Vibration test of " + campaign.head.name);
 }

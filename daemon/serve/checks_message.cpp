@@ -47,7 +47,11 @@ void fill_proof(v1::Proof& out, const ProofStatus& proof) {
         to.set_passed(past.passed);
         to.set_stop_s(past.stop_s);
         to.set_watchdog_s(past.watchdog_s);
+        to.set_table_s(past.table_s);
     }
+    out.set_keys_sha256(proof.keys_sha256);
+    out.set_table_g(proof.table_g);
+    out.set_trend(mend_utf8(proof.trend));
 }
 
 }  // namespace

@@ -27,6 +27,7 @@
 
 #include "daemon/serve/command_queue.hpp"
 #include "daemon/serve/expiry_watch.hpp"
+#include "daemon/serve/own_connection.hpp"
 #include "daemon/serve/session.hpp"
 #include "daemon/serve/tcp_listener.hpp"
 #include "daemon/serve/tls.hpp"
@@ -93,7 +94,11 @@ struct StatusServer::Impl {
             acceptor.assign(protocol, descriptor);
         }
         Door door;
-        std::optional<SocketFile> file;  ///< of a Unix socket
+        std::optional<SocketFile> file;      ///< of a Unix socket
+        std::optional<OwnConnection> probe;  ///< of a TCP door
+        std::string address;                 ///< of that, HOST:PORT
+        int misses = 0;                      ///< of the probe, in a row
+        bool paused = false;                 ///< out of descriptors, mostly
         ServerStatus::Door told;
         asio::basic_socket_acceptor<Protocol> acceptor;
         asio::steady_timer pause;
@@ -178,7 +183,7 @@ struct StatusServer::Impl {
     /// A door that nobody finds is no door: whoever removed it, it is made anew.
     void look_at_doors() {
         for (Listener& listener : listeners)
-            if (listener.file) look_at(listener);
+            listener.file ? look_at(listener) : look_at_tcp(listener);
         door_look.expires_after(kDoorLook);
         door_look.async_wait([this](error_code error) {
             if (!error) look_at_doors();
@@ -216,13 +221,57 @@ struct StatusServer::Impl {
         }
     }
 
+    static Protocol tcp(const std::string& address) {
+        return {address.front() == '[' ? AF_INET6 : AF_INET, IPPROTO_TCP};
+    }
     std::string open_tcp(Door door, const TcpListener& opened) {
-        const bool v6 = opened.address.front() == '[';
-        listeners
-            .emplace_back(io, door, Protocol(v6 ? AF_INET6 : AF_INET, IPPROTO_TCP),
-                          opened.descriptor)
-            .told.address = (door == Door::remote ? "https://" : "http://") + opened.address + '/';
+        Listener& made = listeners.emplace_back(io, door, tcp(opened.address), opened.descriptor);
+        made.told.address = (door == Door::remote ? "https://" : "http://") + opened.address + '/';
+        made.address = opened.address;
+        made.probe.emplace(opened.address);
         return opened.address;
+    }
+    /// As a Unix door, but what a connection comes to is known a look later; and one that is late
+    /// may have been held up by this thread itself.
+    void look_at_tcp(Listener& listener) {
+        constexpr int kMisses = 2;
+        ServerStatus::Door& told = listener.told;
+        const std::string door = std::string(kDoorNames[static_cast<std::size_t>(listener.door)]) +
+                                 " door " + told.address;
+        const std::string wrong = listener.paused ? "" : listener.probe->problem();
+        if (!wrong.empty()) {
+            if (++listener.misses >= kMisses) make_tcp_anew(listener, door, wrong);
+        } else if (listener.probe->arrived()) {
+            if (!told.open) source.told(Severity::alarm, door + " takes connections again");
+            listener.misses = 0;
+            told.open = true;
+            told.note.clear();
+        }
+        listener.probe->begin();
+    }
+    void make_tcp_anew(Listener& listener, const std::string& door, const std::string& wrong) {
+        ServerStatus::Door& told = listener.told;
+        std::string note = wrong;
+        error_code ignored;
+        listener.acceptor.close(ignored);  // it holds the port
+        listener.pause.cancel(ignored);
+        try {
+            const TcpListener fresh =
+                listen_tcp(listener.door == Door::page ? "server.page" : "server.remote",
+                           listener.address, listener.door == Door::page);
+            listener.acceptor.assign(tcp(fresh.address), fresh.descriptor);
+            accept(listener);
+            if (told.open) source.told(Severity::alarm, door + ' ' + wrong + ": made anew");
+            ++told.made_anew;
+        } catch (const std::exception& error) {
+            note = error.what();
+            if (told.open || told.note != note)
+                source.told(Severity::alarm,
+                            door + ' ' + wrong + " and cannot be made anew: " + note);
+        }
+        // It counts as open when a connection has come through.
+        told.open = false;
+        told.note = note;
     }
 
     [[nodiscard]] asio::ssl::context read_certificates() const {
@@ -295,15 +344,26 @@ struct StatusServer::Impl {
                 if (error) {
                     // Out of descriptors, mostly: a waiting connection would be reported again at
                     // once.
+                    listener.paused = error == asio::error::no_descriptors;
                     listener.pause.expires_after(kAcceptPause);
                     listener.pause.async_wait([this, &listener](error_code stopped) {
-                        if (!stopped) accept(listener);
+                        if (!stopped && listener.acceptor.is_open()) accept(listener);
                     });
                     return;
                 }
-                welcome(listener.door, std::move(socket));
+                listener.paused = false;
+                if (!is_probe(listener, socket)) welcome(listener.door, std::move(socket));
                 accept(listener);
             });
+    }
+
+    static bool is_probe(Listener& listener, const AnyStream::Socket& socket) {
+        if (!listener.probe) return false;
+        error_code error;
+        const Protocol::endpoint end = socket.remote_endpoint(error);
+        sockaddr_storage from{};
+        std::memcpy(&from, end.data(), std::min<std::size_t>(end.size(), sizeof from));
+        return !error && listener.probe->is_mine(from);
     }
 
     void welcome(Door door, AnyStream::Socket socket) {

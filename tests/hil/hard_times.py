@@ -135,7 +135,7 @@ def write(path, text):
 
 # ---- the proof against a controller that lies
 
-# Truth, a word of the verdict; whether nothing but the emergency stop ends it.
+# Truth, a word of the verdict (with ramps as short as these the unit itself is not told from them); whether nothing but the emergency stop ends it.
 PROVED = [
     ("honest", [], None, False),
     ("ack-without-stop", ["ack-without-stop"], "not obeyed", False),
@@ -145,7 +145,7 @@ PROVED = [
     ("readback-echo of a dead table", ["dead-table", "readback-echo"], "amplitude", False),
     ("stuck-contactor", ["stuck-contactor"], "not obeyed", True),
     ("slow-ramp", ["slow-ramp=10"], "shaker", False),
-    ("unit-rms", ["unit-rms"], "rms", False),
+    ("unit-rms", ["unit-rms"], "amplitude", False),
 ]
 
 

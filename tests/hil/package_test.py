@@ -306,19 +306,44 @@ def digest(*patterns):
     return found
 
 
+def stays(checks, rig, pid, states):
+    """What is armed or moves is not removed."""
+    wait_until(lambda: any(state in prop("StatusText") for state in ([states] if isinstance(states, str) else states)), 5)
+    status, said = output("dpkg", "-r", "vibrig", timeout=120)
+    found = (rig.status() or {"campaign": {"state": "no answer"}})["campaign"]["state"]
+    checks.check(status != 0 and "vibrigd is not removed" in said and "vibrig abort" in said,
+                 f"the package is not removed while it is {'armed' if states == 'armed' else 'shaking'}, and says what to do first", said)
+    checks.check(int(prop("MainPID")) == pid and found in ([states] if isinstance(states, str) else states), "nothing has stopped",
+                 f"{prop('MainPID')} {found}")
+    checks.equal(output("dpkg-query", "-W", "-f", "${db:Status-Status}", "vibrig")[1], "installed", "and it stays installed")
+
+
 def upgrades(checks, rig, package):
     kept = (CONFIGURATION, os.path.join(DATA, "**", "result.json"), os.path.join(DATA, "**", "raw-*"),
             os.path.join(DATA, "**", "campaign.h5"))
+    rig.campaign = {**SHORT, "dwell_s": 300.0}   # longer than dpkg takes
+    configure(rig)
+    rig.wait_for(lambda s: stages.measuring(s) and s["shaker"].get("rest") == "at rest", 30)
+    output("systemctl", "restart", UNIT)
     before, pid = digest(*kept), int(prop("MainPID"))
     rig.wait_for(lambda s: stages.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted", "tripped"), 30)
     rig.tool("ack", "trip", "--by", "tester")   # what was killed and hung has latched
     rig.wait_for(lambda s: s["campaign"]["state"] != "tripped" and not s["shaker"].get("stop_pending"), 30)
     armed = rig.tool("arm", "--by", "tester")
     checks.check(armed.returncode == 0, "armed again", armed.stderr)
+    stays(checks, rig, pid, "armed")
     status, said = output("dpkg", "-i", package, timeout=120)
     checks.check(status == 0 and "takes the new one at its next rest" in said,
                  "the package upgrades while the daemon is armed, and says that it is not restarted", said)
     checks.equal((int(prop("MainPID")), rig.status()["campaign"]["state"]), (pid, "armed"), "it goes on, armed")
+    rig.tool("start", "--by", "tester")
+    moves = ("slewing", "ramping", "settling", "recording", "resting")
+    status = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 60)
+    checks.check(status is not None and status["campaign"]["state"] == "recording",
+                 "what is installed anew while armed waits while it shakes, too", r.state_of(status))
+    stays(checks, rig, pid, moves)
+    checks.check(int(prop("MainPID")) == pid and (rig.status() or {"campaign": {"state": ""}})["campaign"]["state"] in moves,
+                 "and the campaign goes on", r.state_of(rig.status()))
     rig.tool("abort", "--by", "tester")
     checks.equal(output("dpkg-query", "-W", "-f", "${Version}", "vibrig")[1], VERSIONS[1], "to the new version")
     checks.check(wait_until(lambda: int(prop("MainPID")) not in (0, pid) and prop("ActiveState") == "active", 60),

@@ -24,6 +24,7 @@ const Watch = (() => {
       [s.can.link === 'running' ? '' : 'bad', `CAN ${s.can.link}`], [s.shaker.link === 'running' ? '' : 'bad', `shaker ${s.shaker.link}`],
       [r.folder ? (r.good ? '' : 'warn') : 'off', r.folder ? (r.good ? (r.recording ? 'recorder records' : 'recorder ok') : 'recorder: ' + (r.note || 'degraded')) : 'no recorder'],
       [j.path ? (j.running ? '' : 'bad') : 'off', j.path ? (j.running ? 'journal ok' : 'journal waits') : 'no journal'],
+      ...(s.guard ? [guard(s.guard)] : []), ...(s.annunciator ? horn(s.annunciator) : []),
       ...(s.log.blocked ? [['warn', 'log: nobody reads it']] : []),
       ...doors.map(d => ['bad', `${d.name} door shut`]),
       ...(own.length ? [[days <= 0 ? 'bad' : days <= 30 ? 'warn' : '', days <= 0 ? 'a certificate has EXPIRED' : `certificates ${Math.floor(days)} days`]] : [])];
@@ -31,6 +32,38 @@ const Watch = (() => {
     if (e.dataset.key === key) return;
     e.dataset.key = key;
     e.replaceChildren(...items.map(([kind, words]) => element('li', kind, words)));
+  }
+
+  // Who watches from outside, and what makes itself heard.
+  const guard = g => (!g.heard ? ['bad', 'GUARD NOT HEARD: ' + g.note] : g.text ? ['bad', 'guard: ' + g.text]
+    : !g.sees ? ['bad', 'guard sees no accelerometer'] : !g.reaches_shaker ? ['bad', 'guard does not reach the shaker'] : ['', 'guard watches']);
+  const horn = a => [
+    ...(a.horn ? [a.confirms ? [a.pattern && a.pattern !== 'none' ? 'warn' : '', a.pattern && a.pattern !== 'none' ? 'horn sounds: ' + a.pattern : 'horn ready'] : ['bad', 'HORN: ' + a.horn_note]] : []),
+    ...(a.command ? [a.command_note ? ['warn', 'pager: ' + a.command_note] : ['', 'pager ready']] : [])];
+
+  // The newest proof of the safe state; its stop times as small columns, oldest first: what wears rises.
+  const kMarks = '▁▂▃▄▅▆▇█';
+  function columns(times) {
+    const most = Math.max(...times);
+    return times.map(t => (t > 0 ? kMarks[Math.min(7, Math.floor(8 * t / (most * 1.0001)))] : '·')).join('');
+  }
+  function proof(s) {
+    const p = s.proof || {}, e = byId('proof'), past = (p.history || []).slice(-24);
+    const seconds = name => { const r = (p.rows || []).find(x => x.name === name); return r && r.value !== undefined ? r.value.toFixed(2) + ' s' : '–'; };
+    const trend = key => (past.length > 1 ? ' ' + columns(past.map(x => x[key] || 0)) : '');
+    const wrong = (p.rows || []).filter(r => !r.passed).map(r => r.name);
+    const items = [['state', !p.by ? 'not proved' : p.passed ? 'proved' : 'NOT PROVED: ' + p.message, p.demanded && !!p.refusal],
+      ...(p.by ? [['by', p.by], ['when', new Date(Number(p.utc_ns) / 1e6).toISOString().slice(0, 16).replace('T', ' ') + ' UTC'],
+        ['stop, table', seconds('stop, table') + trend('table_s'), wrong.includes('stop, table')],
+        ['stop, platform', seconds('stop, platform') + trend('stop_s'), wrong.includes('stop, platform')],
+        ['watchdog, rest', seconds('watchdog, rest') + trend('watchdog_s'), wrong.includes('watchdog, rest')],
+        ['keys', 'SHA-256 ' + (p.keys_sha256 || '').slice(0, 12)]] : []),
+      ...(p.trend ? [['trend', p.trend, true]] : []), ...(p.refusal ? [['no arming', p.refusal, p.demanded]] : []),
+      ...(p.advice ? [['to do', p.advice]] : [])];
+    const key = JSON.stringify(items);
+    if (e.dataset.key === key) return;
+    e.dataset.key = key;
+    e.replaceChildren(...items.flatMap(([name, words, bad]) => [element('dt', '', name), element('dd', bad ? 'bad-value' : '', words)]));
   }
 
   // One line of each interlock: name, value and limit, and how much of the limit is used.
@@ -63,7 +96,7 @@ const Watch = (() => {
     e.hidden = !tripped && !disobeyed;
     if (e.hidden) return;
     const what = disobeyed ? 'A STOP IS NOT OBEYED. Press the emergency stop.' : `Stopped by ${person(s.interlock.tripped || 'an interlock')}: ${c.reason || ''}`;
-    const closed = shaker.emergency_stop_open === false, rests = shaker.running === false && !shaker.stop_pending;
+    const closed = shaker.emergency_stop_open === false, rests = shaker.rest === 'at rest';
     const armed = c.state === 'armed', chain = /emergency/.test(s.interlock.tripped + c.reason);
     const steps = [
       ...(disobeyed ? [['Press the emergency stop; keep away from the table', shaker.emergency_stop_open === true]] : []),
@@ -77,7 +110,7 @@ const Watch = (() => {
     byId('next-what').textContent = what;
     byId('next-steps').replaceChildren(...steps.map(([words, done]) => element('li', done ? 'done' : '', words + (done ? ' ✓' : ''))));
   }
-  const isDisobeyed = s => /disobeyed/.test(s.interlock.tripped || '') || (s.interlock.rows || []).some(r => r.raised && /disobeyed/.test(r.name + r.condition));
+  const isDisobeyed = s => s.shaker.rest === 'stop not obeyed' || !!(s.guard && s.guard.heard && s.guard.disobeyed && !s.guard.rest);
 
   // Three sounds that nobody takes for one another: an alarm asks (two even tones), an abort falls, a stop that is not
   // obeyed is a siren. A trip repeats until it is acknowledged.
@@ -119,5 +152,5 @@ const Watch = (() => {
   });
   const alarmed = event => { if (event.severity === 'alarm' && !playing) sound('alarm'); };
 
-  return {person, clock, strip, locks, next, sirens, alarmed, show(s) { strip(s); locks(s); next(s); sirens(s); byId('utc').textContent = clock(s.utc) + ' UTC'; }};
+  return {person, clock, strip, locks, next, sirens, alarmed, show(s) { strip(s); proof(s); locks(s); next(s); sirens(s); byId('utc').textContent = clock(s.utc) + ' UTC'; }};
 })();

@@ -83,6 +83,56 @@ TEST(SafetyProof, ARecordSurvivesTheJournal) {
         EXPECT_FALSE(proof_from_json(bad)) << bad;
 }
 
+TEST(SafetyProof, SaysWhichStopTakesLongerThanItDid) {
+    SafetyProof proof(demanded());
+    // GIVEN a year of proofs whose times scatter by a poll or so
+    for (int week = 0; week < 50; ++week) {
+        proved(proof, kNow + week * 168 * kHour, 0.8 + 0.03 * (week % 4));
+        EXPECT_EQ(proof.trend(), "") << week;
+    }
+    // WHEN the contactor sticks for half a second THEN the newest says so, and still passes
+    EXPECT_TRUE(proved(proof, kNow + 50 * 168 * kHour, 1.4).passed);
+    EXPECT_THAT(proof.trend(), HasSubstr("stop, platform takes longer: 1.40 s, 0.8"));
+    EXPECT_THAT(proof.trend(), HasSubstr("of 50 earlier"));
+    // AND a creeping wear shows against the median of all before it
+    SafetyProof creeping(demanded());
+    for (int week = 0; week < 50; ++week)
+        proved(creeping, kNow + week * 168 * kHour, 0.8 + (week > 25 ? 0.02 * (week - 25) : 0));
+    EXPECT_THAT(creeping.trend(), HasSubstr("takes longer"));
+    // AND a few tell nothing
+    SafetyProof young(demanded());
+    for (int week = 0; week < 3; ++week) proved(young, kNow + week * kHour, 0.5 + week);
+    EXPECT_EQ(young.trend(), "");
+}
+
+TEST(SafetyProof, ARecordingKeepsTheNewestWholeAndTheTimesOfAll) {
+    SafetyProof proof(demanded());
+    EXPECT_EQ(proof.recording_json(), "");
+    proved(proof, kNow, 1.0);
+    proved(proof, kNow + kHour, 1.1);
+    const std::string json = proof.recording_json();
+    EXPECT_THAT(json, HasSubstr("\"keys_sha256\":\"" + sha256(kKeys)));
+    EXPECT_THAT(json, HasSubstr("\"by\":\"Ada\""));
+    EXPECT_THAT(json, HasSubstr("{\"stop, platform\":1.0}"));
+    EXPECT_THAT(json, HasSubstr("{\"stop, platform\":1.1}"));
+}
+
+TEST(SafetyProof, KeepsTheMeasuredTransmissionForTheConfigurationItWasMeasuredWith) {
+    SafetyProof proof(demanded());
+    EXPECT_FALSE(proof.transmission());
+    proof.begin("Ada", 0.5);
+    proof.record().transmission = 0.61;
+    const ProofRecord record = proof.conclude(kNow, "");
+    // GIVEN the next life of the daemon
+    SafetyProof next(demanded());
+    next.take_over({proof_from_json(to_json(record)).value()});
+    EXPECT_EQ(next.transmission(), 0.61);
+    // AND one with another configuration, which measures it anew
+    SafetyProof other(demanded("vibration.transmission=0.5\n"));
+    other.take_over({record});
+    EXPECT_FALSE(other.transmission());
+}
+
 TEST(SafetyProof, AsksForTheEmergencyStopOnceAYear) {
     SafetyProof proof(demanded());
     proved(proof, kNow);

@@ -76,7 +76,10 @@ StatusData full_status() {
                "stop too slow",
                {{"stop, table", "s", 0.4, 0.1, 3, true}},
                "press the emergency stop now",
-               {{1'700'000'000'000'000'000, true, 0.5, 1.7}}};
+               {{1'700'000'000'000'000'000, true, 0.5, 1.7, 0.4}},
+               "0af1",
+               0.5,
+               "stop, table takes longer"};
     s.guard = {"/run/vibrig/guard.sock",
                true,
                "late",

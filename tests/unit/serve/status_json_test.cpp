@@ -49,6 +49,22 @@ Message parsed(const std::string& json) {
     return message;
 }
 
+TEST(StatusJson, HoldsHundredsOfDwellsAsOneTextOfProtobufsWould) {
+    StatusData status = full_status();
+    status.dwells.resize(420, status.dwells.at(0));
+    for (std::size_t i = 0; i < status.dwells.size(); ++i)
+        status.dwells[i].position = static_cast<int>(i) + 1;
+    status.reason = R"("dwells":[])";  // what a person may write anywhere
+    v1::Status message;
+    fill(message, status);
+    google::protobuf::util::JsonPrintOptions options;
+    options.always_print_primitive_fields = true;
+    options.preserve_proto_field_names = true;
+    std::string whole;
+    ASSERT_TRUE(google::protobuf::util::MessageToJsonString(message, &whole, options).ok());
+    EXPECT_EQ(status_json(status), whole);
+}
+
 TEST(StatusJson, CarriesEveryFieldOfTheSchema) {
     // GIVEN a status in which nothing has its default value
     const auto status = parsed<v1::Status>(status_json(full_status()));

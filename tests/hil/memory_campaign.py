@@ -1,0 +1,65 @@
+#!/usr/bin/python3
+"""Resident memory of vibrigd within one campaign of many dwells, recorded, its status asked for all the while, on the
+seqpacket bus and the rig's clock. What grows, grows with the dwells; short ones stand for those of 110 s.
+
+usage: memory_campaign.py PROGRAMS [--dwells N]
+"""
+import argparse
+import os
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+LIMIT_KB_PER_H = 100
+DWELLS_PER_H = 3600 / 110   # of 100 s, with ramps, settling and slews
+WARM = 60                   # dwells until caches and buffers have their size
+
+
+def resident_kb(rig):
+    with open(f"/proc/{rig.daemon.process.pid}/status", encoding="ascii") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("programs")
+    options.add_argument("--dwells", type=int, default=240)
+    given = options.parse_args()
+    checks = r.Checks()
+    campaign = {"name": "many", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 2]] * (given.dwells // 4),
+                "table_g": [9.0, 7.0], "dwell_s": 2.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
+    looks = []   # dwells, kB
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(given.programs, "seqpacket", "rig", folder)
+        try:
+            rig.start_plant("--seed", "3", "--warm-up", "1", "--start-temperature", "45")
+            rig.configure(campaign)
+            rig.start_daemon()
+            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"].get("rest") == "at rest" and
+                         s["platform"].get("ready"), 60)
+            said = [rig.tool(command, "--by", "tester").stderr for command in ("arm", "start")]
+            end, status = time.monotonic() + 300, None
+            while time.monotonic() < end:
+                status = rig.status()
+                if status is None or status["campaign"]["state"] in ("finished", "aborted", "tripped", "idle"):
+                    break
+                looks.append((len(status["campaign"]["dwells"]), resident_kb(rig)))
+                time.sleep(0.5)
+            checks.equal(r.state_of(status), "finished", f"a campaign of {given.dwells} dwells finishes {''.join(said)}")
+        finally:
+            rig.stop()
+    warm = [look for look in looks if look[0] >= WARM]
+    if checks.check(len(warm) >= 10, "it was looked at meanwhile", looks):
+        (first, before), (last, after) = warm[0], warm[-1]
+        growth = (after - before) / (last - first) * DWELLS_PER_H
+        checks.note(f"{before} kB after {first} dwells, {after} kB after {last}: {growth:.0f} kB per hour of the rig")
+        checks.check(growth <= LIMIT_KB_PER_H, f"resident memory grows by {LIMIT_KB_PER_H} kB per hour at most",
+                     f"{growth:.0f}: {looks[::8]}")
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
