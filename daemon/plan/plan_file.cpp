@@ -6,6 +6,7 @@
 #include <optional>
 #include <string_view>
 
+#include "daemon/plan/number_table.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::plan {
@@ -14,7 +15,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t kLargestFile = 16U << 20U;
 constexpr std::size_t kMostRuns = 100'000;
 constexpr double kMostG = 1000;
 constexpr double kMostInner = 80;  // beyond it the gimbals lock
@@ -22,19 +22,6 @@ constexpr double kAgreement = 0.01;
 constexpr double kAtRestG = 1e-9;
 
 std::string number(double value) { return Json(value).dump(); }
-
-[[noreturn]] void refuse(const std::string& place, const std::string& found,
-                         const std::string& expected) {
-    throw PlanFileError(place + ": found " + found + ", expected " + expected);
-}
-
-std::string content_of(const std::string& path) {
-    try {
-        return proto::read_whole_file(path, kLargestFile);
-    } catch (const std::runtime_error& error) {
-        throw PlanFileError(path + ": " + error.what());
-    }
-}
 
 void check_position(const std::array<double, 3>& position, const std::string& place) {
     for (const double angle : position) {
@@ -114,70 +101,7 @@ std::vector<PlannedRun> runs_from_json(const std::string& text, const std::strin
     return result;
 }
 
-struct Table {
-    std::vector<std::string> names;
-    std::vector<std::vector<double>> rows;  ///< NaN: empty field
-    std::vector<std::size_t> lines;
-
-    [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const {
-        const auto at = std::find(names.begin(), names.end(), name);
-        if (at == names.end()) return std::nullopt;
-        return static_cast<std::size_t>(at - names.begin());
-    }
-};
-
-std::vector<std::string_view> split(std::string_view line) {
-    std::vector<std::string_view> fields;
-    for (;;) {
-        const std::size_t end = std::min(line.find(','), line.size());
-        std::string_view field = line.substr(0, end);
-        while (!field.empty() &&
-               std::string_view(" \t\r\"").find(field.front()) != std::string::npos)
-            field.remove_prefix(1);
-        while (!field.empty() &&
-               std::string_view(" \t\r\"").find(field.back()) != std::string::npos)
-            field.remove_suffix(1);
-        fields.push_back(field);
-        if (end == line.size()) return fields;
-        line.remove_prefix(end + 1);
-    }
-}
-
-Table read_table(const std::string& text, const std::string& path,
-                 const std::vector<std::string_view>& wanted) {
-    Table table;
-    std::string_view rest = proto::without_byte_order_mark(text);
-    for (std::size_t number = 1; !rest.empty(); ++number) {
-        const std::size_t end = std::min(rest.find('\n'), rest.size());
-        const auto fields = split(rest.substr(0, end));
-        rest.remove_prefix(std::min(end + 1, rest.size()));
-        if (fields.size() == 1 && fields[0].empty()) continue;
-        const std::string place = path + ":" + std::to_string(number);
-        if (table.names.empty()) {
-            table.names.assign(fields.begin(), fields.end());
-            for (const auto& name : table.names) {
-                if (std::count(table.names.begin(), table.names.end(), name) > 1)
-                    refuse(place, "column " + proto::printable(name) + " twice", "it once");
-            }
-            continue;
-        }
-        std::vector<double> row(table.names.size(), std::nan(""));
-        for (std::size_t c = 0; c < table.names.size(); ++c) {
-            if (std::find(wanted.begin(), wanted.end(), table.names[c]) == wanted.end()) continue;
-            const std::string_view field = c < fields.size() ? fields[c] : "";
-            if (field.empty() || !proto::read_number(field, row[c]) || !std::isfinite(row[c])) {
-                refuse(place + ": column " + table.names[c],
-                       field.empty() ? "nothing" : "'" + proto::printable(field) + "'", "a number");
-            }
-        }
-        table.rows.push_back(std::move(row));
-        table.lines.push_back(number);
-    }
-    if (table.rows.empty()) refuse(path, "no row after a header", "positions");
-    return table;
-}
-
-std::vector<std::array<double, 3>> positions_of(const Table& table, const std::string& path) {
+std::vector<std::array<double, 3>> positions_of(const NumberTable& table, const std::string& path) {
     std::vector<std::array<double, 3>> result(table.rows.size());
     for (std::size_t k = 0; k < 3; ++k) {
         const auto* name = std::array{"alpha_deg", "beta_deg", "gamma_deg"}[k];
@@ -193,7 +117,7 @@ std::vector<std::array<double, 3>> positions_of(const Table& table, const std::s
 
 std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string& path,
                                       double transmission) {
-    const Table table = read_table(
+    const NumberTable table = read_table(
         text, path, {"alpha_deg", "beta_deg", "gamma_deg", "level_g", "table_g", "count"});
     const auto positions = positions_of(table, path);
     const auto level = table.find("level_g"), table_g = table.find("table_g"),

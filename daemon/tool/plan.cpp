@@ -11,6 +11,7 @@
 
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/plan_study.hpp"
+#include "daemon/tool/plan_turntable.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/progress.hpp"
 #include "proto/option_value.hpp"
@@ -26,6 +27,8 @@ struct Options {
     std::string plot;
     std::string output;
     bool json = false;
+    TurntableRequest turntable;
+    bool on_turntable = false;
 };
 
 void require(bool good, const std::string& what, const std::string& expected) {
@@ -95,6 +98,45 @@ int run(Options& options) {
         return kNo;
     }
     return result.beyond_limits ? kNo : 0;
+}
+
+int run_turntable(Options& options) {
+    if (!options.plot.empty())
+        throw std::runtime_error("found --plot with --turntable, expected -o");
+    TurntableRequest& request = options.turntable;
+    request.runs = options.request.runs;
+    request.without = options.request.without;
+    request.seed = options.request.seed;
+    const TurntablePlan plan = turntable_plan(request);
+    if (!options.output.empty()) plot::write_file(options.output, turntable_csv(plan));
+    std::cout << (options.json ? turntable_json(plan) + "\n" : turntable_table(plan));
+    if (plan.refusal.empty()) return 0;
+    std::cerr << "refused: " << plan.refusal << '\n';
+    return kNo;
+}
+
+void add_turntable(CLI::App& command, Options& options) {
+    CLI::Option* turntable = command.add_flag(
+        "--turntable", options.on_turntable,
+        "a plan for a turntable or centrifuge instead of the rig: inputs on spheres, for vibrig "
+        "calibrate (-o: CSV to be filled in)");
+    command
+        .add_option("--spheres", options.turntable.spheres,
+                    "with --turntable: radii, g or deg/s (1,2)")
+        ->delimiter(',')
+        ->needs(turntable)
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command
+        .add_option(
+            "--allocation", options.turntable.allocation,
+            "with --turntable: free (default, D-optimal), or [6]8 + [8]6 as both, split-68, "
+            "split-86")
+        ->needs(turntable)
+        ->check(CLI::IsMember({"free", "both", "split-68", "split-86"}));
+    for (const char* of_the_rig :
+         {"--positions", "--levels", "--grid", "--evaluate", "--done", "--targets", "--config"}) {
+        turntable->excludes(command.get_option(of_the_rig));
+    }
 }
 
 void add_candidates(CLI::App& command, Options& options) {
@@ -183,11 +225,17 @@ void add_plan(CLI::App& app, int& exit_code) {
     command->add_option("-o,--output", options->output, "plan file for vibrigd ([campaign] plan)");
     command->add_option("--plot", options->plot, "an SVG file, or a folder: the directions");
     command->add_flag("--json", options->json, "print the plan as JSON");
+    planner::add_turntable(*command, *options);
     command->footer(
-        "Example: vibrig plan --runs 20 --levels 0,6 -o plan.json --plot sphere.svg\n"
+        "Examples: vibrig plan --runs 20 --levels 0,6 -o plan.json --plot sphere.svg\n"
+        "          vibrig plan --turntable --spheres 1,8 --runs 40 -o turntable.csv\n"
         "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
         "asks for\nmore than the shaker's limits, 2 bad usage or input.");
-    command->callback([options, &exit_code] { exit_code = planner::run(*options); });
+    command->callback([options, &exit_code] {
+        exit_code = options->on_turntable
+                        ? guarded([&] { return planner::run_turntable(*options); })
+                        : planner::run(*options);
+    });
 }
 
 }  // namespace vibrig::tool

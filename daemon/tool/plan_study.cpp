@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/tool/plan_terms.hpp"
 #include "estimator/crlb.hpp"
 #include "estimator/kinematics.hpp"
 #include "estimator/parameters.hpp"
@@ -46,7 +47,7 @@ class Study {
                    request.ramp_s.value_or(c_.campaign.ramp_s), request.slew_deg_per_s};
         limits_ = request.limits;
         if (!request.forbidden.empty()) limits_.forbidden = plan::read_positions(request.forbidden);
-        for (const std::string& name : request.without) switch_off(name);
+        terms_ = terms_without(request.without);
         out_.transmission = c_.estimator.transmission;
         out_.frequency_hz = c_.estimator.frequency_hz;
         out_.dwell_s = timing_.dwell_s;
@@ -73,15 +74,6 @@ class Study {
     }
 
   private:
-    void switch_off(const std::string& name) {
-        const auto at = std::find(planning::kTermNames.begin(), planning::kTermNames.end(), name);
-        if (at == planning::kTermNames.end()) {
-            throw std::runtime_error("--without: found \"" + name +
-                                     "\", expected one of D0 D1 D2 D3 D11 D22 D33 D12 D13 D23");
-        }
-        terms_[static_cast<std::size_t>(at - planning::kTermNames.begin())] = false;
-    }
-
     [[nodiscard]] bool designs() const {
         return request_.evaluate.empty() && (listed_.empty() || request_.runs > 0 || by_targets());
     }

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/tool/plot/chart.hpp"
+
 namespace vibrig::tool {
 
 struct ReproduceOptions {
@@ -20,14 +22,18 @@ struct ReproducedRow {
     std::optional<bool> agrees = {};  ///< nothing to compare with: empty
     /// The numbers of the texts, by name, for machines.
     std::vector<std::pair<std::string, double>> values = {};
+    /// Expected from a derivation of our own, where the paper has no number.
+    std::string theory = {};
 };
 
-/// A paper's table, published next to computed.
+/// A paper's table: what it published, what theory expects where it did not, and what is computed.
 struct Reproduction {
     std::string name;
     std::string title;
     std::vector<ReproducedRow> rows;
     std::vector<std::string> notes;
+    /// Names without extension, if options.plot asks for them.
+    std::vector<std::pair<std::string, plot::Chart>> charts = {};
 };
 
 // One function for each name in the table of reproduce.cpp.

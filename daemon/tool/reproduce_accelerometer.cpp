@@ -148,6 +148,31 @@ void add_levels(Reproduction& table) {
     }
 }
 
+/// Errors of the zeros over the plan, one run, within three standard deviations of the filter.
+plot::Chart zeros_chart() {
+    const CalibrationSettings s = paper();
+    const UnitErrors errors;
+    plot::Chart chart;
+    chart.title = "Errors of the zeros in place";
+    chart.x = plot::Axis("time [s]");
+    chart.y = plot::Axis("|error| [mg]", true);
+    const Calibration calibration = simulate(s, errors, kPeriod, 1);
+    for (std::size_t i = 0; i < 3; ++i) {
+        const std::string axis(1, "xyz"[i]);
+        plot::Curve error{axis, {}, {}, {}, {}, plot::Look::line};
+        plot::Curve sigma{axis + ", stated 1 sigma", {}, {}, {}, {}, plot::Look::dashed};
+        for (const CalibrationTrace& point : calibration.trace()) {
+            error.x.push_back(point.time_s);
+            sigma.x.push_back(point.time_s);
+            error.y.push_back(std::abs(point.zero_mg[i] - errors.zero_mg[i]));
+            sigma.y.push_back(point.sigma_mg[i]);
+        }
+        chart.curves.push_back(error);
+        chart.curves.push_back(sigma);
+    }
+    return chart;
+}
+
 }  // namespace
 
 }  // namespace vibrig::tool::accelerometer
@@ -162,6 +187,7 @@ Reproduction reproduce_accelerometer(const ReproduceOptions& options) {
     accelerometer::add_ranks(table);
     accelerometer::add_residuals(table, seeds);
     accelerometer::add_levels(table);
+    if (!options.plot.empty()) table.charts = {{"zeros", accelerometer::zeros_chart()}};
     table.notes.push_back(accelerometer::words(
         "simulated unit: zeros 5, -5, 5 mg, gyro bias 0.1 deg/h, tilt 0.1 deg, azimuth 0.5 deg "
         "wrong; white noise; %zu runs, seeds from 1",

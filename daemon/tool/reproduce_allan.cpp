@@ -167,9 +167,11 @@ void add_gauss_markov(Reproduction& table, std::size_t seeds, Progress& progress
     const double k = kS * std::sqrt(2 / 1.5);
     const auto row = [&](const char* item, const std::string& expected, const Statistics& s) {
         table.rows.push_back({std::string("slow Gauss-Markov, ") + item,
-                              expected,
+                              "-",
                               text("%.4f +- %.4f", s.mean(), s.deviation()),
-                              {}});
+                              {},
+                              {{"mean", s.mean()}, {"deviation", s.deviation()}},
+                              expected});
     };
     row("sqrt(a0), window mean", text("0.0084 (true %.4f)", kS), root_a0);
     row("K, window mean", text("0.029 (true %.4f)", k), paper_k);
@@ -201,15 +203,21 @@ void add_synthetic(Reproduction& table, std::size_t seeds, Progress& progress) {
     }
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         const double rms = direct[j].rms_error(kTruth[j]);
-        table.rows.push_back({text("rms error of %s, direct fit", allan::kTermNames[j]), kDirect[j],
-                              text("%.2g %%", rms), rms <= kLimit[j]});
+        table.rows.push_back({text("rms error of %s, direct fit", allan::kTermNames[j]),
+                              "-",
+                              text("%.2g %%", rms),
+                              rms <= kLimit[j],
+                              {{"rms_percent", rms}},
+                              kDirect[j]});
     }
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         table.rows.push_back(
             {text("rms error of %s, window mean (paper's way)", allan::kTermNames[j]),
-             kPaper[j],
+             "-",
              text("%.3g %%", paper[j].rms_error(kTruth[j])),
-             {}});
+             {},
+             {{"rms_percent", paper[j].rms_error(kTruth[j])}},
+             kPaper[j]});
     }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <unsupported/Eigen/SpecialFunctions>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace {
 constexpr std::size_t kLagResolution = 64;
 constexpr std::size_t kFewestForIdentification = 30;
 constexpr std::size_t kFewestInPart = 20;
+constexpr double kEnough = 200;  // points: 0.14 of the exponent, 1 sigma
 
 double real(std::size_t n) { return static_cast<double>(n); }
 
@@ -96,6 +98,22 @@ double overlapping_allan_edf(Alpha alpha, double n, double m) {
     }
 }
 
+/// White phase, reflected about noisy end points: each of the m - 1 differences at an end holds
+/// twice that point, so that all of them are correlated. With A of the differences' rows edf = (tr
+/// A A')^2 / tr (A A')^2. Rows inside: length^2 6, products -4 and 1 with those m and 2m further
+/// on. At an end: length^2 10, products 4 among all (8 for i + k = m), and -4, 1, -1, 2 with one
+/// row inside each.
+double total_white_phase_edf(double n, double m) {
+    const double end = std::min(m - 1, std::floor((n - 2) / 2));
+    const double inside = n - 2 - 2 * end;
+    const double trace = 6 * inside + 2 * 10 * end;
+    const double within =
+        36 * inside + 2 * 16 * std::max(0.0, inside - m) + 2 * std::max(0.0, inside - 2 * m);
+    const double at_end = 16 * end * (end - 1) + (100 + 48 + 2 * (16 + 1 + 1 + 4)) * end;
+    const double squares = within + 2 * at_end;
+    return trace * trace / squares;
+}
+
 double total_edf(Alpha alpha, double n, double m) {
     const double ratio = (n - 1) / m;
     // At m = 1 both variances are the same sum; the table is for long averaging times.
@@ -103,6 +121,8 @@ double total_edf(Alpha alpha, double n, double m) {
         return overlapping_allan_edf(alpha, n, m);
     }
     switch (alpha) {
+        case 2:
+            return total_white_phase_edf(n, m);
         case 0:
             return 1.50 * ratio * 4 * m * m / (4 * m * m + 5);
         case -1:
@@ -155,15 +175,12 @@ double lag_one(const std::vector<std::vector<double>>& parts, bool common_mean) 
     return zero > 0 ? one / zero : 0;
 }
 
-}  // namespace
-
-double edf(Statistic statistic, Alpha alpha, std::size_t points, std::size_t m) {
-    const double value = statistic_edf(statistic, std::clamp(alpha, -2, 2), points, m);
-    // The closed forms fall below one, or turn negative, at the very end of a record.
-    return value >= 1.0 ? value : 1.0;
-}
-
-Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback) {
+/// Exponent of the rate's spectrum at averaging factor m, not rounded, and how many points told it.
+struct Exponent {
+    double alpha = 0;
+    double points = 0;
+};
+std::optional<Exponent> exponent_at(const Series& series, std::size_t m) {
     std::vector<std::vector<double>> parts;
     std::size_t count = 0;
     for (const Segment& segment : series.segments) {
@@ -178,14 +195,14 @@ Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback) {
         count += z.size();
     }
     if (count < kFewestForIdentification) {
-        return fallback;
+        return {};
     }
     constexpr int kMostDifferences = 2;
     for (int order = 0;; ++order) {
         const double r = lag_one(parts, order > 0);
         const double delta = r / (1 + r);
         if (order == kMostDifferences || delta < 0.25) {
-            return std::clamp(static_cast<int>(std::lround(2 - 2 * (delta + order))), -2, 2);
+            return Exponent{2 - 2 * (delta + order), real(count)};
         }
         for (std::vector<double>& z : parts) {
             std::adjacent_difference(z.begin(), z.end(), z.begin());
@@ -194,14 +211,36 @@ Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback) {
     }
 }
 
+}  // namespace
+
+double edf(Statistic statistic, Alpha alpha, std::size_t points, std::size_t m) {
+    const double value = statistic_edf(statistic, std::clamp(alpha, -2, 2), points, m);
+    // The closed forms fall below one, or turn negative, at the very end of a record.
+    return value >= 1.0 ? value : 1.0;
+}
+
+Alpha identify_noise(const Series& series, std::size_t m, Alpha fallback) {
+    // Few points mistake one noise for another, and the interval with it: shorter averages of the
+    // same record are asked too, each octave with the weight of its longest.
+    double sum = 0;
+    double weight = 0;
+    double share = 1;
+    for (std::size_t factor = m; factor > 0 && weight < kEnough; factor /= 2, share /= 2) {
+        if (const auto found = exponent_at(series, factor)) {
+            sum += share * found->points * found->alpha;
+            weight += share * found->points;
+        }
+    }
+    return weight > 0 ? std::clamp(static_cast<int>(std::lround(sum / weight)), -2, 2) : fallback;
+}
+
 double normal_quantile(double probability) { return Eigen::numext::ndtri(probability); }
 
-double chi_square_quantile(double probability, double degrees) {
-    // Wilson and Hilferty bring the start, bisection in the logarithm cannot fail after it.
-    const double c = 2 / (9 * degrees);
-    const double cube = 1 - c + normal_quantile(probability) * std::sqrt(c);
-    const double guess = std::max(1e-12 * degrees, degrees * cube * cube * cube);
-    const auto below = [&](double x) { return Eigen::numext::igamma(degrees / 2, x / 2); };
+namespace {
+
+/// Where the growing function reaches `probability`, from a guess.
+template <typename Below>
+double quantile(double probability, double guess, const Below& below) {
     double low = guess;
     double high = guess;
     while (below(low) > probability && low > 1e-300) {
@@ -215,6 +254,23 @@ double chi_square_quantile(double probability, double degrees) {
         (below(middle) < probability ? low : high) = middle;
     }
     return std::sqrt(low * high);
+}
+
+}  // namespace
+
+double chi_square_quantile(double probability, double degrees) {
+    // Wilson and Hilferty bring the start, bisection in the logarithm cannot fail after it.
+    const double c = 2 / (9 * degrees);
+    const double cube = 1 - c + normal_quantile(probability) * std::sqrt(c);
+    return quantile(probability, std::max(1e-12 * degrees, degrees * cube * cube * cube),
+                    [&](double x) { return Eigen::numext::igamma(degrees / 2, x / 2); });
+}
+
+double f_quantile(double probability, double numerator, double denominator) {
+    return quantile(probability, 1, [&](double x) {
+        return Eigen::numext::betainc(numerator / 2, denominator / 2,
+                                      numerator * x / (numerator * x + denominator));
+    });
 }
 
 }  // namespace vibrig::estimator::allan

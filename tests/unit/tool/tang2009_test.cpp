@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/unit/support/vibrig_command.hpp"
 
@@ -42,9 +43,23 @@ TEST_F(Reproduce, RefusesAPlaceForChartsBeforeTheStudy) {
     EXPECT_EQ(refusal_of("tang2009 --plot ''"),
               "reproduce: --plot: found \"\", expected a folder for charts\n");
     EXPECT_NE(refusal_of("tang2009 --plot file/below").find("file/below"), std::string::npos);
-    EXPECT_EQ(refusal_of("allan --plot charts"),
-              "reproduce: --plot: found charts, but allan has no charts\n");
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "charts"));
+}
+
+TEST_F(Reproduce, LinesAreAtMost120ColumnsAndEveryRowHasValues) {
+    for (const std::string name : {"dplan", "zha2019 --seeds 2", "accelerometer --seeds 2"}) {
+        ASSERT_LE(vibrig("reproduce " + name + " --plot charts"), 1) << error;
+        std::istringstream lines(out);
+        for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 120U) << line;
+        EXPECT_NE(out.find("theory"), std::string::npos);
+    }
+    for (const char* chart : {"dplan-growth.svg", "zha2019-drive.svg", "accelerometer-zeros.svg"})
+        EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / chart)) << chart;
+    ASSERT_EQ(vibrig("reproduce dplan --json"), 0) << error;
+    const Json result = Json::parse(out)["reproductions"][0];
+    for (const Json& row : result["rows"]) {
+        EXPECT_FALSE(row["values"].empty()) << row;
+        EXPECT_TRUE(row.contains("theory"));
+    }
 }
 
 // The rigs' seeds are 1, 2, ... in every run, so the numbers are the same in every run. How many

@@ -1,0 +1,86 @@
+#include "daemon/plan/number_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/plan/plan_file.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::plan {
+
+namespace {
+
+constexpr std::size_t kLargestFile = 16U << 20U;
+constexpr std::string_view kBlank = " \t\r\"";
+
+std::string_view trimmed(std::string_view field) {
+    const std::size_t first = field.find_first_not_of(kBlank);
+    if (first == std::string_view::npos) return {};
+    return field.substr(first, field.find_last_not_of(kBlank) - first + 1);
+}
+
+std::vector<std::string_view> split(std::string_view line) {
+    std::vector<std::string_view> fields;
+    for (;;) {
+        const std::size_t end = std::min(line.find(','), line.size());
+        fields.push_back(trimmed(line.substr(0, end)));
+        if (end == line.size()) return fields;
+        line.remove_prefix(end + 1);
+    }
+}
+
+}  // namespace
+
+std::optional<std::size_t> NumberTable::find(std::string_view name) const {
+    const auto at = std::find(names.begin(), names.end(), name);
+    if (at == names.end()) return std::nullopt;
+    return static_cast<std::size_t>(at - names.begin());
+}
+
+void refuse(const std::string& place, const std::string& found, const std::string& expected) {
+    throw PlanFileError(place + ": found " + found + ", expected " + expected);
+}
+
+std::string content_of(const std::string& path) {
+    try {
+        return proto::read_whole_file(path, kLargestFile);
+    } catch (const std::runtime_error& error) {
+        throw PlanFileError(path + ": " + error.what());
+    }
+}
+
+NumberTable read_table(const std::string& text, const std::string& path,
+                       const std::vector<std::string_view>& wanted) {
+    NumberTable table;
+    std::string_view rest = proto::without_byte_order_mark(text);
+    for (std::size_t number = 1; !rest.empty(); ++number) {
+        const std::size_t end = std::min(rest.find('\n'), rest.size());
+        const auto fields = split(rest.substr(0, end));
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        if (fields.size() == 1 && fields[0].empty()) continue;
+        const std::string place = path + ":" + std::to_string(number);
+        if (table.names.empty()) {
+            table.names.assign(fields.begin(), fields.end());
+            for (const auto& name : table.names) {
+                if (std::count(table.names.begin(), table.names.end(), name) > 1)
+                    refuse(place, "column " + proto::printable(name) + " twice", "it once");
+            }
+            continue;
+        }
+        std::vector<double> row(table.names.size(), std::nan(""));
+        for (std::size_t c = 0; c < table.names.size(); ++c) {
+            if (std::find(wanted.begin(), wanted.end(), table.names[c]) == wanted.end()) continue;
+            const std::string_view field = c < fields.size() ? fields[c] : "";
+            if (field.empty() || !proto::read_number(field, row[c]) || !std::isfinite(row[c])) {
+                refuse(place + ": column " + table.names[c],
+                       field.empty() ? "nothing" : "'" + proto::printable(field) + "'", "a number");
+            }
+        }
+        table.rows.push_back(std::move(row));
+        table.lines.push_back(number);
+    }
+    if (table.rows.empty()) refuse(path, "no row after a header", "rows of numbers");
+    return table;
+}
+
+}  // namespace vibrig::plan

@@ -1,0 +1,134 @@
+#include "estimator/plan/calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <unsupported/Eigen/SpecialFunctions>
+
+#include "estimator/linear_algebra.hpp"
+#include "estimator/plan/algebra.hpp"
+
+namespace vibrig::estimator::plan {
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// A reading that alone determines a combination has no residual.
+constexpr double kMustFit = 1e-6;
+
+bool stated(const std::vector<Reading>& readings) { return readings.front().sigma > 0; }
+
+void check(const std::vector<Reading>& readings, const Terms& terms) {
+    const auto needed = static_cast<std::size_t>(std::count(terms.begin(), terms.end(), true));
+    if (needed == 0) throw PlanError("found a model without terms, expected one at least");
+    if (readings.size() < needed) {
+        throw PlanError("found " + std::to_string(readings.size()) + " readings, expected " +
+                        std::to_string(needed) + " at least: as many as coefficients");
+    }
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+        const Reading& r = readings[i];
+        const std::string place = "reading " + std::to_string(i + 1) + ": ";
+        const bool finite = std::isfinite(r.output) && std::isfinite(r.input[0]) &&
+                            std::isfinite(r.input[1]) && std::isfinite(r.input[2]);
+        if (!finite) throw PlanError(place + "found a value that is not finite, expected numbers");
+        if (!(r.sigma >= 0) || !std::isfinite(r.sigma) || (r.sigma > 0) != stated(readings)) {
+            throw PlanError(place + "found sigma " + std::to_string(r.sigma) +
+                            ", expected all of them above 0, or none");
+        }
+    }
+}
+
+/// P(chi-square > x).
+double chi_square_tail(double x, double degrees) {
+    return Eigen::numext::igammac(degrees / 2, std::max(0.0, x) / 2);
+}
+/// P(F > x).
+double f_tail(double x, double numerator, double denominator) {
+    return Eigen::numext::betainc(denominator / 2, numerator / 2,
+                                  denominator / (denominator + numerator * x));
+}
+
+/// Sum of squares about the means of readings at the same input, and its degrees of freedom.
+struct PureError {
+    double squares = 0;
+    std::size_t degrees = 0;
+};
+PureError pure_error(const std::vector<Reading>& readings) {
+    std::map<Vec3, std::vector<double>> at_input;
+    for (const Reading& r : readings) at_input[r.input].push_back(r.output);
+    PureError out;
+    for (const auto& [input, outputs] : at_input) {
+        double mean = 0;
+        for (const double y : outputs) mean += y / static_cast<double>(outputs.size());
+        for (const double y : outputs) out.squares += (y - mean) * (y - mean);
+        out.degrees += outputs.size() - 1;
+    }
+    return out;
+}
+
+std::optional<ResidualTest> test_of(const std::vector<Reading>& readings, double squares,
+                                    std::size_t degrees) {
+    if (degrees == 0) return {};
+    const auto d = static_cast<double>(degrees);
+    if (stated(readings)) return ResidualTest{squares, chi_square_tail(squares, d), d, 0};
+    const PureError error = pure_error(readings);
+    if (error.degrees == 0 || error.degrees >= degrees || !(error.squares > 0)) return {};
+    const auto e = static_cast<double>(error.degrees);
+    const double lack = d - e;
+    const double ratio = std::max(0.0, squares - error.squares) / lack / (error.squares / e);
+    return ResidualTest{ratio, f_tail(ratio, lack, e), lack, e};
+}
+
+}  // namespace
+
+SensorCalibration calibrate(const std::vector<Reading>& readings, const Terms& terms) {
+    check(readings, terms);
+    Problem problem;
+    problem.terms = terms;
+    Vector y(at(readings.size()));
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+        const double sigma = stated(readings) ? readings[i].sigma : 1;
+        problem.points.push_back({turntable_row(readings[i].input), sigma, 1});
+        y[at(i)] = readings[i].output / sigma;
+    }
+    SensorCalibration out;
+    out.plan = evaluate(problem, Effort(readings.size(), 1.0));
+    Vector scale;
+    const Matrix a = scaled_rows(problem, scale);
+    // The least of all solutions where several do as well: what is determined does not depend.
+    const auto svd = linear_algebra::right_singular(a);
+    const Matrix v = svd.v.leftCols(at(out.plan.rank));
+    const Vector inverse = svd.values.head(at(out.plan.rank)).cwiseAbs2().cwiseInverse();
+    const Matrix spread = linear_algebra::product(v * inverse.asDiagonal(), v.transpose());
+    const Vector x = v * linear_algebra::least_squares(linear_algebra::product(a, v), y);
+    const Vector rest = y - a * x;
+    out.degrees = readings.size() - out.plan.rank;
+    const double squares = rest.squaredNorm();
+    const double unit = stated(readings)  ? 1
+                        : out.degrees > 0 ? std::sqrt(squares / static_cast<double>(out.degrees))
+                                          : kNaN;
+    out.test = test_of(readings, squares, out.degrees);
+    const Vector leverage = linear_algebra::product(a, spread).cwiseProduct(a).rowwise().sum();
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+        const double sigma = stated(readings) ? readings[i].sigma : 1;
+        const double own = 1 - leverage[at(i)];
+        out.residual.push_back(rest[at(i)] * sigma);
+        out.standardised.push_back(own > kMustFit ? rest[at(i)] / (unit * std::sqrt(own)) : kNaN);
+        out.noise += std::pow(unit * sigma, 2) / static_cast<double>(readings.size());
+    }
+    out.noise = std::sqrt(out.noise);
+    const std::vector<std::size_t> columns = active(terms);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+        out.value[columns[k]] = x[at(k)] / scale[at(k)];
+        out.sigma[columns[k]] = std::isfinite(out.plan.sigma[columns[k]])
+                                    ? unit * std::sqrt(spread(at(k), at(k))) / scale[at(k)]
+                                    : out.plan.sigma[columns[k]];
+    }
+    out.covariance = unit * unit * scale.cwiseInverse().asDiagonal() * spread *
+                     scale.cwiseInverse().asDiagonal();
+    if (!out.plan.identifies_all()) out.covariance.setConstant(kNaN);
+    return out;
+}
+
+}  // namespace vibrig::estimator::plan
