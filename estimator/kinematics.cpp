@@ -29,9 +29,15 @@ Kinematics::Kinematics(const Settings& settings)
     const int east = (up + 1) % 3;
     const double latitude = settings.latitude_deg * kRadPerDeg;
     const double azimuth = settings.azimuth_deg * kRadPerDeg;
-    up_[up] = settings.up.sign;
-    earth_rate_[north] = std::cos(latitude) * std::cos(azimuth);
-    earth_rate_[up] = settings.up.sign * std::sin(latitude);
+    const double elevation = settings.elevation_deg * kRadPerDeg;
+    // The base leans: the north axis points up by the elevation, seen from above the rig's own up
+    // axis leans back as much.
+    const double ce = std::cos(elevation), se = std::sin(elevation);
+    const double level_north = std::cos(latitude) * std::cos(azimuth), vertical = std::sin(latitude);
+    up_[north] = se;
+    up_[up] = settings.up.sign * ce;
+    earth_rate_[north] = ce * level_north + se * vertical;
+    earth_rate_[up] = settings.up.sign * (ce * vertical - se * level_north);
     earth_rate_[east] = -settings.up.sign * std::cos(latitude) * std::sin(azimuth);
     earth_rate_ *= kEarthRateDegPerHour;
 }
