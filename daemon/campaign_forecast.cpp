@@ -45,6 +45,10 @@ std::optional<plan::AdaptivePlan> adaptive_plan(const configuration::Configurati
     settings.closing_s = stages.closing_s;
     settings.time_limit_s = c.campaign.time_limit_s;
     settings.period_s = period_s(c);
+    for (std::size_t i = 0; i < 3; ++i) {
+        settings.limits.low[i] = c.gimbal.travel_deg[i][0];
+        settings.limits.high[i] = c.gimbal.travel_deg[i][1];
+    }
     return plan::AdaptivePlan(c.estimator, settings);
 }
 

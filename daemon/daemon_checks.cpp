@@ -1,11 +1,14 @@
 // What can be said of a configuration before anything is opened.
+#include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
+#include "daemon/campaign/rig_frame.hpp"
 #include "daemon/daemon.hpp"
 #include "estimator/plan_report.hpp"
 #include "estimator/vibration_level.hpp"
@@ -16,6 +19,30 @@ proto::Dbc Daemon::load_dbc(const std::string& path) {
     return path.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")
                         : proto::read_dbc(path);
 }
+
+namespace {
+
+/// Throws ConfigurationError where the cables do not let zeroing go.
+void check_zeroing_travel(const configuration::Configuration& c) {
+    if (!c.campaign.zeroing) return;
+    const campaign::RigFrame frame(c.estimator);
+    for (const double azimuth_deg : {0.0, 90.0, -90.0}) {
+        for (const bool down : {false, true}) {
+            if (down && !c.campaign.zero.both_ways) continue;
+            const auto at = frame.azimuth_vertical_deg(azimuth_deg, down);
+            for (std::size_t i = 0; i < 3; ++i) {
+                const auto& [low, high] = c.gimbal.travel_deg[i];
+                if (high - low >= 360 || drivers::within_travel(at[i], {low, high})) continue;
+                throw configuration::ConfigurationError(fmt::format(
+                    "campaign.zeroing: found true, which needs a reading of {:g} deg of the {} "
+                    "gimbal, expected {:g} to {:g} deg (gimbal.travel_deg)",
+                    at[i], std::array{"outer", "inner", "azimuth"}[i], low, high));
+            }
+        }
+    }
+}
+
+}  // namespace
 
 void Daemon::check_bindings(const configuration::Loaded& loaded) {
     const auto& configuration = loaded.configuration;
@@ -45,6 +72,7 @@ void Daemon::check_bindings(const configuration::Loaded& loaded) {
     if (!missing.empty()) throw configuration::ConfigurationError(missing);
     const auto why = campaign::check_stages(configuration.campaign, dbc, *port);
     if (!why.empty()) throw configuration::ConfigurationError(why);
+    check_zeroing_travel(configuration);
 }
 
 void Daemon::check_results(const configuration::Configuration& configuration) {
@@ -67,19 +95,26 @@ void Daemon::check_results(const configuration::Configuration& configuration) {
 
 std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
     const campaign::Settings& campaign = configuration.campaign;
+    std::vector<std::string> told;
+    const auto& rig = configuration.estimator;
+    if (rig.encoder_sign != std::array{1, 1, 1} ||
+        rig.encoder_zero_deg != std::array{0.0, 0.0, 0.0})
+        told.emplace_back(
+            "positions of lists and plans are gimbal angles, converted by platform.encoder_sign "
+            "and encoder_zero_deg: a file that states what the encoders show is to be mended");
     // Of a plan file and of an adaptive campaign the forecast tells.
-    if (!campaign.stops.empty() || campaign.adaptive) return {};
-    auto lines = estimator::plan_warnings(estimator::report_plan(
-        configuration.estimator,
-        estimator::campaign_plan(configuration.estimator, campaign.positions_deg, campaign.table_g,
-                                 campaign.dwell_s),
-        drivers::to_seconds(configuration.assembler.sample_period)));
+    if (!campaign.stops.empty() || campaign.adaptive) return told;
+    for (auto& line : estimator::plan_warnings(
+             estimator::report_plan(rig,
+                                    estimator::campaign_plan(rig, campaign.positions_deg,
+                                                             campaign.table_g, campaign.dwell_s),
+                                    drivers::to_seconds(configuration.assembler.sample_period))))
+        told.push_back(std::move(line));
     const std::string alias = estimator::VibrationLevel::aliasing(
-        configuration.estimator.frequency_hz,
-        drivers::to_seconds(configuration.assembler.sample_period),
-        configuration.estimator.level_window_s);
-    if (!alias.empty()) lines.push_back("vibration.frequency_hz: " + alias);
-    return lines;
+        rig.frequency_hz, drivers::to_seconds(configuration.assembler.sample_period),
+        rig.level_window_s);
+    if (!alias.empty()) told.push_back("vibration.frequency_hz: " + alias);
+    return told;
 }
 
 }  // namespace vibrig

@@ -43,11 +43,38 @@ Gimbal::Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& p
 
 void Gimbal::slew_to(const std::array<double, 3>& position_deg, Time now,
                      bool increments) noexcept {
+    // Well below half a turn there is one shorter way, and it is the direct one.
+    constexpr double kOneWay = 170;
     target_deg_ = position_deg;
-    command(increments ? Mode::slew_with_increments : Mode::slew, now);
+    beyond_deg_.reset();
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto& travel = settings_.travel_deg[i];
+        if (travel[1] - travel[0] >= 360) continue;
+        const auto angle = within_travel(position_deg[i], travel);
+        if (!angle) {
+            target_deg_[i] = HUGE_VAL;
+            break;
+        }
+        const auto here = here_deg_ ? within_travel((*here_deg_)[i], travel) : std::nullopt;
+        if (here && std::abs(*angle - *here) < kOneWay) continue;
+        beyond_deg_ = position_deg;
+        target_deg_[i] = 0.5 * (travel[0] + travel[1]);
+    }
+    here_deg_.reset();
+    command(increments && !beyond_deg_ ? Mode::slew_with_increments : Mode::slew, now);
+    after_ = increments ? Mode::slew_with_increments : Mode::slew;
 }
 
-void Gimbal::release(Time now) noexcept { command(Mode::free_drift, now); }
+void Gimbal::next_leg(Time now) noexcept {
+    target_deg_ = *beyond_deg_;
+    beyond_deg_.reset();
+    command(after_, now);
+}
+
+void Gimbal::release(Time now) noexcept {
+    beyond_deg_.reset();
+    command(Mode::free_drift, now);
+}
 
 void Gimbal::command(Mode mode, Time now) noexcept {
     mode_ = mode;
@@ -92,6 +119,12 @@ void Gimbal::send(Time now) noexcept {
 
 GimbalState Gimbal::update(const PlatformStatus& status, Time now) noexcept {
     state_ = follow(status, now);
+    if (state_ != GimbalState::in_position || mode_ == Mode::free_drift) return state_;
+    if (beyond_deg_) {
+        next_leg(now);
+    } else {
+        here_deg_ = target_deg_;
+    }
     return state_;
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "drivers/can_port.hpp"
@@ -15,7 +17,20 @@ struct GimbalSettings {
     Time status_deadline = 500 * kMillisecond;  ///< status older than this is not believed
     Time slew_timeout = 120 * kSecond;
     Time repeat = 200 * kMillisecond;  ///< command sent again until its counter is echoed
+    /// What cables allow outer, inner and azimuth, readings in deg, lowest and highest; a whole
+    /// turn or more: no limit.
+    std::array<std::array<double, 2>, 3> travel_deg{{{-360, 360}, {-360, 360}, {-360, 360}}};
 };
+
+/// The same angle, whole turns aside, within the travel; nothing: the travel does not reach it.
+[[nodiscard]] inline std::optional<double> within_travel(
+    double degrees, const std::array<double, 2>& travel_deg) noexcept {
+    constexpr double kDust = 1e-6;
+    const double middle = 0.5 * (travel_deg[0] + travel_deg[1]);
+    const double nearest = middle + std::remainder(degrees - middle, 360.0);
+    if (nearest < travel_deg[0] - kDust || nearest > travel_deg[1] + kDust) return std::nullopt;
+    return nearest;
+}
 
 enum class GimbalState : std::uint8_t {
     idle,        ///< nothing commanded yet, or released
@@ -35,8 +50,13 @@ class Gimbal {
     Gimbal(const proto::Dbc& dbc, const GimbalSettings& settings, CanPort& port);
     /// Starts a slew to outer, inner, azimuth in deg, as the encoders count. `increments`: the
     /// platform sends the increments of its gyros and accelerometers until the next command.
+    /// A gimbal may take the shorter way round; where cables limit its travel it goes by the
+    /// travel's middle, so that this is the way within it. A target that the travel does not reach
+    /// is not sent: the slew times out.
     void slew_to(const std::array<double, 3>& position_deg, Time now,
                  bool increments = false) noexcept;
+    /// Somebody may have turned the gimbals: the next slew takes no short cut.
+    void forget_position() noexcept { here_deg_.reset(); }
     /// Lets the platform drift freely under its gyros: no torquing.
     void release(Time now) noexcept;
     /// Follows the platform's status; sends again what was not echoed. To be called at
@@ -48,6 +68,7 @@ class Gimbal {
   private:
     enum class Mode : std::uint8_t { free_drift = 0, slew = 1, slew_with_increments = 2 };
     void command(Mode mode, Time now) noexcept;
+    void next_leg(Time now) noexcept;
     void send(Time now) noexcept;
     [[nodiscard]] GimbalState follow(const PlatformStatus& status, Time now) noexcept;
     /// The angle as this signal can carry it: 350 deg goes out as -10 deg where the range is +-180
@@ -60,8 +81,11 @@ class Gimbal {
     const proto::Signal* counter_signal_ = nullptr;
     GimbalSettings settings_;
     CanPort& port_;
-    std::array<double, 3> target_deg_{};
+    std::array<double, 3> target_deg_{};                ///< of the leg under way
+    std::optional<std::array<double, 3>> beyond_deg_;   ///< where it goes on to
+    std::optional<std::array<double, 3>> here_deg_;     ///< where the last slew has ended
     Mode mode_ = Mode::free_drift;
+    Mode after_ = Mode::slew;  ///< of the last leg
     std::uint8_t counter_ = 0;
     bool commanded_ = false;
     bool echoed_ = true;

@@ -41,6 +41,7 @@ struct Settings {
     // site
     double latitude_deg = 45.75;
     double azimuth_deg = 0.0;
+    double elevation_deg = 0.0;  ///< of the rig's north axis: the base is not level
     double gravity_mps2 = 9.80665;
     // vibration
     double frequency_hz = 15.0;

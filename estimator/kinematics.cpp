@@ -16,31 +16,37 @@ double wrap_next_to(double angle_rad, double reference_rad) noexcept {
     return reference_rad + wrap(angle_rad - reference_rad);
 }
 
-Eigen::Vector3d earth_rate_reference(const SignedAxis& up, double latitude_rad,
+Eigen::Matrix3d level_reference(const SignedAxis& up, double elevation_rad) noexcept {
+    const int north = (up.axis + 2) % 3, east = (up.axis + 1) % 3;
+    // The base leans: the north axis points up by the elevation, the rig's own up axis leans back
+    // as much.
+    const double cosine = std::cos(elevation_rad), sine = std::sin(elevation_rad);
+    Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
+    level(north, 0) = cosine;
+    level(up.axis, 0) = -up.sign * sine;
+    level(north, 1) = sine;
+    level(up.axis, 1) = up.sign * cosine;
+    level(east, 2) = up.sign;
+    return level;
+}
+
+Eigen::Vector3d earth_rate_reference(const Eigen::Matrix3d& level, double latitude_rad,
                                      double azimuth_rad) noexcept {
-    Eigen::Vector3d rate;
-    rate[(up.axis + 2) % 3] = std::cos(latitude_rad) * std::cos(azimuth_rad);
-    rate[up.axis] = up.sign * std::sin(latitude_rad);
-    rate[(up.axis + 1) % 3] = -up.sign * std::cos(latitude_rad) * std::sin(azimuth_rad);
-    return kEarthRateDegPerHour * rate;
+    return kEarthRateDegPerHour *
+           (level * Eigen::Vector3d(std::cos(latitude_rad) * std::cos(azimuth_rad),
+                                    std::sin(latitude_rad),
+                                    -std::cos(latitude_rad) * std::sin(azimuth_rad)));
 }
 
 Kinematics::Kinematics(const Settings& settings)
-    : up_(Eigen::Vector3d::Zero()),
-      earth_rate_(Eigen::Vector3d::Zero()),
+    : level_(level_reference(settings.up, settings.elevation_deg * kRadPerDeg)),
+      up_(level_.col(1)),
+      earth_rate_(estimator::earth_rate_reference(level_, settings.latitude_deg * kRadPerDeg,
+                                                  settings.azimuth_deg * kRadPerDeg)),
       encoder_sign_(settings.encoder_sign[0], settings.encoder_sign[1], settings.encoder_sign[2]),
       encoder_zero_(settings.encoder_zero_deg[0], settings.encoder_zero_deg[1],
                     settings.encoder_zero_deg[2]) {
     encoder_zero_ *= kRadPerDeg;
-    const int up = settings.up.axis;
-    const int north = (up + 2) % 3;
-    const int east = (up + 1) % 3;
-    const double latitude = settings.latitude_deg * kRadPerDeg;
-    const double azimuth = settings.azimuth_deg * kRadPerDeg;
-    level_axis_ = {north, up, east};
-    level_sign_ = settings.up.sign;
-    up_[up] = settings.up.sign;
-    earth_rate_ = estimator::earth_rate_reference(settings.up, latitude, azimuth);
 }
 
 Eigen::Vector3d Kinematics::gimbal_angles(const std::array<double, 3>& encoder_rad) const noexcept {
@@ -87,9 +93,7 @@ Pose Kinematics::pose(const Eigen::Vector3d& angles_rad) const noexcept {
     pose.axis[0] = {cg * cb, sg * cb, -sb};
     pose.axis[1] = {-sg, cg, 0.0};
     pose.axis[2] = {0.0, 0.0, 1.0};
-    pose.level.col(0) = pose.c.col(level_axis_[0]);
-    pose.level.col(1) = level_sign_ * pose.c.col(level_axis_[1]);
-    pose.level.col(2) = level_sign_ * pose.c.col(level_axis_[2]);
+    pose.level = pose.c * level_;
     pose.up = pose.level.col(1);
     pose.earth_rate = pose.c * earth_rate_;
     return pose;

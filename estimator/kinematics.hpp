@@ -18,9 +18,14 @@ inline constexpr double kMaxInnerAngleRad = 80.0 * kPi / 180.0;
 /// The same angle, next to `reference`.
 [[nodiscard]] double wrap_next_to(double angle_rad, double reference_rad) noexcept;
 
-/// Of the Earth, deg/h, reference frame. North is the axis before `up`, east the axis after it; a
-/// minus sign turns up and east round.
-[[nodiscard]] Eigen::Vector3d earth_rate_reference(const SignedAxis& up, double latitude_rad,
+/// North, up and east in the reference frame, one a column. North is the axis before `up`, east the
+/// axis after it; a minus sign turns up and east round. `elevation_rad` (site.elevation_deg): how
+/// far the base's north axis points up.
+[[nodiscard]] Eigen::Matrix3d level_reference(const SignedAxis& up, double elevation_rad) noexcept;
+
+/// Of the Earth, deg/h, reference frame.
+[[nodiscard]] Eigen::Vector3d earth_rate_reference(const Eigen::Matrix3d& level,
+                                                   double latitude_rad,
                                                    double azimuth_rad) noexcept;
 
 /// All that follows from the gimbal angles (outer alpha about x, inner beta about y, azimuth gamma
@@ -46,14 +51,15 @@ class Kinematics {
         const std::array<double, 3>& encoder_rad) const noexcept;
     [[nodiscard]] Pose pose(const Eigen::Vector3d& angles_rad) const noexcept;
 
+    /// level_reference() of its settings.
+    [[nodiscard]] const Eigen::Matrix3d& level() const noexcept { return level_; }
     [[nodiscard]] const Eigen::Vector3d& up_reference() const noexcept { return up_; }
     [[nodiscard]] const Eigen::Vector3d& earth_rate_reference() const noexcept {
         return earth_rate_;
     }
 
   private:
-    std::array<int, 3> level_axis_{};  ///< of the reference frame: north, up, east
-    double level_sign_ = 1;            ///< of up and east along their axes
+    Eigen::Matrix3d level_;
     Eigen::Vector3d up_, earth_rate_, encoder_sign_, encoder_zero_;
 };
 

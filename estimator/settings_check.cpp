@@ -59,6 +59,8 @@ void check(const Settings& s) {
     require(std::abs(s.latitude_deg) <= 90, "site.latitude_deg", s.latitude_deg, "-90 to 90");
     require(std::isfinite(s.azimuth_deg), "site.azimuth_deg", s.azimuth_deg,
             "a finite angle in deg");
+    require(std::abs(s.elevation_deg) <= 2, "site.elevation_deg", s.elevation_deg,
+            "-2 to 2: a base that leans more is to be shimmed");
     require(positive(s.gravity_mps2), "site.gravity_mps2", s.gravity_mps2, "above 0");
     require(positive(s.frequency_hz), "vibration.frequency_hz", s.frequency_hz, "above 0");
     require(positive(s.transmission), "vibration.transmission", s.transmission, "above 0");
@@ -92,6 +94,35 @@ void check(const Settings& s) {
     require(s.forgetting >= 0 && s.forgetting < 1, "estimator.forgetting", s.forgetting,
             "0 or above, below 1");
     require(positive(s.gate_nis), "estimator.gate_nis", s.gate_nis, "above 0");
+}
+
+std::vector<DoubtfulAxes> doubtful_axes(const Settings& settings) {
+    std::vector<DoubtfulAxes> doubts;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto& axes = settings.gyro_axes[j];
+        const std::string gyro(1, "xyz"[j]), key = "platform.gyro_" + gyro + "_axes";
+        const int input = axes[0].axis;
+        if (input != static_cast<int>(j)) {
+            std::string found = std::string("\"") + (axes[0].sign > 0 ? '+' : '-') + "xyz"[input] +
+                                '"';
+            if (settings.gyro_axes[static_cast<std::size_t>(input)][0].axis == input)
+                found += std::string(", the input axis of gyro ") + "xyz"[input] + " too";
+            doubts.push_back({key + "[0]", found,
+                              "\"+" + gyro + "\" or \"-" + gyro + "\": gyro " + gyro +
+                                  " drifts about platform " + gyro});
+        }
+        // Input, output, spin in cyclic order with an even number of minus signs, or the reverse.
+        const bool cyclic = (axes[1].axis - input + 3) % 3 == 1;
+        const int signs = axes[0].sign * axes[1].sign * axes[2].sign;
+        if ((cyclic ? 1 : -1) * signs > 0) continue;
+        std::string found;
+        for (const SignedAxis& axis : axes)
+            found += std::string(axis.sign > 0 ? "+" : "-") + "xyz"[axis.axis] + ' ';
+        found.back() = ',';
+        doubts.push_back({key, found + " left-handed",
+                          "a right-handed triad: input cross output is spin"});
+    }
+    return doubts;
 }
 
 }  // namespace vibrig::estimator

@@ -93,6 +93,7 @@ std::string Campaign::not_fit_to_excite(Time now) const {
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
+    if (state == State::paused) ports_.gimbal.forget_position();
     if (state == State::ramping) excited_deg_ = here().stop.position_deg;
     if (state == State::ramping || state == State::checking) {
         // From rest: what the table was told last is over, and no witness may hold it to that.
@@ -192,6 +193,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
 /// From the position after the ones in offer_, which is empty for a new campaign.
 void Campaign::begin(const std::string& by, Time now) {
     started_by_ = by;
+    ports_.gimbal.forget_position();
     dwells_ = std::exchange(offer_, {});
     positions_done_ = positions_before_ = dwells_.size();
     plan_stops();

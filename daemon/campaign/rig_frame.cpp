@@ -34,7 +34,9 @@ double RigFrame::azimuth(const Vector& encoder_rad) const {
     const auto pose = kinematics.pose(kinematics.gimbal_angles(encoder_rad));
     // North is the axis before `up`, east the one after it; turning `up` over turns east over too.
     const int axis = settings_.up.axis;
-    const double north = pose.c(0, (axis + 2) % 3);
+    const double elevation = kRadPerDeg * settings_.elevation_deg;
+    const double north = std::cos(elevation) * pose.c(0, (axis + 2) % 3) -
+                         std::sin(elevation) * settings_.up.sign * pose.c(0, axis);
     const double east = settings_.up.sign * pose.c(0, (axis + 1) % 3);
     const double from_north = std::atan2(east, north) + kRadPerDeg * settings_.azimuth_deg;
     return std::remainder(0.5 * estimator::kPi - from_north, 2 * estimator::kPi);
@@ -49,7 +51,14 @@ Vector RigFrame::azimuth_vertical_deg(double azimuth_deg, bool down) const {
     }
     double outer = settings_.up.axis == 1 ? 90 * settings_.up.sign : 90 - 90 * settings_.up.sign;
     if (down) outer += 180;
-    Vector encoder = estimator::encoder_deg(settings_, {outer, 0, azimuth_deg});
+    // Where the base leans along the north axis: x with up along y, y with up along z.
+    double inner = 0;
+    if (settings_.up.axis == 1) {
+        inner = down ? settings_.elevation_deg : -settings_.elevation_deg;
+    } else {
+        outer += settings_.up.sign * settings_.elevation_deg;
+    }
+    Vector encoder = estimator::encoder_deg(settings_, {outer, inner, azimuth_deg});
     for (double& angle : encoder) angle = std::remainder(angle, 360.0);
     return encoder;
 }

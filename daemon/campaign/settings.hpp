@@ -20,7 +20,7 @@ inline const std::vector<std::array<double, 3>> kTable1Positions{
 
 /// One dwell of a campaign.
 struct Stop {
-    std::array<double, 3> position_deg{};
+    std::array<double, 3> position_deg{};  ///< as the encoders count
     double table_g = 0;
 };
 
@@ -82,6 +82,7 @@ enum class VisitOrder : std::uint8_t {
 struct Settings {
     double sample_s = 0;  ///< between two samples, as configured; nothing works without it
     std::string name = "campaign";
+    /// In a file gimbal angles; once it is loaded, as the encoders count.
     std::vector<std::array<double, 3>> positions_deg = kTable1Positions;
     std::vector<double> table_g{9.0, 7.0};  ///< one run each
     VisitOrder order = VisitOrder::balanced;

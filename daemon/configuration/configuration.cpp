@@ -167,6 +167,25 @@ void take_plan(Configuration& c) {
     }
 }
 
+/// From gimbal angles, which files state, to what the encoders show, within the travel where there
+/// is one that reaches it.
+void to_readings(Configuration& c) {
+    const auto convert = [&](std::array<double, 3>& position) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto& travel = c.gimbal.travel_deg[i];
+            const int sign = c.estimator.encoder_sign[i];
+            const double zero = c.estimator.encoder_zero_deg[i];
+            const bool free = travel[1] - travel[0] >= 360;
+            if (free && sign == 1 && zero == 0) continue;
+            const double reading = sign * position[i] + zero;
+            position[i] = drivers::within_travel(reading, free ? std::array{-180.0, 180.0} : travel)
+                              .value_or(reading);
+        }
+    };
+    for (auto& position : c.campaign.positions_deg) convert(position);
+    for (auto& stop : c.campaign.stops) convert(stop.position_deg);
+}
+
 /// What a proof of the safe state stands on: "key=value\n" each, sorted.
 std::string covered_by_proof(const std::vector<EffectiveValue>& effective) {
     static constexpr std::array<std::string_view, 8> kSections{
@@ -221,6 +240,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         }
     }
 
+    to_readings(c);
     CrossCheck check(c, reader.places(), problems);
     check.everywhere();
     if (daemon) {

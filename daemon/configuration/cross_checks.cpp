@@ -1,6 +1,7 @@
 #include "daemon/configuration/cross_checks.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -58,6 +59,7 @@ void CrossCheck::everywhere() {
 void CrossCheck::for_daemon() {
     rig_clock();
     simulated_rig();
+    if (!c_.simulated()) real_rig();
     status_signals();
     if (!c_.shaker.registers.watchdog) {
         refuse({"shaker.registers.watchdog"}, "no watchdog register",
@@ -101,6 +103,26 @@ void CrossCheck::for_daemon() {
     limits();
     frequency();
     inputs();
+    travel();
+}
+
+void CrossCheck::travel() {
+    if (!sound({"gimbal.travel_deg", "campaign.positions_deg", "campaign.plan"})) return;
+    const bool listed = c_.campaign.stops.empty();
+    std::size_t n = listed ? c_.campaign.positions_deg.size() : c_.campaign.stops.size();
+    if (c_.campaign.adaptive) n = 0;  // chooses within the travel
+    for (std::size_t p = 0; p < n; ++p) {
+        const auto& at = listed ? c_.campaign.positions_deg[p] : c_.campaign.stops[p].position_deg;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto& travel = c_.gimbal.travel_deg[i];
+            if (travel[1] - travel[0] >= 360 || drivers::within_travel(at[i], travel)) continue;
+            refuse({listed ? "campaign.positions_deg" : "campaign.plan", "gimbal.travel_deg"},
+                   "position " + std::to_string(p + 1) + " at a reading of " + rounded(at[i]) +
+                       " deg of the " + std::array{"outer", "inner", "azimuth"}[i] + " gimbal",
+                   plain(travel[0]) + " to " + plain(travel[1]) + " deg (gimbal.travel_deg)");
+            return;
+        }
+    }
 }
 
 void CrossCheck::status_signals() {

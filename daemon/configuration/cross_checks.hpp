@@ -34,12 +34,15 @@ class CrossCheck {
     void adaptive();
     void rig_clock();
     void simulated_rig();
+    void real_rig();
+    void registers_stated();
     void registers();
     void writable_registers_apart();
     void set_points_fit();
     void limits();
     void frequency();
     void inputs();
+    void travel();
 
     const Configuration& c_;
     const std::map<std::string, Place>& places_;

@@ -109,6 +109,10 @@ void add_gimbal_keys(std::vector<Key>& keys) {
     keys.push_back(milliseconds(
         "gimbal.repeat_ms", {10, 60'000}, "a command is sent again until its counter is echoed",
         [](C & c) -> auto& { return c.gimbal.repeat; }));
+    keys.push_back(travels(
+        "gimbal.travel_deg",
+        "what cables allow, as the encoders count; a whole turn or more: no limit",
+        [](C & c) -> auto& { return c.gimbal.travel_deg; }));
 }
 
 }  // namespace

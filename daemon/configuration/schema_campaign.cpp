@@ -113,7 +113,8 @@ void add_campaign_keys(std::vector<Key>& keys) {
         [](C & c) -> auto& { return c.campaign.name; }));
     keys.push_back(positions(
         "campaign.positions_deg", kMostPositions,
-        "gimbal positions of every run as the encoders count (default: Tang et al. 2009, table 1)",
+        "gimbal angles of every run, converted by platform.encoder_sign and encoder_zero_deg "
+        "(default: Tang et al. 2009, table 1)",
         [](C & c) -> auto& { return c.campaign.positions_deg; }));
     keys.push_back(numbers(
         "campaign.table_g", "g", {0, 1000}, kMostRuns,

@@ -14,6 +14,10 @@ void add_rig_keys(std::vector<Key>& keys) {
     keys.push_back(number("site.azimuth_deg", "deg", {-360, 360},
                           "azimuth of the rig's north axis, from true north towards east",
                           [](C& c) -> double& { return c.estimator.azimuth_deg; }));
+    keys.push_back(number("site.elevation_deg", "deg", {-2, 2},
+                          "of the rig's north axis (the outer gimbal's, with up +y): the base is "
+                          "not level; beyond, shim it",
+                          [](C& c) -> double& { return c.estimator.elevation_deg; }));
     keys.push_back(number("site.gravity_mps2", "m/s^2", {9.7, 9.9}, "local gravity, 1 g",
                           [](C& c) -> double& { return c.estimator.gravity_mps2; }));
 

@@ -26,6 +26,8 @@ class Keys {
     /// "file:line:column: key: found X, expected Y" for a key that is well written and cannot be.
     void refuse(const std::string& key, const std::string& found, const std::string& expected);
 
+    [[nodiscard]] bool stated(const std::string& key) { return at(key).node() != nullptr; }
+
     /// One a line.
     [[nodiscard]] const std::string& problems() const noexcept { return problems_; }
     /// What was taken, as TOML with its origin.

@@ -34,6 +34,18 @@ proto::Register read_register(Keys& keys, const std::string& role, proto::Regist
     return reg;
 }
 
+/// What would be written to a controller that is not Vibrig's own must not be Vibrig's own map.
+void insist_on_registers(Keys& keys, bool rig_time) {
+    if (keys.boolean("commission.simulated", false) || rig_time) return;
+    for (const char* key :
+         {"shaker.registers.run.address", "shaker.registers.run.type",
+          "shaker.registers.measured_amplitude.address",
+          "shaker.registers.measured_amplitude.type"})
+        if (!keys.stated(key))
+            keys.refuse(key, "nothing",
+                        "it stated: Vibrig's own map is for the simulated rig only");
+}
+
 void read_shaker(Keys& keys, Settings& s) {
     if (keys.choice("shaker.transport", 0, {"tcp", "rtu"}) == 1)
         keys.refuse("shaker.transport", "\"rtu\"",
@@ -126,6 +138,7 @@ Settings parse_settings(const std::string& text, const std::string& file) {
     read_bus(keys, s.can);
     read_witness(keys, s.witness);
     read_shaker(keys, s);
+    insist_on_registers(keys, s.witness.rig_time);
     read_annunciator(keys, s.annunciator);
     if (!keys.problems().empty()) throw SettingsError(keys.problems());
     s.believed = keys.believed();

@@ -35,7 +35,7 @@ AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSe
     const double dwell_s = adaptive.timing.dwell_s;
     for (const double table_g : adaptive.table_g) {
         for (const auto& direction : planning::cube_directions()) {
-            const auto position = planning::position_for(settings, direction, {});
+            const auto position = planning::position_for(settings, direction, adaptive.limits);
             if (!position) continue;
             const PlannedRun run{*position, table_g * settings.transmission, table_g, 1};
             candidates_.push_back(run);

@@ -8,6 +8,7 @@
 #include "estimator/identification.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/order.hpp"
+#include "estimator/plan/positions.hpp"
 
 namespace vibrig::plan {
 
@@ -21,6 +22,7 @@ struct AdaptiveSettings {
     double closing_s = 0;            ///< after the last dwell, within the limit, too
     double time_limit_s = 0;         ///< 0: none
     double period_s = 0;             ///< between samples; required
+    planning::GimbalLimits limits;   ///< readings
 };
 
 /// Chooses a campaign's dwells one by one from the filter's own covariance: the cheapest plan that

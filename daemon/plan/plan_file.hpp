@@ -15,7 +15,7 @@ class PlanFileError : public std::runtime_error {
 };
 
 struct PlannedRun {
-    std::array<double, 3> position_deg{};  ///< outer, inner, azimuth as the encoders count
+    std::array<double, 3> position_deg{};  ///< gimbal angles: outer, inner, azimuth
     double level_g = 0;                    ///< peak at the platform
     double table_g = 0;                    ///< peak at the table: what the shaker is told
     std::size_t count = 1;

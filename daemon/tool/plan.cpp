@@ -45,6 +45,7 @@ void check(Options& options) {
                                                            &options.azimuth};
     for (std::size_t k = 0; k < 3; ++k) {
         if (ranges[k]->empty()) continue;
+        request.limited[k] = true;
         request.limits.low[k] = ranges[k]->front();
         request.limits.high[k] = ranges[k]->back();
         require(std::isfinite(ranges[k]->front()) && std::isfinite(ranges[k]->back()) &&
@@ -53,8 +54,6 @@ void check(Options& options) {
                     std::to_string(ranges[k]->back()),
                 "LOW,HIGH in deg");
     }
-    request.limits.low[1] = std::max(request.limits.low[1], -80.0);
-    request.limits.high[1] = std::min(request.limits.high[1], 80.0);
     for (const double target : request.targets) {
         require(std::isfinite(target) && target >= 0, "--targets: found " + std::to_string(target),
                 "standard errors of bias, linear and quadratic terms, 0 for none");
@@ -154,7 +153,9 @@ void add_candidates(CLI::App& command, Options& options) {
     for (const auto& [name, range] :
          {std::pair{"--outer", &options.outer}, std::pair{"--inner", &options.inner},
           std::pair{"--azimuth", &options.azimuth}}) {
-        command.add_option(name, *range, "gimbal limits LOW,HIGH, deg")
+        command
+            .add_option(name, *range,
+                        "gimbal limits LOW,HIGH as the encoders count, deg (gimbal.travel_deg)")
             ->delimiter(',')
             ->expected(2)
             ->check(proto::finite());

@@ -31,7 +31,7 @@ Json correlation(const planning::Evaluation& evaluation) {
 std::string plan_json(const PlanStudy& study) {
     Json runs = Json::array();
     for (const PlanRun& run : study.runs) {
-        runs.push_back({{"position", run.visit.position_deg},
+        runs.push_back({{"position", to_attitude(study.rig, run.visit.position_deg)},
                         {"level_g", run.visit.level_g},
                         {"table_g", run.table_g},
                         {"count", run.count}});
@@ -114,7 +114,7 @@ std::string plan_table(const PlanStudy& study) {
     std::string text = "   run   outer  inner azimuth   platform     table  times\n";
     std::size_t number = 1;
     for (const PlanRun& run : study.runs) {
-        const auto& p = run.visit.position_deg;
+        const auto p = to_attitude(study.rig, run.visit.position_deg);
         text += format("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu\n", number++, p[0], p[1],
                        p[2], run.visit.level_g, run.table_g, run.count);
     }

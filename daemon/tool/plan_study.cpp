@@ -32,6 +32,11 @@ std::string text(double value) {
     return out.data();
 }
 
+bool counts_as_gimbals(const estimator::Settings& rig) {
+    return rig.encoder_sign == std::array{1, 1, 1} &&
+           rig.encoder_zero_deg == std::array{0.0, 0.0, 0.0};
+}
+
 /// Candidate or listed runs, with what the design algorithms need of each.
 struct List {
     planning::Problem problem;
@@ -46,16 +51,22 @@ class Study {
                    request.settle_s.value_or(c_.campaign.settle_s),
                    request.ramp_s.value_or(c_.campaign.ramp_s), request.slew_deg_per_s};
         limits_ = request.limits;
-        if (!request.forbidden.empty()) limits_.forbidden = plan::read_positions(request.forbidden);
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (request.limited[k]) continue;
+            limits_.low[k] = c_.gimbal.travel_deg[k][0];
+            limits_.high[k] = c_.gimbal.travel_deg[k][1];
+        }
+        if (!request.forbidden.empty()) limits_.forbidden = positions_in(request.forbidden);
         terms_ = terms_without(request.without);
         out_.transmission = c_.estimator.transmission;
         out_.frequency_hz = c_.estimator.frequency_hz;
         out_.dwell_s = timing_.dwell_s;
+        out_.rig = c_.estimator;
     }
 
     PlanStudy run() {
         if (!request_.positions.empty()) {
-            listed_ = plan::read_positions(request_.positions);
+            listed_ = positions_in(request_.positions);
             for (const Vec3& p : listed_) {
                 if (!limits_.allow(p)) {
                     throw std::runtime_error(request_.positions + ": found (" + text(p[0]) + ", " +
@@ -74,6 +85,17 @@ class Study {
     }
 
   private:
+    [[nodiscard]] std::vector<Vec3> positions_in(const std::string& path) const {
+        auto positions = plan::read_positions(path);
+        for (Vec3& position : positions) position = to_readings(c_.estimator, position);
+        return positions;
+    }
+    [[nodiscard]] std::vector<plan::PlannedRun> plan_in(const std::string& path) const {
+        auto runs = plan::read_plan(path, c_.estimator.transmission);
+        for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
+        return runs;
+    }
+
     [[nodiscard]] bool designs() const {
         return request_.evaluate.empty() && (listed_.empty() || request_.runs > 0 || by_targets());
     }
@@ -82,7 +104,7 @@ class Study {
     void choose_levels() {
         levels_ = request_.levels_g;
         if (!request_.evaluate.empty()) {
-            given_ = plan::read_plan(request_.evaluate, c_.estimator.transmission);
+            given_ = plan_in(request_.evaluate);
             if (levels_.empty()) {
                 for (const auto& run : given_) levels_.push_back(run.level_g);
             }
@@ -196,7 +218,7 @@ class Study {
     planning::Effort done() {
         if (request_.done.empty()) return {};
         planning::Effort effort(candidates_.visits.size(), 0.0);
-        for (const auto& run : plan::read_plan(request_.done, c_.estimator.transmission)) {
+        for (const auto& run : plan_in(request_.done)) {
             const planning::Point wanted = point({run.position_deg, run.level_g});
             std::size_t at = 0;
             for (; at < candidates_.problem.size(); ++at) {
@@ -395,6 +417,14 @@ class Study {
 };
 
 }  // namespace
+
+Vec3 to_readings(const estimator::Settings& rig, const Vec3& at) {
+    return counts_as_gimbals(rig) ? at : planning::position_of(rig, at);
+}
+
+Vec3 to_attitude(const estimator::Settings& rig, const Vec3& at) {
+    return counts_as_gimbals(rig) ? at : planning::attitude_of(rig, at);
+}
 
 PlanStudy study(const PlanRequest& request) { return Study(request).run(); }
 

@@ -36,6 +36,7 @@ struct PlanRequest {
     std::vector<std::string> without;  ///< terms the model has not
     double grid_deg = 0;               ///< candidates every so many deg; 0: the 26 directions
     planning::GimbalLimits limits;
+    std::array<bool, 3> limited{};  ///< by `limits`; else by the configuration's travel
     std::string forbidden;    ///< file of positions
     double noise_per_g = 0;   ///< noise is hypot(1, this times the level)
     bool time_costs = false;  ///< compare per time instead of per run
@@ -79,7 +80,12 @@ struct PlanStudy {
     bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
     std::string refusal;         ///< empty: the plan determines everything
     double transmission = 0, frequency_hz = 0, dwell_s = 0;
+    estimator::Settings rig;
 };
+
+/// Files and people have gimbal angles, a visit has what the encoders show; deg.
+[[nodiscard]] planning::Vec3 to_readings(const estimator::Settings& rig, const planning::Vec3& at);
+[[nodiscard]] planning::Vec3 to_attitude(const estimator::Settings& rig, const planning::Vec3& at);
 
 /// Throws std::runtime_error for bad input.
 [[nodiscard]] PlanStudy study(const PlanRequest& request);

@@ -30,12 +30,6 @@ bool within(double deg, double low, double high) {
     return false;
 }
 
-Vec3 position_of(const Settings& settings, const Vec3& gimbal) {
-    Vec3 position = encoder_deg(settings, gimbal);
-    for (double& angle : position) angle = wrapped_deg(angle);
-    return position;
-}
-
 /// Both ways to put the vertical along `d` with as little inner angle as possible.
 std::vector<Vec3> ways(const SignedAxis& up, Vec3 d) {
     for (double& x : d) x *= up.sign;
@@ -73,6 +67,18 @@ std::vector<Vec3> ways(const SignedAxis& up, Vec3 d) {
 }
 
 }  // namespace
+
+Vec3 attitude_of(const Settings& settings, const Vec3& position_deg) {
+    Vec3 gimbal = gimbal_deg(settings, position_deg);
+    for (double& angle : gimbal) angle = wrapped_deg(angle);
+    return gimbal;
+}
+
+Vec3 position_of(const Settings& settings, const Vec3& gimbal_deg) {
+    Vec3 position = encoder_deg(settings, gimbal_deg);
+    for (double& angle : position) angle = wrapped_deg(angle);
+    return position;
+}
 
 Vec3 up_at(const Settings& settings, const Vec3& position_deg) {
     const Vec3 gimbal = gimbal_deg(settings, position_deg);
@@ -113,6 +119,7 @@ bool GimbalLimits::allow(const Vec3& position_deg) const {
 std::optional<Vec3> position_for(const Settings& settings, const Vec3& direction,
                                  const GimbalLimits& limits) {
     for (const Vec3& way : ways(settings.up, direction)) {
+        if (std::abs(way[1]) > kLargestInner_deg + kDust) continue;
         const Vec3 position = position_of(settings, way);
         if (limits.allow(position)) return position;
     }

@@ -67,15 +67,14 @@ ForwardModel::ForwardModel(const Settings& settings, const ParameterArray& coeff
     : kinematics_(settings),
       model_(settings),
       coefficients_(coefficients),
-      up_(settings.up),
       latitude_rad_(settings.latitude_deg * kPi / 180.0),
       azimuth_rad_(settings.azimuth_deg * kPi / 180.0) {}
 
 Vector3d ForwardModel::apparent(const DwellRow& row, const Disturbance& d) const {
     const Vector3d theta = row.angles;
     // The true rig.
-    const Vector3d earth =
-        earth_rate_reference(up_, latitude_rad_ + d.latitude_rad, azimuth_rad_ + d.azimuth_rad);
+    const Vector3d earth = earth_rate_reference(kinematics_.level(), latitude_rad_ + d.latitude_rad,
+                                                azimuth_rad_ + d.azimuth_rad);
     const Pose pose = kinematics_.pose(theta);
     const Gimbals rig = gimbals(theta, d.non_orthogonality_rad);
     // North, up and east in the reference frame, one a column.

@@ -43,7 +43,6 @@ class ForwardModel {
     Kinematics kinematics_;
     DriftModel model_;
     ParameterArray coefficients_;
-    SignedAxis up_;
     double latitude_rad_, azimuth_rad_;
 };
 

@@ -39,7 +39,7 @@ void daemon(benchmark::State& state) {
         << "[campaign]\nname = \"live\"\nresults = \"results\"\nidentify = \"what-it-can\"\n"
         << "[can]\nport = \"seqpacket\"\npath = \"" << bus.path << "\"\nsample_rate_hz = " << kRate
         << ".0\n[server]\nsocket = \"" << (folder / "vibrigd.sock").string()
-        << "\"\n[log]\nfile = \"log\"\n[shaker]\nport = 1\n";
+        << "\"\n[log]\nfile = \"log\"\n[shaker]\nport = 1\n[commission]\nsimulated = true\n";
     const auto program = fs::read_symlink("/proc/self/exe").parent_path() / "vibrigd";
     const std::string configuration = folder / "vibrigd.toml";
     const std::array<const char*, 4> arguments{"vibrigd", "--config", configuration.c_str(),

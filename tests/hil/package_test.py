@@ -406,8 +406,14 @@ def installs_below_a_prefix(checks, build, folder):
     with open(os.path.join(prefix, "lib/systemd/system/vibrigd.service"), encoding="utf-8") as file:
         program = re.search(r"^ExecStart=(\S+)", file.read(), re.M)[1]
     checks.equal(program, os.path.join(prefix, "bin/vibrigd"), "its unit starts the program installed")
-    checks.equal(output(program, "--check", "--config", os.path.join(prefix, "share/doc/vibrig/examples/vibrigd.toml"))[0], 0,
-                 "which accepts the example configuration")
+    example = os.path.join(prefix, "share/doc/vibrig/examples/vibrigd.toml")
+    status, said = output(program, "--check", "--config", example)
+    checks.check(status == 2 and said.count("shaker.registers.") >= 10 and said.count("found") == said.count("found nothing"),
+                 "which refuses the example configuration for the registers of a shaker that nobody has stated, and nothing else", said)
+    simulated = os.path.join(folder, "simulated.toml")
+    with open(example, encoding="utf-8") as file, open(simulated, "w", encoding="utf-8") as copy:
+        copy.write(file.read() + "\n[commission]\nsimulated = true\n")
+    checks.equal(output(program, "--check", "--config", simulated)[0], 0, "and accepts it for a simulated rig")
 
 
 def package(checks, build, folder, version):

@@ -214,7 +214,7 @@ class Files : public ::testing::Test {
 
 TEST_F(Files, AreReadAndNamedAsGiven) {
     const auto path = folder_ / "rig.toml";
-    std::ofstream(path) << "[site]\nlatitude_deg = 10\n";
+    std::ofstream(path) << "[site]\nlatitude_deg = 10\n[commission]\nsimulated = true\n";
     const Loaded loaded = load(path.string(), true);
     EXPECT_EQ(loaded.configuration.estimator.latitude_deg, 10);
     EXPECT_EQ(loaded.effective.front().origin, path.string() + ":2");
@@ -227,7 +227,7 @@ TEST_F(Files, ThatCannotBeReadSayWhy) {
 }
 
 TEST_F(Files, NoPathMeansAllDefaults) {
-    EXPECT_EQ(load("", true).configuration.estimator.latitude_deg, 45.75);
+    EXPECT_EQ(load("", false).configuration.estimator.latitude_deg, 45.75);
 }
 
 }  // namespace

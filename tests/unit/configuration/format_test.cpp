@@ -21,8 +21,9 @@ const EffectiveValue& value_of(const Loaded& loaded, const std::string& key) {
 }
 
 TEST(Effective, EveryValueHasItsOrigin) {
-    const Loaded loaded = parse("[site]\nlatitude_deg = 50\n\n[noise]\n\nresolver_bits = 18\n",
-                                "/etc/rig.toml", true);
+    const Loaded loaded =
+        parse(as_simulated("[site]\nlatitude_deg = 50\n\n[noise]\n\nresolver_bits = 18\n", true),
+              "/etc/rig.toml", true);
     EXPECT_EQ(value_of(loaded, "site.latitude_deg").value, "50.0");
     EXPECT_EQ(value_of(loaded, "site.latitude_deg").unit, "deg");
     EXPECT_EQ(value_of(loaded, "site.latitude_deg").origin, "/etc/rig.toml:2");
@@ -36,7 +37,7 @@ TEST(Effective, EveryValueHasItsOrigin) {
 }
 
 TEST(Effective, TheScaleIsShownAsDeclaredNotAsFolded) {
-    EXPECT_EQ(value_of(parse("shaker.amplitude_unit = \"g_rms\"", "f", true),
+    EXPECT_EQ(value_of(parse("shaker.amplitude_unit = \"g_rms\"", "f", false),
                        "shaker.registers.amplitude.scale")
                   .value,
               "0.0001");

@@ -200,5 +200,55 @@ TEST(GimbalBinding, NamesWhatTheDbcLacks) {
     }
 }
 
+/// In position at the newest command.
+GimbalState arrive(Gimbal& gimbal, PlatformStatus& status, std::uint8_t echo, Time now) {
+    status.gimbal_time = now;
+    status.gimbal_command_echo = echo;
+    status.in_position = true;
+    status.slewing = false;
+    return gimbal.update(status, now);
+}
+
+TEST_F(GimbalTest, GoesByTheMiddleOfATravelThatCablesLimit) {
+    // GIVEN cables that do not let the azimuth gimbal through its half turn
+    settings_.travel_deg[2] = {-175, 175};
+    Gimbal gimbal(rig_dbc(), settings_, port_);
+    // WHEN it is sent somewhere THEN it goes by the middle: nobody knows where it is
+    gimbal.slew_to({10, 0, -170}, kStart);
+    EXPECT_NEAR(sent(0, "Outer"), 10, 1e-9);
+    EXPECT_NEAR(sent(0, "Azimuth"), 0, 1e-9);
+    EXPECT_NE(arrive(gimbal, status_, 1, kStart + kSecond), GimbalState::in_position);
+    ASSERT_EQ(port_.sent.size(), 2u);
+    EXPECT_NEAR(sent(1, "Azimuth"), -170, 1e-9);
+    EXPECT_EQ(arrive(gimbal, status_, 2, kStart + 2 * kSecond), GimbalState::in_position);
+    // AND the 20 deg through the cables are 340 deg the other way, by the middle
+    gimbal.slew_to({10, 0, 170}, kStart + 3 * kSecond, true);
+    EXPECT_NEAR(sent(2, "Azimuth"), 0, 1e-9);
+    EXPECT_EQ(sent(2, "Mode"), 1) << "increments are of the last leg";
+    EXPECT_NE(arrive(gimbal, status_, 3, kStart + 4 * kSecond), GimbalState::in_position);
+    EXPECT_NEAR(sent(3, "Azimuth"), 170, 1e-9);
+    EXPECT_EQ(sent(3, "Mode"), 2);
+    EXPECT_EQ(arrive(gimbal, status_, 4, kStart + 5 * kSecond), GimbalState::in_position);
+    // BUT what is near is gone to at once, until somebody may have turned it
+    gimbal.slew_to({10, 0, 20}, kStart + 6 * kSecond);
+    EXPECT_NEAR(sent(4, "Azimuth"), 20, 1e-9);
+    EXPECT_EQ(arrive(gimbal, status_, 5, kStart + 7 * kSecond), GimbalState::in_position);
+    gimbal.forget_position();
+    gimbal.slew_to({10, 0, 30}, kStart + 8 * kSecond);
+    EXPECT_NEAR(sent(5, "Azimuth"), 0, 1e-9);
+}
+
+TEST_F(GimbalTest, NeverSendsWhatTheTravelDoesNotReach) {
+    settings_.travel_deg[0] = {-130, 130};
+    Gimbal gimbal(rig_dbc(), settings_, port_);
+    gimbal.slew_to({180, 0, 0}, kStart);
+    EXPECT_EQ(port_.sent.size(), 0u);
+    status_.gimbal_time = kStart + settings_.slew_timeout;
+    EXPECT_EQ(gimbal.update(status_, kStart + settings_.slew_timeout), GimbalState::timed_out);
+    // 230 deg is -130 deg
+    gimbal.slew_to({230, 0, 0}, kStart);
+    EXPECT_EQ(port_.sent.size(), 1u);
+}
+
 }  // namespace
 }  // namespace vibrig::test

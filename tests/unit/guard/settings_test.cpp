@@ -12,7 +12,7 @@
 namespace vibrig::guard {
 namespace {
 
-const std::string kGuard = "[guard]\nsocket = \"/run/guard.sock\"\n";
+const std::string kGuard = "guard.socket = \"/run/guard.sock\"\ncommission.simulated = true\n";
 
 std::string refusal(const std::string& text) {
     try {
@@ -87,7 +87,7 @@ table_accel = ""
 [campaign]
 table_g = [2.0]
 [shaker]
-host = "192.168.1.40"
+host = "127.0.0.40"
 port = 1502
 unit = 7
 amplitude_unit = "g_rms"
@@ -112,11 +112,23 @@ TEST(GuardSettings, FoldTheAmplitudesUnitIn) {
 }
 
 TEST(GuardSettings, WithoutASocketThereIsNothingToMeetAt) {
-    EXPECT_EQ(refusal(""),
+    EXPECT_EQ(refusal("commission.simulated = true"),
               "rig.toml: guard.socket: found \"\" (default), expected an absolute path or "
               "\"@name\": vibrigd and the guard meet there\n");
     EXPECT_NE(refusal("[guard]\nsocket = \"guard.sock\"\n").find("rig.toml:2:10: guard.socket"),
               std::string::npos);
+}
+
+TEST(GuardSettings, NeverWritesItsOwnMapToAForeignController) {
+    const std::string real = "guard.socket = \"/run/guard.sock\"\n";
+    const auto said = refusal(real);
+    EXPECT_NE(said.find("shaker.registers.run.address: found nothing (default), expected it stated"),
+              std::string::npos)
+        << said;
+    const std::string half = "[shaker.registers]\nrun = { address = 30, type = \"u16\" }\n";
+    EXPECT_NE(refusal(real + half).find("measured_amplitude.address"), std::string::npos);
+    EXPECT_EQ(refusal(real + half + "measured_amplitude = { address = 40, type = \"u16\" }\n"),
+              "taken");
 }
 
 TEST(GuardSettings, ASerialLineIsRefusedWithTheReason) {

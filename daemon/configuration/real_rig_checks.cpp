@@ -1,0 +1,74 @@
+// What a rig that can hurt somebody must state: Vibrig's defaults are those of its simulated rig.
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/value.hpp"
+#include "estimator/settings_check.hpp"
+
+namespace vibrig::configuration {
+
+void CrossCheck::real_rig() {
+    registers_stated();
+    if (sound({"platform"})) {
+        for (const auto& doubt : estimator::doubtful_axes(c_.estimator)) {
+            const auto place = places_.find(doubt.key.substr(0, doubt.key.find('[')));
+            problems_.add(place == places_.end() ? Place{} : place->second, doubt.key, doubt.found,
+                          doubt.expected);
+        }
+    }
+    const auto& table_g = c_.campaign.table_g;
+    const double range = c_.estimator.accelerometer_range_g;
+    if (range > 0 && !table_g.empty() &&
+        sound({"accelerometer.range_g", "campaign.table_g", "vibration.transmission"})) {
+        const double most = 1 + c_.estimator.transmission * *std::ranges::max_element(table_g);
+        if (range < most)
+            refuse({"accelerometer.range_g"}, plain(range) + " g",
+                   rounded(most) + " g at least: 1 g and transmission x the highest table_g");
+    }
+}
+
+void CrossCheck::registers_stated() {
+    struct Role {
+        const char* name;
+        const proto::Register* reg;
+        bool quantity;
+    };
+    if (!sound({"shaker.registers"}) || !c_.shaker.registers.watchdog) return;
+    const proto::ShakerRegisters& r = c_.shaker.registers;
+    for (const Role& role : {Role{"frequency", &r.frequency, true},
+                             {"amplitude", &r.amplitude, true},
+                             {"ramp_time", &r.ramp_time, true},
+                             {"run", &r.run, false},
+                             {"watchdog", &*r.watchdog, false},
+                             {"watchdog_timeout", &r.watchdog_timeout, true},
+                             {"state", &r.state, false},
+                             {"fault", &r.fault, false},
+                             {"emergency_stop", &r.emergency_stop, false},
+                             {"measured_amplitude", &r.measured_amplitude, true}}) {
+        const std::string key = std::string("shaker.registers.") + role.name;
+        const auto stated = [&](const char* part) { return places_.contains(key + "." + part); };
+        const auto miss = [&](const std::string& what) {
+            problems_.add({}, what, "nothing",
+                          "it stated: Vibrig's own map is for the simulated rig only");
+        };
+        const auto first = places_.lower_bound(key + ".");
+        if (first == places_.end() || !first->first.starts_with(key + ".")) {
+            miss(key);
+            continue;
+        }
+        using proto::RegisterType;
+        const RegisterType type = role.reg->type;
+        const bool words = role.reg->words() == 2;
+        const bool own_table = role.reg->table == proto::RegisterTable::holding;
+        for (const auto& [part, needed] :
+             {std::pair{"address", true}, {"type", true}, {"word_order", words},
+              {"scale", role.quantity && type != RegisterType::f32},
+              {"mask", type == RegisterType::bits},
+              {"table", !own_table}})
+            if (needed && !stated(part)) miss(key + "." + part);
+    }
+}
+
+}  // namespace vibrig::configuration
