@@ -38,7 +38,7 @@ ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
         Eigen::Vector3d::Constant(start.velocity_mps), metre, metre / std::cos(site.latitude_rad),
         start.position_m, Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
         Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2),
-        Eigen::Matrix<double, 6, 1>::Constant(start.cross);
+        Eigen::Vector4d::Constant(start.cross), Eigen::Vector2d::Constant(start.cross_z);
     p_ = sigma.cwiseAbs2().asDiagonal();
 }
 
@@ -57,6 +57,13 @@ void ZeroFilter::advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& vel
     if (part_s_ >= kPart_s) {
         propagate();
     }
+}
+
+void ZeroFilter::turn_back(double azimuth) {
+    // About the gyro's axis, not the vertical: a unit that stands off level would keep the turn's
+    // share of its tilt.
+    const Eigen::Vector3d axis = strapdown_.c().col(2);
+    strapdown_.correct((axis[2] > 0 ? -azimuth : azimuth) * axis, {0, 0, 0}, {0, 0, 0});
 }
 
 void ZeroFilter::propagate() {

@@ -18,8 +18,8 @@ class ZeroFilter {
     ZeroFilter(const CalibrationSettings& settings, double azimuth_rad);
 
     void advance(const Eigen::Vector3d& turn, const Eigen::Vector3d& velocity, double dt_s);
-    /// The azimuth is so much too large, rad.
-    void turn_back(double azimuth) { strapdown_.correct({0, 0, -azimuth}, {0, 0, 0}, {0, 0, 0}); }
+    /// The vertical gyro has turned so much too far about its own axis, rad, positive about up.
+    void turn_back(double azimuth);
     /// Forgets attitude, velocity and position to this extent (1 sigma): rad, m/s, m.
     void loosen(double tilt, double velocity, double position);
 

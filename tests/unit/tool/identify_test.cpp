@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -90,9 +91,18 @@ TEST_F(Identify, WithOneAmplitudeGivesCombinationsInsteadOfNumbers) {
     const Outcome outcome = vibrig("identify rec.csv --json");
     // THEN it is told before what cannot be determined
     EXPECT_EQ(outcome.exit_code, 1) << outcome.error;
-    EXPECT_THAT(outcome.error, AllOf(HasSubstr("before the run: these positions and levels do not "
-                                               "determine one by one: D_Fx D_IIx"),
-                                     HasSubstr("determined is D_Fx + 19")));
+    EXPECT_THAT(outcome.error, HasSubstr("before the run: these positions and levels do not "
+                                         "determine one by one: D_Fx D_IIx"));
+    // AND of each gyro, what is: the weight is the level as measured, 19 to 3e-5 after 10 s
+    for (const std::string gyro : {"x", "y", "z"}) {
+        std::smatch weight;
+        const std::regex sum("determined is D_F" + gyro + " \\+ (\\d+\\.?\\d*) D_OO" + gyro +
+                             ", expected sigma 0\\.0\\d+\n");
+        ASSERT_TRUE(std::regex_search(outcome.error, weight, sum)) << outcome.error;
+        EXPECT_NEAR(std::stod(weight[1]), 19, 19 * 3e-5) << gyro;
+        EXPECT_THAT(outcome.error, HasSubstr("determined is D_II" + gyro + " - D_OO" + gyro + ","));
+        EXPECT_THAT(outcome.error, HasSubstr("determined is D_SS" + gyro + " - D_OO" + gyro + ","));
+    }
     // AND the four of each gyro that cannot be told apart are null
     const Json result = Json::parse(outcome.out);
     const std::set<std::string> together{"D_F", "D_II", "D_OO", "D_SS"};

@@ -111,6 +111,22 @@ TEST_F(Reproduce, Tang2009) {
         EXPECT_LE(bound["at_most"], 1.08);
     }
 
+    // Two-sided: the joint filter is as good as theory says, no worse and no better, and the
+    // two-step route with plain eq. 13 makes the paper's own errors at the doubled levels.
+    for (const std::string group : {"all 30", "bias", "linear", "squares", "products"}) {
+        for (const std::string row : {"6 g: trial 1, joint, ", "12 g: trial 1, joint, ",
+                                      "6 g: trial 2, joint, ", "12 g: trial 2, joint, "}) {
+            const Json theory =
+                row_of(row + group + ", rms relative error, %, against theory")["values"];
+            EXPECT_NEAR(theory["computed"], theory["theory"], 3.29 * theory["sigma"].get<double>());
+            EXPECT_LT(theory["sigma"], 0.2 * theory["theory"].get<double>()) << row << group;
+        }
+        const Json paper =
+            row_of("12 g: trial 1, two-step, " + group +
+                   ", rms relative error, %, against the paper's one draw")["values"];
+        EXPECT_NEAR(paper["computed"], paper["published"], 0.25 * paper["published"].get<double>());
+    }
+
     // Table 2, with sigma of both routes.
     const Json& first = reproduction["rows"][0];
     EXPECT_EQ(first["item"], "Table 2, trial 1, D_Fx (truth 1)");
