@@ -238,6 +238,10 @@ void read_head(const File& file, Campaign& to) {
     head.configuration = file.read_text("/configuration");
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
+    try {
+        head.journal_head = file.text("/", "journal_head");
+    } catch (const hdf5::Error&) {  // of a daemon that kept no journal, or of one that signed none
+    }
     to.state = file.text("/", "state");
     if (to.state != "running") {
         to.reason = file.text("/", "reason");

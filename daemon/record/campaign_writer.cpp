@@ -160,6 +160,7 @@ void CampaignWriter::write_head(const Head& head) {
     file_->set("/", "restart", static_cast<std::int64_t>(head.restart));
     file_->set("/", "dwells_before", static_cast<std::int64_t>(head.dwells_before));
     file_->set("/", "state", "running");
+    if (!head.journal_head.empty()) file_->set("/", "journal_head", head.journal_head);
     std::string names;
     for (const char* name : estimator::parameter_names())
         names += (names.empty() ? "" : " ") + std::string(name);
@@ -227,6 +228,7 @@ void CampaignWriter::end(const Ended& ended) {
     file.set("/", "reason", ended.reason);
     file.set("/", "mark", ended.mark);
     file.set("/", "ended_utc_ns", ended.utc_ns);
+    if (!ended.journal_head.empty()) file.set("/", "journal_head", ended.journal_head);
     file.write_text("/result", ended.result_json, "final result, JSON as vibrig identify --json");
     file.close();
 }

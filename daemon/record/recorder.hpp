@@ -62,6 +62,10 @@ class Recorder {
     [[nodiscard]] rt::Ring<FrameRecord>& sent() noexcept { return sent_; }
     /// Before start(): where the state of the filter is looked at.
     void watch(Estimates estimates) { estimates_ = std::move(estimates); }
+    /// Likewise the signed head of the journal, for what is recorded.
+    void sign_with(std::function<std::string()> journal_head) {
+        journal_head_ = std::move(journal_head);
+    }
 
     void start();
     /// Writes what there is and ends the thread.
@@ -94,6 +98,7 @@ class Recorder {
     void find_folder();
     void close_previous();
     void note(const std::string& path);
+    [[nodiscard]] std::string journal_head() const;
     void take(const Order& order);
     void take(const Dwell& dwell);
     void take(const EventRecord& event);
@@ -120,6 +125,7 @@ class Recorder {
     drivers::Waiter& self_;
     Event on_event_;
     Estimates estimates_;
+    std::function<std::string()> journal_head_;
     rt::Ring<FrameRecord> received_{65536};
     rt::Ring<FrameRecord> sent_{1024};
     rt::Ring<drivers::Sample> samples_{16384};
