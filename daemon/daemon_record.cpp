@@ -66,6 +66,7 @@ std::unique_ptr<record::Recorder> Daemon::make_recorder() {
         settings, folder, clock_, *recorder_waiter_,
         [this](Severity severity, const std::string& text) { log(severity, "recorder", text); });
     recorder->watch([this] { return estimator_stage_.view().estimate; });
+    recorder->sign_with([this] { return journal_ ? journal_->status().head : std::string(); });
     return recorder;
 }
 
