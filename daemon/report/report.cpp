@@ -11,6 +11,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/digest.hpp"
+#include "daemon/report/journal_section.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/plan_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
@@ -99,6 +100,7 @@ void add_head(Page& page, const Campaign& campaign, const Analysis& a) {
         rows.push_back(
             {"Parts", fmt::format("{} files, joined in their order", campaign.parts.size())});
     page.table(rows, "words");
+    add_journal(page, campaign, a.journal);
     add_files(page, campaign);
     if (!unit.instruments.empty()) {
         std::vector<std::vector<std::string>> table{

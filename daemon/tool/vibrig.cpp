@@ -33,6 +33,7 @@ int main(int argc, char** argv) {
     vibrig::tool::add_recordings(app, exit_code);
     vibrig::tool::add_reports(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
+    vibrig::tool::add_journal(app, exit_code);
     vibrig::tool::add_pki(app, exit_code);
     // Of a word that it does not know CLI11 says only that there should be a command.
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
