@@ -435,12 +435,11 @@ void Daemon::write_result(const estimator::uncertainty::Assessment& assessed) {
     StatusData ended;
     campaign_.fill(ended, clock_.now());
     write_result_file(text, complete);
+    // The journal first: the recording is closed with a head of it.
+    if (journal_) journal_->campaign_ended(name_of(ended.state), ended.reason, text);
     if (recorder_)
         recorder_->campaign_ended(
             {name_of(ended.state), ended.reason, campaign_.mark(), text, utc_now()});
-    if (journal_) {
-        journal_->campaign_ended(name_of(ended.state), ended.reason, text);
-    }
 }
 
 void Daemon::write_result_file(const std::string& text, bool complete) {

@@ -110,6 +110,7 @@ class Daemon final : public StatusSource {
     void give_up_arming(const std::string& why);
     void watch_arming();
     void end_arming(const std::string& why);
+    [[nodiscard]] std::string journal_being_verified() const;
     [[nodiscard]] std::string not_fit_to_arm(const CommandRequest& request,
                                              drivers::Time now) const;
     void take_over_latches();
@@ -155,6 +156,7 @@ class Daemon final : public StatusSource {
     [[nodiscard]] std::optional<campaign::Next> next_dwell(const std::array<double, 3>& here_deg,
                                                            double elapsed_s);
     void open_journal();
+    [[nodiscard]] std::vector<journal::Anchor> journal_anchors() const;
     /// Everything that results depend on; not where things are kept or how one talks to the daemon.
     [[nodiscard]] std::string result_configuration() const;
     [[nodiscard]] std::unique_ptr<record::Recorder> make_recorder();

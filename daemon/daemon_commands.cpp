@@ -54,10 +54,21 @@ std::string Daemon::not_fit_to_arm(const CommandRequest& request, Time now) cons
     if (auto why = guard_refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
         return changed->cause + ": vibrig ack journal";
+    if (const auto why = journal_being_verified(); !why.empty()) return why;
     if (arming_) return "another arming is being written to the journal";
     if (journal_ || rig_clock_) return {};
     return "no journal is kept, found campaign.results and journal.file empty: a trip would be "
            "forgotten by a restart";
+}
+
+/// Until all of it was looked at nobody knows what it says of trips and proofs.
+std::string Daemon::journal_being_verified() const {
+    if (!journal_) return {};
+    const auto journal = journal_->status();
+    if (journal.verified) return {};
+    return fmt::format("the journal is still being verified ({:.0f} %): arm it then{}",
+                       100 * journal.verified_part,
+                       journal.not_watched.empty() ? "" : "; " + journal.not_watched);
 }
 
 void Daemon::begin_arming(WaitingCommand waiting, Time now) {

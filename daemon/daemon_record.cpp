@@ -139,6 +139,7 @@ std::unique_ptr<record::Recorder> Daemon::make_recorder() {
         [this](Severity severity, const std::string& text) { log(severity, "recorder", text); });
     recorder->watch([this] { return estimator_stage_.view().estimate; },
                     [this] { return conditions(); });
+    recorder->sign_with([this] { return journal_ ? journal_->status().head : std::string(); });
     return recorder;
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "daemon/daemon.hpp"
+#include "daemon/record/journal_anchors.hpp"
 
 namespace vibrig {
 
@@ -31,9 +32,11 @@ void Daemon::open_journal() {
     if (path.empty()) return;
     journal_ = std::make_unique<journal::Journal>(
         path, journal::configuration_hash(result_configuration()),
-        [this](double free_mb) { interlock_.disk_free(free_mb); });
+        [this](double free_mb) { interlock_.disk_free(free_mb); }, journal_anchors());
     for (const auto& refused : journal_->recovery().refused)
         log(Severity::warning, "journal", refused);
+    if (const auto& begins = journal_->recovery().begins; !begins.empty())
+        log(Severity::warning, "journal", begins);
     if (const auto& assumed = journal_->recovery().assumed; !assumed.empty())
         log(Severity::warning, "journal", assumed);
     if (const auto& found = journal_->recovery().out_of_band; !found.empty()) {
@@ -54,6 +57,12 @@ void Daemon::open_journal() {
     journal_->on_written([this] { control_waiter_->notify(); });
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
+}
+
+/// Heads that the newest recordings carry: the journal has to go through them.
+std::vector<journal::Anchor> Daemon::journal_anchors() const {
+    const auto& folder = configuration_.record.folder;
+    return record::journal_anchors(folder.empty() ? configuration_.results : folder);
 }
 
 std::string Daemon::result_configuration() const {
@@ -332,6 +341,11 @@ void Daemon::tell_log() {
 }
 
 void Daemon::tell_journal() {
+    for (const std::string& found : journal_->take_found()) {
+        // In the new file it stands already.
+        latches_.add({journal::kJournalLatch, found, {}, {}, false, utc_now()});
+        log(Severity::alarm, "journal", found + ": vibrig ack journal");
+    }
     const auto status = journal_->status();
     if (std::exchange(journal_was_running_, status.running) == status.running) return;
     log(status.running ? Severity::info : Severity::alarm, "journal",

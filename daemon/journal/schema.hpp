@@ -16,6 +16,13 @@ inline constexpr std::int64_t kSchemaVersion = 2;
 inline constexpr std::array kChained{"origin",  "campaign",   "dwell",  "event",
                                      "command", "loop_check", "safety", "proof"};
 
+/// What stands in the table safety.
+inline constexpr const char* kArmed = "armed";
+inline constexpr const char* kDisarmed = "disarmed";
+inline constexpr const char* kLatched = "latched";
+inline constexpr const char* kFirst = "acknowledged by the first";
+inline constexpr const char* kOver = "acknowledged";
+
 /// Those that are not there yet.
 void make_tables(Database& database);
 [[nodiscard]] bool has_table(Database& database, const char* name);

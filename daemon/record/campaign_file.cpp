@@ -299,6 +299,10 @@ void read_head(const File& file, Campaign& to) {
     head.plan = file.read_text("/plan");
     if (file.has("/interlocks")) head.interlocks = file.read_text("/interlocks");
     if (file.has("/proof")) head.proof = file.read_text("/proof");
+    try {
+        head.journal_head = file.text("/", "journal_head");
+    } catch (const hdf5::Error&) {  // of a daemon that kept no journal, or of one that signed none
+    }
     to.state = file.text("/", "state");
     if (to.state != "running") {
         to.reason = file.text("/", "reason");

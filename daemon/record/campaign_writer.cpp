@@ -236,6 +236,7 @@ void CampaignWriter::write_head(const Head& head) {
     file_->set("/", "restart", static_cast<std::int64_t>(head.restart));
     file_->set("/", "dwells_before", static_cast<std::int64_t>(head.dwells_before));
     file_->set("/", "state", "running");
+    if (!head.journal_head.empty()) file_->set("/", "journal_head", head.journal_head);
     std::string names;
     for (const char* name : estimator::parameter_names())
         names += (names.empty() ? "" : " ") + std::string(name);
@@ -323,6 +324,7 @@ void CampaignWriter::end(const Ended& ended) {
     // While a file is written with readers, no attribute can be added.
     File file = File::open(path, File::Mode::write);
     write_end(file, ended);
+    if (!ended.journal_head.empty()) file.set("/", "journal_head", ended.journal_head);
     file.write_text("/result", ended.result_json, "final result, JSON as vibrig identify --json");
     file.close();
 }

@@ -344,6 +344,7 @@ void Recorder::close_previous() {
 void Recorder::take(Head& head) {
     if (head_) take(Ended{"interrupted", "another campaign began", "", "", head.utc_ns});
     head_ = std::move(head);
+    head_->journal_head = journal_head();
     find_folder();
     const std::size_t going_on = head_->dwells_before;
     lost_ = {};
@@ -484,6 +485,8 @@ void Recorder::write_rows() {
     }
 }
 
+std::string Recorder::journal_head() const { return journal_head_ ? journal_head_() : ""; }
+
 void Recorder::take(const Ended& ended) {
     if (!head_) return;
     sent_.consume([this](const FrameRecord& record) { late_sent_.push_back(record); }, 1024);
@@ -495,7 +498,9 @@ void Recorder::take(const Ended& ended) {
     if (raw_) raw_->close();
     if (writer_) {
         try {
-            writer_->end(ended);
+            Ended signed_end = ended;
+            signed_end.journal_head = journal_head();
+            writer_->end(signed_end);
             note(writer_->path());
         } catch (const hdf5::Error& error) {
             refuse(error.what());

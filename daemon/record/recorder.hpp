@@ -67,6 +67,10 @@ class Recorder {
         estimates_ = std::move(estimates);
         conditions_ = std::move(conditions);
     }
+    /// Likewise the signed head of the journal, for what is recorded.
+    void sign_with(std::function<std::string()> journal_head) {
+        journal_head_ = std::move(journal_head);
+    }
 
     void start();
     /// Writes what there is and ends the thread.
@@ -99,6 +103,7 @@ class Recorder {
     void find_folder();
     void close_previous();
     void note(const std::string& path);
+    [[nodiscard]] std::string journal_head() const;
     void take(const Order& order);
     void take(const Dwell& dwell);
     void take(const EventRecord& event);
@@ -127,6 +132,7 @@ class Recorder {
     Event on_event_;
     Estimates estimates_;
     Conditions conditions_;
+    std::function<std::string()> journal_head_;
     rt::Ring<FrameRecord> received_{65536};
     rt::Ring<FrameRecord> sent_{1024};
     rt::Ring<drivers::Sample> samples_{16384};

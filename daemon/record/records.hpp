@@ -35,6 +35,7 @@ struct Head {
     int part = 1;                   ///< a campaign's files, in order
     bool restart = false;           ///< this part goes on after the daemon's restart
     std::size_t dwells_before = 0;  ///< that the filter then had
+    std::string journal_head;       ///< signed, as it was when this was last written; empty: none
 };
 
 /// A dwell as it was ordered from the estimator.
@@ -74,6 +75,7 @@ struct Ended {
     std::string mark;  ///< why the campaign is marked; empty: it is not
     std::string result_json;
     std::int64_t utc_ns = 0;
+    std::string journal_head = {};  ///< signed, as it is now; empty: no journal is kept
 };
 
 /// The state of the filter, about once a second.

@@ -43,6 +43,7 @@ struct Analysis {
     /// Overlapping Allan deviation of each gyro's residual rate, deg/h, mean over the dwells.
     std::array<std::vector<estimator::allan::Point>, 3> allan;
     std::array<double, estimator::kParameters> expected_sigma{};  ///< of the plan; infinite: none
+    std::string journal;  ///< journal_verdict() of its daemon's journal
 };
 
 using Progress = std::function<void(double fraction)>;

@@ -10,6 +10,7 @@
 
 #include "daemon/record/digest.hpp"
 #include "daemon/report/conditions_section.hpp"
+#include "daemon/report/journal_section.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/report/plan_section.hpp"
@@ -94,6 +95,7 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
         rows.push_back(
             {"Parts", fmt::format("{} files, joined in their order", campaign.parts.size())});
     page.table(rows, "words");
+    add_journal(page, campaign, a.journal);
     add_files(page, campaign);
     if (!unit.instruments.empty()) {
         std::vector<std::vector<std::string>> table{

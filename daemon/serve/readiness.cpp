@@ -22,6 +22,25 @@ std::string seconds(double value) {
     return text.data();
 }
 
+/// Whether it writes, and is what was written into it.
+Readiness::Check journal_check(const StatusData& status) {
+    const auto& journal = status.journal;
+    const char* const name = "journal";
+    if (journal.path.empty()) return {name, true, "none is kept"};
+    for (const Latch& latch : status.interlock.latches) {
+        if (latch.name == name) return {name, false, latch.cause + ": vibrig ack journal"};
+    }
+    if (!journal.running) return {name, false, journal.note};
+    if (!journal.not_watched.empty())
+        return {name, false, "cannot be looked at: " + journal.not_watched};
+    if (!journal.verified) {
+        return {name, false,
+                "being verified, " + std::to_string(std::lround(100 * journal.verified_part)) +
+                    " % done"};
+    }
+    return {name, true, "writes; verified, " + std::to_string(journal.entries) + " entries"};
+}
+
 }  // namespace
 
 bool Readiness::ready() const {
@@ -109,11 +128,7 @@ Readiness readiness(const StatusData& status) {
                                     : "watches");
     if (const auto& horn = status.annunciator; horn.horn)
         add("annunciator", horn.confirms, horn.confirms ? "confirms" : horn.horn_note);
-    const auto& journal = status.journal;
-    add("journal", journal.path.empty() || journal.running,
-        journal.path.empty() ? "none is kept"
-        : journal.running    ? "writes"
-                             : journal.note);
+    found.checks.push_back(journal_check(status));
     std::string shut;
     for (const auto& door : status.server.doors)
         if (!door.open) shut += (shut.empty() ? "" : "; ") + door.name + ": " + door.note;

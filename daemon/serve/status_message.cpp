@@ -505,6 +505,13 @@ void fill(v1::Status& out, const StatusData& status) {
     journal.set_taken(status.journal.taken);
     journal.set_written(status.journal.written);
     journal.set_dropped(status.journal.dropped);
+    journal.set_public_key(status.journal.public_key);
+    journal.set_head(status.journal.head);
+    journal.set_proof_head(status.journal.proof_head);
+    journal.set_entries(status.journal.entries);
+    journal.set_verified(status.journal.verified);
+    journal.set_verified_part(status.journal.verified_part);
+    journal.set_not_watched(mend_utf8(status.journal.not_watched));
     fill(*out.mutable_recorder(), status.recorder);
     fill(*out.mutable_noise(), status.noise);
     if (status.verdict.dwells > 0 || status.verdict.complete)

@@ -16,6 +16,7 @@ void add_calibrate(CLI::App& app, int& exit_code);
 void add_level(CLI::App& app, int& exit_code);
 void add_zero(CLI::App& app, int& exit_code);
 void add_reproduce(CLI::App& app, int& exit_code);
+void add_journal(CLI::App& app, int& exit_code);  ///< journal verify
 void add_pki(CLI::App& app, int& exit_code);
 void add_remote(
     CLI::App& app,

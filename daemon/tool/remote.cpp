@@ -13,6 +13,7 @@
 #include <memory>
 #include <thread>
 
+#include "daemon/serve/one_line.hpp"
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
@@ -125,9 +126,24 @@ void show_rows(const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& row
     }
 }
 
-/// Waits for the end of loop check and safe-state proof; their rows. `before`: time of the proof
-/// that there was.
-void show_loop_check(serve::Client& client, std::int64_t before) {
+/// The proof's entry in the journal, once it is on disk. `before`: that of the proof that there
+/// was.
+void show_signed_record(serve::Client& client, const std::string& before) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30; ++looks) {
+        const auto journal = ask_status(client).journal();
+        if (journal.path().empty()) return;
+        if (!journal.proof_head().empty() && journal.proof_head() != before) {
+            std::cout << "signed record: " << serve::one_line(journal.proof_head()) << '\n';
+            return;
+        }
+        std::this_thread::sleep_for(kLook);
+    }
+}
+
+/// Waits for the end of loop check and safe-state proof; their rows. `then`: the status before.
+void show_loop_check(serve::Client& client, const v1::Status& then) {
+    const std::int64_t before = then.proof().utc_ns();
     constexpr auto kLook = std::chrono::milliseconds(300);
     constexpr int kLooks = 100;  // after the check, for the proof's last rows
     v1::Status status;
@@ -145,6 +161,7 @@ void show_loop_check(serve::Client& client, std::int64_t before) {
     show_rows(status.loop_check().rows());
     show_rows(status.proof().rows());
     if (!status.proof().passed()) std::cout << "not proved: " << status.proof().message() << '\n';
+    if (status.proof().utc_ns() != before) show_signed_record(client, then.journal().proof_head());
 }
 
 /// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
@@ -163,7 +180,7 @@ int self_test(const TestOptions& options) {
         command.set_by(options.by);
         if (options.emergency_stop) command.set_argument("emergency_stop");
         wait_for_rest(client);
-        const std::int64_t before = ask_status(client).proof().utc_ns();
+        const auto before = ask_status(client);
         const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
         if (begun.status != 200) {
             std::cerr << kWho << problem_of(begun) << '\n';

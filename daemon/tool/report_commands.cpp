@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/report/journal_section.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
@@ -34,7 +35,7 @@ using Json = nlohmann::ordered_json;
 using estimator::kParameters;
 
 struct ReportArguments {
-    std::string campaign, output = "report.html", config, compare, pdf;
+    std::string campaign, output = "report.html", config, compare, pdf, journal;
     bool strict = false;
     bool same_unit = false;
 };
@@ -75,6 +76,9 @@ int make_report(const ReportArguments& arguments) {
             progress.show(static_cast<std::size_t>(100 * fraction), 100);
         });
     }
+    analysis.journal = report::journal_verdict(campaign, arguments.journal);
+    if (analysis.journal.starts_with('!'))
+        std::cerr << "journal: " << analysis.journal.substr(1) << '\n';
     plot::write_file(arguments.output, report::make_page(campaign, analysis, earlier));
     std::cerr << arguments.output << ": " << fs::file_size(arguments.output) / 1000 << " kB\n";
     if (!arguments.pdf.empty()) {
@@ -310,6 +314,9 @@ void add_reports(CLI::App& app, int& exit_code) {
         ->needs("--compare");
     reporting->add_option("--config", report->config,
                           "identify anew with these settings instead of the recorded ones");
+    reporting->add_option("--journal", report->journal,
+                          "the daemon's journal, to be verified (default: journal.sqlite3 beside "
+                          "the campaign's folder)");
     reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");
     reporting->add_flag("--strict", report->strict, "a doubtful result is a no as well");
     reporting->footer(

@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
     vibrig::tool::add_reports(app, exit_code);
     vibrig::tool::add_certificate(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
+    vibrig::tool::add_journal(app, exit_code);
     vibrig::tool::add_pki(app, exit_code);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {
         std::cout << vibrig::proto::command_tree_json(

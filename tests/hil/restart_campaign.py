@@ -4,8 +4,10 @@ rig's clock. What was done stays done, the shaker never starts by itself, and a 
 
 usage: restart_campaign.py PROGRAMS
 """
+import glob
 import json
 import os
+import shutil
 import signal
 import socket
 import sqlite3
@@ -183,6 +185,22 @@ def noise_goes_on(checks, programs, folder):
         rig.stop()
 
 
+class Kept:
+    """The journal as it was, with what lies beside it."""
+
+    def __init__(self, rig, folder):
+        self.rig, self.folder = rig, os.path.join(folder, "kept")
+        os.mkdir(self.folder)
+        for path in glob.glob(journal(rig) + "*"):
+            shutil.copy(path, self.folder)
+
+    def put_back(self):
+        for path in glob.glob(journal(self.rig) + "*"):
+            os.remove(path)
+        for name in os.listdir(self.folder):
+            shutil.copy(os.path.join(self.folder, name), self.rig.results)
+
+
 def not_used(checks, programs, folder):
     """Damage to the journal: a cold start, and said so."""
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
@@ -196,25 +214,18 @@ def not_used(checks, programs, folder):
         rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)
         time.sleep(1)
         kill(rig)
-        with sqlite3.connect(journal(rig)) as database:
-            blob = bytearray(database.execute("SELECT checkpoint FROM dwell").fetchone()[0])
-            whole = bytes(blob)
-        blob[len(blob) // 2] ^= 1
-        newer = whole[:8] + b"\x63" + whole[9:]
-        for what, change, says in (("corrupt", bytes(blob), "corrupt: the checksum does not match"),
-                                   ("truncated", whole[:-1000], "corrupt: the checksum does not match"),
-                                   ("newer", newer, "version 99, newer than ")):
+        kept = Kept(rig, folder)
+        for what, change in (("edited", "UPDATE dwell SET checkpoint = x'00'"), ("a row removed", "DELETE FROM dwell")):
+            kept.put_back()
             with sqlite3.connect(journal(rig)) as database:
-                database.execute("UPDATE dwell SET checkpoint = ?", (change,))
+                database.execute(change)
             database.close()
             status = restart(checks, rig, what)
             said = events(rig)
-            checks.check(says in said and "cold start" in said, f"{what}: it says that it starts cold", said)
+            checks.check("dwell 1 (entry " in said and "cold start" in said, f"{what}: it says that it starts cold", said)
             checks.equal(status["campaign"].get("resume_offer", ""), "", f"{what}: it offers nothing to resume")
             kill(rig)
-        with sqlite3.connect(journal(rig)) as database:
-            database.execute("UPDATE dwell SET checkpoint = ?", (whole,))
-        database.close()
+        kept.put_back()
         rig.configure({**CAMPAIGN, "dwell_s": 11.0})
         status = restart(checks, rig, "foreign")
         checks.check("of another configuration: cold start" in events(rig), "foreign: it says so", events(rig))

@@ -103,7 +103,19 @@ StatusData full_status() {
         s.estimate.observable[i] = true;
     }
     s.resume_offer = "5 of 28 positions done";
-    s.journal = {"/var/lib/vibrig/journal.sqlite3", true, "disk full", 80, 81, 82};
+    s.journal = {"/var/lib/vibrig/journal.sqlite3",
+                 true,
+                 "disk full",
+                 80,
+                 81,
+                 82,
+                 "5eed",
+                 "vibrig-journal-head/1",
+                 "vibrig-journal-head/1 proof",
+                 83,
+                 true,
+                 0.5,
+                 "locked"};
     s.recorder = {"/var/lib/vibrig",
                   "/var/lib/vibrig/a/campaign.h5",
                   true,

@@ -226,6 +226,17 @@ TEST(Readiness, NamesWhatIsNotWell) {
              Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
              Row{"journal: disk full",
                  [](StatusData& s) { s.journal = {"j", false, "disk full", 0, 0, 0}; }},
+             Row{"journal: being verified, 34 % done",
+                 [](StatusData& s) {
+                     s.journal = {"j", true, "", 0, 0, 0};
+                     s.journal.verified_part = 0.34;
+                 }},
+             Row{"journal: event 2 was changed: vibrig ack journal",
+                 [](StatusData& s) {
+                     s.journal = {"j", true, "", 0, 0, 0};
+                     s.journal.verified = true;
+                     s.interlock.latches = {{"journal", "event 2 was changed", "", "", false, 0}};
+                 }},
          }) {
         StatusData spoilt = well;
         row.spoil(spoilt);
