@@ -5,7 +5,6 @@
 namespace vibrig::journal {
 
 namespace {
-// Later than version 1, whose readers leave it alone; made with the first certificate.
 constexpr const char* kTable = R"(
 CREATE TABLE IF NOT EXISTS certificate (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
     number TEXT NOT NULL UNIQUE, campaign TEXT NOT NULL, person TEXT NOT NULL,

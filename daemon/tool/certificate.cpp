@@ -34,8 +34,8 @@ namespace fs = std::filesystem;
 using report::Issue;
 
 struct CertificateArguments {
-    std::string campaign, paper, output = "certificate", by, journal;
-    bool no_journal = false;
+    std::string campaign, paper, output = "certificate", by, entered_in;
+    bool no_register = false;
 };
 
 [[noreturn]] void refuse(const std::string& file, const toml::node& node, const std::string& what) {
@@ -144,19 +144,13 @@ Issue read_paper(const std::string& file) {
     return issue;
 }
 
-/// Beside the campaigns' folders, where the daemon keeps it.
-std::string journal_of(const CertificateArguments& arguments, const record::Campaign& campaign) {
-    if (arguments.no_journal) return {};
-    const std::string path =
-        !arguments.journal.empty()
-            ? arguments.journal
-            : (fs::absolute(campaign.folder).lexically_normal().parent_path() / "journal.sqlite3")
-                  .string();
-    if (!fs::is_regular_file(path))
-        throw std::runtime_error(path +
-                                 ": found no journal, expected the rig's (--journal PATH; "
-                                 "--no-journal: the certificate is entered nowhere)");
-    return path;
+/// Beside the campaigns' folders. Not the daemon's journal: that one is signed, and whoever else
+/// writes into it breaks its chain.
+std::string register_of(const CertificateArguments& arguments, const record::Campaign& campaign) {
+    if (arguments.no_register) return {};
+    if (!arguments.entered_in.empty()) return arguments.entered_in;
+    return (fs::absolute(campaign.folder).lexically_normal().parent_path() / "certificates.sqlite3")
+        .string();
 }
 
 int certify(const CertificateArguments& arguments) {
@@ -167,9 +161,9 @@ int certify(const CertificateArguments& arguments) {
                        .count();
     keep_recordings(arguments.output + ".html");
     const auto campaign = read_named_campaign(arguments.campaign);
-    const std::string journal = journal_of(arguments, campaign);
-    if (!journal.empty() && journal::certificate_issued(journal, issue.number))
-        throw std::runtime_error(journal + ": found certificate " + issue.number +
+    const std::string entered_in = register_of(arguments, campaign);
+    if (!entered_in.empty() && journal::certificate_issued(entered_in, issue.number))
+        throw std::runtime_error(entered_in + ": found certificate " + issue.number +
                                  " issued already, expected a new number");
     const auto result = nlohmann::ordered_json::parse(campaign.result_json, nullptr, false);
     record::ReplayResult replayed;
@@ -193,13 +187,14 @@ int certify(const CertificateArguments& arguments) {
     plot::write_file(json, certificate.dump(2) + "\n");
     plot::write_file(html, report::certificate_page(certificate));
     print_pdf(html, pdf);
-    if (!journal.empty())
-        journal::note_certificate(journal,
+    if (!entered_in.empty())
+        journal::note_certificate(entered_in,
                                   {issue.utc_ns, issue.number, campaign.head.campaign, issue.by,
                                    record::sha256_of_file(pdf), record::sha256_of_file(json)});
     const std::string word = certificate["verdict"]["word"];
     std::cout << pdf << ": certificate " << issue.number << ", " << word << ", SHA-256 "
-              << record::sha256_of_file(pdf) << (journal.empty() ? ", in no journal" : "") << '\n';
+              << record::sha256_of_file(pdf) << (entered_in.empty() ? ", in no register" : "")
+              << '\n';
     return 0;
 }
 
@@ -217,10 +212,10 @@ void add_certificate(CLI::App& app, int& exit_code) {
     command->add_option("--by", arguments->by, "named person who issues it")->required();
     command->add_option("-o,--output", arguments->output,
                         "files to write, without .html, .pdf, .json (default certificate)");
-    command->add_option("--journal", arguments->journal,
-                        "the rig's journal, where the PDF's hash goes (default: beside the "
-                        "campaign's folder)");
-    command->add_flag("--no-journal", arguments->no_journal, "enter it nowhere");
+    command->add_option("--register", arguments->entered_in,
+                        "the register of certificates, where the number and the PDF's hash go "
+                        "(default: certificates.sqlite3 beside the campaign's folder)");
+    command->add_flag("--no-register", arguments->no_register, "enter it nowhere");
     command->footer(
         "Example: vibrig certificate demo-20260301T080000Z --paper C-17.toml --by \"A. Person\"\n"
         "A result that is not valid is refused, a doubtful one marked.\n"

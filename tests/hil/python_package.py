@@ -229,14 +229,14 @@ high = 2.0
     checks.check("Customer &amp; Sons" in content and ">SIMULATED<" in content and "last bit" in content, "and on its page")
     import hashlib
     digest = hashlib.sha256(open(pdf, "rb").read()).hexdigest()
-    with sqlite3.connect(os.path.join(rig.results, "journal.sqlite3")) as journal:
+    with sqlite3.connect(os.path.join(rig.results, "certificates.sqlite3")) as journal:
         rows = journal.execute("SELECT number, person, pdf_sha256 FROM certificate").fetchall()
-    checks.equal(rows, [("C-17", "A. Person", digest)], "the journal has the PDF's SHA-256")
+    checks.equal(rows, [("C-17", "A. Person", digest)], "the register has the PDF's SHA-256")
     again = tool(rig, "certificate", str(campaign.folder), *issue)
     checks.check(again.returncode == 2 and "issued already" in again.stderr, "a number is given once", again.stderr)
     result["verdict"] = {"word": "not valid", "reasons": [{"text": "the fit contradicts"}]}
     with_result(result)
-    no = tool(rig, "certificate", str(campaign.folder), "--paper", paper, "--by", "A", "--no-journal", "-o", "no")
+    no = tool(rig, "certificate", str(campaign.folder), "--paper", paper, "--by", "A", "--no-register", "-o", "no")
     checks.check(no.returncode == 1 and "the fit contradicts" in no.stderr and not os.path.exists(os.path.join(rig.folder, "no.pdf")),
                  "what is not valid is refused", no.stderr)
     for wrong, words in ((text.replace("C-17", ""), "number"), (text.replace("D_Fx", "D_t"), "expected one such as D_Fx"),
@@ -244,7 +244,7 @@ high = 2.0
                          ("number = ", "C-17.toml:1"), (text.replace("[customer]", "[costumer]"), "unknown key costumer")):
         with open(paper, "w", encoding="utf-8") as file:
             file.write(wrong)
-        bad = tool(rig, "certificate", str(campaign.folder), *issue, "--no-journal")
+        bad = tool(rig, "certificate", str(campaign.folder), *issue, "--no-register")
         checks.check(bad.returncode == 2 and words in bad.stderr, f"a paper that is wrong is named: {words}", bad.stderr)
     shutil.move(path + ".kept", path)
 
