@@ -74,7 +74,7 @@ struct PlanStudy {
     planning::Duration duration;
     double drift_imbalance = 0;
     std::optional<PlanUncertainty> uncertainty;  ///< of a plan that determines everything
-    std::vector<VerticalAxis> vertical_axes;  ///< if a position list was given
+    std::vector<VerticalAxis> vertical_axes;     ///< if a position list was given
     std::vector<std::string> warnings;
     std::string refusal;  ///< empty: the plan determines everything
     double transmission = 0, frequency_hz = 0, dwell_s = 0;
