@@ -399,7 +399,9 @@ void Daemon::control_loop() {
         check_balance(now);
         {
             const std::lock_guard lock(mutex_);
-            campaign_.fill(campaign_status_, now);
+            // Nobody is to see "finished" before there is a result.
+            if (!concluding_ || to_write_ != ToWrite::complete)
+                campaign_.fill(campaign_status_, now);
             campaign_status_.interlock.latches = latches_.open();
             campaign_status_.noise = noise_monitor_.status();
             armed_.store(!campaign_status_.armed_by.empty());

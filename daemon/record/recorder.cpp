@@ -378,9 +378,9 @@ void Recorder::write_order_line(const Order& order) {
         return fmt::format("{}.{:06d}", t / 1'000'000, t % 1'000'000);
     };
     append_dwells(fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", order.run, order.position, order.table_g,
-        order.cancel ? "" : seconds(us(order.from)), order.cancel ? "" : seconds(us(order.to)),
-        order.cancel ? seconds(us(order.announced)) : "",
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", order.run, order.position,
+        order.table_g, order.cancel ? "" : seconds(us(order.from)),
+        order.cancel ? "" : seconds(us(order.to)), order.cancel ? seconds(us(order.announced)) : "",
         head_->utc_offset_ns / drivers::kMicrosecond, order.zero_g[0], order.zero_g[1],
         order.zero_g[2], order.level_sigma_g, order.noise.angle_arcsec,
         order.noise.gyro_random_walk_deg_per_rt_h[0], order.noise.gyro_random_walk_deg_per_rt_h[1],

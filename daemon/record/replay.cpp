@@ -336,7 +336,8 @@ void read_dwells(const std::string& path, Campaign& to) {
         const bool dated = fields.size() == 16 && !fields[15].empty();
         bool good = (fields.size() == 15 || fields.size() == 16) &&
                     (!dated || (proto::read_number(fields[15], order.begin_s) &&
-                                std::isfinite(order.begin_s))) && proto::read_number(fields[0], order.run) &&
+                                std::isfinite(order.begin_s))) &&
+                    proto::read_number(fields[0], order.run) &&
                     proto::read_number(fields[1], order.position) &&
                     proto::read_number(fields[6], offset_us);
         for (const auto& [field, value] : numbers)

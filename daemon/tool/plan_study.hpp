@@ -75,7 +75,7 @@ struct PlanStudy {
     planning::Duration duration;
     double drift_imbalance = 0;
     std::optional<PlanUncertainty> uncertainty;  ///< of a plan that determines everything
-    std::vector<VerticalAxis> vertical_axes;  ///< if a position list was given
+    std::vector<VerticalAxis> vertical_axes;     ///< if a position list was given
     std::vector<std::string> warnings;
     bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
     std::string refusal;         ///< empty: the plan determines everything

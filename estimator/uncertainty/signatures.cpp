@@ -102,6 +102,9 @@ DwellTable dwell_table(std::span<const DwellRow> rows) {
     DwellTable table{rows, VectorXd::Zero(static_cast<Index>(rows.size())), false};
     table.times_assumed = !std::all_of(rows.begin(), rows.end(),
                                        [](const DwellRow& row) { return row.common_clock; });
+    // A clock that was set back between two dwells is none that they have in common.
+    for (std::size_t k = 1; k < rows.size(); ++k)
+        table.times_assumed |= !(rows[k].middle_s > rows[k - 1].middle_s);
     double at = 0;
     for (std::size_t k = 0; k < rows.size(); ++k) {
         const double before = k > 0 ? rows[k - 1].duration_s : 0;
