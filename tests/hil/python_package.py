@@ -116,6 +116,18 @@ def check_recording(checks, rig, folder):
     return campaign
 
 
+def check_cycle_times(checks, campaign):
+    """What the DBC says of the rig's messages is what is on its bus."""
+    stated = {int(i): int(ms) for i, ms in re.findall(r'BA_ "GenMsgCycleTime" BO_ (\d+) (\d+);', campaign.dbc)}
+    text = subprocess.run(["zstdcat", os.path.join(campaign.folder, "raw-0001.log.zst")], capture_output=True, text=True, timeout=60).stdout
+    times = {}
+    for time_s, number in re.findall(r"^\((\d+\.\d+)\) \S+ ([0-9A-F]+)#", text, re.M):
+        times.setdefault(int(number, 16), []).append(float(time_s))
+    wrong = {i: found for i, ms in stated.items() if i in times and not 0.9 * ms < (found := 1e3 * np.median(np.diff(times[i]))) < 1.1 * ms}
+    # Increments come in a mode of their own.
+    checks.check(not wrong and set(stated) - set(times) <= {288, 289}, "the DBC's cycle times are those of the rig", f"{wrong} {set(stated) - set(times)}")
+
+
 def tool(rig, *arguments, timeout=300):
     return subprocess.run([rig.program("vibrig"), *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
                           timeout=timeout, cwd=rig.folder)
@@ -275,6 +287,7 @@ def main():
             rig.stop()
             recording = next(os.path.join(rig.results, name) for name in os.listdir(rig.results) if name.startswith("python-"))
             campaign = check_recording(checks, rig, recording)
+            check_cycle_times(checks, campaign)
             check_octave(checks, rig, campaign)
             check_examples(checks, campaign)
             check_certificate(checks, rig, campaign)
