@@ -97,7 +97,7 @@ def check_recording(checks, rig, folder):
     checks.check(np.nanmax(np.abs(hot - c["temperature_c"])) < 0.5, "an interlock's value is what it watches")
     checks.check(all(c.units[n] == u for n, u in (("temperature_c", "degC"), ("measured_g", "g"), ("set_point_hz", "Hz"))),
                  "they have units")
-    checks.check((c["ready"][10:] == 1).all() and set(np.unique(c["fault"])) <= {-1, 0}, "the platform's own status is there")
+    checks.check((c["ready"][-100:] == 1).all() and set(np.unique(c["fault"])) <= {-1, 0}, "the platform's own status is there")
     status_unknown = int(rig_counter(rig, "unknown"))
     received = int(rig_counter(rig, "received"))
     checks.check(status_unknown < 0.002 * received, "of a rig's frames none is unknown", f"{status_unknown} of {received}")
@@ -114,6 +114,18 @@ def check_recording(checks, rig, folder):
     counted = sum(s.stop - s.start for s in (campaign.of_dwell(i) for i in range(campaign.dwells.rows)))
     checks.equal(counted, rows, "rows of the dwells as vibrig exports them")
     return campaign
+
+
+def check_cycle_times(checks, campaign):
+    """What the DBC says of the rig's messages is what is on its bus."""
+    stated = {int(i): int(ms) for i, ms in re.findall(r'BA_ "GenMsgCycleTime" BO_ (\d+) (\d+);', campaign.dbc)}
+    text = subprocess.run(["zstdcat", os.path.join(campaign.folder, "raw-0001.log.zst")], capture_output=True, text=True, timeout=60).stdout
+    times = {}
+    for time_s, number in re.findall(r"^\((\d+\.\d+)\) \S+ ([0-9A-F]+)#", text, re.M):
+        times.setdefault(int(number, 16), []).append(float(time_s))
+    wrong = {i: found for i, ms in stated.items() if i in times and not 0.9 * ms < (found := 1e3 * np.median(np.diff(times[i]))) < 1.1 * ms}
+    # Increments come in a mode of their own.
+    checks.check(not wrong and set(stated) - set(times) <= {288, 289}, "the DBC's cycle times are those of the rig", f"{wrong} {set(stated) - set(times)}")
 
 
 def tool(rig, *arguments, timeout=300):
@@ -275,6 +287,7 @@ def main():
             rig.stop()
             recording = next(os.path.join(rig.results, name) for name in os.listdir(rig.results) if name.startswith("python-"))
             campaign = check_recording(checks, rig, recording)
+            check_cycle_times(checks, campaign)
             check_octave(checks, rig, campaign)
             check_examples(checks, campaign)
             check_certificate(checks, rig, campaign)
