@@ -1,6 +1,8 @@
 // The loop check and the safe-state proof: about a minute at a small level, its own arming.
 #include <spdlog/fmt/fmt.h>
 
+#include <cmath>
+
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
 
@@ -111,6 +113,10 @@ Time Campaign::check_loop(Time now) {
             if (ports_.transmission) ports_.transmission(loop_->transmission());
         }
         proof_.row("loop check in band", loop_->out_of_band().empty());
+        for (const auto& row : loop_->status().rows) {  // the ratios
+            if (std::isfinite(row.value) && std::isfinite(row.low) && std::isfinite(row.high))
+                proof_.row(row.name, row.unit, row.value, row.low, row.high);
+        }
         order_proved_stop(now);
     } else if (check_ == Check::stop) {
         prove_stop(now);

@@ -4,10 +4,12 @@ to: no campaign is armed without one, an honest controller passes, each lying on
 
 usage: safety_proof.py PROGRAMS
 """
+import glob
 import json
 import math
 import os
 import sqlite3
+import subprocess
 import sys
 import tempfile
 
@@ -62,6 +64,30 @@ class Proof:
         self.rig.stop()
 
 
+def recorded(checks, p, proof):
+    """A campaign takes its proof along, into recording and report."""
+    p.rig.tool("start", "--by", "Ada")
+    last = p.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped") and not s["recorder"].get("recording"), 60)
+    checks.equal(r.state_of(last), "finished", "and finishes")
+    found = glob.glob(os.path.join(p.rig.results, "proved-*", "campaign.h5"))
+    if not checks.check(found, "it is recorded", os.listdir(p.rig.results)):
+        return
+    dump = subprocess.run(["h5dump", "-d", "/proof", "-o", os.path.join(p.rig.folder, "proof"), "-b", found[0]], capture_output=True,
+                          text=True, check=False)
+    with open(os.path.join(p.rig.folder, "proof"), encoding="utf-8") as file:
+        kept = json.loads(file.read().rstrip("\0"))
+    checks.check(kept["newest"]["utc_ns"] == r.number(proof["utc_ns"]) and kept["newest"]["keys_sha256"] == proof["keys_sha256"] and
+                 "platform over command" in [row["name"] for row in kept["newest"]["rows"]],
+                 "the recording has the proof: when, times, ratios, hash of the keys", dump.stderr + str(kept)[:600])
+    page = os.path.join(p.rig.folder, "report.html")
+    made = subprocess.run([p.rig.program("vibrig"), "report", os.path.dirname(found[0]), "-o", page], capture_output=True, text=True,
+                          check=False)
+    with open(page, encoding="utf-8") as file:
+        text = file.read()
+    checks.check(all(word in text for word in ("Proof of the safe state", "Ada", proof["keys_sha256"], "stop, platform", "platform over command",
+                                               "there is no trend")), "and so has the report", made.stderr)
+
+
 def pads_of_the_rig(p):
     """Natural frequency and damping: |T|^2 = (1 + z x) / ((1 - x)^2 + z x), x = (f/fn)^2, z = (2 damping)^2."""
     with open(os.path.join(p.rig.folder, "truth.json"), encoding="utf-8") as file:
@@ -95,7 +121,7 @@ def honest(checks, programs, folder):
         checks.check("emergency stop has never" in proof.get("advice", ""), "the emergency stop is asked for", proof)
         armed = p.rig.tool("arm", "--by", "Ada")
         checks.equal(armed.returncode, 0, "then a campaign is armed")
-        p.rig.tool("abort", "--by", "Ada")
+        recorded(checks, p, proof)
         database = sqlite3.connect(f"file:{os.path.join(p.rig.results, 'journal.sqlite3')}?mode=ro", uri=True)
         kept = [json.loads(text) for (text,) in database.execute("SELECT record FROM proof ORDER BY id")]
         database.close()
@@ -110,6 +136,8 @@ def honest(checks, programs, folder):
         p.rig.start_daemon()
         p.rig.wait_for(ready, 60)
         checks.equal(p.rig.tool("arm", "--by", "Ada").returncode, 0, "a proof outlives the daemon")
+        checks.check("as the loop check of the newest proof measured it" in p.rig.daemon.text(), "with the transmission that it measured",
+                     p.rig.logs())
         p.rig.tool("abort", "--by", "Ada")
         p.rig.daemon.end()
         p.rig.configure(CAMPAIGN, commission={"enforce": True}, shaker={"poll_period_ms": 150})

@@ -54,6 +54,8 @@ void shut(std::uint16_t port) {
 
 class TcpDoor : public testing::Test {
   protected:
+    using Use = CertificateSettings::Use;
+
     TcpDoor() {
         save("authority", authority);
         save("server", make_identity({Use::server, "rig", "", {"127.0.0.1"}}, &authority));
