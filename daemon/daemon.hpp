@@ -26,6 +26,7 @@
 #include "daemon/rt/real_clock.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/rt/rig_clock.hpp"
+#include "daemon/rt/stirred_waiter.hpp"
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
 #include "daemon/watch/guard_link.hpp"
@@ -191,7 +192,7 @@ class Daemon final : public StatusSource {
     boost::asio::io_context io_{1};
     std::unique_ptr<drivers::CanPort> port_;
     std::unique_ptr<drivers::Shaker> shaker_;
-    std::unique_ptr<drivers::Waiter> control_waiter_;
+    std::unique_ptr<rt::StirredWaiter> control_waiter_;
     std::unique_ptr<drivers::Waiter> estimator_waiter_;
     rt::Interlock interlock_;
     rt::Ring<drivers::Sample> estimator_ring_{4096};

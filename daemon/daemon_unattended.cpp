@@ -54,7 +54,7 @@ void Daemon::open_journal() {
     campaign_.take_over_proofs(std::move(proofs));
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
-    journal_->on_written([this] { control_waiter_->notify(); });
+    journal_->on_written([this] { control_waiter_->wake(); });
     estimator_stage_.feed_to(journal_->fed());
     journal_->start();
 }

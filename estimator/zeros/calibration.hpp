@@ -36,8 +36,7 @@ struct Initial {
     double tilt_deg = 1, azimuth_deg = 1;
     double velocity_mps = 0.1, position_m = 1;
     double gyro_bias_deg_h = 0.2, zero_mg = 5;
-    double cross = 1e-3;    ///< of what x and y show of x and y, their gain included, 1
-    double cross_z = 5e-4;  ///< of what z shows of them: misalignment alone
+    double cross = 1e-3;  ///< of what an accelerometer shows of x and y, its gain included, 1
 };
 
 struct CalibrationSettings {

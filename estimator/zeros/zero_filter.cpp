@@ -38,7 +38,7 @@ ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
         Eigen::Vector3d::Constant(start.velocity_mps), metre, metre / std::cos(site.latitude_rad),
         start.position_m, Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
         Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2),
-        Eigen::Vector4d::Constant(start.cross), Eigen::Vector2d::Constant(start.cross_z);
+        Eigen::Vector4d::Constant(start.cross), Eigen::Vector2d::Constant(kCrossOfZ);
     p_ = sigma.cwiseAbs2().asDiagonal();
 }
 

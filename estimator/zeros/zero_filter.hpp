@@ -8,6 +8,8 @@ namespace vibrig::estimator::zeros {
 /// Besides the 15 states: what each accelerometer shows of x and y besides its own axis, gains
 /// included. A unit that is not level has some of them in its zeros.
 inline constexpr int kCross = kStates, kFilterStates = kStates + 6;
+/// 1 sigma of what z shows of x and y: there is no gain in it as in theirs (Initial::cross).
+inline constexpr double kCrossOfZ = 5e-4;
 using FilterMatrix = Eigen::Matrix<double, kFilterStates, kFilterStates>;
 using FilterVector = Eigen::Matrix<double, kFilterStates, 1>;
 

@@ -10,6 +10,7 @@
 
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
+#include "estimator/zeros/zero_filter.hpp"
 
 namespace {
 
@@ -143,7 +144,7 @@ TEST(ZeroSeeds, FiftySeedsMeetTheResidualsInTimeAndAreConsistent) {
             errors.zero_mg[i] = (seed >> i) % 2 == 0 ? 5 : -5;
             for (std::size_t j = 0; j < 2; ++j)
                 errors.accelerometer_cross[i][j] =
-                    (i < 2 ? s.initial.cross : s.initial.cross_z) * normal(generator);
+                    (i < 2 ? s.initial.cross : kCrossOfZ) * normal(generator);
         }
         const Calibration run = simulate(s, errors, kPeriod, seed);
         const CalibrationResult result = run.result();
