@@ -80,6 +80,7 @@ void SigningKey::keep() {
     const std::string unfinished = path_ + ".new";
     if (made_ && ::rename(unfinished.c_str(), path_.c_str()) != 0)
         fail(unfinished, std::strerror(errno));
+    made_ = false;
 }
 
 std::string SigningKey::sign(std::string_view message) const {

@@ -16,7 +16,9 @@ class SigningKey {
     explicit SigningKey(const std::string& path);
     void keep();
 
-    [[nodiscard]] bool made() const noexcept { return made_; }  ///< it was not there
+    [[nodiscard]] bool made() const noexcept {
+        return made_;
+    }  ///< it was not there, and is not yet
     [[nodiscard]] const std::string& public_key() const noexcept { return public_; }
     [[nodiscard]] std::string sign(std::string_view message) const;
 

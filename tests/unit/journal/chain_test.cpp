@@ -418,6 +418,7 @@ TEST_F(ChainTest, NoticesWhileItRuns) {
             ASSERT_TRUE(eventually([&] { return journal.on_disk(armed); }));
             std::this_thread::sleep_for(100ms);
             EXPECT_TRUE(journal.status().verified) << c.what;
+            const std::string key = journal.status().public_key;
             c.harm();
             std::vector<std::string> said;
             ASSERT_TRUE(eventually([&] { return !(said = journal.take_found()).empty(); }))
@@ -428,6 +429,8 @@ TEST_F(ChainTest, NoticesWhileItRuns) {
             journal.stop();
             EXPECT_TRUE(journal.status().running) << journal.status().note;
             EXPECT_THAT(journal.take_found(), IsEmpty()) << c.what << ": said once";
+            const bool of_key = std::string(c.what).find("key") != std::string::npos;
+            EXPECT_EQ(journal.status().public_key == key, !of_key) << c.what;
         }
         EXPECT_THAT(found(), IsEmpty()) << c.what;
         Journal journal(path, kRig);
