@@ -47,7 +47,6 @@ constexpr std::array kEssentials{
     Essential{"shaker.limits.acceleration_g", Fill::blank},
     Essential{"shaker.limits.velocity_mps", Fill::blank},
     Essential{"shaker.limits.displacement_mm", Fill::blank},
-    Essential{"shaker.registers.watchdog.address", Fill::blank},
     Essential{"server.operator_group", Fill::shown, "\"vibrig-operator\""},
     Essential{"server.page", Fill::shown, "\"127.0.0.1:8090\""},
 };
@@ -56,6 +55,33 @@ const Key& key_named(const std::string& name) {
     const auto found = std::ranges::find(schema(), name, &Key::name);
     if (found == schema().end()) throw std::logic_error("no key " + name);
     return *found;
+}
+
+/// The built-in map is that of the simulated rig: the address is a blank of every register, the
+/// rest stands there to be looked at.
+std::string registers() {
+    static constexpr std::string_view kPrefix = "shaker.registers.", kAddress = ".address";
+    std::string text =
+        "\n[shaker.registers]   # the controller's map; `vibrigd --schema` says more of each "
+        "word\n";
+    Configuration defaults;
+    for (const Key& first : schema()) {
+        if (!first.name.starts_with(kPrefix) || !first.name.ends_with(kAddress)) continue;
+        const std::string role =
+            first.name.substr(kPrefix.size(), first.name.size() - kPrefix.size() - kAddress.size());
+        std::string row = role + " = { address = \"" + kBlank + '"';
+        bool bits = false;
+        for (const char* word : {"type", "word_order", "table", "access", "scale", "mask"}) {
+            const Key& key = key_named(std::string(kPrefix) + role + "." + word);
+            const std::string value = key.write(defaults);
+            bits = bits || value == "\"bits\"";
+            if (std::string_view(word) == "mask" && !bits) continue;
+            row += std::string(", ") + word + " = " + value;
+        }
+        text +=
+            "# " + first.doc + "\n# for instance: " + first.write(defaults) + "\n" + row + " }\n";
+    }
+    return text;
 }
 
 std::string comment_of(const Key& key) {
@@ -68,12 +94,7 @@ std::string comment_of(const Key& key) {
 }  // namespace
 
 std::string format_essentials() {
-    const auto blanks = std::ranges::count(kEssentials, Fill::blank, &Essential::fill);
-    std::string text = "# vibrigd: the keys that a rig needs; `vibrigd --schema` lists all.\n# " +
-                       std::to_string(blanks) + " blanks stand as \"" + kBlank +
-                       "\": put what your rig has in their place, then\n"
-                       "#   vibrigd --config FILE --check\n"
-                       "# It names each blank that is left, and what else cannot be.\n";
+    std::string text;
     Configuration defaults;
     std::string section;
     for (const Essential& essential : kEssentials) {
@@ -90,7 +111,17 @@ std::string format_essentials() {
         text += name.substr(dot + 1) + " = " +
                 (essential.fill == Fill::blank ? '"' + std::string(kBlank) + '"' : value) + "\n";
     }
-    return text;
+    text += registers();
+    std::size_t blanks = 0;
+    for (std::size_t at = text.find(kBlank); at != std::string::npos;
+         at = text.find(kBlank, at + 1))
+        ++blanks;
+    return "# vibrigd: the keys that a rig needs; `vibrigd --schema` lists all.\n# " +
+           std::to_string(blanks) + " blanks stand as \"" + kBlank +
+           "\": put what your rig has in their place, then\n"
+           "#   vibrigd --config FILE --check\n"
+           "# It names each blank that is left, and what else cannot be.\n" +
+           text;
 }
 
 }  // namespace vibrig::configuration
