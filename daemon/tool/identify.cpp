@@ -22,6 +22,7 @@
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
+#include "daemon/tool/rig_doubts.hpp"
 #include "estimator/hann.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
@@ -152,19 +153,34 @@ void tell_before(const Dwells& dwells, const estimator::Settings& settings, cons
     }
 }
 
-estimator::Result identify(const std::vector<RecordingRow>& rows,
-                           const estimator::Settings& settings) {
+/// A result, and whether the configuration fits what was recorded.
+struct Identified {
+    estimator::Result result;
+    bool doubtful = false;
+};
+
+Identified with_doubts(estimator::Result result, const RigDoubts& doubts) {
+    Identified identified{std::move(result)};
+    identified.doubtful = doubts.tell(identified.result);
+    return identified;
+}
+
+Identified identify(const std::vector<RecordingRow>& rows, const estimator::Settings& settings) {
     const std::vector<Dwell> dwells = dwells_of(rows);
     tell_before(dwells, settings, [](const Dwell& dwell, SeenDwell& seen) {
         for (const RecordingRow* row : dwell.rows) seen.add(measurement_of(*row));
     });
     estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
     for (const Dwell& dwell : dwells) {
         identification.begin_dwell({dwell.run, dwell.position, -1});
+        doubts.begin_dwell();
         for (const RecordingRow* row : dwell.rows) {
-            static_cast<void>(identification.add(measurement_of(*row)));
+            const auto measurement = measurement_of(*row);
+            static_cast<void>(identification.add(measurement));
+            doubts.add(measurement);
             // Asking a clock costs more than a filter step.
             if (++done % 1024 == 0) {
                 progress.show(done, rows.size());
@@ -172,11 +188,11 @@ estimator::Result identify(const std::vector<RecordingRow>& rows,
         }
         static_cast<void>(identification.end_dwell());
     }
-    return identification.result();
+    return with_doubts(identification.result(), doubts);
 }
 
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
-estimator::Result identify(const record::Campaign& campaign, const estimator::Settings& settings) {
+Identified identify(const record::Campaign& campaign, const estimator::Settings& settings) {
     const auto dwells = record::recorded_dwells(campaign);
     tell_before(dwells, settings, [&](const record::RecordedDwell& dwell, SeenDwell& seen) {
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
@@ -184,18 +200,22 @@ estimator::Result identify(const record::Campaign& campaign, const estimator::Se
                 rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
     });
     estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
     for (const auto& dwell : dwells) {
+        doubts.begin_dwell();
         record::feed(identification, campaign, dwell,
-                     [&](std::size_t, const estimator::StepResult&) {
+                     [&](std::size_t sample, const estimator::StepResult&) {
+                         doubts.add(rt::measurement_of(campaign.samples[sample],
+                                                       dwell.order->from, dwell.order->zero_g));
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }
-    return identification.result();
+    return with_doubts(identification.result(), doubts);
 }
 
-estimator::Result identify_campaign(const std::string& path, const std::string& config) {
+Identified identify_campaign(const std::string& path, const std::string& config) {
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
@@ -224,15 +244,16 @@ std::vector<RecordingRow> read(const std::string& path) {
 
 int run(const std::string& recording, const std::string& config, const std::string& instruction_set,
         bool json) {
-    estimator::Result result;
+    Identified identified;
+    const estimator::Result& result = identified.result;
     try {
         estimator::use_instruction_set(instruction_set);
         if (is_campaign(recording)) {
-            result = identify_campaign(recording, config);
+            identified = identify_campaign(recording, config);
         } else {
             const estimator::Settings settings =
                 configuration::load(config, false).configuration.estimator;
-            result = identify(read(recording), settings);
+            identified = identify(read(recording), settings);
         }
     } catch (const std::exception& error) {
         // The room that found the fault named file, line, key and value already.
@@ -244,7 +265,7 @@ int run(const std::string& recording, const std::string& config, const std::stri
         std::cerr << "standard output: cannot be written\n";
         return kBadInput;
     }
-    return all_observable(result) ? 0 : kResultSaysNo;
+    return all_observable(result) && !identified.doubtful ? 0 : kResultSaysNo;
 }
 
 }  // namespace
@@ -277,7 +298,9 @@ void add_identify(CLI::App& app, int& exit_code) {
     command->footer(
         "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
         "Exit codes: 0 all 30 coefficients are determined, 1 some are not observable (the result "
-        "names\nthem and the combinations that are determined), 2 bad usage or input.");
+        "names\nthem and the combinations that are determined) or the configuration does not fit "
+        "the recording\n(the warnings name what contradicts, and the keys suspected), 2 bad usage "
+        "or input.");
     command->callback([options, &exit_code] {
         exit_code =
             run(options->recording, options->config, options->instruction_set, options->json);

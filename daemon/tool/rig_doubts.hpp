@@ -1,0 +1,26 @@
+#pragma once
+
+#include <vector>
+
+#include "estimator/commissioning/consistency.hpp"
+#include "estimator/identification.hpp"
+
+namespace vibrig::tool {
+
+/// Holds a recording against the configuration that it is identified with: gravity, Earth rate and
+/// what 30 coefficients cannot explain (docs/commissioning.md).
+class RigDoubts {
+  public:
+    explicit RigDoubts(const estimator::Settings& settings) : settings_(settings) {}
+
+    void begin_dwell() { dwells_.emplace_back(); }
+    void add(const estimator::Measurement& measurement) { dwells_.back().add(measurement); }
+    /// Adds to the result's warnings; true if the configuration does not fit the recording.
+    [[nodiscard]] bool tell(estimator::Result& result) const;
+
+  private:
+    estimator::Settings settings_;
+    std::vector<estimator::commissioning::DwellMeans> dwells_;
+};
+
+}  // namespace vibrig::tool
