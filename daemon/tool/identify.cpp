@@ -24,6 +24,7 @@
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
+#include "daemon/tool/rig_doubts.hpp"
 #include "estimator/hann.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
@@ -164,22 +165,37 @@ void tell_before(const Dwells& dwells, const estimator::Settings& settings, cons
     if (vibrating && !alias.empty()) std::cerr << "before the run: " << alias << '\n';
 }
 
-estimator::Result identify(const std::vector<RecordingRow>& rows,
-                           const estimator::Settings& settings) {
+/// A result, and what of the recording contradicts the configuration.
+struct Found {
+    estimator::Result result;
+    std::string contradiction;  ///< the first; empty: none
+};
+
+Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
+    Found found{std::move(result), {}};
+    found.contradiction = doubts.tell(found.result);
+    return found;
+}
+
+Found identify(const std::vector<RecordingRow>& rows, const estimator::Settings& settings) {
     const std::vector<Dwell> dwells = dwells_of(rows);
     tell_before(dwells, settings, [](const Dwell& dwell, SeenDwell& seen) {
         for (const RecordingRow* row : dwell.rows) seen.add(measurement_of(*row));
     });
     const bool common_clock = has_common_clock(dwells);
     estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
     for (const Dwell& dwell : dwells) {
         estimator::DwellInfo info{dwell.run, dwell.position};
         if (common_clock) info.begin_s = 0;
         identification.begin_dwell(info);
+        doubts.begin_dwell();
         for (const RecordingRow* row : dwell.rows) {
-            static_cast<void>(identification.add(measurement_of(*row)));
+            const auto measurement = measurement_of(*row);
+            static_cast<void>(identification.add(measurement));
+            doubts.add(measurement);
             // Asking a clock costs more than a filter step.
             if (++done % 1024 == 0) {
                 progress.show(done, rows.size());
@@ -187,11 +203,11 @@ estimator::Result identify(const std::vector<RecordingRow>& rows,
         }
         static_cast<void>(identification.end_dwell());
     }
-    return identification.result();
+    return with_doubts(identification.result(), doubts);
 }
 
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
-estimator::Result identify(const record::Campaign& campaign, const estimator::Settings& settings) {
+Found identify(const record::Campaign& campaign, const estimator::Settings& settings) {
     const auto dwells = record::recorded_dwells(campaign);
     tell_before(dwells, settings, [&](const record::RecordedDwell& dwell, SeenDwell& seen) {
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
@@ -199,18 +215,23 @@ estimator::Result identify(const record::Campaign& campaign, const estimator::Se
                 rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
     });
     estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
     for (const auto& dwell : dwells) {
+        doubts.begin_dwell();
         record::feed(identification, campaign, dwell,
-                     [&](std::size_t, const estimator::StepResult&) {
+                     [&](std::size_t sample, const estimator::StepResult&) {
+                         doubts.add(rt::measurement_of(campaign.samples[sample], dwell.order->from,
+                                                       dwell.order->zero_g));
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }
-    return identification.result();
+    return with_doubts(identification.result(), doubts);
 }
 
-Identified identify_campaign(const std::string& path, const std::string& config) {
+Found identify_campaign(const std::string& path, const std::string& config,
+                        estimator::Settings& settings) {
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
@@ -219,8 +240,18 @@ Identified identify_campaign(const std::string& path, const std::string& config)
             ? configuration::parse(record::identification_sections(campaign.head.configuration),
                                    "configuration in " + campaign.path, false)
             : configuration::load(config, false);
-    const auto& settings = loaded.configuration.estimator;
-    return {settings, identify(campaign, settings), {}};
+    settings = loaded.configuration.estimator;
+    return identify(campaign, settings);
+}
+
+/// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
+void contradict(estimator::uncertainty::Verdict& verdict, const std::string& contradiction) {
+    if (contradiction.empty()) return;
+    using estimator::uncertainty::Level;
+    const std::string text = "the configuration does not fit the recording: " + contradiction;
+    verdict.level = Level::not_valid;
+    verdict.reasons.insert(verdict.reasons.begin(), {"configuration", text, Level::not_valid});
+    verdict.sentence = "not valid, because " + text;
 }
 
 /// A folder, an HDF5 file, or the name of a campaign: then there is no such file.
@@ -266,13 +297,16 @@ int run(const IdentifyOptions& options) {
 
 Identified identify_recording(const std::string& file, const std::string& config) {
     Identified identified;
+    Found found;
     if (is_campaign(file)) {
-        identified = identify_campaign(file, config);
+        found = identify_campaign(file, config, identified.settings);
     } else {
         identified.settings = configuration::load(config, false).configuration.estimator;
-        identified.result = identify(read(file), identified.settings);
+        found = identify(read(file), identified.settings);
     }
+    identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }
 
@@ -309,7 +343,9 @@ void add_identify(CLI::App& app, int& exit_code) {
     command->footer(
         "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
         "Exit codes: 0 the result is valid or doubtful (the verdict says why), 1 it is not valid, "
-        "or\ncoefficients are not observable (the result names them and the combinations that are "
+        "the configuration does not\nfit the recording (the warnings name what contradicts, and "
+        "the keys suspected), or\ncoefficients are not observable (the result names them and the "
+        "combinations that are "
         "determined),\nwith --strict also when it is doubtful; 2 bad usage or input.");
     command->callback(
         [options, &exit_code] { exit_code = guarded([&] { return run(*options); }); });

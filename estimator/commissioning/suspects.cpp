@@ -1,0 +1,203 @@
+// Which single key, changed, would explain dwells that contradict their configuration.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "estimator/commissioning/consistency.hpp"
+#include "estimator/commissioning/dwell_fit.hpp"
+#include "estimator/commissioning/rig.hpp"
+#include "estimator/commissioning/words.hpp"
+#include "estimator/kinematics.hpp"
+
+namespace vibrig::estimator::commissioning {
+
+namespace {
+
+constexpr double kForceSigma_g = 3e-3;
+/// Linear drift terms are believed to be about so large, deg/h/g: what the sign of the latitude is
+/// told by.
+constexpr double kLinearSigma = 2, kEarthFixed = 1e-3;
+constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
+
+class Search {
+  public:
+    Search(const Settings& settings, const std::vector<DwellMean>& dwells,
+           const ConsistencyLimits& limits)
+        : as_is_(settings), dwells_(dwells), limits_(limits) {
+        const auto c = consistency(settings, dwells, limits);
+        earth_ = c.earth_known;
+    }
+
+    std::vector<Suspect> run() {
+        signs_and_zeros();
+        accelerometers();
+        verticals_up();
+        lean();
+        site();
+        time();
+        std::ranges::stable_sort(found_, {}, &Suspect::cost);
+        return std::move(found_);
+    }
+
+  private:
+    [[nodiscard]] double gravity(const Settings& s) const {
+        double cost = 0;
+        for (const Verticals& v : verticals(s, dwells_))
+            cost += (v.force - v.encoders).squaredNorm() / (kForceSigma_g * kForceSigma_g);
+        return cost;
+    }
+    [[nodiscard]] double rates(const Settings& s, double time_factor) const {
+        return earth_ ? fit_rates(s, dwells_, {kEarthFixed, kLinearSigma}, time_factor).cost : 0;
+    }
+    [[nodiscard]] double cost(const Settings& s) const { return gravity(s) + rates(s, 1); }
+
+    /// Takes it if all limits hold with it.
+    void consider(const Settings& s, std::string what) {
+        if (!consistency(s, dwells_, limits_).contradictions.empty()) return;
+        found_.push_back({std::move(what), cost(s)});
+    }
+
+    /// The value about which the cost is least: `steps` of `step` to both sides, then finer.
+    double best_of(const std::function<Settings(double)>& with, double step, int steps) const {
+        double best = 0, least = HUGE_VAL;
+        for (; step > 0.004; step /= 5, steps = 6) {
+            const double middle = best;
+            for (int n = -steps; n <= steps; ++n) {
+                const double at = middle + n * step, c = cost(with(at));
+                if (c >= least) continue;
+                least = c;
+                best = at;
+            }
+        }
+        return best;
+    }
+
+    void signs_and_zeros() {
+        for (std::size_t i = 0; i < 3; ++i) {
+            Settings s = as_is_;
+            s.encoder_sign[i] = -s.encoder_sign[i];
+            consider(s, words("platform.encoder_sign: %d instead of %d of the %s gimbal",
+                              s.encoder_sign[i], as_is_.encoder_sign[i], kGimbalNames[i]));
+            const auto with = [&](double off) {
+                Settings z = as_is_;
+                z.encoder_zero_deg[i] += off;
+                return z;
+            };
+            const Settings best = with(best_of(with, 5, 36));
+            consider(best,
+                     words("platform.encoder_zero_deg: %.2f instead of %g of the %s gimbal",
+                           best.encoder_zero_deg[i], as_is_.encoder_zero_deg[i], kGimbalNames[i]));
+        }
+    }
+
+    void accelerometers() {
+        for (const Eigen::Matrix3d& order : signed_permutations()) {
+            if (order.isIdentity()) continue;
+            Settings s = as_is_;
+            for (std::size_t i = 0; i < 3; ++i) {
+                for (std::size_t k = 0; k < 3; ++k) {
+                    s.accelerometer_matrix[i][k] = 0;
+                    for (std::size_t j = 0; j < 3; ++j)
+                        s.accelerometer_matrix[i][k] +=
+                            order(static_cast<int>(i), static_cast<int>(j)) *
+                            as_is_.accelerometer_matrix[j][k];
+                }
+            }
+            // Gravity tells at once; the rates do not know the accelerometers.
+            double worst = 0;
+            for (const Verticals& v : verticals(s, dwells_)) worst = std::max(worst, v.apart_deg());
+            if (!(worst <= limits_.gravity_deg)) continue;
+            std::string what = "accelerometer.matrix: x, y, z are";
+            for (int i = 0; i < 3; ++i) {
+                int from = 0;
+                order.row(i).cwiseAbs().maxCoeff(&from);
+                what += words("%s %c%c", i == 0 ? "" : ",", order(i, from) > 0 ? '+' : '-',
+                              "xyz"[from]);
+            }
+            consider(s, std::move(what));
+        }
+    }
+
+    void verticals_up() {
+        for (int axis = 0; axis < 3; ++axis) {
+            for (const int sign : {1, -1}) {
+                Settings s = as_is_;
+                s.up = {axis, sign};
+                if (axis == as_is_.up.axis && sign == as_is_.up.sign) continue;
+                consider(
+                    s, words("platform.up: %c%c instead of %c%c", sign > 0 ? '+' : '-', "xyz"[axis],
+                             as_is_.up.sign > 0 ? '+' : '-', "xyz"[as_is_.up.axis]));
+            }
+        }
+    }
+
+    void lean() {
+        const auto with = [&](double off) {
+            Settings s = as_is_;
+            s.elevation_deg = std::clamp(s.elevation_deg + off, -2.0, 2.0);
+            return s;
+        };
+        const Settings s = with(best_of(with, 0.5, 8));
+        consider(s, words("site.elevation_deg: %.2f instead of %g", s.elevation_deg + 0.0,
+                          as_is_.elevation_deg));
+    }
+
+    void site() {
+        if (!earth_) return;
+        Settings s = as_is_;
+        s.latitude_deg = -s.latitude_deg;
+        consider(s,
+                 words("site.latitude_deg: %g instead of %g", s.latitude_deg, as_is_.latitude_deg));
+        const auto latitude = [&](double off) {
+            Settings l = as_is_;
+            l.latitude_deg = std::clamp(l.latitude_deg + off, -90.0, 90.0);
+            return l;
+        };
+        s = latitude(best_of(latitude, 5, 36));
+        consider(
+            s, words("site.latitude_deg: %.2f instead of %g", s.latitude_deg, as_is_.latitude_deg));
+        const auto azimuth = [&](double off) {
+            Settings a = as_is_;
+            a.azimuth_deg += off;
+            return a;
+        };
+        s = azimuth(best_of(azimuth, 5, 36));
+        consider(s, words("site.azimuth_deg: %.2f instead of %g",
+                          std::remainder(s.azimuth_deg, 360.0), as_is_.azimuth_deg));
+    }
+
+    void time() {
+        if (!earth_) return;
+        for (const auto& [factor, name] : {std::pair{60.0, "minutes"},
+                                           {3600.0, "hours"},
+                                           {1 / 1000.0, "milliseconds"},
+                                           {1e-6, "microseconds"},
+                                           {1000.0, "units of 1000 s"},
+                                           {1 / 60.0, "1/60 s"}}) {
+            auto scaled = dwells_;
+            for (DwellMean& dwell : scaled)
+                for (double& slope : dwell.slope_deg_h) slope /= factor;
+            if (!consistency(as_is_, scaled, limits_).contradictions.empty()) continue;
+            found_.push_back(
+                {words("time_s: it is in %s", name), gravity(as_is_) + rates(as_is_, factor)});
+        }
+    }
+
+    Settings as_is_;
+    const std::vector<DwellMean>& dwells_;
+    ConsistencyLimits limits_;
+    bool earth_ = false;
+    std::vector<Suspect> found_;
+};
+
+}  // namespace
+
+std::vector<Suspect> suspects(const Settings& settings, const std::vector<DwellMean>& dwells,
+                              const ConsistencyLimits& limits, std::size_t most) {
+    auto found = Search(settings, dwells, limits).run();
+    if (found.size() > most) found.resize(most);
+    return found;
+}
+
+}  // namespace vibrig::estimator::commissioning

@@ -1,0 +1,175 @@
+#include "estimator/commissioning/consistency.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "tests/plant/platform_model.hpp"
+#include "tests/plant/random.hpp"
+
+namespace vibrig::estimator::commissioning {
+namespace {
+
+using plant::operator*;
+
+constexpr double kRad = std::numbers::pi / 180;
+const std::vector<plant::Vec3> kTable1{
+    {0, 0, 0},   {0, 0, 45},   {0, 0, 90},    {0, 0, 180}, {180, 0, 45}, {45, 0, 0},  {45, 0, 90},
+    {90, 0, 90}, {90, 0, 180}, {180, 0, 270}, {270, 0, 0}, {270, 0, 90}, {-45, 0, 0}, {-45, 0, 90}};
+
+/// The simulated rig's dwells at rest and at one level, with encoders that count as the gimbals do.
+std::vector<DwellMean> dwells_of(const plant::Truth& truth, std::uint64_t seed,
+                                 const std::vector<plant::Vec3>& positions = kTable1) {
+    const plant::PlatformModel model(truth);
+    plant::Random random(seed, 3);
+    std::vector<DwellMean> dwells;
+    for (const double kappa : {1.0, 19.0}) {
+        // The mean square of the vibration is what the model feels at its root.
+        const double a1 = std::sqrt(kappa) - 1;
+        for (const auto& position : positions) {
+            const plant::Vec3 angle = kRad * position;
+            DwellMean dwell;
+            dwell.encoder_rad = angle;
+            dwell.force_g = model.up_at(angle);
+            for (double& f : dwell.force_g) f += 3e-4 * random.normal();
+            dwell.kappa = kappa;
+            // Linear terms are of 1 g whatever the vibration: what is linear in a1 averages out.
+            const auto still = model.angle_rates(angle, 0, {});
+            const auto more = model.angle_rates(angle, a1, {});
+            const auto less = model.angle_rates(angle, -a1, {});
+            const double square = a1 == 0 ? 0 : (kappa - 1) / (a1 * a1);
+            for (std::size_t i = 0; i < 3; ++i)
+                dwell.slope_deg_h[i] =
+                    (still[i] + 0.5 * square * (more[i] + less[i] - 2 * still[i])) / kRad * 3600 +
+                    0.007 * random.normal();
+            dwells.push_back(dwell);
+        }
+    }
+    return dwells;
+}
+
+struct WrongKey {
+    const char* name;
+    std::function<void(Settings&)> change;
+    const char* key;
+};
+
+class Wrong : public ::testing::TestWithParam<WrongKey> {};
+
+std::vector<WrongKey> wrong_keys() {
+    return {
+        {"InnerSign", [](Settings& s) { s.encoder_sign[1] = -1; }, "platform.encoder_sign: 1"},
+        {"OuterSign", [](Settings& s) { s.encoder_sign[0] = -1; }, "platform.encoder_sign: 1"},
+        {"AzimuthSign", [](Settings& s) { s.encoder_sign[2] = -1; }, "platform.encoder_sign: 1"},
+        {"OuterZero", [](Settings& s) { s.encoder_zero_deg[0] = 5; }, "platform.encoder_zero_deg"},
+        {"InnerZero", [](Settings& s) { s.encoder_zero_deg[1] = 5; }, "platform.encoder_zero_deg"},
+        {"AzimuthZero", [](Settings& s) { s.encoder_zero_deg[2] = 5; },
+         "platform.encoder_zero_deg"},
+        {"LatitudeSign", [](Settings& s) { s.latitude_deg = -45.75; }, "site.latitude_deg: 45.75"},
+        {"Latitude", [](Settings& s) { s.latitude_deg = 47.75; }, "site.latitude_deg: 45.7"},
+        {"Azimuth90", [](Settings& s) { s.azimuth_deg = 90; }, "site.azimuth_deg"},
+        {"Swapped",
+         [](Settings& s) {
+             s.accelerometer_matrix = {{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}};
+         },
+         "accelerometer.matrix"},
+        {"Inverted",
+         [](Settings& s) {
+             s.accelerometer_matrix = {{{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
+         },
+         "accelerometer.matrix"},
+        {"Up",
+         [](Settings& s) {
+             s.up = {2, 1};
+         },
+         "platform.up"},
+    };
+}
+
+TEST_P(Wrong, KeyIsAmongTheFirstThreeSuspects) {
+    Settings settings;
+    GetParam().change(settings);
+    const auto dwells = dwells_of({}, 11);
+    const auto found = consistency(settings, dwells);
+    EXPECT_FALSE(found.contradictions.empty());
+    const auto suspected = suspects(settings, dwells);
+    EXPECT_TRUE(std::ranges::any_of(suspected, [&](const Suspect& suspect) {
+        return suspect.words.rfind(GetParam().key, 0) == 0;
+    })) << testing::PrintToString([&] {
+        std::vector<std::string> words;
+        for (const auto& suspect : suspected) words.push_back(suspect.words);
+        for (const auto& contradiction : found.contradictions) words.push_back(contradiction);
+        return words;
+    }());
+}
+
+INSTANTIATE_TEST_SUITE_P(Keys, Wrong, ::testing::ValuesIn(wrong_keys()),
+                         [](const auto& wrong) { return std::string(wrong.param.name); });
+
+TEST(Consistency, TimeInMinutesIsNamed) {
+    auto dwells = dwells_of({}, 12);
+    for (auto& dwell : dwells)
+        for (double& slope : dwell.slope_deg_h) slope *= 60;
+    EXPECT_FALSE(consistency({}, dwells).contradictions.empty());
+    const auto suspected = suspects({}, dwells);
+    ASSERT_FALSE(suspected.empty());
+    EXPECT_EQ(suspected.front().words, "time_s: it is in minutes");
+}
+
+TEST(Consistency, RaisesNoFalseAlarm) {
+    // GIVEN 200 rigs with drift as gyros have it, described as they are
+    for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+        plant::Random random(seed, 9);
+        plant::Truth truth;
+        truth.latitude_deg = 75 * (2 * random.uniform() - 1);
+        truth.azimuth_deg = 180 * (2 * random.uniform() - 1);
+        for (auto& skew : truth.non_orthogonality_arcsec) skew = 60 * random.normal();
+        for (auto& gyro : truth.coefficients)
+            for (std::size_t term = 0; term < plant::kTerms; ++term)
+                gyro[term] = random.normal() * (term == 0 ? 2 : term < plant::kII ? 1 : 0.03);
+        Settings settings;
+        settings.latitude_deg = truth.latitude_deg;
+        settings.azimuth_deg = truth.azimuth_deg;
+        const auto found = consistency(settings, dwells_of(truth, seed));
+        EXPECT_THAT(found.contradictions, ::testing::IsEmpty()) << "seed " << seed;
+    }
+}
+
+TEST(Consistency, SaysNothingOfTheEarthBeforeTheNinthDwell) {
+    auto dwells = dwells_of({}, 14);
+    dwells.resize(8);
+    Settings settings;
+    settings.azimuth_deg = 90;
+    const auto found = consistency(settings, dwells);
+    EXPECT_FALSE(found.earth_known);
+    EXPECT_THAT(found.contradictions, ::testing::IsEmpty());
+}
+
+TEST(DwellMeans, GiveMeanSlopeAndForceOverAWrap) {
+    DwellMeans means;
+    for (int k = 0; k < 400; ++k) {
+        Measurement m;
+        m.time_s = 10 + 0.025 * k;
+        // 36 deg/h through half a turn
+        const double angle = std::numbers::pi + (m.time_s - 15) * 36 * kRad / 3600;
+        m.angle_rad = {angle > std::numbers::pi ? angle - 2 * std::numbers::pi : angle, 0.1, 0};
+        m.force_g = {0, 1, k % 2 == 0 ? 0.5 : -0.5};
+        if (k == 100) m.force_good = false;
+        means.add(m);
+    }
+    ASSERT_TRUE(means.known());
+    const auto mean = means.mean(1, true);
+    EXPECT_NEAR(mean.slope_deg_h[0], 36, 1e-6);
+    EXPECT_NEAR(mean.slope_deg_h[1], 0, 1e-9);
+    EXPECT_NEAR(std::abs(std::remainder(mean.encoder_rad[0], 2 * std::numbers::pi)),
+                std::numbers::pi, 1e-6);
+    EXPECT_NEAR(mean.force_g[1], 1, 1e-12);
+    EXPECT_FALSE(DwellMeans{}.known());
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::commissioning

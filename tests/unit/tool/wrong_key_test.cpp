@@ -1,0 +1,109 @@
+// A recording that is identified with one wrong key: `vibrig identify` says so and names it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct WrongKey {
+    const char* name;
+    const char* configuration;
+    const char* named;
+};
+
+class WrongKeys : public ::testing::TestWithParam<WrongKey> {
+  protected:
+    static void SetUpTestSuite() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+        ASSERT_EQ(run(std::string(VIBRIG_PLANT) + " record --seed 5 --dwell 20 -o rec.csv"), 0);
+    }
+    static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+
+    static int run(const std::string& command) {
+        const int status =
+            std::system(("cd '" + folder_.string() + "' && " + command + " >out 2>error").c_str());
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    }
+    /// Exit code and all warnings of an identification.
+    static std::pair<int, std::string> identify(const std::string& configuration) {
+        std::ofstream(folder_ / "rig.toml") << configuration;
+        const int code =
+            run(std::string(VIBRIG) + " identify rec.csv --config rig.toml --json");
+        std::ostringstream text;
+        text << std::ifstream(folder_ / "out").rdbuf();
+        std::string warnings;
+        for (const auto& warning : nlohmann::json::parse(text.str())["warnings"])
+            warnings += warning.get<std::string>() + "\n";
+        return {code, warnings};
+    }
+
+    static inline std::filesystem::path folder_;
+};
+
+TEST_P(WrongKeys, AreSuspectedAndTheExitCodeSaysNo) {
+    const auto [code, warnings] = identify(GetParam().configuration);
+    EXPECT_EQ(code, 1);
+    EXPECT_THAT(warnings, HasSubstr(std::string("suspects, best first: ")));
+    EXPECT_THAT(warnings, HasSubstr(GetParam().named));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Each, WrongKeys,
+    ::testing::Values(
+        WrongKey{"InnerSign", "platform.encoder_sign = [1, -1, 1]",
+                 "platform.encoder_sign: 1 instead of -1 of the inner"},
+        WrongKey{"OuterSign", "platform.encoder_sign = [-1, 1, 1]",
+                 "platform.encoder_sign: 1 instead of -1 of the outer"},
+        WrongKey{"AzimuthSign", "platform.encoder_sign = [1, 1, -1]",
+                 "platform.encoder_sign: 1 instead of -1 of the azimuth"},
+        WrongKey{"OuterZero", "platform.encoder_zero_deg = [5, 0, 0]",
+                 "instead of 5 of the outer gimbal"},
+        WrongKey{"InnerZero", "platform.encoder_zero_deg = [0, 5, 0]",
+                 "instead of 5 of the inner gimbal"},
+        WrongKey{"AzimuthZero", "platform.encoder_zero_deg = [0, 0, 5]",
+                 "instead of 5 of the azimuth gimbal"},
+        WrongKey{"Swapped", "accelerometer.matrix = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]",
+                 "accelerometer.matrix: x, y, z are +y, +x, +z"},
+        WrongKey{"Inverted", "accelerometer.matrix = [[-1, 0, 0], [0, -1, 0], [0, 0, -1]]",
+                 "accelerometer.matrix: x, y, z are -x, -y, -z"},
+        WrongKey{"LatitudeSign", "site.latitude_deg = -45.75",
+                 "site.latitude_deg: 45.75 instead of -45.75"},
+        WrongKey{"Azimuth", "site.azimuth_deg = 90", "site.azimuth_deg: "},
+        WrongKey{"Elevation", "site.elevation_deg = 1.5", "site.elevation_deg: 0.0"}),
+    [](const auto& wrong) { return std::string(wrong.param.name); });
+
+class RightKeys : public WrongKeys {};
+
+TEST_F(RightKeys, RaiseNoDoubt) {
+    const auto [code, warnings] = identify("");
+    EXPECT_EQ(code, 0) << warnings;
+    EXPECT_THAT(warnings, Not(HasSubstr("do not fit")));
+}
+
+TEST_F(RightKeys, ButTwoGyrosOnOneAxisAreTold) {
+    EXPECT_THAT(identify("platform.gyro_y_axes = [\"+x\", \"+y\", \"+z\"]").second,
+                HasSubstr("platform.gyro_y_axes[0]: found \"+x\", the input axis of gyro x too"));
+}
+
+TEST_F(RightKeys, ButTimeInMinutesIsSuspected) {
+    ASSERT_EQ(run("awk -F, 'BEGIN{OFS=\",\"} NR==1{for(i=1;i<=NF;++i) if($i==\"time_s\") t=i} "
+                  "NR>1{$t=sprintf(\"%.12g\",$t/60)} {print}' rec.csv > m.csv && mv rec.csv s.csv "
+                  "&& mv m.csv rec.csv; :"),
+              0);
+    const auto [code, warnings] = identify("");
+    EXPECT_EQ(run("mv s.csv rec.csv"), 0);
+    EXPECT_EQ(code, 1);
+    EXPECT_THAT(warnings, HasSubstr("time_s: it is in minutes"));
+}
+
+}  // namespace
