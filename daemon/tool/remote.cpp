@@ -13,7 +13,6 @@
 #include <memory>
 #include <thread>
 
-#include "daemon/serve/one_line.hpp"
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
@@ -130,11 +129,12 @@ void show_rows(const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& row
 /// was.
 void show_signed_record(serve::Client& client, const std::string& before) {
     constexpr auto kLook = std::chrono::milliseconds(100);
+    constexpr int kLongestLine = 1000;
     for (int looks = 0; looks < 30; ++looks) {
         const auto journal = ask_status(client).journal();
         if (journal.path().empty()) return;
         if (!journal.proof_head().empty() && journal.proof_head() != before) {
-            std::cout << "signed record: " << serve::one_line(journal.proof_head()) << '\n';
+            std::cout << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine) << '\n';
             return;
         }
         std::this_thread::sleep_for(kLook);
