@@ -20,7 +20,7 @@ constexpr double kRounding = 1e-9;  // relative, of a point of the curve
 constexpr double kCovarianceError = 0.02;
 constexpr double kNegligible = 1e-5;  // of every point of the curve
 constexpr int kMostSteps = 60;
-constexpr double kConverged = 1e-5;  // of the logarithm
+constexpr double kLogConverged = 1e-5;  // of the logarithm
 constexpr double kLongestStep = 1.5;
 constexpr double kStep = 1e-4;  // of numerical derivatives
 constexpr double kMostDamping = 1e8;
@@ -152,7 +152,7 @@ TermFit CurveLikelihood::minimise(const TermSet& set, Terms squares, std::size_t
         } else {
             damping *= 10;
         }
-        if (by.cwiseAbs().maxCoeff() < kConverged) break;
+        if (by.cwiseAbs().maxCoeff() < kLogConverged) break;
     }
     TermFit fit{set, squares, {}, here.deviance, free.size()};
     const auto factor = linear_algebra::Cholesky::of(information);
