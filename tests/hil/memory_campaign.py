@@ -15,7 +15,7 @@ import rig as r  # noqa: E402
 
 LIMIT_KB_PER_H = 100
 DWELLS_PER_H = 3600 / 110   # of 100 s, with ramps, settling and slews
-WARM = 60                   # dwells until caches and buffers have their size
+WARM = 140                  # dwells until caches and buffers have their size
 
 
 def resident_kb(rig):
@@ -26,7 +26,7 @@ def resident_kb(rig):
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("programs")
-    options.add_argument("--dwells", type=int, default=240)
+    options.add_argument("--dwells", type=int, default=320)
     given = options.parse_args()
     checks = r.Checks()
     campaign = {"name": "many", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 2]] * (given.dwells // 4),
