@@ -28,7 +28,7 @@ def resident_kb(rig):
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("programs")
-    options.add_argument("--dwells", type=int, default=240)
+    options.add_argument("--dwells", type=int, default=320)
     given = options.parse_args()
     checks = r.Checks()
     campaign = {"name": "many", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 2]] * (given.dwells // 4),
