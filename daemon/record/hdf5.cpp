@@ -109,6 +109,17 @@ Handle access_list() {
     // with what is written already, for hours, in every one of some forty columns.
     constexpr std::size_t kSlots = 521, kBytes = 32 * 1024;
     H5Pset_cache(list.get(), 0, kSlots, kBytes, 1.0);
+    // What stands in it is read again by nobody: it stays as large as it begins.
+    H5AC_cache_config_t metadata{};
+    metadata.version = H5AC__CURR_CACHE_CONFIG_VERSION;
+    if (H5Pget_mdc_config(list.get(), &metadata) >= 0) {
+        metadata.set_initial_size = true;
+        metadata.initial_size = metadata.min_size = metadata.max_size = 1024 * 1024;
+        metadata.incr_mode = H5C_incr__off;
+        metadata.flash_incr_mode = H5C_flash_incr__off;
+        metadata.decr_mode = H5C_decr__off;
+        H5Pset_mdc_config(list.get(), &metadata);
+    }
     return list;
 }
 
