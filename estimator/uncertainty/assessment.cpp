@@ -283,7 +283,7 @@ Assessment assess(const Settings& settings, const Result& result) {
         out.model = settings.drift.model;
         out.times_assumed = table.times_assumed;
         const VectorXd prior = prior_information(settings);
-        const std::array<GyroRates, 3> gyros = gyros_of(table, settings);
+        std::array<GyroRates, 3> gyros = gyros_of(table, settings);
         for (std::size_t j = 0; j < 3; ++j) out.drift[j] = average_drift(gyros[j], settings.drift);
 
         ParameterArray coefficients{};
@@ -299,6 +299,11 @@ Assessment assess(const Settings& settings, const Result& result) {
             declared.col(index(i)) = out.inputs[i].rates;
         const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
         const MatrixXd scaled = declared * MatrixXd(root.matrixL());
+        for (Index k = 0; k < scaled.rows(); ++k) {
+            MatrixXd& of_gyro = gyros[static_cast<std::size_t>(k % 3)].declared;
+            if (k < 3) of_gyro.resize(table.dwells(), scaled.cols());
+            of_gyro.row(k / 3) = scaled.row(k);
+        }
         const NullFit fit(table, scaled, prior);
         out.chi_square = fit.chi_square();
         out.degrees = fit.degrees();

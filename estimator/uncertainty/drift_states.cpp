@@ -324,7 +324,12 @@ DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
 namespace {
 
 double log_likelihood(const GyroRates& gyro, double scatter, double walk) {
-    return Fit(gyro, Kernels(gyro).covariance(gyro, {scatter, walk})).log_likelihood;
+    const Kernels kernels(gyro);
+    const double unit = kernels.s0 * kernels.s0;
+    const MatrixXd declared = gyro.declared.rows() > 0 ? gyro.declared : MatrixXd(gyro.dwells(), 0);
+    return Fit(gyro, drifting(gyro.variance.array() + unit * scatter * scatter, kernels.elapsed,
+                              unit * walk * walk, declared))
+        .log_likelihood;
 }
 
 }  // namespace

@@ -16,6 +16,9 @@ struct GyroRates {
     Eigen::VectorXd prior_information;       ///< 10, 1 over the prior variances; may be 0
     /// Dwells after which the power was off, each a step as likely as not.
     std::vector<std::size_t> breaks;
+    /// What the declared inputs do to the rates, n x m, a standard uncertainty each: no evidence of
+    /// a drift. Only DriftLikelihood looks at it.
+    Eigen::MatrixXd declared;
 
     [[nodiscard]] Eigen::Index dwells() const { return rate.size(); }
 };

@@ -25,7 +25,7 @@ TEST(RatesCovariance, IsThatOfTheDenseMatrices) {
     VectorXd noise(n), elapsed(n);
     MatrixXd columns(n, 2), x(n, 3);
     for (Index i = 0; i < n; ++i) {
-        noise[i] = 1 + 0.5 * normal(random) * normal(random);
+        noise[i] = 0.5 + std::abs(normal(random));
         elapsed[i] = i == 0 ? 0 : elapsed[i - 1] + 0.01 + 0.02 * std::abs(normal(random));
         columns.row(i) << normal(random), 3 * normal(random);
         x.row(i) << 1, normal(random), normal(random);

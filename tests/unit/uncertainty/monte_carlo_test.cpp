@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/uncertainty/leverage.hpp"
@@ -64,10 +65,13 @@ TEST(Leverage, NamesThePartThatShrinksTheSquaresMost) {
     const Clean rig(settings);
     const auto list = leverages(rig.assessed);
     ASSERT_GT(list.size(), 3U);
-    EXPECT_EQ(list[0].input, "accelerometer_gain");
-    EXPECT_EQ(kind_name(list[0].strongest()), std::string("squares"));
-    EXPECT_NE(advice(list[0]).find("gain at the vibration's frequency"), std::string::npos);
-    EXPECT_NE(advice(list[0]).find("not declared"), std::string::npos);
+    const auto best = std::min_element(
+        list.begin(), list.end(),
+        [](const Leverage& a, const Leverage& b) { return a.without[2] < b.without[2]; });
+    EXPECT_EQ(best->input, "accelerometer_gain");
+    EXPECT_EQ(kind_name(best->strongest()), std::string("squares"));
+    EXPECT_NE(advice(*best).find("gain at the vibration's frequency"), std::string::npos);
+    EXPECT_NE(advice(*best).find("not declared"), std::string::npos);
     // Without the gain u of the squares is that of a rig without this input.
     settings.uncertainty.accelerometer_gain.u = 0;
     const Clean without(settings);
@@ -78,7 +82,7 @@ TEST(Leverage, NamesThePartThatShrinksTheSquaresMost) {
         sum += ratio * ratio;
         ++count;
     }
-    EXPECT_NEAR(list[0].without[2], std::sqrt(sum / count), 0.01);
+    EXPECT_NEAR(best->without[2], std::sqrt(sum / count), 0.01);
 }
 
 }  // namespace
