@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "daemon/tool/allan_analysis.hpp"
-#include "daemon/tool/plot/chart.hpp"
 
 namespace vibrig::tool {
 
@@ -52,7 +51,7 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
     }
     chart.curves.push_back(model);
     if (analysis.fit->slow.found && !analysis.fit->slow.determined) {
-        plot::Curve slow{"slow noise, kind not determined", {}, {}, {}, {}, plot::Look::dashed};
+        plot::Curve slow{"slow noise", {}, {}, {}, {}, plot::Look::dashed};
         allan::Terms rest = terms;
         rest[static_cast<std::size_t>(allan::Term::Q)] = 0;
         rest[static_cast<std::size_t>(allan::Term::N)] = 0;
@@ -90,6 +89,8 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
     }
 }
 
+}  // namespace
+
 plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     const std::string name = upper(allan::name_of(analysis.request.statistic));
     plot::Chart chart;
@@ -117,6 +118,8 @@ plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     return chart;
 }
 
+namespace {
+
 /// Borders halfway between neighbours, in the logarithm for tau.
 std::vector<double> borders(const std::vector<double>& centres, bool log) {
     std::vector<double> at;
@@ -132,6 +135,8 @@ std::vector<double> borders(const std::vector<double>& centres, bool log) {
     at.push_back(unfold(fold(centres[n - 1]) + last / 2));
     return at;
 }
+
+}  // namespace
 
 plot::Chart surface_chart(const AllanAnalysis& analysis) {
     plot::Chart chart;
@@ -200,8 +205,6 @@ plot::Chart traces_chart(const AllanAnalysis& analysis) {
     chart.notes.emplace_back("No dot: not detected in that window. Bars: 1 sigma.");
     return chart;
 }
-
-}  // namespace
 
 void allan_plot(const AllanAnalysis& analysis, const std::string& path) {
     const std::filesystem::path where(path);
