@@ -103,11 +103,11 @@ std::vector<std::string> Daemon::check_plan(const configuration::Configuration& 
             "and encoder_zero_deg: a file that states what the encoders show is to be mended");
     // Of a plan file and of an adaptive campaign the forecast tells.
     if (!campaign.stops.empty() || campaign.adaptive) return told;
-    for (auto& line : estimator::plan_warnings(estimator::report_plan(
-             rig,
-             estimator::campaign_plan(rig, campaign.positions_deg, campaign.table_g,
-                                      campaign.dwell_s),
-             drivers::to_seconds(configuration.assembler.sample_period))))
+    for (auto& line : estimator::plan_warnings(
+             estimator::report_plan(rig,
+                                    estimator::campaign_plan(rig, campaign.positions_deg,
+                                                             campaign.table_g, campaign.dwell_s),
+                                    drivers::to_seconds(configuration.assembler.sample_period))))
         told.push_back(std::move(line));
     return told;
 }

@@ -33,7 +33,8 @@ Kinematics::Kinematics(const Settings& settings)
     // The base leans: the north axis points up by the elevation, seen from above the rig's own up
     // axis leans back as much.
     const double ce = std::cos(elevation), se = std::sin(elevation);
-    const double level_north = std::cos(latitude) * std::cos(azimuth), vertical = std::sin(latitude);
+    const double level_north = std::cos(latitude) * std::cos(azimuth),
+                 vertical = std::sin(latitude);
     up_[north] = se;
     up_[up] = settings.up.sign * ce;
     earth_rate_[north] = ce * level_north + se * vertical;

@@ -207,8 +207,8 @@ Identified identify(const record::Campaign& campaign, const estimator::Settings&
         doubts.begin_dwell();
         record::feed(identification, campaign, dwell,
                      [&](std::size_t sample, const estimator::StepResult&) {
-                         doubts.add(rt::measurement_of(campaign.samples[sample],
-                                                       dwell.order->from, dwell.order->zero_g));
+                         doubts.add(rt::measurement_of(campaign.samples[sample], dwell.order->from,
+                                                       dwell.order->zero_g));
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }

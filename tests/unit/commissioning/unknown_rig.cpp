@@ -67,6 +67,13 @@ void UnknownRig::go(plant::Vec3 travel) {
     }
 }
 
+void UnknownRig::stand_up() {
+    for (const double outer : {0.0, 45.0, -45.0, 90.0, -90.0}) {
+        go({outer, 0, 0});
+        if (std::abs(model_.up_at(kRadPerDegree * angle_deg_)[2]) > 0.5) return;
+    }
+}
+
 Vec3 UnknownRig::reading_at(const plant::Vec3& angle_deg) const {
     Vec3 reading{};
     for (std::size_t i = 0; i < 3; ++i) {
