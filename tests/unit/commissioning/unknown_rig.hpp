@@ -54,7 +54,7 @@ class UnknownRig {
     [[nodiscard]] int whose(std::size_t gimbal) const { return channel[gimbal]; }
     [[nodiscard]] bool hardly_responds(std::size_t gimbal, const plant::Vec3& from);
     plant::PlatformModel model_;
-    plant::Vec3 start_deg_{}, angle_deg_{};
+    plant::Vec3 start_deg_{}, angle_deg_{}, asked_{};
 };
 
 }  // namespace vibrig::estimator::commissioning
