@@ -81,9 +81,9 @@ class Gimbal {
     const proto::Signal* counter_signal_ = nullptr;
     GimbalSettings settings_;
     CanPort& port_;
-    std::array<double, 3> target_deg_{};                ///< of the leg under way
-    std::optional<std::array<double, 3>> beyond_deg_;   ///< where it goes on to
-    std::optional<std::array<double, 3>> here_deg_;     ///< where the last slew has ended
+    std::array<double, 3> target_deg_{};               ///< of the leg under way
+    std::optional<std::array<double, 3>> beyond_deg_;  ///< where it goes on to
+    std::optional<std::array<double, 3>> here_deg_;    ///< where the last slew has ended
     Mode mode_ = Mode::free_drift;
     Mode after_ = Mode::slew;  ///< of the last leg
     std::uint8_t counter_ = 0;

@@ -103,8 +103,8 @@ std::vector<DoubtfulAxes> doubtful_axes(const Settings& settings) {
         const std::string gyro(1, "xyz"[j]), key = "platform.gyro_" + gyro + "_axes";
         const int input = axes[0].axis;
         if (input != static_cast<int>(j)) {
-            std::string found = std::string("\"") + (axes[0].sign > 0 ? '+' : '-') + "xyz"[input] +
-                                '"';
+            std::string found =
+                std::string("\"") + (axes[0].sign > 0 ? '+' : '-') + "xyz"[input] + '"';
             if (settings.gyro_axes[static_cast<std::size_t>(input)][0].axis == input)
                 found += std::string(", the input axis of gyro ") + "xyz"[input] + " too";
             doubts.push_back({key + "[0]", found,
@@ -119,8 +119,8 @@ std::vector<DoubtfulAxes> doubtful_axes(const Settings& settings) {
         for (const SignedAxis& axis : axes)
             found += std::string(axis.sign > 0 ? "+" : "-") + "xyz"[axis.axis] + ' ';
         found.back() = ',';
-        doubts.push_back({key, found + " left-handed",
-                          "a right-handed triad: input cross output is spin"});
+        doubts.push_back(
+            {key, found + " left-handed", "a right-handed triad: input cross output is spin"});
     }
     return doubts;
 }

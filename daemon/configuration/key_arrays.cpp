@@ -200,15 +200,15 @@ Key numbers(std::string name, std::string unit, Range range, std::size_t at_most
 
 Key travels(std::string name, std::string doc, At<std::array<std::array<double, 2>, 3>> at) {
     auto read = [name, at](const toml::node& node, Configuration& c, Problems& problems) {
-        const toml::array* rows =
-            read_array(node, name, 3, 3, "ranges [lowest, highest] of outer, inner, azimuth",
-                       problems);
+        const toml::array* rows = read_array(
+            node, name, 3, 3, "ranges [lowest, highest] of outer, inner, azimuth", problems);
         for (std::size_t i = 0; rows != nullptr && i < 3; ++i) {
             const std::string place = element(name, i);
             const toml::array* ends =
                 read_array(*rows->get(i), place, 2, 2, "numbers, lowest and highest", problems);
             if (ends == nullptr) continue;
-            const auto low = read_number(*ends->get(0), element(place, 0), kFullTurn, "deg", problems);
+            const auto low =
+                read_number(*ends->get(0), element(place, 0), kFullTurn, "deg", problems);
             const auto high =
                 read_number(*ends->get(1), element(place, 1), kFullTurn, "deg", problems);
             if (!low || !high) continue;
@@ -228,8 +228,8 @@ Key travels(std::string name, std::string doc, At<std::array<std::array<double, 
                     write_number(ends[1]) + "]";
         return "[" + text + "]";
     };
-    return {std::move(name), "ranges", "deg", "3 x [lowest, highest], -360 to 360", std::move(doc),
-            read, write};
+    return {std::move(name), "ranges", "deg", "3 x [lowest, highest], -360 to 360",
+            std::move(doc),  read,     write};
 }
 
 Key positions(std::string name, std::size_t at_most, std::string doc,

@@ -62,11 +62,12 @@ void CrossCheck::registers_stated() {
         const RegisterType type = role.reg->type;
         const bool words = role.reg->words() == 2;
         const bool own_table = role.reg->table == proto::RegisterTable::holding;
-        for (const auto& [part, needed] :
-             {std::pair{"address", true}, {"type", true}, {"word_order", words},
-              {"scale", role.quantity && type != RegisterType::f32},
-              {"mask", type == RegisterType::bits},
-              {"table", !own_table}})
+        for (const auto& [part, needed] : {std::pair{"address", true},
+                                           {"type", true},
+                                           {"word_order", words},
+                                           {"scale", role.quantity && type != RegisterType::f32},
+                                           {"mask", type == RegisterType::bits},
+                                           {"table", !own_table}})
             if (needed && !stated(part)) miss(key + "." + part);
     }
 }

@@ -37,10 +37,9 @@ proto::Register read_register(Keys& keys, const std::string& role, proto::Regist
 /// What would be written to a controller that is not Vibrig's own must not be Vibrig's own map.
 void insist_on_registers(Keys& keys, bool rig_time) {
     if (keys.boolean("commission.simulated", false) || rig_time) return;
-    for (const char* key :
-         {"shaker.registers.run.address", "shaker.registers.run.type",
-          "shaker.registers.measured_amplitude.address",
-          "shaker.registers.measured_amplitude.type"})
+    for (const char* key : {"shaker.registers.run.address", "shaker.registers.run.type",
+                            "shaker.registers.measured_amplitude.address",
+                            "shaker.registers.measured_amplitude.type"})
         if (!keys.stated(key))
             keys.refuse(key, "nothing",
                         "it stated: Vibrig's own map is for the simulated rig only");

@@ -37,9 +37,9 @@ struct PlanRequest {
     double grid_deg = 0;               ///< candidates every so many deg; 0: the 26 directions
     planning::GimbalLimits limits;
     std::array<bool, 3> limited{};  ///< by `limits`; else by the configuration's travel
-    std::string forbidden;    ///< file of positions
-    double noise_per_g = 0;   ///< noise is hypot(1, this times the level)
-    bool time_costs = false;  ///< compare per time instead of per run
+    std::string forbidden;          ///< file of positions
+    double noise_per_g = 0;         ///< noise is hypot(1, this times the level)
+    bool time_costs = false;        ///< compare per time instead of per run
     std::optional<double> dwell_s, settle_s, ramp_s;
     double slew_deg_per_s = 5;
     std::string order = "travel";  ///< "travel", "balanced", "random", "list"

@@ -2,6 +2,7 @@
 #include "estimator/commissioning/dwell_fit.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 

@@ -21,6 +21,8 @@ constexpr double kDegree = 180 / kPi;
 // at a drawing or a hand's sense weighs (40 : 1), and what is asked of all together.
 constexpr double kMostOdds = 4.6, kSeenOdds = 3.7, kAsked = 6;
 constexpr double kCompassSigma_deg = 15, kCompassBlind_deg = 20;
+// An azimuth axis nearer to the horizontal has no upper end to look from.
+constexpr double kUpright = 0.3;
 constexpr int kUnknown = 15;  // north, east, up; D_F; G by rows
 
 using Normal = Eigen::Matrix<double, kUnknown, kUnknown>;
@@ -85,8 +87,10 @@ std::vector<Witness> hear(const Description& d, const std::optional<EarthRate>& 
     }
     if (said.sense) {
         // d azimuth / dt = -w_z: anticlockwise about an upward z counts down.
-        const bool grows = -d.sign[2] * d.up(said.sense->reading)[2] > 0;
-        witnesses.push_back({"sense", grows == said.sense->grew ? kSeenOdds : -kSeenOdds});
+        const double upright = d.up(said.sense->reading)[2];
+        const bool grows = -d.sign[2] * upright > 0;
+        const double odds = std::abs(upright) < kUpright ? 0 : kSeenOdds;
+        witnesses.push_back({"sense", grows == said.sense->grew ? odds : -odds});
     }
     return witnesses;
 }

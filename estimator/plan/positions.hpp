@@ -21,8 +21,8 @@ namespace vibrig::estimator::plan {
 /// Faces, edges and corners of the cube: 6 + 12 + 8 unit vectors.
 [[nodiscard]] std::vector<Vec3> cube_directions();
 
-/// What the gimbals may do, all in deg; the inner gimbal's angle never exceeds 80 deg. A limit holds for the angle in (-180, 180] as well as for
-/// the same angle a turn further.
+/// What the gimbals may do, all in deg; the inner gimbal's angle never exceeds 80 deg. A limit
+/// holds for the angle in (-180, 180] as well as for the same angle a turn further.
 struct GimbalLimits {
     Vec3 low{-360, -360, -360};
     Vec3 high{360, 360, 360};

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 
@@ -132,6 +133,7 @@ TEST(Earth, OneWitnessOfParityNeverSuffices) {
     const auto drifts = rig.drifts(named);
     const double latitude = rig.truth.latitude_deg;
     ASSERT_GT(std::abs(latitude), 20) << "of this seed";
+    rig.stand_up();
     const Statements::Sense sense{rig.look().reading, rig.grows_anticlockwise()};
     // WHEN only one thing is known THEN it is undecided
     for (const Statements& said :

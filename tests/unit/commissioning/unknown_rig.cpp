@@ -60,10 +60,19 @@ UnknownRig::UnknownRig(std::uint64_t seed) : random(seed, 5), model_(truth = dra
 
 void UnknownRig::go(plant::Vec3 travel) {
     for (std::size_t i = 0; i < 3; ++i) {
-        if (stuck == i) continue;
+        // A hand that turns one gimbal leaves the others where they are.
+        if (stuck == i || travel[i] == asked_[i]) continue;
+        asked_[i] = travel[i];
         if (by_hand && travel[i] != 0) travel[i] += 8 * (2 * random.uniform() - 1);
         travel[i] = std::clamp(travel[i], -travel_deg[i], travel_deg[i]);
         angle_deg_[i] = start_deg_[i] + direction[i] * travel[i];
+    }
+}
+
+void UnknownRig::stand_up() {
+    for (const double outer : {0.0, 45.0, -45.0, 90.0, -90.0}) {
+        go({outer, 0, 0});
+        if (std::abs(model_.up_at(kRadPerDegree * angle_deg_)[2]) > 0.5) return;
     }
 }
 

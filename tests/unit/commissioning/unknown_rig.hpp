@@ -33,6 +33,8 @@ class UnknownRig {
     /// To a travel from the start, deg; beyond the limits it is scaled into them, and what is stuck
     /// stays.
     void go(plant::Vec3 travel);
+    /// To where the azimuth axis has an upper end.
+    void stand_up();
     [[nodiscard]] Stop look(int swept = -1);
     [[nodiscard]] FreeDrift drift();
     /// The whole sequence of look, moves, sweeps and common positions.
@@ -52,7 +54,7 @@ class UnknownRig {
     [[nodiscard]] int whose(std::size_t gimbal) const { return channel[gimbal]; }
     [[nodiscard]] bool hardly_responds(std::size_t gimbal, const plant::Vec3& from);
     plant::PlatformModel model_;
-    plant::Vec3 start_deg_{}, angle_deg_{};
+    plant::Vec3 start_deg_{}, angle_deg_{}, asked_{};
 };
 
 }  // namespace vibrig::estimator::commissioning

@@ -122,8 +122,9 @@ TEST(GuardSettings, WithoutASocketThereIsNothingToMeetAt) {
 TEST(GuardSettings, NeverWritesItsOwnMapToAForeignController) {
     const std::string real = "guard.socket = \"/run/guard.sock\"\n";
     const auto said = refusal(real);
-    EXPECT_NE(said.find("shaker.registers.run.address: found nothing (default), expected it stated"),
-              std::string::npos)
+    EXPECT_NE(
+        said.find("shaker.registers.run.address: found nothing (default), expected it stated"),
+        std::string::npos)
         << said;
     const std::string half = "[shaker.registers]\nrun = { address = 30, type = \"u16\" }\n";
     EXPECT_NE(refusal(real + half).find("measured_amplitude.address"), std::string::npos);

@@ -37,8 +37,7 @@ class WrongKeys : public ::testing::TestWithParam<WrongKey> {
     /// Exit code and all warnings of an identification.
     static std::pair<int, std::string> identify(const std::string& configuration) {
         std::ofstream(folder_ / "rig.toml") << configuration;
-        const int code =
-            run(std::string(VIBRIG) + " identify rec.csv --config rig.toml --json");
+        const int code = run(std::string(VIBRIG) + " identify rec.csv --config rig.toml --json");
         std::ostringstream text;
         text << std::ifstream(folder_ / "out").rdbuf();
         std::string warnings;
@@ -59,27 +58,28 @@ TEST_P(WrongKeys, AreSuspectedAndTheExitCodeSaysNo) {
 
 INSTANTIATE_TEST_SUITE_P(
     Each, WrongKeys,
-    ::testing::Values(
-        WrongKey{"InnerSign", "platform.encoder_sign = [1, -1, 1]",
-                 "platform.encoder_sign: 1 instead of -1 of the inner"},
-        WrongKey{"OuterSign", "platform.encoder_sign = [-1, 1, 1]",
-                 "platform.encoder_sign: 1 instead of -1 of the outer"},
-        WrongKey{"AzimuthSign", "platform.encoder_sign = [1, 1, -1]",
-                 "platform.encoder_sign: 1 instead of -1 of the azimuth"},
-        WrongKey{"OuterZero", "platform.encoder_zero_deg = [5, 0, 0]",
-                 "instead of 5 of the outer gimbal"},
-        WrongKey{"InnerZero", "platform.encoder_zero_deg = [0, 5, 0]",
-                 "instead of 5 of the inner gimbal"},
-        WrongKey{"AzimuthZero", "platform.encoder_zero_deg = [0, 0, 5]",
-                 "instead of 5 of the azimuth gimbal"},
-        WrongKey{"Swapped", "accelerometer.matrix = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]",
-                 "accelerometer.matrix: x, y, z are +y, +x, +z"},
-        WrongKey{"Inverted", "accelerometer.matrix = [[-1, 0, 0], [0, -1, 0], [0, 0, -1]]",
-                 "accelerometer.matrix: x, y, z are -x, -y, -z"},
-        WrongKey{"LatitudeSign", "site.latitude_deg = -45.75",
-                 "site.latitude_deg: 45.75 instead of -45.75"},
-        WrongKey{"Azimuth", "site.azimuth_deg = 90", "site.azimuth_deg: "},
-        WrongKey{"Elevation", "site.elevation_deg = 1.5", "site.elevation_deg: 0.0"}),
+    ::testing::Values(WrongKey{"InnerSign", "platform.encoder_sign = [1, -1, 1]",
+                               "platform.encoder_sign: 1 instead of -1 of the inner"},
+                      WrongKey{"OuterSign", "platform.encoder_sign = [-1, 1, 1]",
+                               "platform.encoder_sign: 1 instead of -1 of the outer"},
+                      WrongKey{"AzimuthSign", "platform.encoder_sign = [1, 1, -1]",
+                               "platform.encoder_sign: 1 instead of -1 of the azimuth"},
+                      WrongKey{"OuterZero", "platform.encoder_zero_deg = [5, 0, 0]",
+                               "instead of 5 of the outer gimbal"},
+                      WrongKey{"InnerZero", "platform.encoder_zero_deg = [0, 5, 0]",
+                               "instead of 5 of the inner gimbal"},
+                      WrongKey{"AzimuthZero", "platform.encoder_zero_deg = [0, 0, 5]",
+                               "instead of 5 of the azimuth gimbal"},
+                      WrongKey{"Swapped",
+                               "accelerometer.matrix = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]",
+                               "accelerometer.matrix: x, y, z are +y, +x, +z"},
+                      WrongKey{"Inverted",
+                               "accelerometer.matrix = [[-1, 0, 0], [0, -1, 0], [0, 0, -1]]",
+                               "accelerometer.matrix: x, y, z are -x, -y, -z"},
+                      WrongKey{"LatitudeSign", "site.latitude_deg = -45.75",
+                               "site.latitude_deg: 45.75 instead of -45.75"},
+                      WrongKey{"Azimuth", "site.azimuth_deg = 90", "site.azimuth_deg: "},
+                      WrongKey{"Elevation", "site.elevation_deg = 1.5", "site.elevation_deg: 0.0"}),
     [](const auto& wrong) { return std::string(wrong.param.name); });
 
 class RightKeys : public WrongKeys {};
