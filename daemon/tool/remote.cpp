@@ -134,7 +134,8 @@ void show_signed_record(serve::Client& client, const std::string& before) {
         const auto journal = ask_status(client).journal();
         if (journal.path().empty()) return;
         if (!journal.proof_head().empty() && journal.proof_head() != before) {
-            std::cout << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine) << '\n';
+            std::cout << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine)
+                      << '\n';
             return;
         }
         std::this_thread::sleep_for(kLook);
