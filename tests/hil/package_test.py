@@ -453,7 +453,7 @@ def main():
         installs_below_a_prefix(checks, build, folder)
         packages = [package(checks, build, folder, version) for version in VERSIONS]
         is_complete(checks, packages[0])
-        limit = 14000 if soak else 240
+        limit = 14000 if soak else 330
         run = subprocess.run([os.path.join(HERE, "run-in-uml"), "--systemd", "-t", str(limit), "--", os.path.abspath(__file__),
                               programs, "--inside", *packages, *(["--soak"] if soak else [])], stdin=subprocess.DEVNULL,
                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False,
