@@ -135,6 +135,12 @@ void decide(GravityFinding& finding, const GravitySettings& s) {
 GravityFinding find_by_gravity(const std::vector<Stop>& stops, const GravitySettings& settings) {
     check_stops(stops);
     GravityFinding finding;
+    // First: of a gimbal that is stuck an accelerometer may see nothing, and is not dead.
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+        if (!stands_still(stops, channel)) continue;
+        finding.why = words("angle channel %zu does not move: its gimbal is stuck", channel + 1);
+        return finding;
+    }
     if (auto dead = dead_channel(stops, settings.dead_g); !dead.empty()) {
         finding.verdict = Verdict::refused;
         finding.why = std::move(dead);
@@ -143,12 +149,9 @@ GravityFinding find_by_gravity(const std::vector<Stop>& stops, const GravitySett
     for (std::size_t channel = 0; channel < 3; ++channel) {
         const auto sweep = sweep_of(stops, channel);
         if (std::max({spread(sweep, 0), spread(sweep, 1), spread(sweep, 2)}) < settings.dead_g) {
-            const bool still = stands_still(stops, channel);
-            finding.verdict = still ? Verdict::undecided : Verdict::refused;
-            finding.why =
-                words(still ? "angle channel %zu does not move: its gimbal is stuck"
-                            : "gravity does not respond to angle channel %zu: its axis is upright",
-                      channel + 1);
+            finding.verdict = Verdict::refused;
+            finding.why = words(
+                "gravity does not respond to angle channel %zu: its axis is upright", channel + 1);
             return finding;
         }
         const auto scores = unit_scores(sweep, channel);
