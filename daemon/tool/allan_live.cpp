@@ -16,9 +16,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kLongestLine = 4096;
+constexpr std::size_t kLongestReading = 4096;
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks(std::string_view text) {
     const std::size_t first = text.find_first_not_of(" \t\r");
     if (first == std::string_view::npos) return {};
     return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
@@ -26,10 +26,10 @@ std::string_view trimmed(std::string_view text) {
 
 /// One number; an empty line and "nan" are a missing sample.
 double sample_of(std::string_view line, std::size_t number) {
-    const std::string_view text = trimmed(line);
+    const std::string_view text = without_blanks(line);
     if (text.empty() || text == "nan" || text == "NaN" || text == "NA") return kNaN;
     double value = 0;
-    if (text.size() > kLongestLine || !proto::read_number(text, value) ||
+    if (text.size() > kLongestReading || !proto::read_number(text, value) ||
         !(std::abs(value) <= kLargestValue)) {
         throw std::runtime_error("standard input:" + std::to_string(number) + ": found '" +
                                  proto::printable(text.substr(0, 60)) +

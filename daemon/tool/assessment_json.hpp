@@ -8,7 +8,7 @@
 namespace vibrig::tool {
 
 /// null for what is no number.
-[[nodiscard]] inline nlohmann::ordered_json number(double value) {
+[[nodiscard]] inline nlohmann::ordered_json number_or_null(double value) {
     return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
 }
 

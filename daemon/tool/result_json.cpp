@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 using estimator::kParameters;
 namespace uncertainty = estimator::uncertainty;
 
-Json number_if(bool exists, double value) { return exists ? number(value) : Json(nullptr); }
+Json number_if(bool exists, double value) { return exists ? number_or_null(value) : Json(nullptr); }
 
 Json parameters(const estimator::Result& result, const uncertainty::Assessment& assessed,
                 const uncertainty::MonteCarlo* drawn) {
@@ -34,7 +34,7 @@ Json parameters(const estimator::Result& result, const uncertainty::Assessment& 
             one.update(coefficient_json(of));
             if (drawn != nullptr) {
                 const auto& interval = drawn->coefficients[i];
-                one["interval"] = {number(interval.low), number(interval.high)};
+                one["interval"] = {number_or_null(interval.low), number_or_null(interval.high)};
                 one["gum_confirmed"] = interval.confirmed;
             }
         }
@@ -60,8 +60,8 @@ Json amplitudes(const estimator::Result& result) {
     Json list = Json::array();
     for (const estimator::RunAmplitude& run : result.amplitudes) {
         list.push_back({{"run", run.run},
-                        {"amplitude_g", number(run.amplitude_g)},
-                        {"kappa", number(run.kappa)},
+                        {"amplitude_g", number_or_null(run.amplitude_g)},
+                        {"kappa", number_or_null(run.kappa)},
                         {"sigma_g", number_if(run.sigma_g > 0, run.sigma_g)},
                         // A table at rest has no frequency.
                         {"frequency_hz", number_if(run.frequency_hz > 0, run.frequency_hz)}});
@@ -74,11 +74,11 @@ Json combinations(const estimator::Result& result) {
     for (const estimator::Combination& combination : result.combinations) {
         Json weights = Json::object();
         for (const auto& [name, weight] : combination.weights) {
-            weights[name] = number(weight);
+            weights[name] = number_or_null(weight);
         }
         list.push_back({{"weights", std::move(weights)},
-                        {"value", number(combination.value)},
-                        {"sigma", number(combination.sigma)}});
+                        {"value", number_or_null(combination.value)},
+                        {"sigma", number_or_null(combination.sigma)}});
     }
     return list;
 }
@@ -98,11 +98,12 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
     root["rejected"] = result.rejected;
     root["warnings"] = result.warnings;
     const estimator::CrossCheck& check = result.cross_check;
-    root["cross_check"] = check.done ? Json{{"largest_difference_sigma", number(check.largest)},
-                                            {"coefficient", check.coefficient},
-                                            {"limit_sigma", estimator::CrossCheck::kLimit},
-                                            {"agrees", check.agrees()}}
-                                     : Json(nullptr);
+    root["cross_check"] = check.done
+                              ? Json{{"largest_difference_sigma", number_or_null(check.largest)},
+                                     {"coefficient", check.coefficient},
+                                     {"limit_sigma", estimator::CrossCheck::kLimit},
+                                     {"agrees", check.agrees()}}
+                              : Json(nullptr);
     if (!assessed.verdict.sentence.empty()) root.update(assessment_json(assessed));
     if (drawn != nullptr) root["monte_carlo"] = monte_carlo_json(*drawn);
     root["instruction_set"] = estimator::instruction_set();

@@ -34,9 +34,9 @@ Json leverage_json(const uncertainty::Assessment& assessed) {
     for (const uncertainty::Leverage& of : uncertainty::leverages(assessed)) {
         Json without = Json::object();
         for (std::size_t k = 0; k < uncertainty::kKinds; ++k)
-            without[uncertainty::kind_name(k)] = number(of.without[k]);
+            without[uncertainty::kind_name(k)] = number_or_null(of.without[k]);
         list.push_back({{"input", of.input},
-                        {"u", number(of.u)},
+                        {"u", number_or_null(of.u)},
                         {"declared", of.declared},
                         {"u_ratio_without", std::move(without)},
                         {"remedy", of.remedy()}});
@@ -50,12 +50,12 @@ std::string budget_json(const Identified& of, const uncertainty::MonteCarlo* dra
         const auto& c = of.assessed.coefficients[i];
         Json one{{"name", estimator::parameter_names()[i]},
                  {"unit", estimator::parameter_unit(i)},
-                 {"value", number(c.value)},
-                 {"sigma", number(c.sigma)}};
+                 {"value", number_or_null(c.value)},
+                 {"sigma", number_or_null(c.sigma)}};
         one.update(coefficient_json(c));
         if (drawn != nullptr)
-            one["interval"] = {number(drawn->coefficients[i].low),
-                               number(drawn->coefficients[i].high)};
+            one["interval"] = {number_or_null(drawn->coefficients[i].low),
+                               number_or_null(drawn->coefficients[i].high)};
         list.push_back(std::move(one));
     }
     Json out{{"coefficients", std::move(list)}, {"leverage", leverage_json(of.assessed)}};

@@ -62,13 +62,14 @@ std::vector<int> places(Index first, Index last) {
 }
 
 void add_slow(std::vector<Weighted>& list) {
-    static const std::vector<double> kScatter{0, 1, 2, 4, 8, 16}, kWalk{0, 2, 4, 8, 16, 32},
-        kTrend{0, 4, 16};
-    for (const double a : kScatter) {
-        for (const double b : kWalk) {
-            for (const double c : kTrend) {
-                list.push_back(
-                    {{a, b, c}, 0.85 * share(a, kScatter) * share(b, kWalk) * share(c, kTrend)});
+    static const std::vector<double> kScatterSizes{0, 1, 2, 4, 8, 16},
+        kWalkSizes{0, 2, 4, 8, 16, 32}, kTrendSizes{0, 4, 16};
+    for (const double a : kScatterSizes) {
+        for (const double b : kWalkSizes) {
+            for (const double c : kTrendSizes) {
+                list.push_back({{a, b, c},
+                                0.85 * share(a, kScatterSizes) * share(b, kWalkSizes) *
+                                    share(c, kTrendSizes)});
             }
         }
     }

@@ -186,6 +186,7 @@ StatusData full_status() {
                         10,
                         1,
                         18.9,
+                        estimator::kVertical,
                         5.98,
                         15.0,
                         1.001,
