@@ -225,15 +225,23 @@ TEST(Readiness, NamesWhatIsNotWell) {
                  [](StatusData& s) { s.server.certificates[0].expires = 1'700'000'000; }},
              Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
              Row{"journal: disk full",
-                 [](StatusData& s) { s.journal = {"j", false, "disk full", 0, 0, 0}; }},
+                 [](StatusData& s) {
+                     s.journal = {};
+                     s.journal.path = "j";
+                     s.journal.note = "disk full";
+                 }},
              Row{"journal: being verified, 34 % done",
                  [](StatusData& s) {
-                     s.journal = {"j", true, "", 0, 0, 0};
+                     s.journal = {};
+                     s.journal.path = "j";
+                     s.journal.running = true;
                      s.journal.verified_part = 0.34;
                  }},
              Row{"journal: event 2 was changed: vibrig ack journal",
                  [](StatusData& s) {
-                     s.journal = {"j", true, "", 0, 0, 0};
+                     s.journal = {};
+                     s.journal.path = "j";
+                     s.journal.running = true;
                      s.journal.verified = true;
                      s.interlock.latches = {{"journal", "event 2 was changed", "", "", false, 0}};
                  }},
