@@ -1,5 +1,7 @@
 #include "daemon/report/conditions_section.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -60,6 +62,25 @@ void add_conditions(Page& page, const record::Campaign& campaign) {
         curve("measured by the controller", Look::dots,
               [](const auto& r) { return r.measured_g; })};
     page.figure(shaker.svg(), "Once a second.");
+}
+
+void add_zeros(Page& page, const record::Campaign& campaign) {
+    std::vector<std::vector<std::string>> rows{
+        {"from run, position", "zero x mg", "y", "z", "vertical uncertain by, ppm"}};
+    const record::Order* before = nullptr;
+    for (const auto& order : campaign.orders) {
+        const bool none = order.zero_g == std::array<double, 3>{};
+        if (order.cancel || (before == nullptr ? none : before->zero_g == order.zero_g)) continue;
+        rows.push_back({fmt::format("{}, {}", order.run, order.position),
+                        fmt::format("{:.4f}", 1e3 * order.zero_g[0]),
+                        fmt::format("{:.4f}", 1e3 * order.zero_g[1]),
+                        fmt::format("{:.4f}", 1e3 * order.zero_g[2]),
+                        fmt::format("{:.1f}", 1e6 * order.level_sigma_g)});
+        before = &order;
+    }
+    if (rows.size() == 1) return page.paragraph("None were taken in place.");
+    page.paragraph("Taken in place, on top of them, and subtracted from every sample since:");
+    page.table(rows);
 }
 
 }  // namespace vibrig::report

@@ -461,24 +461,6 @@ void add_noise(Page& page, const Campaign& campaign, const Analysis& a) {
     page.paragraph(fmt::format("Alarms of the noise monitor: {}.", alarms));
 }
 
-/// Zeros taken in place, where they changed.
-void add_zeros(Page& page, const Campaign& campaign) {
-    std::vector<std::vector<std::string>> rows{
-        {"from run, position", "zero x mg", "y", "z", "vertical uncertain by, ppm"}};
-    const record::Order* before = nullptr;
-    for (const auto& order : campaign.orders) {
-        const bool none = order.zero_g == std::array<double, 3>{};
-        if (order.cancel || (before == nullptr ? none : before->zero_g == order.zero_g)) continue;
-        rows.push_back({fmt::format("{}, {}", order.run, order.position),
-                        num(1e3 * order.zero_g[0], 4), num(1e3 * order.zero_g[1], 4),
-                        num(1e3 * order.zero_g[2], 4), num(1e6 * order.level_sigma_g, 1)});
-        before = &order;
-    }
-    if (rows.size() == 1) return page.paragraph("None were taken in place.");
-    page.paragraph("Taken in place, on top of them, and subtracted from every sample since:");
-    page.table(rows);
-}
-
 void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
               const std::optional<Earlier>& earlier) {
     page.section("accelerometers", "Levelling and accelerometer zeros");

@@ -35,6 +35,24 @@ void fill_annunciator(v1::Annunciator& out, const drivers::AnnunciatorStatus& an
 
 }  // namespace
 
+void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
+    out.set_broker(mend_utf8(mqtt.broker));
+    out.set_connected(mqtt.connected);
+    out.set_note(mend_utf8(mqtt.note));
+    out.set_connections(mqtt.connections);
+    out.set_births(mqtt.births);
+    out.set_messages(mqtt.messages);
+    out.set_left_out(mqtt.left_out);
+}
+
+void fill(v1::Log& out, const LogStatus& log) {
+    out.set_taken(log.taken);
+    out.set_written(log.written);
+    out.set_dropped(log.dropped);
+    out.set_waiting(log.waiting);
+    out.set_blocked(log.blocked);
+}
+
 void fill_outside(v1::Status& out, const StatusData& status) {
     if (!status.guard.socket.empty()) fill_guard(*out.mutable_guard(), status.guard);
     if (status.annunciator.horn || status.annunciator.command)

@@ -69,24 +69,6 @@ void fill(v1::RealTime& out, const RealTimeStatus& real_time) {
     for (const std::string& what : real_time.missing) out.add_missing(mend_utf8(what));
 }
 
-void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
-    out.set_broker(mend_utf8(mqtt.broker));
-    out.set_connected(mqtt.connected);
-    out.set_note(mend_utf8(mqtt.note));
-    out.set_connections(mqtt.connections);
-    out.set_births(mqtt.births);
-    out.set_messages(mqtt.messages);
-    out.set_left_out(mqtt.left_out);
-}
-
-void fill(v1::Log& out, const LogStatus& log) {
-    out.set_taken(log.taken);
-    out.set_written(log.written);
-    out.set_dropped(log.dropped);
-    out.set_waiting(log.waiting);
-    out.set_blocked(log.blocked);
-}
-
 void fill(v1::Server& out, const ServerStatus& server, std::int64_t utc_ns) {
     for (const ServerStatus::Door& door : server.doors) {
         v1::Server::Door& to = *out.add_doors();

@@ -9,6 +9,8 @@
 namespace vibrig::v1 {
 class Campaign;
 class Event;
+class Log;
+class Mqtt;
 class Parameters;
 class Plan;
 class Status;
@@ -19,6 +21,8 @@ class Status;
 namespace vibrig::serve {
 
 void fill(v1::Status& out, const StatusData& status);
+void fill(v1::Log& out, const LogStatus& log);
+void fill(v1::Mqtt& out, const MqttStatus& mqtt);
 /// Part of it: guard and annunciator, where they are configured.
 void fill_outside(v1::Status& out, const StatusData& status);
 /// Likewise of the newest loop check and safe-state proof.
