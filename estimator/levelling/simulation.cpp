@@ -6,19 +6,6 @@
 
 namespace vibrig::estimator::levelling {
 
-namespace {
-
-Pair acceleration_at(const Scenario& scenario, double time_s) noexcept {
-    Pair sum{};
-    for (const Manoeuvre& m : scenario.motion) {
-        if (time_s < m.from_s || time_s >= m.until_s) continue;
-        for (std::size_t i = 0; i < 2; ++i) sum[i] += m.acceleration_mps2[i];
-    }
-    return sum;
-}
-
-}  // namespace
-
 double SimulatedStart::last_above(double fraction) const noexcept {
     if (trace.empty()) {
         return 0;
@@ -51,10 +38,9 @@ SimulatedStart simulate(const Scenario& scenario) {
     Leveller leveller(loop);
     std::array<ConventionalNetwork, 2> conventional{ConventionalNetwork(loop.earth),
                                                     ConventionalNetwork(loop.earth)};
-    std::array<FastNetwork, 2> plain{FastNetwork(loop.earth), FastNetwork(loop.earth)};
+    std::array<FastNetwork, 2> undamped{FastNetwork(loop.earth), FastNetwork(loop.earth)};
     SimulatedStart result;
     Pair tilt = scenario.tilt;
-    Pair velocity{};
     const auto steps = static_cast<std::size_t>(std::llround(scenario.duration_s / t));
     if (!scenario.until_settled) {
         result.trace.reserve(steps);
@@ -67,28 +53,25 @@ SimulatedStart simulate(const Scenario& scenario) {
             for (std::size_t i = 0; i < 2; ++i) tilt[i] += scenario.step[i];
         }
         LevelInput input;
-        const Pair acceleration = acceleration_at(scenario, now);
         for (std::size_t i = 0; i < 2; ++i) {
-            input.force[i] = acceleration[i] + loop.earth.gravity_mps2 * tilt[i] +
-                             scenario.zero[i] + loop.noise.accelerometer_mps2 * normal(generator);
-            const double error =
+            input.force[i] = loop.earth.gravity_mps2 * tilt[i] + scenario.zero[i] +
+                             loop.noise.accelerometer_mps2 * normal(generator);
+            input.reference[i] =
                 (now >= scenario.reference_error_s ? scenario.reference_error[i] : 0) +
                 loop.noise.reference_mps * normal(generator);
-            input.reference[i] = scenario.internal ? 0 : velocity[i] + error;
         }
         for (std::size_t i = 0; k == 0 && i < 2; ++i) {
             conventional[i].start(input.reference[i]);
-            plain[i].start(input.reference[i]);
+            undamped[i].start(input.reference[i]);
         }
         Pair rate{};
         if (scenario.network == Network::fast) {
             rate = leveller.step(input).rate;
         } else {
             for (std::size_t i = 0; i < 2; ++i) {
-                const Gains gains = scenario.network == Network::bare ? loop.fast : Gains{};
                 rate[i] = scenario.network == Network::conventional
                               ? conventional[i].step(input.force[i], input.reference[i], t)
-                              : plain[i].step(input.force[i], input.reference[i], gains, t);
+                              : undamped[i].step(input.force[i], input.reference[i], {}, t);
             }
         }
         if (!scenario.until_settled) {
@@ -102,10 +85,8 @@ SimulatedStart simulate(const Scenario& scenario) {
             }
         }
         for (std::size_t i = 0; i < 2; ++i) {
-            // The vertical of the carrier's place turns with its way.
-            tilt[i] += t * (scenario.drift[i] - rate[i] + velocity[i] / loop.earth.radius_m) +
+            tilt[i] += t * (scenario.drift[i] - rate[i]) +
                        loop.noise.gyro_random_walk * std::sqrt(t) * normal(generator);
-            velocity[i] += t * acceleration[i];
         }
     }
     result.verdict = leveller.verdict();
