@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tool/plot/chart.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/monitor.hpp"
 
@@ -31,7 +30,6 @@ struct AllanRequest {
     bool fit = false;
     double window_s = 0;  ///< 0: not dynamic
     double overlap = 0.5;
-    allan::WindowShape shape = allan::WindowShape::rectangular;
     allan::MeanMode mode = allan::MeanMode::corrected;
     double known_mean = 0;  ///< deg/h
     double alpha = 1e-3;
@@ -64,19 +62,9 @@ struct AllanAnalysis {
 
 /// Reads and analyses. Throws std::exception with what to tell the user.
 [[nodiscard]] AllanAnalysis analyse(const AllanRequest& request);
-/// Windows of rates that come on standard input, one a line: each is printed when it is complete.
-/// True if one was refused or raised an alarm. Throws as above.
-[[nodiscard]] bool allan_live(const AllanRequest& request, bool json);
-/// 1 arcsec/s is 1 deg/h. Throws for a unit that is none.
-[[nodiscard]] double to_deg_per_hour(const std::string& unit, bool phase);
-[[nodiscard]] allan::DynamicSettings dynamic_settings(const AllanRequest& request);
 
 [[nodiscard]] std::string allan_table(const AllanAnalysis& analysis);
 [[nodiscard]] std::string allan_json(const AllanAnalysis& analysis);
-[[nodiscard]] plot::Chart deviation_chart(const AllanAnalysis& analysis);
-/// Time, tau, deviation of the windows.
-[[nodiscard]] plot::Chart surface_chart(const AllanAnalysis& analysis);
-[[nodiscard]] plot::Chart traces_chart(const AllanAnalysis& analysis);
 /// An SVG file, or every chart in a folder when `path` does not end in ".svg".
 void allan_plot(const AllanAnalysis& analysis, const std::string& path);
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "daemon/tool/allan_analysis.hpp"
+#include "daemon/tool/plot/chart.hpp"
 
 namespace vibrig::tool {
 
@@ -89,8 +90,6 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
     }
 }
 
-}  // namespace
-
 plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     const std::string name = upper(allan::name_of(analysis.request.statistic));
     plot::Chart chart;
@@ -118,8 +117,6 @@ plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     return chart;
 }
 
-namespace {
-
 /// Borders halfway between neighbours, in the logarithm for tau.
 std::vector<double> borders(const std::vector<double>& centres, bool log) {
     std::vector<double> at;
@@ -135,8 +132,6 @@ std::vector<double> borders(const std::vector<double>& centres, bool log) {
     at.push_back(unfold(fold(centres[n - 1]) + last / 2));
     return at;
 }
-
-}  // namespace
 
 plot::Chart surface_chart(const AllanAnalysis& analysis) {
     plot::Chart chart;
@@ -205,6 +200,8 @@ plot::Chart traces_chart(const AllanAnalysis& analysis) {
     chart.notes.emplace_back("No dot: not detected in that window. Bars: 1 sigma.");
     return chart;
 }
+
+}  // namespace
 
 void allan_plot(const AllanAnalysis& analysis, const std::string& path) {
     const std::filesystem::path where(path);

@@ -88,8 +88,8 @@ WindowRow DynamicAllan::row() const {
     const double centre = settings_.mode == MeanMode::known_mean ? settings_.known_mean : row.mean;
     std::vector<ClassicalPoint> classical;
     for (std::size_t k = 0; k < factors.size(); ++k) {
-        row.allan.push_back(near_.allan(k, settings_.shape));
-        row.share.push_back(near_.share(k) * share_of(settings_.shape));
+        row.allan.push_back(near_.allan(k));
+        row.share.push_back(near_.share(k));
         const double tau = static_cast<double>(factors[k]) * tau0;
         if (settings_.mode == MeanMode::corrected) {
             const SlidingVariance::Tiled tiled = near_.tiled(k);

@@ -25,7 +25,6 @@ StationarityMonitor::StationarityMonitor(const MonitorSettings& settings,
                                          const DynamicAllan& dynamic)
     : settings_(settings),
       covariance_(dynamic.covariance()),
-      window_share_(share_of(dynamic.settings().shape)),
       tau0_(dynamic.settings().tau0),
       window_(dynamic.settings().window),
       back_(std::max<std::size_t>(
@@ -62,9 +61,8 @@ void StationarityMonitor::set_bounds(const Terms& terms, double reference_window
         Octave& octave = octaves_[i];
         const double mean = model_variance(terms, static_cast<double>(octave.m) * tau0_);
         // A ramp alone does not vary at all; half the window is what any noise has at least.
-        const double degrees =
-            std::clamp(window_share_ * 2 * mean * mean / spread[static_cast<Eigen::Index>(i)], 0.5,
-                       static_cast<double>(window_));
+        const double degrees = std::clamp(2 * mean * mean / spread[static_cast<Eigen::Index>(i)],
+                                          0.5, static_cast<double>(window_));
         if (reference_windows > 0) {
             octave.low = f_quantile(tail, degrees, degrees * reference_windows);
             octave.high = f_quantile(1 - tail, degrees, degrees * reference_windows);
@@ -90,8 +88,8 @@ void StationarityMonitor::learn(const WindowRow& row) {
             octave.reference += lesson.allan[octave.k] / n;
         }
         if (octave.reference > 0) {
-            curve.push_back({static_cast<double>(octave.m) * tau0_, octave.m, octave.reference,
-                             windows * window_share_});
+            curve.push_back(
+                {static_cast<double>(octave.m) * tau0_, octave.m, octave.reference, windows});
         }
     }
     lessons_.clear();

@@ -65,7 +65,6 @@ class StationarityMonitor {
 
     MonitorSettings settings_;
     CurveCovariance covariance_;
-    double window_share_;  ///< of the degrees of freedom, by the window's shape
     double tau0_;
     std::size_t window_;
     std::size_t back_;  ///< rows from one window to the adjacent one

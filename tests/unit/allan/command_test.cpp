@@ -247,29 +247,6 @@ TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     expect_refusal("allan ok.txt --tau0 1 --plot none/x.svg", {"none/x.svg"});
 }
 
-TEST_F(AllanCommand, LivePrintsWindowsAsTheyComplete) {
-    write("louder.txt", noise(6000, 0.06) + noise(2000, 0.12));
-    ASSERT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live --json <louder.txt"), 1) << error;
-    std::istringstream lines(out);
-    std::vector<Json> rows;
-    for (std::string line; std::getline(lines, line);) rows.push_back(Json::parse(line));
-    // The same windows as from a file
-    ASSERT_EQ(vibrig("allan louder.txt --tau0 1 --dynamic 500 --json"), 1) << error;
-    const Json whole = Json::parse(out)["dynamic"]["rows"];
-    ASSERT_EQ(rows.size(), whole.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        EXPECT_EQ(rows[i]["dev"], whole[i]["dev"]);
-        EXPECT_EQ(rows[i]["alarms"], whole[i]["alarms"]);
-    }
-    EXPECT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live --shape hann <louder.txt"), 1);
-    write("word.txt", "1\n2\nthree\n");
-    expect_refusal("allan - --tau0 1 --dynamic 500 --live <word.txt",
-                   {"standard input:3", "'three'", "expected a number"});
-    expect_refusal("allan - --tau0 1 --dynamic 500 --live", {"0 samples came", "500"});
-    expect_refusal("allan word.txt --tau0 1 --dynamic 500 --live", {"--live", "standard input"});
-    expect_refusal("allan - --tau0 1 --dynamic 500 --shape square --live", {"--shape", "square"});
-}
-
 TEST_F(AllanCommand, ReproducesThePublishedTable) {
     ASSERT_EQ(vibrig("reproduce allan --seeds 4 --json"), 0) << out << error;
     const Json table = Json::parse(out)["reproductions"][0];
