@@ -109,7 +109,7 @@ WindowRow DynamicAllan::row() const {
     row.refused =
         static_cast<double>(row.missing) > kMostMissing * static_cast<double>(settings_.window) ||
         curve.size() < 2 || classical.size() < kPowers.size();
-    if (!row.refused && settings_.fits) {
+    if (!row.refused) {
         row.fit = fit_noise(curve, covariance_, settings_.wanted);
         row.classical_fit = fit_classical(classical, settings_.mode);
     }

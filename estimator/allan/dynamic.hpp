@@ -18,7 +18,6 @@ struct DynamicSettings {
     MeanMode mode = MeanMode::corrected;
     double known_mean = 0;  ///< deg/h, for MeanMode::known_mean
     std::array<bool, kTerms> wanted = kAllTerms;
-    bool fits = true;           ///< of each window; false: curves only
     bool long_records = false;  ///< a second ring, decimated by 16, for tau beyond the window
 };
 

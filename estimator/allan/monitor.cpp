@@ -24,7 +24,6 @@ const char* words_of(Reading reading) {
 StationarityMonitor::StationarityMonitor(const MonitorSettings& settings,
                                          const DynamicAllan& dynamic)
     : settings_(settings),
-      covariance_(dynamic.covariance()),
       tau0_(dynamic.settings().tau0),
       window_(dynamic.settings().window),
       back_(std::max<std::size_t>(
@@ -45,31 +44,19 @@ void StationarityMonitor::set_reference(const Terms& terms) {
         octave.reference = model_variance(terms, static_cast<double>(octave.m) * tau0_);
     }
     set_bounds(terms, 0);
-    mean_limit_ = normal_quantile(1 - share_of_alpha() / 2);
-}
-
-double StationarityMonitor::share_of_alpha() const {
-    return settings_.alpha / static_cast<double>(octaves_.size() + 1);
 }
 
 void StationarityMonitor::set_bounds(const Terms& terms, double reference_windows) {
-    std::vector<std::size_t> factors;
-    for (const Octave& octave : octaves_) factors.push_back(octave.m);
-    const Eigen::VectorXd spread = covariance_.of(factors, terms).diagonal();
-    const double tail = share_of_alpha() / 2;
-    for (std::size_t i = 0; i < octaves_.size(); ++i) {
-        Octave& octave = octaves_[i];
-        const double mean = model_variance(terms, static_cast<double>(octave.m) * tau0_);
-        // A ramp alone does not vary at all; half the window is what any noise has at least.
-        const double degrees = std::clamp(2 * mean * mean / spread[static_cast<Eigen::Index>(i)],
-                                          0.5, static_cast<double>(window_));
+    const double tail = settings_.alpha / static_cast<double>(octaves_.size()) / 2;
+    for (Octave& octave : octaves_) {
+        const double tau = static_cast<double>(octave.m) * tau0_;
+        double degrees = edf(Statistic::oadev, dominant_noise(terms, tau), window_ + 1, octave.m);
         if (reference_windows > 0) {
-            octave.low = f_quantile(tail, degrees, degrees * reference_windows);
-            octave.high = f_quantile(1 - tail, degrees, degrees * reference_windows);
-        } else {
-            octave.low = chi_square_quantile(tail, degrees) / degrees;
-            octave.high = chi_square_quantile(1 - tail, degrees) / degrees;
+            // The reference is uncertain too; variances of the logarithm add.
+            degrees *= reference_windows / (1 + reference_windows);
         }
+        octave.low = chi_square_quantile(tail, degrees) / degrees;
+        octave.high = chi_square_quantile(1 - tail, degrees) / degrees;
     }
     mean_sigma_ = std::sqrt(2 * model_variance(terms, static_cast<double>(window_) * tau0_));
 }
@@ -80,33 +67,18 @@ void StationarityMonitor::learn(const WindowRow& row) {
         return;
     }
     const auto n = static_cast<double>(lessons_.size());
-    const double windows = 1 + (n - 1) * (1 - overlap_);
     std::vector<VariancePoint> curve;
     for (Octave& octave : octaves_) {
-        octave.reference = 0;
         for (const WindowRow& lesson : lessons_) {
             octave.reference += lesson.allan[octave.k] / n;
         }
         if (octave.reference > 0) {
             curve.push_back(
-                {static_cast<double>(octave.m) * tau0_, octave.m, octave.reference, windows});
+                {static_cast<double>(octave.m) * tau0_, octave.m, octave.reference, 1.0});
         }
     }
+    set_bounds(fit_noise(curve, window_ + 1, tau0_).values(), 1 + (n - 1) * (1 - overlap_));
     lessons_.clear();
-    if (curve.size() < 2) return;
-    const Fit fit = fit_noise(curve, covariance_);
-    set_bounds(fit.values(), windows);
-    // The windows' mean varies by what is slow, and that is known from a few windows only.
-    const double tau = static_cast<double>(window_) * tau0_;
-    double error = 0;
-    for (std::size_t j = 0; j < kTerms; ++j) {
-        error += std::pow(
-            2 * fit.terms[j].value * fit.terms[j].sigma * term_variance(static_cast<Term>(j), tau),
-            2);
-    }
-    constexpr double kAsNormal = 1e4;
-    const double degrees = std::clamp(std::pow(mean_sigma_, 4) / 2 / error, 1.0, kAsNormal);
-    mean_limit_ = std::sqrt(f_quantile(1 - share_of_alpha(), 1, degrees));
 }
 
 std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
@@ -137,13 +109,14 @@ std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
     const double step = means_.size() > back_ && mean_sigma_ > 0
                             ? (means_.back() - means_.front()) / mean_sigma_
                             : 0;
-    if (std::abs(step) <= mean_limit_) {
+    const double limit = normal_quantile(1 - settings_.alpha / 2);
+    if (std::abs(step) <= limit) {
         step_since_.reset();
         return alarms;
     }
     step_since_ = step_since_.value_or(row.begin_s);
     alarms.push_back({Reading::mean_step, static_cast<double>(window_) * tau0_, step,
-                      std::copysign(mean_limit_, step), *step_since_});
+                      std::copysign(limit, step), *step_since_});
     return alarms;
 }
 

@@ -8,7 +8,7 @@
 namespace vibrig::estimator::allan {
 
 struct MonitorSettings {
-    double alpha = 1e-3;                ///< of one window, shared by the octaves and the mean
+    double alpha = 1e-3;                ///< of one window, shared by the octaves
     std::size_t reference_windows = 5;  ///< that teach the reference when none is given
 };
 
@@ -28,13 +28,7 @@ struct Alarm {
     double since_s = 0;
 };
 
-/// Compares windows with a reference, octave by octave. Model: the record is one mixture of Q, N,
-/// B, K and R throughout. The variance of a window at an octave then has mean mu and the degrees of
-/// freedom nu = 2 mu^2 / C of that mixture (CurveCovariance). Against an accepted calibration
-/// ratio x nu follows chi-square(nu); against a learnt reference, the mean of n windows that
-/// overlap, the ratio follows F(nu, nu n_eff), n_eff = 1 + (n - 1) (1 - overlap). The mean of a
-/// window less that of the one before it has variance 2 AVAR(T): normal, or Student's t with the
-/// degrees of freedom of the fitted AVAR(T). Each gets an equal share of alpha.
+/// Compares windows with a reference, octave by octave: ratio x edf follows chi-square(edf).
 class StationarityMonitor {
   public:
     StationarityMonitor(const MonitorSettings& settings, const DynamicAllan& dynamic);
@@ -60,11 +54,9 @@ class StationarityMonitor {
     };
     void learn(const WindowRow& row);
     void set_bounds(const Terms& terms, double reference_windows);
-    [[nodiscard]] double share_of_alpha() const;
     [[nodiscard]] Reading reading_of(std::size_t octave) const;
 
     MonitorSettings settings_;
-    CurveCovariance covariance_;
     double tau0_;
     std::size_t window_;
     std::size_t back_;  ///< rows from one window to the adjacent one
@@ -73,7 +65,6 @@ class StationarityMonitor {
     std::vector<WindowRow> lessons_;
     std::vector<double> means_;
     double mean_sigma_ = 0;  ///< of the difference of adjacent means
-    double mean_limit_ = 0;  ///< in those
     std::optional<double> step_since_;
 };
 
