@@ -60,9 +60,6 @@ struct Settings {
     std::array<double, 3> accelerometer_zero_g{0, 0, 0};
     std::array<std::array<double, 3>, 3> accelerometer_matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     double accelerometer_range_g = 0;  ///< raw readings from here on are saturated; 0: not known
-    /// [uncertainty]: of each accelerometer towards each other axis, not known better, g/g, 1
-    /// sigma.
-    double accelerometer_cross = 2.4e-4;
     // noise
     double resolver_arcsec = 5.0;
     int resolver_bits = 20;

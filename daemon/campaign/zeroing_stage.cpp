@@ -33,7 +33,9 @@ zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
     s.plan.duration_s = settings_.duration_s;
     s.inverted = down;
     s.noise.scale_factor = settings_.scale_factor;
-    s.noise.misalignment = rig_.accelerometer_cross;
+    s.noise.misalignment = 0;
+    for (const auto& of_axes : rig_.uncertainty.accelerometer_cross)
+        s.noise.misalignment = std::max(s.noise.misalignment, of_axes.u);
     s.noise.velocity_reference = settings_.velocity_reference_mps;
     s.noise.position_reference = settings_.position_reference_m;
     s.noise.reference_is_bound = true;

@@ -67,10 +67,6 @@ void add_estimation_keys(std::vector<Key>& keys) {
     keys.push_back(matrix(
         "accelerometer.matrix", "then applied: raw to platform axes",
         [](C & c) -> auto& { return c.estimator.accelerometer_matrix; }));
-    keys.push_back(number("uncertainty.accelerometer_cross", "g/g", {0, 0.1},
-                          "of an accelerometer towards another axis, not known better, 1 sigma; "
-                          "2.4e-4 is 50 arcsec",
-                          [](C& c) -> double& { return c.estimator.accelerometer_cross; }));
     keys.push_back(number("accelerometer.range_g", "g", {0, 1000},
                           "raw readings of this size are saturated; 0: not known",
                           [](C& c) -> double& { return c.estimator.accelerometer_range_g; }));

@@ -230,12 +230,12 @@ TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
         const char* says;
     };
     std::string newer = good, foreign = good;
-    newer[8] = 4;
+    newer[8] = 5;
     foreign[0] = 'X';
     std::vector<Case> cases{{"", "truncated: 0 bytes"},
                             {good.substr(0, 11), "truncated"},
                             {foreign, "not a checkpoint"},
-                            {newer, "version 4, newer than 3"}};
+                            {newer, "version 5, newer than 4"}};
     // any cut and any flipped bit
     for (std::size_t at = 12; at < good.size(); at += good.size() / 50) {
         cases.push_back({good.substr(0, at), ""});
@@ -360,11 +360,12 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
     }
 }
 
-/// As version 1 wrote it: without the four noise levels, position, repeats and time used.
+/// As version 1 wrote it: without the four noise levels, position, repeats, time used and times of
+/// the beginning.
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers, (4 + 5) * sizeof(double) + sizeof(std::int32_t));
+    bytes.erase(numbers, (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t));
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(

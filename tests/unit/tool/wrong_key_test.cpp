@@ -41,7 +41,8 @@ class WrongKeys : public ::testing::TestWithParam<WrongKey> {
         std::ostringstream text;
         text << std::ifstream(folder_ / "out").rdbuf();
         std::string warnings;
-        for (const auto& warning : nlohmann::json::parse(text.str())["warnings"])
+        const auto result = nlohmann::json::parse(text.str());
+        for (const auto& warning : result.at("warnings"))
             warnings += warning.get<std::string>() + "\n";
         return {code, warnings};
     }
