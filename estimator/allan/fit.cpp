@@ -208,18 +208,13 @@ Fit fit_noise(std::span<const VariancePoint> curve, const CurveCovariance& covar
         term.below = wanted[j] ? std::sqrt(bound_of(j, fits, best, likelihood)) : 0;
     }
     out.slow = slow_noise(fits, best, likelihood);
-    const double hours = static_cast<double>(covariance.points() - 1) * covariance.tau0() / 3600;
-    // A random walk makes a ramp of K / sqrt(T) by itself, 1 sigma.
-    FittedTerm& ramp = out.terms[at(Term::R)];
-    ramp.detected =
-        ramp.detected && ramp.value > 3 * out.terms[at(Term::K)].value / std::sqrt(hours);
     for (const Term term : {Term::B, Term::K, Term::R}) {
         // One question comes first: is there anything?
         FittedTerm& slow = out.terms[at(term)];
         slow.detected = slow.detected && out.slow.found;
         out.slow.determined = out.slow.determined || slow.detected;
     }
-    note_ramp(out, hours);
+    note_ramp(out, static_cast<double>(covariance.points() - 1) * covariance.tau0() / 3600);
     return out;
 }
 

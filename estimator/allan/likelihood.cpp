@@ -65,13 +65,9 @@ CurveLikelihood::Evaluated CurveLikelihood::evaluate(const Terms& squares) const
     // Of v over its mean: numbers near one, whatever the unit.
     const VectorXd scale = share_.cwiseQuotient(out.mean);
     MatrixXd c = scale.asDiagonal() * covariance_.of(terms) * scale.asDiagonal();
+    c.diagonal() *= 1 + kCovarianceError;
     c.diagonal().array() += kRounding * kRounding;
-    std::optional<linear_algebra::Cholesky> factor;
-    // The sums over lags are good to about 1 %, and points near one another almost the same.
-    for (double error = kCovarianceError; !factor && error < 1; error *= 4) {
-        c.diagonal() *= 1 + error;
-        factor = linear_algebra::Cholesky::of(c);
-    }
+    const auto factor = linear_algebra::Cholesky::of(c);
     if (!factor) return out;
     VectorXd r(points_.size());
     for (Index i = 0; i < r.size(); ++i) {
