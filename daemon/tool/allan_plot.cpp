@@ -52,7 +52,7 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
     }
     chart.curves.push_back(model);
     if (analysis.fit->slow.found && !analysis.fit->slow.determined) {
-        plot::Curve slow{"slow noise", {}, {}, {}, {}, plot::Look::dashed};
+        plot::Curve slow{"slow noise, kind not determined", {}, {}, {}, {}, plot::Look::dashed};
         allan::Terms rest = terms;
         rest[static_cast<std::size_t>(allan::Term::Q)] = 0;
         rest[static_cast<std::size_t>(allan::Term::N)] = 0;
