@@ -26,25 +26,6 @@ Json fit_json(const allan::Fit& fit) {
     return terms;
 }
 
-/// What there is beside white noise, of whatever kind, and the sets of terms that explain the
-/// curve.
-Json slow_json(const allan::Fit& fit) {
-    Json models = Json::array();
-    for (const allan::NoiseModel& model : fit.models) {
-        std::string terms;
-        for (std::size_t j = 0; j < allan::kTerms; ++j)
-            terms += model.terms[j] ? allan::kTermNames[j] : "";
-        models.push_back({{"terms", terms}, {"weight", model.weight}});
-    }
-    const bool where = fit.slow.tau > 0;
-    return {{"found", fit.slow.found},
-            {"kind_determined", fit.slow.determined},
-            {"tau", where ? Json(fit.slow.tau) : Json(nullptr)},
-            {"ratio", where ? number(fit.slow.ratio) : Json(nullptr)},
-            {"verdict", fit.verdict()},
-            {"models", std::move(models)}};
-}
-
 /// Without a known mean the slow class is known up to the constant a0, which is left out.
 Json class_sums_json(const allan::ClassicalFit& fit, const std::vector<double>& taus) {
     allan::Polynomial a = fit.a;
@@ -113,7 +94,6 @@ Json dynamic_json(const AllanAnalysis& analysis) {
         summary = {{"windows", analysis.summary->windows},
                    {"refused", analysis.summary->refused},
                    {"fit", fit_json(analysis.summary->fit)},
-                   {"slow_noise", slow_json(analysis.summary->fit)},
                    {"classical", classical_json(analysis.summary->classical, taus)},
                    {"recomputation_faults", analysis.summary->faults}};
     }
@@ -148,7 +128,6 @@ std::string allan_json(const AllanAnalysis& analysis) {
     root["points"] = std::move(points);
     if (analysis.fit) {
         root["fit"] = fit_json(*analysis.fit);
-        root["slow_noise"] = slow_json(*analysis.fit);
     }
     if (analysis.request.window_s > 0) {
         root["dynamic"] = dynamic_json(analysis);

@@ -51,20 +51,6 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
         model.y.push_back(std::sqrt(allan::model_variance(terms, tau)) / analysis.to_deg_h);
     }
     chart.curves.push_back(model);
-    if (analysis.fit->slow.found && !analysis.fit->slow.determined) {
-        plot::Curve slow{"slow noise, kind not determined", {}, {}, {}, {}, plot::Look::dashed};
-        allan::Terms rest = terms;
-        rest[static_cast<std::size_t>(allan::Term::Q)] = 0;
-        rest[static_cast<std::size_t>(allan::Term::N)] = 0;
-        for (std::size_t i = 0; i < model.x.size(); ++i) {
-            const double y = std::sqrt(allan::model_variance(rest, model.x[i])) / analysis.to_deg_h;
-            slow.x.push_back(model.x[i]);
-            slow.y.push_back(y > 0.05 * model.y[i] ? y : kNaN);
-        }
-        chart.curves.push_back(slow);
-    }
-    if (const auto verdict = analysis.fit->verdict(); !verdict.empty())
-        chart.notes.push_back(verdict);
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         if (!analysis.fit->terms[j].detected) {
             continue;

@@ -3,142 +3,120 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <sstream>
 
-#include "estimator/allan/series.hpp"
+#include "estimator/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 
 namespace {
 
+constexpr int kReweightings = 12;
+constexpr double kRounding = 1e-9;  // relative, of a point of the curve
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastWeight = 0.01;  // of a set that is named
-constexpr int kBisections = 20;
 
-std::size_t at(Term term) { return static_cast<std::size_t>(term); }
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, static_cast<int>(kTerms)>;
+using Vector = Eigen::VectorXd;
+using Squares = Eigen::Matrix<double, static_cast<int>(kTerms), 1>;  // squared coefficients
 
-bool white(const TermSet& set) {
-    return !set[at(Term::B)] && !set[at(Term::K)] && !set[at(Term::R)];
+using Columns = std::vector<int>;
+
+/// Columns differ by many decades in scale: X of min |part diag(1 / scale) X - b|, or nothing when
+/// a column is zero.
+struct Scaled {
+    Eigen::MatrixXd part;
+    Vector scale;
+};
+std::optional<Scaled> scaled(const Matrix& a, const Columns& columns) {
+    Eigen::MatrixXd part = a(Eigen::all, columns);
+    const Vector scale = part.colwise().norm();
+    if (!(scale.minCoeff() > 0)) {
+        return {};
+    }
+    return Scaled{part * scale.cwiseInverse().asDiagonal(), scale};
 }
 
-std::vector<TermFit> fits_of(const CurveLikelihood& likelihood, const TermSet& wanted) {
-    std::vector<TermFit> fits;
-    for (unsigned bits = 1; bits < (1U << kTerms); ++bits) {
-        TermSet set{};
+/// With five unknowns every set of non-zero terms can be tried: the best feasible one is the
+/// non-negative least-squares solution, without an iteration that could stall.
+Squares non_negative(const Matrix& a, const Vector& b, const std::array<bool, kTerms>& wanted) {
+    Squares best = Squares::Zero();
+    double least = b.squaredNorm();
+    for (unsigned set = 1; set < (1U << kTerms); ++set) {
+        Columns columns;
         bool all_wanted = true;
-        for (std::size_t j = 0; j < kTerms; ++j) {
-            set[j] = (bits >> j & 1U) != 0;
-            all_wanted = all_wanted && (!set[j] || wanted[j]);
+        for (unsigned j = 0; j < kTerms; ++j) {
+            if ((set >> j & 1U) != 0) {
+                columns.push_back(static_cast<int>(j));
+                all_wanted = all_wanted && wanted[j];
+            }
         }
-        if (!all_wanted) continue;
-        if (const auto fit = likelihood.best(set)) fits.push_back(*fit);
-    }
-    return fits;
-}
-
-/// Least deviance of the sets that `where` holds for; infinite without any.
-template <typename Where>
-double least(const std::vector<TermFit>& fits, const Where& where) {
-    double deviance = kInfinity;
-    for (const TermFit& fit : fits) {
-        if (where(fit)) deviance = std::min(deviance, fit.deviance);
-    }
-    return deviance;
-}
-
-/// Largest square of term j that costs kBound over `best` when the other terms of `from` follow.
-double bound_from(const TermFit& from, std::size_t j, double best,
-                  const CurveLikelihood& likelihood) {
-    // Beyond where the term alone would make the curve many times over.
-    double high = std::log(1e3 * likelihood.largest_square(j));
-    double low = std::log(from.has[j] ? from.square[j] : 1e-6 * likelihood.largest_square(j));
-    const auto allowed = [&](double x) {
-        return likelihood.profile(from, j, std::exp(x)) <= best + kBound;
-    };
-    high = std::max(high, low + 1);
-    for (int i = 0; i < kBisections && high - low > 1e-3; ++i) {
-        const double middle = (low + high) / 2;
-        (allowed(middle) ? low : high) = middle;
-    }
-    return std::exp(high);
-}
-
-/// Over the sets with the term that are not excluded; the best is followed exactly, the others by
-/// their errors.
-double bound_of(std::size_t j, const std::vector<TermFit>& fits, double best,
-                const CurveLikelihood& likelihood) {
-    const TermFit* with = nullptr;
-    const TermFit* any = &fits.front();
-    double square = 0;
-    for (const TermFit& fit : fits) {
-        any = fit.deviance < any->deviance ? &fit : any;
-        if (!fit.has[j]) continue;
-        with = with == nullptr || fit.deviance < with->deviance ? &fit : with;
-        const double left = best + kBound - fit.deviance;
-        if (left > 0) {
-            square = std::max(square, fit.square[j] * std::exp(std::sqrt(left) * fit.log_sigma[j]));
+        if (!all_wanted || static_cast<Eigen::Index>(columns.size()) > a.rows()) {
+            continue;
+        }
+        const std::optional<Scaled> part = scaled(a, columns);
+        if (!part) {
+            continue;
+        }
+        const Vector x = linear_algebra::least_squares(part->part, b);
+        const double rest = (part->part * x - b).squaredNorm();
+        if (!x.allFinite() || x.minCoeff() <= 0 || rest >= least) {
+            continue;
+        }
+        least = rest;
+        best.setZero();
+        for (std::size_t k = 0; k < columns.size(); ++k) {
+            const auto at = static_cast<Eigen::Index>(k);
+            best[columns[k]] = x[at] / part->scale[at];
         }
     }
-    const bool followed = with != nullptr && with->deviance < best + kBound;
-    return std::max(followed ? 0 : square,
-                    bound_from(followed ? *with : *any, j, best, likelihood));
+    return best;
 }
 
-/// Mean and spread over the sets; weights by Akaike's criterion.
-void average(const std::vector<TermFit>& fits, Fit& out) {
-    const auto criterion = [](const TermFit& fit) {
-        return fit.deviance + 2 * static_cast<double>(fit.parameters);
-    };
-    double lowest = kInfinity;
-    for (const TermFit& fit : fits) lowest = std::min(lowest, criterion(fit));
-    double sum = 0;
-    for (const TermFit& fit : fits) {
-        out.models.push_back({fit.has, std::exp((lowest - criterion(fit)) / 2)});
-        sum += out.models.back().weight;
-    }
-    for (NoiseModel& model : out.models) model.weight /= sum;
-    for (std::size_t j = 0; j < kTerms; ++j) {
-        double mean = 0;
-        for (std::size_t k = 0; k < fits.size(); ++k) {
-            mean += out.models[k].weight * std::sqrt(fits[k].square[j]);
+/// Standard error of the squared coefficient `j` in a fit of the terms that are not zero and it;
+/// infinite when the curve cannot tell.
+double error_of(int j, const Squares& squares, const Matrix& a, const Eigen::MatrixXd& covariance) {
+    Columns columns{j};
+    for (int other = 0; other < static_cast<int>(kTerms); ++other) {
+        if (other != j && squares[other] > 0) {
+            columns.push_back(other);
         }
-        double spread = 0;
-        for (std::size_t k = 0; k < fits.size(); ++k) {
-            const double value = std::sqrt(fits[k].square[j]);
-            // d(ln c^2) = 2 d(ln c).
-            const double own = fits[k].has[j] ? value * fits[k].log_sigma[j] / 2 : 0;
-            spread += out.models[k].weight * (own * own + (value - mean) * (value - mean));
-        }
-        out.terms[j].value = mean;
-        out.terms[j].sigma = std::sqrt(spread);
     }
-    std::erase_if(out.models, [](const NoiseModel& m) { return m.weight < kLeastWeight; });
-    std::stable_sort(out.models.begin(), out.models.end(),
-                     [](const NoiseModel& a, const NoiseModel& b) { return a.weight > b.weight; });
+    const std::optional<Scaled> part = scaled(a, columns);
+    if (!part || part->part.cols() > part->part.rows()) {
+        return kInfinity;
+    }
+    const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(a.rows(), a.rows());
+    const Vector gain =
+        linear_algebra::least_squares(part->part, unit).row(0).transpose() / part->scale[0];
+    return std::sqrt(std::max(0.0, gain.dot(covariance * gain)));
 }
 
-SlowNoise slow_noise(const std::vector<TermFit>& fits, double best,
-                     const CurveLikelihood& likelihood) {
-    SlowNoise slow;
-    const double alone = least(fits, [](const TermFit& fit) { return white(fit.has); });
-    slow.deviance = alone - best;
-    slow.found = slow.deviance > kLongTerm;
-    if (!slow.found || !std::isfinite(alone)) return slow;
-    const auto fit = std::find_if(fits.begin(), fits.end(), [&](const TermFit& f) {
-        return white(f.has) && f.deviance == alone;
-    });
-    double most = -kInfinity;
-    for (std::size_t i = 0; i < likelihood.points(); ++i) {
-        const double excess = likelihood.excess(fit->square, i);
-        if (excess <= most) continue;
-        most = excess;
-        const VariancePoint& point = likelihood.curve()[i];
-        Terms terms{};
-        for (std::size_t j = 0; j < kTerms; ++j) terms[j] = std::sqrt(fit->square[j]);
-        slow.tau = point.tau;
-        slow.ratio = std::sqrt(point.variance / model_variance(terms, point.tau));
+/// Of the weighted curve.
+Eigen::MatrixXd weighted_covariance(std::span<const VariancePoint> curve, const Vector& weight,
+                                    const CurveCovariance& covariance, const Terms& terms) {
+    std::vector<std::size_t> factors;
+    for (const VariancePoint& point : curve) {
+        factors.push_back(point.m);
     }
-    return slow;
+    Eigen::MatrixXd c = covariance.of(factors, terms);
+    for (Eigen::Index i = 0; i < c.rows(); ++i) {
+        const VariancePoint& point = curve[static_cast<std::size_t>(i)];
+        const double scale = weight[i] / std::sqrt(point.share);
+        c.row(i) *= scale;
+        c.col(i) *= scale;
+    }
+    // A ramp alone has no error, but the sums were rounded.
+    for (Eigen::Index i = 0; i < c.rows(); ++i) {
+        const VariancePoint& point = curve[static_cast<std::size_t>(i)];
+        c(i, i) += std::pow(kRounding * weight[i] * point.variance, 2);
+    }
+    return c;
+}
+
+double edf_at(const VariancePoint& point, const Terms& terms, std::size_t points) {
+    return std::max(1.0, point.share * edf(Statistic::oadev, dominant_noise(terms, point.tau),
+                                           points, point.m));
 }
 
 void note_ramp(Fit& fit, double record_h) {
@@ -175,51 +153,59 @@ Terms Fit::values() const {
     return values;
 }
 
-std::string Fit::verdict() const {
-    if (!slow.found) return "no noise slower than white is detected";
-    if (slow.determined) return {};
-    std::ostringstream text;
-    text.precision(3);
-    text << "slow noise";
-    if (slow.tau > 0) text << " of " << slow.ratio << " times white at " << slow.tau << " s";
-    text << "; kind not determined";
-    return text.str();
-}
-
 Fit fit_noise(std::span<const VariancePoint> curve, const CurveCovariance& covariance,
-              const TermSet& wanted) {
-    if (curve.size() < 2) {
-        throw DataError("fit: a curve of " + std::to_string(curve.size()) +
+              const std::array<bool, kTerms>& wanted) {
+    const auto rows = static_cast<Eigen::Index>(curve.size());
+    if (rows < 2) {
+        throw DataError("fit: a curve of " + std::to_string(rows) +
                         " points found, at least 2 needed");
     }
-    const CurveLikelihood likelihood(curve, covariance);
-    Fit out;
-    const std::vector<TermFit> fits =
-        likelihood.points() > 0 ? fits_of(likelihood, wanted) : std::vector<TermFit>{};
-    if (fits.empty()) {
-        throw DataError("fit: no set of the terms fits the curve, every variance is zero");
+    Vector model(rows);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+        model[i] = curve[static_cast<std::size_t>(i)].variance;
     }
-    const double best = least(fits, [](const TermFit&) { return true; });
-    average(fits, out);
+    Vector weight(rows);
+    Matrix a(rows, static_cast<int>(kTerms));
+    Vector b(rows);
+    Terms terms{};
+    Squares squares;
+    for (int round = 0; round <= kReweightings; ++round) {
+        for (Eigen::Index i = 0; i < rows; ++i) {
+            const VariancePoint& point = curve[static_cast<std::size_t>(i)];
+            weight[i] = model[i] > 0
+                            ? std::sqrt(edf_at(point, terms, covariance.points()) / 2) / model[i]
+                            : 0;
+            b[i] = weight[i] * point.variance;
+            for (std::size_t j = 0; j < kTerms; ++j) {
+                a(i, static_cast<Eigen::Index>(j)) =
+                    weight[i] * term_variance(static_cast<Term>(j), point.tau);
+            }
+        }
+        squares = non_negative(a, b, wanted);
+        for (std::size_t j = 0; j < kTerms; ++j) {
+            terms[j] = std::sqrt(squares[static_cast<Eigen::Index>(j)]);
+        }
+        for (Eigen::Index i = 0; i < rows; ++i) {
+            model[i] = model_variance(terms, curve[static_cast<std::size_t>(i)].tau);
+        }
+    }
+    const Eigen::MatrixXd errors = weighted_covariance(curve, weight, covariance, terms);
+    Fit fit;
     for (std::size_t j = 0; j < kTerms; ++j) {
-        FittedTerm& term = out.terms[j];
-        const double without = least(fits, [&](const TermFit& fit) { return !fit.has[j]; });
-        term.detected = without - best > kDetected;
-        term.below = wanted[j] ? std::sqrt(bound_of(j, fits, best, likelihood)) : 0;
+        FittedTerm& term = fit.terms[j];
+        const double square = squares[static_cast<Eigen::Index>(j)];
+        const double error = error_of(static_cast<int>(j), squares, a, errors);
+        term.value = terms[j];
+        term.detected = square > kDetected * error;
+        term.sigma = term.value > 0 ? error / (2 * term.value) : 0;  // d(c^2) = 2 c dc
+        term.below = std::sqrt(square + kBound * error);
     }
-    out.slow = slow_noise(fits, best, likelihood);
-    for (const Term term : {Term::B, Term::K, Term::R}) {
-        // One question comes first: is there anything?
-        FittedTerm& slow = out.terms[at(term)];
-        slow.detected = slow.detected && out.slow.found;
-        out.slow.determined = out.slow.determined || slow.detected;
-    }
-    note_ramp(out, static_cast<double>(covariance.points() - 1) * covariance.tau0() / 3600);
-    return out;
+    note_ramp(fit, static_cast<double>(covariance.points() - 1) * covariance.tau0() / 3600);
+    return fit;
 }
 
 Fit fit_noise(std::span<const VariancePoint> curve, std::size_t points, double tau0,
-              const TermSet& wanted) {
+              const std::array<bool, kTerms>& wanted) {
     std::vector<std::size_t> factors;
     for (const VariancePoint& point : curve) {
         factors.push_back(point.m);
