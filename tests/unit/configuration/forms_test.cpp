@@ -35,7 +35,8 @@ TEST(Essentials, AreAcceptedWithTheirExamplesInPlaceOfTheBlanks) {
     const std::string filled =
         replaced(format_essentials(), "# for instance: ([^\n]*)\n([^\n]*= )\"FILL IN\"", "$2$1");
     ASSERT_EQ(filled.find("= \"FILL IN\""), std::string::npos);
-    EXPECT_EQ(complaint(filled, true), "");
+    // A real rig's, so nothing is added that makes it a simulated one.
+    EXPECT_NO_THROW(static_cast<void>(parse(filled, "rig.toml", true)));
 }
 
 TEST(Essentials, ABlankIsRefusedByKeysThatTakeAnyText) {

@@ -359,8 +359,14 @@ TEST(Leveller, NotSettledSaysWhatItSees) {
                  {"cannot settle", "below 4 times the noise", "accelerometer", "no window"});
     // AND the default tolerance follows the noise: of the tilt and, over 100 samples, of the means
     s.tolerance_rad = 0;
-    EXPECT_NEAR(Leveller(s).tolerance(), 4 * std::hypot(Leveller(s).budget().total, 1e-2 / 10),
+    s.noise.accelerometer_mps2 = 2e-3 * kG;
+    EXPECT_NEAR(Leveller(s).tolerance(), 4 * std::hypot(Leveller(s).budget().total, 2e-3 / 10),
                 1e-9);
+    // AND up to 5' only: beyond that nothing is level
+    s.noise.accelerometer_mps2 = 1e-2 * kG;
+    Leveller noisy(s);
+    EXPECT_NEAR(noisy.tolerance(), 5 * kArcmin, 1e-12);
+    EXPECT_EQ(noisy.step({}).verdict, Verdict::cannot_settle);
     // AND what the mean over one sample cannot do, that over the window named can
     LevellerSettings brief = rig();
     brief.window_s = 0.1;

@@ -172,7 +172,7 @@ StatusData full_status() {
         for (std::size_t t = 2; t < gyro.terms.size(); ++t) gyro.terms[t] = {false, 0, 0, 0.03};
     }
     s.noise.gyros[0].terms.fill({true, 0.01, 0.002, 0.014});
-    s.verdict = {28, 2, "not valid", "not valid, because the drift walked", 3.5, true};
+    s.verdict = {28, 1, "doubtful", "doubtful, because the drift walked", 3.5, true};
     s.noise.angle_in_force_arcsec = 5;
     s.noise.block_s = 1;
     s.noise.dwells = 81;

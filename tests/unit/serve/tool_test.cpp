@@ -129,7 +129,12 @@ TEST_F(Tool, WatchesUntilTheCampaignEnds) {
     }
     EXPECT_EQ(outcome.code, 0) << outcome.output;
     EXPECT_NE(outcome.output.find("finished"), std::string::npos) << outcome.output;
-    EXPECT_LE(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 2) << outcome.output;
+    EXPECT_NE(outcome.output.find("verdict: doubtful"), std::string::npos) << outcome.output;
+    EXPECT_LE(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 3) << outcome.output;
+    // AND a result that is not valid is a no
+    status.verdict.level = 2;
+    show(status);
+    EXPECT_EQ(vibrig(watch).code, 1);
 }
 
 TEST_F(Tool, WatchFindsARestartedDaemonAgain) {
