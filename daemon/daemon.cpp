@@ -431,7 +431,8 @@ void Daemon::control_loop() {
 
 void Daemon::write_result(const estimator::uncertainty::Assessment& assessed) {
     const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
-    log(severity_of(assessed.verdict.level), "campaign", "result " + assessed.verdict.sentence);
+    if (!result_.dwells.empty())  // of no data nothing is to be said
+        log(severity_of(assessed.verdict.level), "campaign", "result " + assessed.verdict.sentence);
     std::string text;
     {
         const std::lock_guard lock(mutex_);

@@ -186,6 +186,8 @@ Key harmonics() {
     };
     auto write = [](C& c) {
         std::string text;
+        // A default that somebody states is declared from then on.
+        if (!c.estimator.uncertainty.resolver_harmonics_declared) return text;
         for (const auto& harmonic : c.estimator.uncertainty.resolver_harmonics)
             text += (text.empty() ? "" : ", ") + ("{ order = " + std::to_string(harmonic.order)) +
                     ", arcsec = " + write_number(harmonic.arcsec) + " }";

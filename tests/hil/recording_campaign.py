@@ -236,7 +236,8 @@ def complete(checks, rig):
     stored = stored.decode() if isinstance(stored, bytes) else stored
     checks.equal(stored, result.decode().strip(), "the result in the file is result.json")
     for parameter, value in zip(json.loads(result)["parameters"], last):
-        if parameter["observable"] and parameter["value"] != value:
+        # The filter's own: beside it the result's `value` is the drift-averaged one.
+        if parameter["observable"] and parameter["value_constant"] != value:
             checks.check(False, "estimates after the last dwell are the result's", str(parameter))
             break
     else:
@@ -421,7 +422,8 @@ def report(checks, rig, folder):
         file.attrs.modify("started_utc_ns", file.attrs["started_utc_ns"] - 86400 * 10**9)
         file["configuration"][()] = file["configuration"][()].replace(b'"0017"', b'"0018"')
     made = offline(rig, "report", folder, "-o", "x.html", "--compare", "earlier.h5", "--pdf", "x.pdf")
-    checks.check(made.returncode == 0, "a report is written", made.stderr)
+    # These positions do not determine all coefficients: the result is not valid, and the report says so.
+    checks.check(made.returncode == 1 and "not valid" in made.stderr + made.stdout, "a report is written, and its verdict is a no", made.stderr)
     with open(os.path.join(rig.folder, "x.pdf"), "rb") as file:
         pdf = file.read()
     pages = len(re.findall(rb"/Type\s*/Page\b", pdf))
@@ -443,8 +445,9 @@ def report(checks, rig, folder):
     unknown = offline(rig, "report", folder, "-o", "unknown.html", "--compare", "earlier.h5")
     checks.check(unknown.returncode == 2 and "found no serial number" in unknown.stderr,
                  "a unit without a serial number is not compared", unknown.stderr)
-    checks.equal(offline(rig, "report", folder, "-o", "same.html", "--compare", "earlier.h5", "--same-unit").returncode, 0,
-                 "unless somebody says that it is the same")
+    same = offline(rig, "report", folder, "-o", "same.html", "--compare", "earlier.h5", "--same-unit")
+    checks.check(same.returncode == 1 and "found no serial number" not in same.stderr, "unless somebody says that it is the same",
+                 same.stderr)
     checks.check(page.count('class="mark"') == 1 and ">SIMULATED<" in page, "a simulated rig's report says so across it")
     checks.check(page.index('id="coefficients"') < page.index('id="campaign"'), "it leads with the coefficients")
     checks.check("Shaker: command and read-back" in page and "Temperatures" in page, "it has the conditions")
@@ -461,15 +464,13 @@ def report(checks, rig, folder):
                  any("at 45, 0, 90 deg with 6 g peak" in row for row in comments) and
                  len([row for row in comments if "1 sigma" in row]) == 3 and len(rows) == len(comments) + 31,
                  "as CSV it says the axes and what is predicted", "\n".join(rows[:8]))
-    header = offline(rig, "compensate", determined(rig, folder, 0.5), "--to", "c", "--attitude", "45,0,90", "--table-g", "9")
-    compiled = subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-Wno-unused-variable", "-x", "c", "-fsyntax-only", "-"],
-                              input=header.stdout, capture_output=True, text=True)
-    checks.check(header.returncode == compiled.returncode == 0 and "drift sign -1" in header.stdout and
-                 "at 45, 0, 90 deg with 6 g peak" in header.stdout, "so does the C header", header.stderr + compiled.stderr)
-    for to in ("c", "csv", "json", "text"):
-        run = offline(rig, "compensate", determined(rig, folder, math.nan), "--to", to)
-        checks.check(run.returncode == 2 and "found nan, expected a finite number" in run.stderr,
-                     f"to {to}: what is not finite is refused", f"status {run.returncode} {run.stdout[:300]} {run.stderr}")
+    header = offline(rig, "compensate", folder, "--to", "c")
+    checks.check(header.returncode == 2 and "not determined" in header.stderr, "a C header needs all 30", header.stderr)
+    # It is identified anew: what somebody wrote into the file as estimates is not believed.
+    honest, forged = (offline(rig, "compensate", one, "--to", "csv") for one in (folder, determined(rig, folder, 0.5)))
+    checks.check([row for row in honest.stdout.splitlines() if row.startswith("D_")] ==
+                 [row for row in forged.stdout.splitlines() if row.startswith("D_")] != [],
+                 "estimates that were written into the file are not believed", forged.stdout[:500] + forged.stderr)
     for arguments in (("replay", "nowhere"), ("export", folder, "--to", "pdf"), ("report", "/dev/null"),
                       ("compensate", folder, "--attitude", "nan,0,0"), ("compensate", folder, "--table-g", "-1"),
                       ("compensate", folder, "--table-g", ""), ("compensate", folder, "--platform-g", "-2"),
