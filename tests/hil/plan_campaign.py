@@ -136,7 +136,7 @@ def refused(checks, programs, folder):
     path = os.path.join(folder, "one.toml")
     for what, more in (("one level only", "table_g = [9.0]"), ("a plan file with one level", "plan = \"one.csv\"")):
         with open(path, "w", encoding="utf-8") as file:
-            file.write(f"[campaign]\n{more}\n[server]\nsocket = \"{folder}/s\"\n[can]\nport = \"seqpacket\"\npath = \"{folder}/c\"\n")
+            file.write(f"[commission]\nsimulated = true\n[campaign]\n{more}\n[server]\nsocket = \"{folder}/s\"\n[can]\nport = \"seqpacket\"\npath = \"{folder}/c\"\n")
         with open(os.path.join(folder, "one.csv"), "w", encoding="utf-8") as file:
             file.write("alpha_deg,beta_deg,gamma_deg,table_g\n" + "".join(f"{a},0,{g},9\n" for a in (0, 45, 90, 180)
                                                                           for g in (0, 45, 90, 180)))

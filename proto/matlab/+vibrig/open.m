@@ -79,5 +79,14 @@ seen = campaign.dwells.observable(end, :)' ~= 0;
 c.observable = seen;
 value = campaign.dwells.value(end, :)'; sigma = campaign.dwells.sigma(end, :)';
 covariance = reshape(campaign.dwells.covariance(end, :, :), 30, 30);
+if isfield(campaign.result, 'covariance_combined') && isnumeric(campaign.result.covariance_combined) ...
+    && isequal(size(campaign.result.covariance_combined), [30 30])
+  % The result's own, with drift states and declared inputs.
+  covariance = campaign.result.covariance_combined;
+  for i = 1:30
+    one = campaign.result.parameters(i).value;
+    if ~isempty(one), value(i) = one; end
+  end
+end
 c.value(seen) = value(seen); c.sigma(seen) = sigma(seen); c.covariance(seen, seen) = covariance(seen, seen);
 end

@@ -190,10 +190,13 @@ class Campaign:
 
     @property
     def coefficients(self) -> Coefficients:
-        """After the last dwell. Raises ValueError when there is none."""
+        """Of the result, with its combined covariance; without one the filter's after the last dwell. Raises ValueError when
+        there is no dwell."""
         dwells = self.dwells
         if dwells.rows == 0:
             raise ValueError(f"{self.parts[0]}: found no finished dwell, expected one")
+        if self.result and self.result.get("covariance_combined"):
+            return Coefficients.of_result(self.result)
         return Coefficients(dwells["value"][-1], dwells["sigma"][-1], dwells["covariance"][-1],
                             dwells["observable"][-1] != 0)
 

@@ -64,7 +64,10 @@ class Coefficients(Mapping[str, Coefficient]):
 
     @classmethod
     def of_result(cls, result: Mapping[str, Any]) -> Coefficients:
-        """Of result.json, `vibrig identify --json`, or /api/v1/parameters. Raises KeyError, ValueError."""
+        """Of result.json, `vibrig identify --json`, or /api/v1/parameters. Raises KeyError, ValueError.
+
+        `covariance` is the combined one (noise, drift states, declared inputs) where the result has it.
+        """
         parameters = result["parameters"]
         names = tuple(p["name"] for p in parameters)
         if names != NAMES:
@@ -72,7 +75,7 @@ class Coefficients(Mapping[str, Coefficient]):
 
         def number(value: Any) -> float:
             return math.nan if value is None else float(value)
-        covariance = [[number(v) for v in row] for row in result.get("covariance") or []]
+        covariance = [[number(v) for v in row] for row in result.get("covariance_combined") or result.get("covariance") or []]
         return cls(np.array([number(p.get("value")) for p in parameters]),
                    np.array([number(p.get("sigma")) for p in parameters]),
                    np.array(covariance) if covariance else np.full((30, 30), np.nan),
