@@ -229,12 +229,12 @@ def effect(checks, programs, coefficients):
         bias = predicted_bias(gyro, truth[gyro], dwells, zero_g)
         for k, kind in enumerate(NAMES):
             name = f"D_{kind}{'xyz'[gyro]}"
-            moved = found[wrong][name]["value"] - found[exact][name]["value"]
+            moved = found[wrong][name]["value_constant"] - found[exact][name]["value_constant"]
             noise = 5 * math.hypot(found[wrong][name]["sigma"], found[exact][name]["sigma"])
             significant += k >= 4 and abs(bias[k]) > noise
             if abs(moved - bias[k]) > 0.1 * abs(bias[k]) + noise:
                 biased.append(f"{name} moved by {moved:.3g}, predicted {bias[k]:.3g}, noise {noise:.2g}")
-            error, sigma = found[right][name]["value"] - truth[gyro][k], found[right][name]["sigma"]
+            error, sigma = found[right][name]["value_constant"] - truth[gyro][k], found[right][name]["sigma"]
             if abs(error) > 5 * sigma:
                 left.append(f"{name} off by {error:.3g}, sigma {sigma:.2g}")
     checks.check(significant >= 10, "the biases of at least 10 quadratic coefficients stand out of the noise (5 sigma)",
