@@ -438,7 +438,7 @@ def is_complete(checks, package_file):
                                  "doc/vibrig/operating.md", "doc/vibrig/reference/keys.md", "doc/vibrig/changelog.gz")
                if f"./usr/share/{name}\n" not in files + "\n"]
     checks.equal(missing, [], "manual pages, completion, pages, rig.dbc, vibrig.proto and the schema are in the package")
-    checks.equal(output("dpkg-deb", "-f", package_file, "Suggests")[1], "chromium", "chromium is suggested")
+    checks.equal(output("dpkg-deb", "-f", package_file, "Suggests")[1], "chromium, python3-vibrig", "chromium is suggested")
 
 
 def main():
