@@ -54,9 +54,9 @@ bool recover(const RunSolution& first, const RunSolution& second, RunSolution& o
                 two.covariance(t, static_cast<Eigen::Index>(internal_index(kDt, other)));
         }
     }
-    using Vector30 = Eigen::Matrix<double, kParameters, 1>;
-    const Eigen::Map<const Vector30> value_one(one.value.data());
-    const Vector30 value = from_one * value_one + from_two * value_two;
+    using ValueVector = Eigen::Matrix<double, kParameters, 1>;
+    const Eigen::Map<const ValueVector> value_one(one.value.data());
+    const ValueVector value = from_one * value_one + from_two * value_two;
     const Covariance covariance = from_one * one.covariance * from_one.transpose() +
                                   from_two * constants * from_two.transpose();
     for (std::size_t i = 0; i < kParameters; ++i)
