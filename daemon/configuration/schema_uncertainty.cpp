@@ -43,8 +43,8 @@ std::optional<Declared> read_table(const toml::table& table, const std::string& 
     bool good = true;
     for (const auto& [key, node] : table) {
         const std::string part = name + "." + std::string(key.str());
-        const auto read_part = [&](Range range) {
-            const auto value = read_number(node, part, range, unit, problems);
+        const auto read_part = [&, &own = node](Range range) {
+            const auto value = read_number(own, part, range, unit, problems);
             good = good && value.has_value();
             return value;
         };

@@ -90,11 +90,11 @@ std::string with_dwells(const google::protobuf::Message& whole, v1::Campaign& ca
     dwells.Swap(campaign.mutable_dwells());
     std::string text = to_json(whole);
     // A text would have its quotes escaped.
-    constexpr std::string_view kNone = "\"dwells\":[]";
-    const std::size_t at = text.find(kNone);
+    constexpr std::string_view kNoDwells = "\"dwells\":[]";
+    const std::size_t at = text.find(kNoDwells);
     if (dwells.empty() || at == std::string::npos) return text;
-    const std::string behind = text.substr(at + kNone.size() - 1);
-    text.resize(at + kNone.size() - 1);
+    const std::string behind = text.substr(at + kNoDwells.size() - 1);
+    text.resize(at + kNoDwells.size() - 1);
     for (const v1::Dwell& dwell : dwells) {
         if (text.back() != '[') text += ',';
         text += to_json(dwell);

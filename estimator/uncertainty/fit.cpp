@@ -106,14 +106,14 @@ VectorXd NullFit::residual_variance() const {
 double RampFit::log_evidence() const {
     double square = 0;
     for (std::size_t j = 0; j < 3; ++j) square += (mean[j] / sigma[j]) * (mean[j] / sigma[j]);
-    constexpr std::array<double, 3> kSizes{2, 6, 20};
+    constexpr std::array<double, 3> kRampSizes{2, 6, 20};
     double sum = 0;
-    for (const double q : kSizes) {
+    for (const double q : kRampSizes) {
         const double share = q * q / (1 + q * q);
         // Relative to the largest term: the exponent may be large.
         sum += std::exp(-1.5 * std::log1p(q * q) + 0.5 * (share - 1) * square);
     }
-    return 0.5 * square + std::log(sum / kSizes.size());
+    return 0.5 * square + std::log(sum / kRampSizes.size());
 }
 
 RampFit fit_ramps(const DwellTable& table, const VectorXd& coefficients) {
