@@ -3,9 +3,10 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <string>
+#include <utility>
 #include <vector>
 
-#include "estimator/identification.hpp"
 #include "estimator/linear_algebra.hpp"
 #include "estimator/parameters.hpp"
 
@@ -36,6 +37,12 @@ struct Observability {
 /// Neither allocates nor throws.
 [[nodiscard]] Observability observability(const Covariance& posterior, const ParameterArray& prior,
                                           const KappaSpread& kappa) noexcept;
+
+/// A determined combination of coefficients that are not determined one by one.
+struct Combination {
+    std::vector<std::pair<std::string, double>> weights;
+    double value = 0, sigma = 0;
+};
 
 /// Combinations of the undetermined coefficients that the data do determine, by name.
 [[nodiscard]] std::vector<Combination> determined_combinations(const Observability& found,

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

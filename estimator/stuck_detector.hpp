@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

@@ -6,8 +6,8 @@
 
 #include "daemon/plan/plan_file.hpp"
 #include "estimator/crlb.hpp"
-#include "estimator/identification.hpp"
 #include "estimator/plan/model.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::plan {
 

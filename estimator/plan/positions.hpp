@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/identification.hpp"
 #include "estimator/plan/model.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator::plan {
 
