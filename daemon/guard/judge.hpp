@@ -6,8 +6,8 @@
 
 #include "daemon/guard/settings.hpp"
 #include "daemon/guard/witnesses.hpp"
-#include "drivers/clock.hpp"
-#include "drivers/horn.hpp"
+#include "drivers/annunciator/horn.hpp"
+#include "drivers/base/clock.hpp"
 #include "proto/guard_words.hpp"
 
 namespace vibrig::guard {

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "drivers/annunciator.hpp"
-#include "drivers/can_port.hpp"
+#include "drivers/annunciator/annunciator.hpp"
+#include "drivers/can/can_port.hpp"
 #include "proto/register_map.hpp"
 #include "proto/safety.hpp"
 

@@ -13,11 +13,11 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/domain/status.hpp"
 #include "daemon/journal/checkpoint.hpp"
 #include "daemon/journal/latches.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/status.hpp"
 
 namespace vibrig::journal {
 

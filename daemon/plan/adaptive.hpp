@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "daemon/plan/plan_file.hpp"
+#include "estimator/filter/settings.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/order.hpp"
-#include "estimator/settings.hpp"
 
 namespace vibrig::plan {
 

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "daemon/plan/plan_file.hpp"
-#include "estimator/crlb.hpp"
+#include "estimator/filter/settings.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/plan/model.hpp"
-#include "estimator/settings.hpp"
 
 namespace vibrig::plan {
 

@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/domain/status.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/status.hpp"
-#include "drivers/sample.hpp"
+#include "drivers/sample/sample.hpp"
 
 namespace vibrig::record {
 

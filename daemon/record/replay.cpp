@@ -19,7 +19,7 @@
 #include "daemon/record/raw_log.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/rig_clock.hpp"
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 #include "proto/candump.hpp"
 #include "proto/text.hpp"
 

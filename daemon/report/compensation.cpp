@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimator/drift_model.hpp"
-#include "estimator/kinematics.hpp"
-#include "estimator/parameters.hpp"
+#include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::report {
 

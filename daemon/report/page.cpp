@@ -1,6 +1,6 @@
 #include "daemon/report/page.hpp"
 
-#include "daemon/tool/plot/xml_text.hpp"
+#include "daemon/plot/xml_text.hpp"
 
 namespace vibrig::report {
 

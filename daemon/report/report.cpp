@@ -10,12 +10,12 @@
 #include <numbers>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/plan_section.hpp"
-#include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
-#include "estimator/instruction_set.hpp"
+#include "estimator/filter/instruction_set.hpp"
 
 namespace vibrig::report {
 

@@ -4,7 +4,7 @@
 #include <numbers>
 #include <span>
 
-#include "drivers/signal_binding.hpp"
+#include "drivers/sample/signal_binding.hpp"
 
 namespace vibrig::rt {
 

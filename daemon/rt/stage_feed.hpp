@@ -6,10 +6,10 @@
 #include <string>
 
 #include "daemon/rt/ring.hpp"
-#include "daemon/rt/snapshot.hpp"
-#include "drivers/can_port.hpp"
-#include "drivers/clock.hpp"
-#include "drivers/sample.hpp"
+#include "drivers/base/clock.hpp"
+#include "drivers/base/snapshot.hpp"
+#include "drivers/can/can_port.hpp"
+#include "drivers/sample/sample.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::rt {

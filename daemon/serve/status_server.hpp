@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
+#include "daemon/domain/status.hpp"
 #include "daemon/serve/socket_file.hpp"
-#include "daemon/status.hpp"
 
 namespace vibrig::serve {
 

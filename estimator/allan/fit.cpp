@@ -6,7 +6,7 @@
 #include <optional>
 #include <sstream>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 

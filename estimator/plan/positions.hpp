@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/filter/settings.hpp"
 #include "estimator/plan/model.hpp"
-#include "estimator/settings.hpp"
 
 namespace vibrig::estimator::plan {
 

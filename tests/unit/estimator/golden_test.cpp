@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "estimator/crlb.hpp"
-#include "estimator/drift_model.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

@@ -1,0 +1,39 @@
+#include "daemon/results/progress.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace vibrig::tool {
+
+namespace {
+
+constexpr std::chrono::milliseconds kPatience{500};
+constexpr std::chrono::milliseconds kRefresh{100};
+
+}  // namespace
+
+Progress::Progress(std::string what)
+    : what_(std::move(what)),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      next_(Clock::now() + kPatience) {}
+
+Progress::~Progress() {
+    if (shown_) {
+        std::fputs("\r\033[K", stderr);
+    }
+}
+
+void Progress::show(std::size_t done, std::size_t all) {
+    if (!terminal_ || Clock::now() < next_) {
+        return;
+    }
+    next_ = Clock::now() + kRefresh;
+    shown_ = true;
+    const std::size_t percent = all == 0 ? 100 : done * 100 / all;
+    std::fprintf(stderr, "\r%s %zu %%\033[K", what_.c_str(), percent);
+    std::fflush(stderr);
+}
+
+}  // namespace vibrig::tool
