@@ -29,6 +29,7 @@
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
 #include "daemon/watch/guard_link.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig {
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -136,48 +135,7 @@ struct Estimate {
     std::uint32_t dwells = 0;
 };
 
-struct RunAmplitude {
-    int run = 0;
-    double amplitude_g = 0, kappa = 1, sigma_g = 0, frequency_hz = 0;
-};
-
-/// A determined combination of coefficients that are not determined one by one.
-struct Combination {
-    std::vector<std::pair<std::string, double>> weights;
-    double value = 0, sigma = 0;
-};
-
-/// Agreement of the filter with an independent batch least squares over the same readings.
-struct CrossCheck {
-    static constexpr double kLimit = 0.05;  ///< of a standard deviation
-    bool done = false;
-    double largest = 0;       ///< difference of all that is determined, in standard deviations
-    std::string coefficient;  ///< where: a name, or the first of a combination
-
-    [[nodiscard]] bool agrees() const noexcept { return largest <= kLimit; }
-};
-
-struct Result {
-    std::array<double, kParameters> value{};
-    std::array<double, kParameters> sigma{};
-    std::array<bool, kParameters> observable{};
-    /// 30 x 30, rows in the order of parameter_names(); rows of what is not observable are NaN
-    /// (null in JSON).
-    Eigen::Matrix<double, kParameters, kParameters> covariance =
-        Eigen::Matrix<double, kParameters, kParameters>::Zero();
-    std::vector<RunAmplitude> amplitudes;
-    std::vector<Combination> combinations;
-    double nis_per_dof = 0;
-    std::uint64_t samples = 0, rejected = 0;
-    std::vector<DwellSummary> dwells;
-    CrossCheck cross_check;
-    std::vector<std::string> warnings;
-};
-
-/// Adds what uncertain zeros of the accelerometers do to the runs' amplitudes. `level_variances`:
-/// for each dwell with known zeros its run and the variance of the vertical force, relative. The
-/// zeros are the same in every dwell: they do not average out.
-void widen_amplitudes(Result& result, const std::vector<std::pair<int, double>>& level_variances);
+struct Result;  // estimator/result.hpp: whoever shows a status does without Eigen
 
 /// D_Fx D_Ix D_Ox D_Sx D_IIx D_OOx D_SSx D_IOx D_ISx D_OSx, then y, z (IEEE Std 517 usage).
 [[nodiscard]] const std::array<const char*, kParameters>& parameter_names() noexcept;

@@ -11,6 +11,7 @@
 #include "estimator/identification.hpp"
 #include "estimator/observability.hpp"
 #include "estimator/paper_level.hpp"
+#include "estimator/result.hpp"
 #include "estimator/saturation_detector.hpp"
 #include "estimator/stuck_detector.hpp"
 #include "estimator/two_step.hpp"

@@ -8,6 +8,7 @@
 #include "estimator/identification.hpp"
 #include "estimator/linear_algebra.hpp"
 #include "estimator/parameters.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::estimator {
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/crlb.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::estimator {
 

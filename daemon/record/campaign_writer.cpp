@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "estimator/result.hpp"
+
 namespace vibrig::record {
 
 using hdf5::ColumnSpec;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/record/campaign_file.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::record {
 

@@ -10,6 +10,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "estimator/crlb.hpp"
 #include "estimator/dwell_residual.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::report {
 

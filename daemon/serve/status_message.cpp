@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/result.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {

@@ -28,6 +28,7 @@
 #include "estimator/kinematics.hpp"
 #include "estimator/plan/positions.hpp"
 #include "estimator/plan_report.hpp"
+#include "estimator/result.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {

@@ -10,6 +10,7 @@
 #include "daemon/tool/progress.hpp"
 #include "estimator/crlb.hpp"
 #include "estimator/linear_algebra.hpp"
+#include "estimator/result.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::tool::tang2009 {

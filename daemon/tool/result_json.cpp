@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/instruction_set.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::tool {
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "daemon/tool/result_json.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::tool {
 

@@ -16,13 +16,6 @@ inline constexpr double kDetected = 3;
 /// and otherwise below this many above the estimate.
 inline constexpr double kBound = 2;
 
-struct FittedTerm {
-    bool detected = false;
-    double value = 0;  ///< best estimate, detected or not; 0 where its square would be negative
-    double sigma = 0;  ///< 1 sigma of the value, meaningful when detected; 0 if the value is
-    double below = 0;  ///< the term is not larger, when it is not detected
-};
-
 struct Fit {
     std::array<FittedTerm, kTerms> terms;
     /// Not empty when the ramp cannot be told from the rate random walk in this record.

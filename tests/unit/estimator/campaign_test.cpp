@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "estimator/identification.hpp"
+#include "estimator/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "estimator/plan_report.hpp"
+#include "estimator/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "estimator/identification.hpp"
+#include "estimator/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

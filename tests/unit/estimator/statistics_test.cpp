@@ -8,6 +8,7 @@
 #include "estimator/crlb.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/linear_algebra.hpp"
+#include "estimator/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 // Many simulated campaigns (9 and 7 g at the table, Table 1 of Tang et al. 2009): are the errors as

@@ -11,6 +11,7 @@
 #include "estimator/kinematics.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/positions.hpp"
+#include "estimator/result.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::plan {

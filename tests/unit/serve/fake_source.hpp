@@ -9,6 +9,7 @@
 
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
+#include "estimator/result.hpp"
 
 namespace vibrig::serve {
 

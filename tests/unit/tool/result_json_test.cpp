@@ -7,6 +7,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "estimator/result.hpp"
+
 namespace vibrig::tool {
 namespace {
 
