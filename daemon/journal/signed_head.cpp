@@ -18,7 +18,7 @@ namespace vibrig::journal {
 namespace {
 
 constexpr std::size_t kLargestHead = 1024;  // a line has some 440 characters
-constexpr std::size_t kDigits = 64, kSignatureDigits = 128;
+constexpr std::size_t kHashDigits = 64, kSignatureDigits = 128;
 
 /// " name=word" at the beginning of `rest`, which goes on behind it.
 bool take(std::string_view& rest, std::string_view name, std::string_view& word) {
@@ -73,8 +73,8 @@ std::optional<SignedHead> parse_head(std::string_view line) {
         !take(line, "hash", hash) || !take(line, "utc_ns", head.utc_ns) ||
         !take(line, "key", key) || !take(line, "signature", signature))
         return {};
-    if ((!chain.empty() && chain.size() != kDigits) || hash.size() != kDigits ||
-        key.size() != kDigits || signature.size() != kSignatureDigits)
+    if ((!chain.empty() && chain.size() != kHashDigits) || hash.size() != kHashDigits ||
+        key.size() != kHashDigits || signature.size() != kSignatureDigits)
         return {};
     head.chain = chain;
     head.link.hash = from_hex(hash);

@@ -11,6 +11,7 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 namespace vibrig::journal {
@@ -78,8 +79,15 @@ SigningKey::SigningKey(const std::string& path) : path_(path) {
 
 void SigningKey::keep() {
     const std::string unfinished = path_ + ".new";
-    if (made_ && ::rename(unfinished.c_str(), path_.c_str()) != 0)
-        fail(unfinished, std::strerror(errno));
+    if (!made_) return;
+    if (::rename(unfinished.c_str(), path_.c_str()) != 0) fail(unfinished, std::strerror(errno));
+    // The journal names this key from now on: its name has to survive a power cut as well.
+    const std::string folder = std::filesystem::absolute(path_).parent_path().string();
+    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool synced = fd >= 0 && ::fsync(fd) == 0;
+    const int why = errno;
+    if (fd >= 0) ::close(fd);
+    if (!synced) fail(folder, std::strerror(why));
     made_ = false;
 }
 

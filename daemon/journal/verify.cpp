@@ -93,6 +93,7 @@ bool look_at_version(Database& database, const std::string& path, Verdict& verdi
     if (version < kSchemaVersion) {
         if (std::filesystem::file_size(path) > 0 && !beside)
             throw std::runtime_error(path + ": found another database, expected a journal");
+        verdict.begins = "nowhere";
         verdict.found.emplace_back("has nothing in it");
         return false;
     }

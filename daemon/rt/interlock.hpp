@@ -21,7 +21,7 @@ namespace vibrig::rt {
 [[nodiscard]] const char* text_of(Trip trip) noexcept;
 
 /// A latched trip: cause, row of the table and value belong together, in one atomic value.
-struct Tripped {
+struct alignas(8) Tripped {
     Trip cause = Trip::none;
     std::uint8_t row = 0;
     std::uint8_t channel = drivers::kChannels;  ///< drivers::Channel that told; kChannels: none

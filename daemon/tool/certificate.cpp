@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -96,9 +97,14 @@ report::Limit limit_of(const std::string& file, const toml::node& node) {
 }
 
 Issue read_paper(const std::string& file) {
+    std::ifstream in(file);
+    if (!in || std::filesystem::is_directory(file))
+        throw std::runtime_error(file + ": cannot be read");
+    std::ostringstream text;
+    text << in.rdbuf();
     toml::table root;
     try {
-        root = toml::parse_file(file);
+        root = toml::parse(text.str(), file);
     } catch (const toml::parse_error& error) {
         throw std::runtime_error(file + ":" + std::to_string(error.source().begin.line) + ": " +
                                  std::string(error.description()));

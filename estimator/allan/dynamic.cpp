@@ -36,6 +36,15 @@ std::vector<VariancePoint> curve_of(const std::vector<double>& allan,
     return curve;
 }
 
+std::uint64_t checked_hop(const DynamicSettings& settings) {
+    if (!(settings.overlap >= 0 && settings.overlap < 1)) {
+        throw DataError("overlap: must be at least 0 and below 1, got " +
+                        std::to_string(settings.overlap));
+    }
+    const double hop = static_cast<double>(settings.window) * (1 - settings.overlap);
+    return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(hop));
+}
+
 }  // namespace
 
 std::vector<std::size_t> window_factors(std::size_t window) {
@@ -51,13 +60,7 @@ DynamicAllan::DynamicAllan(const DynamicSettings& settings)
     : settings_(settings),
       near_(settings.tau0, checked_window(settings.window), window_factors(settings.window)),
       covariance_(near_.factors(), settings.window + 1, settings.tau0),
-      hop_(std::max<std::uint64_t>(
-          1, static_cast<std::uint64_t>(static_cast<double>(settings.window) *
-                                        (1 - std::clamp(settings.overlap, 0.0, 1.0))))) {
-    if (!(settings.overlap >= 0 && settings.overlap < 1)) {
-        throw DataError("overlap: must be at least 0 and below 1, got " +
-                        std::to_string(settings.overlap));
-    }
+      hop_(checked_hop(settings)) {
     if (settings.long_records) {
         far_.emplace(settings.tau0 * kDecimation, settings.window, window_factors(settings.window));
     }

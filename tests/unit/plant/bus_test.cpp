@@ -124,10 +124,10 @@ TEST(Hub, TakesOverAStaleSocketButNotALivingOne) {
 }
 
 TEST(Bus, NamesABadAddress) {
-    EXPECT_THROW(open_bus("seqpacket:"), PlantError);
-    EXPECT_THROW(open_bus("seqpacket:/no/such/folder/bus"), PlantError);
-    EXPECT_THROW(open_bus("seqpacket:" + std::string(200, 'a')), PlantError);
-    EXPECT_THROW(open_bus("nosuchcan0"), PlantError);
+    EXPECT_THROW((void)open_bus("seqpacket:"), PlantError);
+    EXPECT_THROW((void)open_bus("seqpacket:/no/such/folder/bus"), PlantError);
+    EXPECT_THROW((void)open_bus("seqpacket:" + std::string(200, 'a')), PlantError);
+    EXPECT_THROW((void)open_bus("nosuchcan0"), PlantError);
 }
 
 }  // namespace

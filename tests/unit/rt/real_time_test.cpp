@@ -94,7 +94,7 @@ TEST(RealTime, TellsWhyAPriorityCouldNotBeHad) {
 }
 
 // Sanitizers answer for mlockall, and touch memory of their own.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifndef VIBRIG_SANITIZED
 std::uint64_t locked_kb() {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;)

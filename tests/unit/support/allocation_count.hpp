@@ -4,8 +4,7 @@
 
 namespace vibrig::test {
 
-/// Heap allocations of this thread so far, by operator new or by malloc (Eigen's way). Under a
-/// sanitizer, which has its own malloc, only new is counted.
+/// Heap allocations of this thread so far, by operator new or by malloc (Eigen's way).
 [[nodiscard]] std::uint64_t allocations() noexcept;
 
 /// From now on this thread's allocations are also added to watched_allocations().

@@ -34,7 +34,8 @@ def main():
         copy = os.path.join(place, os.path.basename(unit))
         with open(copy, "w", encoding="utf-8") as file:
             file.write(text.replace(program, shutil.which("true")))
-        status, said = output("systemd-analyze", "verify", copy)
+        # Its manual pages are looked at in tests/docs: here they are not installed.
+        status, said = output("systemd-analyze", "verify", "--man=no", copy)
         mine = [line for line in said.splitlines() if "vibrig" in line]
         if status != 0 or mine:
             failed.append(f"systemd-analyze verify: status {status}: {said}")

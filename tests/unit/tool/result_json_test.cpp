@@ -17,6 +17,9 @@ using ::testing::Not;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+// clang 14 takes the constructor of a member's default value for granted and does not make it.
+[[maybe_unused]] const Eigen::VectorXd kMakesIt;
+
 estimator::Result complete() {
     estimator::Result result;
     result.covariance.setZero();

@@ -52,7 +52,7 @@ TEST_F(Reproduce, LinesAreAtMost120ColumnsAndEveryRowHasValues) {
         for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 120U) << line;
         EXPECT_NE(out.find("theory"), std::string::npos);
     }
-    for (const char* chart : {"dplan-growth.svg", "zha2019-drive.svg", "accelerometer-zeros.svg"})
+    for (const char* chart : {"dplan-growth.svg", "accelerometer-zeros.svg"})
         EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / chart)) << chart;
     ASSERT_EQ(vibrig("reproduce dplan --json"), 0) << error;
     const Json result = Json::parse(out)["reproductions"][0];
