@@ -54,9 +54,12 @@ void Daemon::tell_verdict(const uncertainty::Assessment& assessed) {
     const auto& verdict = assessed.verdict;
     const std::string first = verdict.reasons.empty() ? "" : verdict.reasons.front().code;
     const std::string told = uncertainty::word_of(verdict.level) + (" " + first);
-    if (enough && std::exchange(verdict_told_, told) != told)
-        log(severity_of(verdict.level), "fit",
-            fmt::format("after {} dwells {}", assessed.rates.size(), verdict.sentence));
+    if (enough && std::exchange(verdict_told_, told) != told) {
+        const auto said =
+            fmt::format("after {} dwells {}", assessed.rates.size(), verdict.sentence);
+        log(severity_of(verdict.level), "fit", said);
+        if (verdict.level == uncertainty::Level::not_valid) campaign_.doubted(said);
+    }
     const std::lock_guard lock(mutex_);
     campaign_status_.verdict = {static_cast<std::uint32_t>(assessed.rates.size()),
                                 static_cast<int>(verdict.level),

@@ -203,6 +203,7 @@ void Campaign::begin(const std::string& by, Time now) {
     temperatures_.clear();
     pause_asked_ = false;
     rejected_in_a_row_ = 0;
+    doubted_.clear();
     zeroed_ = false;
     zeroing_ = Zeroing::none;
     mark_.clear();
@@ -277,7 +278,7 @@ void Campaign::start_position(Time now) {
         return;
     }
     if (zero_ && !zeroed_) return begin_zeroing(false, now);
-    if (too_many_rejected(now)) return;
+    if (too_many_rejected(now) || not_valid_so_far(now)) return;
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);
         // At rest it is asked again.

@@ -151,6 +151,8 @@ class Campaign {
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
+    /// The verdict on the dwells so far has become "not valid".
+    void doubted(const std::string& why) { doubted_ = why; }
     /// Why the campaign is marked; empty: it is not.
     [[nodiscard]] const std::string& mark() const { return mark_; }
 
@@ -237,6 +239,8 @@ class Campaign {
     void pause_at_rest(const std::string& why, drivers::Time now);
     /// Two or so in a row: it pauses. True: it has.
     [[nodiscard]] bool too_many_rejected(drivers::Time now);
+    /// True: it has paused, since that is asked for.
+    [[nodiscard]] bool not_valid_so_far(drivers::Time now);
     /// Asks the shaker for a level; whoever watches it knows what it was asked.
     [[nodiscard]] bool ask_level(double table_g, drivers::Time now);
     void tell_ramp(double table_g, drivers::Time now);
@@ -342,6 +346,7 @@ class Campaign {
     bool gravity_told_ = false;
     int rejected_in_a_row_ = 0;  ///< dwells, the newest included
     std::string rejected_for_;
+    std::string doubted_;  ///< and not paused for yet
     Part part_ = Part::go;
     Check check_ = Check::look;
     SafetyProof proof_;

@@ -63,6 +63,12 @@ bool Campaign::too_many_rejected(Time now) {
     return true;
 }
 
+bool Campaign::not_valid_so_far(Time now) {
+    if (doubted_.empty() || !settings_.pause_when_not_valid) return false;
+    pause_at_rest("the dwells so far: " + std::exchange(doubted_, {}), now);
+    return true;
+}
+
 void Campaign::pause_at_rest(const std::string& why, Time now) {
     pause_asked_ = true;
     enter(State::paused, now);

@@ -112,6 +112,7 @@ struct Settings {
     double temperature_band_c = 0.5;    ///< largest spread within the window
     double amplitude_tolerance = 0.05;  ///< relative; measured against commanded after the ramp
     int rejected_in_a_row = 2;          ///< dwells, after which it pauses at rest
+    bool pause_when_not_valid = false;  ///< the verdict on the dwells so far
     /// Gravity against encoders: beyond it nothing is ramped. A simulated rig is not commissioned.
     double gravity_refused_deg = 0.5;
     rt::RestSettings rest;

@@ -183,6 +183,11 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(integer("campaign.rejected_in_a_row", "", 1, 1000,
                            "rejected dwells, after which it pauses at rest and says why",
                            [](C& c) -> int& { return c.campaign.rejected_in_a_row; }));
+    keys.push_back(choice<bool>(
+        "campaign.on_not_valid", {{"go-on", false}, {"pause", true}},
+        "when the verdict on the dwells so far becomes \"not valid\"; the pause is at rest, before "
+        "the next position",
+        [](C & c) -> auto& { return c.campaign.pause_when_not_valid; }));
     keys.push_back(number("campaign.arming_valid_s", "s", {10, 86'400},
                           "an arming ends after so long without a start",
                           [](C& c) -> double& { return c.campaign.arming_valid_s; }));

@@ -219,6 +219,31 @@ TEST_F(WatchedCampaign, TwoRejectedDwellsInARowPauseAtRestWithTheCause) {
     EXPECT_EQ(orders.size(), 4U);
 }
 
+TEST_F(WatchedCampaign, DwellsThatAreNotValidTogetherPauseWhereThatIsAskedFor) {
+    settings.pause_when_not_valid = true;
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 100));
+    campaign->doubted("after 12 dwells not valid: azimuth");
+    ASSERT_TRUE(run_until(CampaignState::paused, 300)) << status().reason;
+    EXPECT_EQ(orders.size(), 1U) << "the dwell under way is closed";
+    EXPECT_TRUE(shaker.now.at_rest());
+    EXPECT_NE(status().reason.find("not valid: azimuth"), std::string::npos) << status().reason;
+    // somebody who takes that upon himself goes on, and is not asked for the same again
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    EXPECT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    EXPECT_EQ(orders.size(), 4U);
+}
+
+TEST_F(WatchedCampaign, DwellsThatAreNotValidTogetherDoNotHoldItUpByThemselves) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 100));
+    campaign->doubted("after 12 dwells not valid: azimuth");
+    ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+}
+
 TEST_F(WatchedCampaign, DwellsThatAreFlaggedButUsedDoNotPause) {
     // Another noise than in the earlier dwells, samples left out: the estimate takes them.
     all_flagged = true;
