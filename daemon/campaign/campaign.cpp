@@ -7,6 +7,7 @@
 
 #include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/opening_stage.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 
 namespace vibrig::campaign {
@@ -149,10 +150,12 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         case Kind::resume:
             if (!active() && !offer_.empty()) return resume_interrupted(request, now);
             if (state_ != State::paused && !pause_asked_) return refuse("not paused");
+            if (state_ == State::paused) vibration_off_.clear();  // looked at anew
             pause_asked_ = false;
             return accept("resumed");
         case Kind::abort:
-            if (active() || state_ == State::armed || state_ == State::checking) {
+            if (active() || state_ == State::armed || state_ == State::checking ||
+                state_ == State::commissioning) {
                 abort("aborted by " + request.by, now);
             } else {
                 order_stop("stopped by " + request.by);
@@ -186,6 +189,8 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         }
         case Kind::selftest:
             return begin_loop_check(request, now);
+        case Kind::commission:  // the daemon's, by begin_commissioning()
+            break;
     }
     return refuse("unknown command");
 }
@@ -200,11 +205,14 @@ void Campaign::begin(const std::string& by, Time now) {
     static_cast<void>(put_first(dwells_));
     offered_stops_.clear();
     at_ = positions_done_;
+    repeat_after_interruption();
     temperatures_.clear();
     pause_asked_ = false;
     rejected_in_a_row_ = 0;
-    doubted_.clear();
-    zeroed_ = false;
+    vibration_off_.clear();
+    vibration_off_since_ = -1;
+    doubted_.reset();
+    zeroed_ = opened_ = false;
     zeroing_ = Zeroing::none;
     mark_.clear();
     level_variances_.clear();
@@ -225,7 +233,7 @@ Time Campaign::step(Time now) {
 
 Time Campaign::step_once(Time now) {
     watch_stop(now);
-    if (pressed_) await_pressed_rest(now);
+    if (pressed_ != Pressed::no) await_pressed(now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
         !ports_.shaker.reading().valid) {
@@ -236,7 +244,7 @@ Time Campaign::step_once(Time now) {
     watch_arming(now);
     switch (state_) {
         case State::waiting:
-            return wait_for_platform(now);
+            return opening() ? open(now) : wait_for_platform(now);
         case State::zeroing:
             return zeroing(now);
         case State::levelling:
@@ -255,6 +263,13 @@ Time Campaign::step_once(Time now) {
         case State::paused:
             if (!pause_asked_ || shutting_down_) start_position(now);
             return now + kSecond;
+        case State::commissioning:
+            if (!ports_.shaker.reading().at_rest()) {
+                abort("the shaker is not at rest, or cannot be read", now);
+                return now;
+            }
+            ports_.gimbal.update(ports_.platform(), now);
+            return std::min(ports_.gimbal.next_deadline(), now + kPoll);
         case State::idle:
         case State::armed:
         case State::finished:
@@ -278,7 +293,8 @@ void Campaign::start_position(Time now) {
         return;
     }
     if (zero_ && !zeroed_) return begin_zeroing(false, now);
-    if (too_many_rejected(now) || not_valid_so_far(now)) return;
+    if (opening_ && !opened_) return begin_opening(now);
+    if (too_many_rejected(now) || vibration_was_off(now) || not_valid_so_far(now)) return;
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);
         // At rest it is asked again.
@@ -288,9 +304,12 @@ void Campaign::start_position(Time now) {
     const auto& angle = here().stop.position_deg;
     ports_.event(
         Severity::info,
-        fmt::format("run {} of {}, position {} of {}: {:g}, {:g}, {:g} deg, {:g} g, dwell {} of {}",
-                    here().run, runs(), here().position, positions(), angle[0], angle[1], angle[2],
-                    table_g(), at_ + 1, std::max(expected_, at_ + 1)));
+        fmt::format("run {} of {}, position {}: {:g}, {:g}, {:g} deg, {:g} g, dwell {} of {}",
+                    here().run, runs(),
+                    is_repeat(here()) ? fmt::format("{}, a repeat", here().position)
+                                      : fmt::format("{} of {}", here().position, positions()),
+                    angle[0], angle[1], angle[2], table_g(), at_ + 1,
+                    std::max(expected_, at_ + 1)));
     enter(State::slewing, now);
 }
 
@@ -333,6 +352,17 @@ bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading, dou
     return reading.valid && reading.running && reading.state == drivers::kShakerRunning &&
            std::abs(reading.frequency_hz - settings_.frequency_hz) <= kFrequencyToleranceHz &&
            std::abs(reading.measured_g - table_g) <= settings_.amplitude_tolerance * table_g;
+}
+
+/// A stop of another thread comes before the word of who ordered it and why, which is to be the
+/// reason; for so long it is waited for.
+bool Campaign::stopped_by_another(Time now) {
+    if (ports_.shaker.stops() == armed_under_) return false;
+    if (stopped_under_ != ports_.shaker.stops()) {
+        stopped_under_ = ports_.shaker.stops();
+        stopped_since_ = now;
+    }
+    return now - stopped_since_ < drivers::kSecond;
 }
 
 Time Campaign::ramp(Time now) {
@@ -388,7 +418,8 @@ Time Campaign::record(Time now) {
         if (!ports_.order_dwell(order)) abort("the estimator takes no order", now);
         return now + kPoll;
     }
-    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.shaker.reading(), table_g())) {
+    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.shaker.reading(), table_g()) &&
+        !stopped_by_another(now)) {
         const auto reading = ports_.shaker.reading();
         abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                           reading.state, reading.measured_g, table_g()),
@@ -432,6 +463,7 @@ Time Campaign::rest(Time now) {
         end(State::aborted, "the daemon is shutting down", now);
         return now;
     }
+    repeat_doubted();
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);
         if (choice == Choice::thinking) return now + kPoll;
@@ -478,16 +510,17 @@ void Campaign::abort(const std::string& why, Time now) {
 void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
     const bool checking = state_ == State::checking;
+    const bool commissioning = state_ == State::commissioning;
     if (checking) {
         loop_->not_completed(why);
-        pressed_ = check_ == Check::press && ports_.shaker.reading().emergency_stop_open;
-        if (pressed_) {
-            stop_times_.begin(now);
+        if (check_ == Check::press && ports_.shaker.reading().emergency_stop_open) {
+            begin_pressed(now);
         } else {
             conclude_proof("not completed: " + why + suspect_unit());
         }
     }
-    const bool slewing = state_ == State::slewing || state_ == State::zeroing;
+    const bool slewing = state_ == State::slewing || state_ == State::zeroing || opening();
+    if (opening_) opening_->end();
     leave_dwell();
     leave_stage();
     zeroing_ = Zeroing::none;
@@ -498,8 +531,10 @@ void Campaign::end(State state, const std::string& why, Time now) {
     if (state == State::tripped) {
         ports_.event(Severity::trip, "stop of the shaker ordered: " + why);
     } else {
-        ports_.event(Severity::alarm,
-                     (checking ? "loop check aborted: " : "campaign aborted: ") + why);
+        ports_.event(Severity::alarm, (checking        ? "loop check aborted: "
+                                       : commissioning ? "commissioning aborted: "
+                                                       : "campaign aborted: ") +
+                                          why);
     }
     if (had_campaign) ports_.end(false);
 }
@@ -528,11 +563,13 @@ void Campaign::on_trip(const std::string& cause, Time now) {
 void Campaign::shut_down(Time now) {
     if (shutting_down_) return;
     shutting_down_ = true;
-    if (state_ == State::checking) return abort("the daemon is shutting down", now);
+    if (pressed_ != Pressed::no) end_pressed("not completed: the daemon is shutting down");
+    if (state_ == State::checking || state_ == State::commissioning)
+        return abort("the daemon is shutting down", now);
     if (!active()) return;
     leave_dwell();
     leave_stage();
-    if (state_ == State::slewing) ports_.gimbal.release(now);
+    if (state_ == State::slewing || opening()) ports_.gimbal.release(now);
     if (!stop_.excited()) return end(State::aborted, "the daemon is shutting down", now);
     ports_.event(Severity::warning, "shutting down: ramping the shaker down");
     enter(State::resting, now);

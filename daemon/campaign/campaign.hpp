@@ -26,6 +26,7 @@ namespace vibrig::campaign {
 class GravityWatch;
 class LevellingStage;
 class LoopCheck;
+class OpeningStage;
 class ZeroingStage;
 
 /// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
@@ -36,6 +37,7 @@ class ZeroingStage;
 struct StageTimes {
     double levelling_s = 0;  ///< before each position
     double closing_s = 0;    ///< after the last one: zeros again
+    double opening_s = 0;    ///< before the first one
     double look_s = 1.5;     ///< before each ramp a whole still second, wherever seconds begin
 };
 [[nodiscard]] StageTimes stage_times(const Settings& settings);
@@ -93,6 +95,8 @@ struct Ports {
     StopMonitor::Rest rest = {};
     /// A stop was not obeyed in its time; or was, and all is at rest.
     std::function<void(bool)> disobeyed = {};
+    /// The table moves though nothing was asked for.
+    std::function<void()> uncommanded = {};
     /// What is being proved by making it happen.
     std::function<void(Proving)> proving = {};
     /// A proof is over, passed or not.
@@ -124,7 +128,7 @@ class Campaign {
     /// Likewise: what earlier lives have proved of stopping.
     void take_over_proofs(std::vector<ProofRecord> history);
     /// Before the first step(): what an earlier life has left latched, in words.
-    void take_over_trip(const std::string& causes);
+    void take_over_trip(const std::string& causes, double table_g = 0);
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Why an arming or an acknowledgement would be refused now; empty: it would not, or it is
     /// another command.
@@ -133,6 +137,11 @@ class Campaign {
     [[nodiscard]] std::string arming_text(const CommandRequest& request) const;
     /// The person who has armed; empty: nobody.
     [[nodiscard]] const std::string& armed_by() const { return armed_by_; }
+    /// From now on gimbals move as commissioning says (daemon/commission/), while the shaker rests;
+    /// an abort, a trip and a shaker that does not rest end it. Why not, else empty.
+    [[nodiscard]] std::string begin_commissioning(const std::string& by, drivers::Time now);
+    void end_commissioning(drivers::Time now);
+    [[nodiscard]] bool commissioning() const { return state_ == CampaignState::commissioning; }
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
     void on_dwell_done(const estimator::DwellSummary& summary);
@@ -151,14 +160,17 @@ class Campaign {
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
-    /// The verdict on the dwells so far has become "not valid".
-    void doubted(const std::string& why) { doubted_ = why; }
+    /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that
+    /// it names, 0: none.
+    void doubted(const std::string& why, int run = 0, int position = 0) {
+        doubted_ = Doubt{why, run, position};
+    }
     /// Why the campaign is marked; empty: it is not.
     [[nodiscard]] const std::string& mark() const { return mark_; }
 
   private:
     /// Within zeroing and levelling.
-    enum class Part : std::uint8_t { go, slew, measure, zero };
+    enum class Part : std::uint8_t { go, slew, release, measure, zero };
     /// The zeroing that is under way, its levelling included.
     enum class Zeroing : std::uint8_t { none, start, end };
 
@@ -178,7 +190,13 @@ class Campaign {
         rest
     };
 
-    /// A stop and what the estimator and people call it, from 1.
+    struct Doubt {
+        std::string why;
+        int run = 0, position = 0;
+    };
+
+    /// A stop and what the estimator and people call it, from 1. Of one that is repeated the
+    /// position is a number that no other has.
     struct NumberedStop {
         Stop stop;
         int run = 1, position = 1;
@@ -206,7 +224,10 @@ class Campaign {
     void prove_clearing(drivers::Time now);
     void prove_emergency_stop(drivers::Time now);
     void prove_refusals(drivers::Time now);
-    void await_pressed_rest(drivers::Time now);
+    void begin_pressed(drivers::Time now);
+    void await_pressed(drivers::Time now);
+    void end_pressed(const std::string& why);
+    void prove_quiet();
     void keep_ring_down();
     void conclude_proof(const std::string& why);
     [[nodiscard]] std::string suspect_unit() const;
@@ -215,6 +236,11 @@ class Campaign {
     /// Gimbals slew only at rest; why not, else empty.
     [[nodiscard]] std::string may_slew() const;
     void make_stages();
+    void make_opening();
+    [[nodiscard]] bool opening() const;  ///< it is being held against the rig at rest
+    void begin_opening(drivers::Time now);
+    drivers::Time open(drivers::Time now);
+    void conclude_opening(drivers::Time now);
     void begin_zeroing(bool at_end, drivers::Time now);
     void leave_stage();
     void insist_on_zero_torque(drivers::Time now);
@@ -239,6 +265,16 @@ class Campaign {
     void pause_at_rest(const std::string& why, drivers::Time now);
     /// Two or so in a row: it pauses. True: it has.
     [[nodiscard]] bool too_many_rejected(drivers::Time now);
+    [[nodiscard]] bool vibration_was_off(drivers::Time now);
+    /// At rest: repeats the dwell that the verdict names, if that is asked for.
+    void repeat_doubted();
+    /// After an interruption of hours: a dwell of before, once more.
+    void repeat_after_interruption();
+    /// Next, before what is left. False: it was repeated before.
+    bool repeat_stop(std::size_t of, const std::string& why);
+    [[nodiscard]] bool is_repeat(const NumberedStop& stop) const {
+        return !settings_.adaptive && stop.position > static_cast<int>(planned_);
+    }
     /// True: it has paused, since that is asked for.
     [[nodiscard]] bool not_valid_so_far(drivers::Time now);
     /// Asks the shaker for a level; whoever watches it knows what it was asked.
@@ -260,6 +296,7 @@ class Campaign {
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
                                               double table_g) const;
+    [[nodiscard]] bool stopped_by_another(drivers::Time now);
     void plan_stops();
     [[nodiscard]] bool put_first(const std::vector<estimator::DwellSummary>& done);
     /// Runs and positions per run of a list; of a plan the levels and all its stops.
@@ -306,13 +343,16 @@ class Campaign {
     std::vector<NumberedStop> stops_;
     std::size_t at_ = 0;          ///< the stop that is being done
     std::size_t expected_ = 0;    ///< stops in all, as far as can be foreseen
+    std::size_t planned_ = 0;     ///< of them by the plan: not adaptive, no repeats
     std::vector<double> levels_;  ///< one run each, in order of appearance
     int repeats_ = 0;             ///< of the present stop, after flagged dwells
     std::string armed_by_;
     std::string armed_for_, started_by_;
     drivers::Time armed_wall_ = 0;  ///< when it was armed, in people's time
-    std::uint64_t armed_under_ =
-        0;  ///< of the shaker when it was armed, and this thread's own since
+    /// Stops of the shaker when it was armed, and this thread's own since; and when one of another
+    /// thread was found, since when.
+    std::uint64_t armed_under_ = 0, stopped_under_ = 0;
+    drivers::Time stopped_since_ = 0;
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;
@@ -333,7 +373,7 @@ class Campaign {
     std::size_t positions_before_ = 0;  ///< of them before a restart
     double used_before_s_ = 0;          ///< of the campaign, before a restart
     std::vector<estimator::DwellSummary> offer_;
-    std::vector<StopDone> offered_stops_;  ///< of an adaptive campaign
+    std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
@@ -342,19 +382,26 @@ class Campaign {
     std::shared_ptr<ZeroingStage> zero_;
     std::shared_ptr<LoopCheck> loop_;
     std::shared_ptr<GravityWatch> gravity_;
+    std::shared_ptr<OpeningStage> opening_;
     drivers::Time second_from_ = -1;  ///< the newest second that was judged
     bool gravity_told_ = false;
-    int rejected_in_a_row_ = 0;  ///< dwells, the newest included
+    drivers::Time vibration_off_since_ = -1;  ///< -1: it is vertical
+    std::string vibration_off_;               ///< in words, and nothing done about it yet
+    int rejected_in_a_row_ = 0;               ///< dwells, the newest included
     std::string rejected_for_;
-    std::string doubted_;  ///< and not paused for yet
+    std::optional<Doubt> doubted_;  ///< and nothing done about it yet
     Part part_ = Part::go;
     Check check_ = Check::look;
     SafetyProof proof_;
     StopTimes stop_times_;
     bool press_wanted_ = false;  ///< the emergency stop is to be proved, too
-    bool pressed_ = false;       ///< it was, and rest is awaited
+    /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
+    enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
+    drivers::Time pressed_at_ = 0;  ///< when that began
+    bool press_felt_ = false;       ///< by the controller, too
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell
+    bool opened_ = false;                      ///< likewise, the opening check
     std::array<double, 3> level_angle_rad_{};  ///< encoders, while levelling
     drivers::Time last_motion_ = 0, torque_sent_ = 0, zero_since_ = 0;
     std::string mark_;  ///< why the campaign is marked

@@ -24,18 +24,41 @@ std::string duration_text(double seconds) {
 
 }  // namespace
 
-void Campaign::take_over_trip(const std::string& causes) {
+void Campaign::take_over_trip(const std::string& causes, double table_g) {
     state_ = State::tripped;
     reason_ = causes;
+    // Nobody has seen rest since: silence is none.
+    stop_.excited(table_g);
 }
 
 std::string Campaign::not_fit_to_arm(Time now) const {
     if (active()) return "a campaign is running";
     if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (auto why = loop_->refusal(); !why.empty()) return why;
     if (auto why = proof_.refusal(utc_ns()); !why.empty()) return why;
     return not_fit_to_excite(now);
+}
+
+std::string Campaign::begin_commissioning(const std::string& by, Time now) {
+    if (shutting_down_) return "the daemon is shutting down";
+    if (active()) return "a campaign is running";
+    if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::armed) return "armed for a campaign: abort that first";
+    if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
+    if (auto why = platform_lacks(now); !why.empty()) return why;
+    if (auto why = may_slew(); !why.empty()) return why;
+    ports_.gimbal.forget_position();
+    reason_ = by;
+    enter(State::commissioning, now);
+    return {};
+}
+
+void Campaign::end_commissioning(Time now) {
+    if (state_ != State::commissioning) return;
+    reason_.clear();
+    enter(State::idle, now);
 }
 
 std::string Campaign::not_fit_to_acknowledge(Time now) const {
@@ -70,11 +93,11 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
                            : fmt::format("{} positions{}", stops_.size(),
                                          settings_.plan.empty() ? "" : " of " + settings_.plan);
     const double left_s = static_cast<double>(stops_.size() - offer_.size()) * nominal_stop_s();
-    const std::string lasts = settings_.adaptive
-                                  ? settings_.time_limit_s > 0
-                                        ? "at most " + duration_text(settings_.time_limit_s)
-                                        : std::string("until its targets are met")
-                                  : "about " + duration_text(left_s + times_.closing_s);
+    const std::string lasts =
+        settings_.adaptive ? settings_.time_limit_s > 0
+                                 ? "at most " + duration_text(settings_.time_limit_s)
+                                 : std::string("until its targets are met")
+                           : "about " + duration_text(left_s + times_.opening_s + times_.closing_s);
     return fmt::format(
         "{}, plan \"{}\" ({}), up to {:g} g at the table, {}; to be started within {}", unit,
         settings_.name, plan, highest_level(), lasts, duration_text(settings_.arming_valid_s));

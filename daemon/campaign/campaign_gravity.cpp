@@ -19,13 +19,21 @@ using State = CampaignState;
 namespace {
 // A position that does not show a still second in this time does not stand.
 constexpr Time kStillTimeout = 10 * kSecond;
+// One reading that is wild turns the direction of the vibration in its second, not in two.
+constexpr Time kVibrationOff = 2 * kSecond;
 }  // namespace
 
 void Campaign::watch_gravity() {
-    if (!ports_.second || !active() || state_ == State::slewing || state_ == State::zeroing) return;
+    if (!ports_.second || !active() || state_ == State::slewing || state_ == State::zeroing ||
+        opening())
+        return;
     const rt::MeanMotion second = ports_.second();
     // What began before the state may still be of a slew.
-    if (second.from == second_from_ || !second.good || second.from < entered_) return;
+    if (second.from == second_from_ || second.from < entered_) return;
+    if (!second.good) {
+        vibration_off_since_ = -1;
+        return;
+    }
     second_from_ = second.from;
     if (state_ == State::ramping && !requested_) gravity_->next_position();
     Vector zero_g = settings_.rig.accelerometer_zero_g;
@@ -34,9 +42,24 @@ void Campaign::watch_gravity() {
         for (std::size_t i = 0; i < 3; ++i) zero_g[i] += found[i];
     }
     const auto verdict = gravity_->judge(second, zero_g, !stop_.excited());
+    if (!verdict.vibration_told) {
+        vibration_off_since_ = -1;
+    } else if (vibration_off_since_ < 0) {
+        vibration_off_since_ = second.from;
+    } else if (second.to - vibration_off_since_ >= kVibrationOff) {
+        const bool first = vibration_off_.empty();
+        vibration_off_ = gravity_->vibration_words();
+        if (first) ports_.event(Severity::alarm, vibration_off_);
+    }
     if (std::exchange(gravity_told_, verdict.told) == verdict.told) return;
     ports_.event(verdict.told ? Severity::alarm : Severity::info,
                  verdict.told ? gravity_->words() : "gravity is where the encoders say again");
+}
+
+bool Campaign::vibration_was_off(Time now) {
+    if (vibration_off_.empty()) return false;
+    pause_at_rest(std::exchange(vibration_off_, {}), now);
+    return true;
 }
 
 bool Campaign::gravity_holds(Time now) {
@@ -64,8 +87,9 @@ bool Campaign::too_many_rejected(Time now) {
 }
 
 bool Campaign::not_valid_so_far(Time now) {
-    if (doubted_.empty() || !settings_.pause_when_not_valid) return false;
-    pause_at_rest("the dwells so far: " + std::exchange(doubted_, {}), now);
+    if (!doubted_ || settings_.on_not_valid != OnNotValid::pause) return false;
+    pause_at_rest("the dwells so far: " + doubted_->why, now);
+    doubted_.reset();
     return true;
 }
 

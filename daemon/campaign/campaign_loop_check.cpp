@@ -27,6 +27,7 @@ void Campaign::take_over_loop_check(const std::string& out_of_band) {
 std::string Campaign::not_fit_to_check(Time now) const {
     if (active()) return "a campaign is running";
     if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (state_ == State::armed) return "armed for a campaign: abort that first";
     if (ports_.feed == nullptr) return "no samples to look at";
@@ -48,7 +49,7 @@ CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now)
     loop_->begin(request.by);
     proof_.begin(request.by, settings_.loop.table_g);
     press_wanted_ = request.argument == "emergency_stop";
-    pressed_ = false;
+    pressed_ = Pressed::no;
     ports_.feed->order(rt::StageFeed::Mode::samples);
     last_motion_ = now;
     check_ = Check::look;
@@ -83,7 +84,8 @@ Time Campaign::check_loop(Time now) {
         abort(why, now);
     } else if ((check_ == Check::settle || check_ == Check::measure || check_ == Check::press) &&
                !reading.emergency_stop_open &&
-               !vibrating_as_commanded(reading, settings_.loop.table_g)) {
+               !vibrating_as_commanded(reading, settings_.loop.table_g) &&
+               !stopped_by_another(now)) {
         abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                           reading.state, reading.measured_g, settings_.loop.table_g),
               now);
@@ -92,8 +94,10 @@ Time Campaign::check_loop(Time now) {
             abort(still, now);
         } else if (!stop_.rest(now).measured()) {
             abort("not at rest: " + stop_.what_moves(now), now);
-        } else {
+        } else if (prove_quiet(); proof_.record().rows.back().passed()) {
             go_on_to(Check::ramp, now);
+        } else {
+            abort("the noise at rest is too near to shaker.rest_g", now);
         }
     } else if (check_ == Check::ramp) {
         ramp_for_check(Check::settle, now);

@@ -3,6 +3,8 @@
 // those who can tell, never by the controller's word alone.
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
+
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/safety_proof.hpp"
@@ -15,8 +17,13 @@ using drivers::Time;
 using drivers::to_seconds;
 
 namespace {
-// How long a person has to press the emergency stop.
+// How long a person has to press the emergency stop, and then to close its chain again.
 constexpr Time kPress = 60 * drivers::kSecond;
+// From the fall of the table to the register, and how long nothing may start with the chain closed.
+constexpr double kSeen_s = 0.5;
+constexpr Time kClosed = 3 * drivers::kSecond;
+// What is called rest has to be so many times the noise.
+constexpr double kNoises = 6;
 }  // namespace
 
 void StopTimes::begin(Time now) {
@@ -170,16 +177,65 @@ void Campaign::prove_emergency_stop(Time now) {
     if (now - entered_ > kPress) abort("nobody pressed the emergency stop", now);
 }
 
-/// After the trip: those who can tell, and the button's own latch.
-void Campaign::await_pressed_rest(Time now) {
-    stop_times_.look(ports_.shaker.reading(), stop_.rest(now));
-    if (stop_.stopping() && !stop_.disobeyed()) return;
-    pressed_ = false;
-    const double limit_s = stop_.longest_s(settings_.loop.table_g);
-    proof_.row("emergency stop, rest", "s", stop_times_.platform_s.value_or(1e3), 0, limit_s);
-    proof_.row("emergency stop, latched", state_ == CampaignState::tripped);
-    proof_.record().emergency_stop = true;
-    conclude_proof({});
+/// The opened chain has tripped: whether it was seen in time, by the table's own fall.
+void Campaign::begin_pressed(Time now) {
+    rt::Motion motion;
+    while (take_motion(motion, now)) loop_->add(motion);
+    pressed_ = Pressed::rest;
+    pressed_at_ = now;
+    press_felt_ = false;
+    stop_times_.begin(now);
+    const Time fell = loop_->last_at_half();
+    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0, kSeen_s);
+}
+
+/// After the trip: those who can tell, the button's own latch, and that closing the chain starts
+/// nothing.
+void Campaign::await_pressed(Time now) {
+    const auto reading = ports_.shaker.reading();
+    const auto rest = stop_.rest(now);
+    if (pressed_ == Pressed::rest) {
+        stop_times_.look(reading, rest);
+        press_felt_ =
+            press_felt_ || (reading.valid && reading.time > pressed_at_ &&
+                            (reading.fault != 0 || reading.state == drivers::kShakerFault));
+        if (stop_.stopping() && !stop_.disobeyed()) return;
+        const double limit_s = stop_.longest_s(settings_.loop.table_g);
+        proof_.row("emergency stop, rest", "s", stop_times_.platform_s.value_or(1e3), 0, limit_s);
+        proof_.row("emergency stop, latched", state_ == CampaignState::tripped);
+        // A contact alone cuts nothing: the trip's own stop brings the table to rest as well.
+        proof_.row("emergency stop, the controller says fault", press_felt_);
+        proof_.record().emergency_stop = true;
+        pressed_ = Pressed::open;
+        pressed_at_ = now;
+        if (reading.emergency_stop_open)
+            ports_.event(Severity::warning, "proof: close the emergency-stop chain again");
+    }
+    if (pressed_ == Pressed::open) {
+        if (now - pressed_at_ > kPress)
+            return end_pressed("nobody closed the emergency-stop chain again");
+        if (!reading.valid || reading.emergency_stop_open) return;
+        pressed_ = Pressed::closed;
+        pressed_at_ = now;
+    }
+    const bool starts = reading.valid && (reading.running || !reading.still());
+    if (starts || rest.moving() || now - pressed_at_ >= kClosed) {
+        proof_.row("closing the chain starts nothing", !starts && !rest.moving());
+        end_pressed({});
+    }
+}
+
+void Campaign::end_pressed(const std::string& why) {
+    pressed_ = Pressed::no;
+    conclude_proof(why);
+}
+
+/// Rest is called by what is well above the noise of those who call it.
+void Campaign::prove_quiet() {
+    const auto noise = loop_->noise();
+    const double limit_g = settings_.rest.limit_g / kNoises;
+    if (noise.table_g > 0) proof_.row("noise at rest, table", "g", noise.table_g, 0, limit_g);
+    proof_.row("noise at rest, platform", "g", noise.platform_g, 0, limit_g);
 }
 
 /// Every order that must not be followed while the table moves, tried.

@@ -49,8 +49,16 @@ void Campaign::order_stop(const std::string& by) {
 }
 
 void Campaign::watch_stop(Time now) {
-    switch (stop_.update(now)) {
+    // A hand, a slew or a torquer on the platform is no shaker.
+    const bool handled = state_ == State::slewing || state_ == State::paused ||
+                         state_ == State::zeroing || state_ == State::levelling || opening() ||
+                         commissioning();
+    switch (stop_.update(now, handled)) {
         case StopMonitor::News::none:
+            return;
+        case StopMonitor::News::uncommanded:
+            ports_.event(Severity::trip, "motion without a command: " + stop_.what_moves(now));
+            if (ports_.uncommanded) ports_.uncommanded();
             return;
         case StopMonitor::News::confirmed:
             if (ports_.disobeyed) ports_.disobeyed(false);

@@ -48,6 +48,13 @@ std::string check_stages(const Settings& settings, const proto::Dbc& dbc, driver
             if (auto why = stage.refusal(); !why.empty()) return why;
         }
         const rt::StageFeed feed(dbc, stage_feed_settings(settings), nullptr);
+        const auto& level = settings.level;
+        if (settings.levelling && level.velocity_north.empty() != (level.velocity_noise_mps == 0))
+            return fmt::format(
+                "levelling.velocity_noise_mps: found {:g}, expected {}", level.velocity_noise_mps,
+                level.velocity_north.empty()
+                    ? "0: levelling.velocity_north and velocity_east are not configured"
+                    : "above 0: no reading of the base's velocity is exact");
     } catch (const estimator::levelling::DesignError& error) {
         return std::string("levelling: ") + error.what();
     } catch (const estimator::zeros::ZeroError& error) {
@@ -79,6 +86,8 @@ rt::StageFeedSettings stage_feed_settings(const Settings& settings) {
     feed.gyro_message = settings.zero.gyro_message;
     feed.accelerometer_message = settings.zero.accelerometer_message;
     feed.block = settings.level.block;
+    if (settings.levelling)
+        feed.velocity = {settings.level.velocity_north, settings.level.velocity_east};
     return feed;
 }
 
@@ -93,6 +102,7 @@ void Campaign::make_stages() {
     }
     if (settings_.zeroing && ports_.feed != nullptr)
         zero_ = std::make_shared<ZeroingStage>(settings_.zero, settings_.rig, settings_.sample_s);
+    make_opening();
 }
 
 std::string Campaign::platform_lacks(Time now) const {

@@ -37,9 +37,11 @@ void Campaign::fill(StatusData& status, Time now) const {
     }
     fill_stages(status);
     proof_.fill(status.proof, utc_ns());
-    status.proof.asks = state_ == State::checking && check_ == Check::press && requested_
-                            ? "press the emergency stop now"
-                            : "";
+    const bool press = state_ == State::checking && check_ == Check::press && requested_;
+    const bool close = pressed_ == Pressed::open && ports_.shaker.reading().emergency_stop_open;
+    status.proof.asks = press   ? "press the emergency stop now"
+                        : close ? "close the emergency-stop chain again"
+                                : "";
     fill_rest(status, now);
     // Of what has ended nothing is left and nothing is commanded.
     status.remaining_s = 0;

@@ -9,11 +9,18 @@
 namespace vibrig::campaign {
 
 using drivers::Time;
+using State = CampaignState;
 
 namespace {
 
 // A flagged dwell of an adaptive campaign is repeated so often at most.
 constexpr int kMostRepeats = 2;
+/// An interruption after which a dwell of before is repeated: it ties both halves.
+constexpr Time kLongInterruption = 3600 * drivers::kSecond;
+
+bool same(const Stop& a, const Stop& b) {
+    return a.position_deg == b.position_deg && a.table_g == b.table_g;
+}
 
 }  // namespace
 
@@ -31,7 +38,7 @@ void Campaign::plan_stops() {
     repeats_ = 0;
     used_before_s_ = 0;
     for (const Stop& stop : settings_.stops) add_stop(stop);
-    for (const StopDone& done : offered_stops_) {
+    for (const StopDone& done : settings_.adaptive ? offered_stops_ : std::vector<StopDone>{}) {
         add_stop({done.position_deg, done.table_g});
         repeats_ = done.repeats;
         used_before_s_ = done.used_s;
@@ -48,22 +55,72 @@ void Campaign::plan_stops() {
                               static_cast<int>(k) + 1});
         }
     }
-    expected_ = stops_.size();
+    expected_ = planned_ = stops_.size();
 }
 
 /// An interrupted campaign goes on with what is left, in whatever order the first stops were: that
-/// of an earlier version, too. False: it did others.
+/// of an earlier version, too. A stop that was repeated is there as often. False: it did others.
 bool Campaign::put_first(const std::vector<estimator::DwellSummary>& done) {
-    if (done.size() > stops_.size()) return false;
     for (std::size_t i = 0; i < done.size(); ++i) {
         const auto from = stops_.begin() + static_cast<std::ptrdiff_t>(i);
+        const NumberedStop again{{}, done[i].run, done[i].position};
+        if (is_repeat(again) && offered_stops_.size() == done.size()) {
+            const auto of = std::find_if(stops_.begin(), from, [&](const NumberedStop& stop) {
+                return same(stop.stop, {offered_stops_[i].position_deg, offered_stops_[i].table_g});
+            });
+            if (of == from) return false;
+            stops_.insert(from, {of->stop, again.run, again.position});
+            continue;
+        }
         const auto at = std::find_if(from, stops_.end(), [&](const NumberedStop& stop) {
             return stop.run == done[i].run && stop.position == done[i].position;
         });
         if (at == stops_.end() || (at != from && !listed())) return false;
         std::rotate(from, at, at + 1);
     }
+    expected_ = stops_.size();
     return true;
+}
+
+bool Campaign::repeat_stop(std::size_t of, const std::string& why) {
+    const NumberedStop stop = stops_[of];
+    const bool before = std::ranges::any_of(stops_, [&](const NumberedStop& other) {
+        return is_repeat(other) && same(other.stop, stop.stop);
+    });
+    if (before) return false;
+    const int number = static_cast<int>(stops_.size()) + 1;
+    stops_.insert(stops_.begin() + static_cast<std::ptrdiff_t>(at_), {stop.stop, stop.run, number});
+    expected_ = stops_.size();
+    ports_.event(Severity::warning,
+                 fmt::format("run {} position {} is repeated, as position {}: {}", stop.run,
+                             stop.position, number, why));
+    return true;
+}
+
+void Campaign::repeat_doubted() {
+    if (!doubted_ || settings_.on_not_valid != OnNotValid::repeat) return;
+    const Doubt doubt = *std::exchange(doubted_, std::nullopt);
+    const auto named = std::ranges::find_if(stops_, [&](const NumberedStop& stop) {
+        return stop.run == doubt.run && stop.position == doubt.position;
+    });
+    if (named - stops_.begin() >= static_cast<std::ptrdiff_t>(at_)) {
+        ports_.event(Severity::warning, "it goes on, there is no dwell to repeat: " + doubt.why);
+    } else if (!repeat_stop(static_cast<std::size_t>(named - stops_.begin()), doubt.why)) {
+        ports_.event(Severity::warning,
+                     fmt::format("it goes on, run {} position {} was repeated before: {}",
+                                 doubt.run, doubt.position, doubt.why));
+    }
+}
+
+void Campaign::repeat_after_interruption() {
+    if (settings_.adaptive || !offered_last_ || offered_last_->begun_utc_ns <= 0 || at_ == 0 ||
+        at_ >= stops_.size())
+        return;
+    const Time since = utc_ns() - offered_last_->begun_utc_ns;
+    if (since <= kLongInterruption + drivers::from_seconds(settings_.dwell_s)) return;
+    static_cast<void>(
+        repeat_stop(at_ - 1, fmt::format("{:.1f} h without a dwell, which it ties together",
+                                         drivers::to_seconds(since) / 3600)));
 }
 
 Campaign::Choice Campaign::choose_next(Time now) {
@@ -131,10 +188,8 @@ void Campaign::take_over_origin() {
 bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops) {
     offered_last_.reset();
     if (!stops.empty()) offered_last_ = stops.back();
-    if (settings_.adaptive) {
-        offered_stops_ = std::move(stops);
-        plan_stops();
-    }
+    offered_stops_ = std::move(stops);
+    if (settings_.adaptive) plan_stops();
     const bool fits = put_first(done);
     if (fits) {
         offer_ = std::move(done);

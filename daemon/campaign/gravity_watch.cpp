@@ -30,11 +30,24 @@ GravityWatch::Verdict GravityWatch::judge(const rt::MeanMotion& second, const Ve
                                           bool at_rest) {
     Vector off{};
     for (std::size_t i = 0; i < 3; ++i) off[i] = second.force[i] - zero_g[i];
-    const Matrix& m = rig_.accelerometer_matrix;
-    const Vector force{dot(m[0], off), dot(m[1], off), dot(m[2], off)};
+    const auto of = [&m = rig_.accelerometer_matrix](const Vector& raw) {
+        return Vector{dot(m[0], raw), dot(m[1], raw), dot(m[2], raw)};
+    };
+    const Vector force = of(off), up = frame_.up(second.angle);
     newest_.known = true;
     newest_.size_g = std::sqrt(dot(force, force));
-    newest_.angle_deg = angle_deg(frame_.up(second.angle), force);
+    newest_.angle_deg = angle_deg(up, force);
+    // Whatever its phase, and be it an ellipse: the share of its power that is along the vertical.
+    const Vector cosine = of(second.cosine), sine = of(second.sine);
+    const double power = dot(cosine, cosine) + dot(sine, sine);
+    const double along = std::hypot(dot(cosine, up), dot(sine, up));
+    newest_.vibration_g = std::sqrt(power);
+    newest_.vibration_deg =
+        newest_.vibration_g < limits_.vibration_g
+            ? 0
+            : std::atan2(std::sqrt(std::max(power - along * along, 0.0)), along) *
+                  kDegreesPerRadian;
+    newest_.vibration_told = !(newest_.vibration_deg <= limits_.vibration_deg);
     const bool size = !at_rest || std::abs(newest_.size_g - 1) <= limits_.size;
     newest_.told = !(newest_.angle_deg <= limits_.told_deg) || !size;
     newest_.refused = !(newest_.angle_deg <= limits_.refused_deg) || !size;
@@ -51,6 +64,14 @@ std::string GravityWatch::words() const {
         "gravity {:.2f} deg off what the encoders say (told beyond {:g}, no ramp beyond {:g} deg), "
         "{:.3f} g (1 within {:g})",
         newest_.angle_deg, limits_.told_deg, limits_.refused_deg, newest_.size_g, limits_.size);
+}
+
+std::string GravityWatch::vibration_words() const {
+    return fmt::format(
+        "the vibration of {:.2f} g is {:.1f} deg off the vertical by the encoders (told beyond "
+        "{:g} "
+        "deg): motion across it, or an accelerometer that follows gravity and not the vibration",
+        newest_.vibration_g, newest_.vibration_deg, limits_.vibration_deg);
 }
 
 double GravityWatch::worst_deg(const estimator::Settings& rig) const {

@@ -14,10 +14,14 @@ struct GravityLimits {
     double told_deg = 0.2;
     double refused_deg = 0.5;
     double size = 0.02;  ///< of 1 g, at rest
+    /// Of the vibration against the vertical by the encoders, from so much on, peak. Motion across
+    /// the vertical of a quarter of that along it, which the identification accounts for, is 14
+    /// deg.
+    double vibration_deg = 15, vibration_g = 0.3;
 };
 
-/// Holds gravity against the encoders, second by second, and names the keys that would explain what
-/// does not fit. Control thread only.
+/// Holds gravity and the vibration against the encoders, second by second, and names the keys that
+/// would explain what does not fit. Control thread only.
 class GravityWatch {
   public:
     GravityWatch(const estimator::Settings& rig, const GravityLimits& limits);
@@ -26,6 +30,8 @@ class GravityWatch {
         bool known = false;
         double angle_deg = 0, size_g = 1;
         bool told = false, refused = false;
+        double vibration_g = 0, vibration_deg = 0;  ///< peak; off the vertical, 0 when too small
+        bool vibration_told = false;
     };
     /// A new position: it is remembered apart from the earlier ones.
     void next_position() noexcept { fresh_ = true; }
@@ -35,6 +41,7 @@ class GravityWatch {
     [[nodiscard]] const Verdict& newest() const noexcept { return newest_; }
     /// In words, with its limits.
     [[nodiscard]] std::string words() const;
+    [[nodiscard]] std::string vibration_words() const;
     /// Keys of which one alone, changed, would bring all positions so far within the limits, best
     /// first, three at most; empty: none.
     [[nodiscard]] std::string suspects() const;

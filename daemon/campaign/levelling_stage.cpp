@@ -30,6 +30,7 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
     loop.torquer_limit = std::min(s.torquer_limit_deg_h, torquer_limit_deg_h) * level::kDegPerHour;
     loop.noise.accelerometer_mps2 =
         rig.accelerometer_g * rig.gravity_mps2 / std::sqrt(static_cast<double>(s.block));
+    if (!s.velocity_north.empty()) loop.noise.reference_mps = s.velocity_noise_mps;
     loop.noise.gyro_random_walk = rig.gyro_random_walk_deg_per_rt_h * level::kPi / 180 / 60;
     return loop;
 }
@@ -73,6 +74,7 @@ void LevellingStage::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
     const double length = std::sqrt(dot(first, first));
     for (double& part : first) part /= length;
     channel_ = {first, cross(up, first)};
+    north_east_ = frame_.north_east_at_deg(encoder_deg);
     zero_g_ = {};
     limit_rad_ = 0;
     if (zeros.known) {
@@ -97,6 +99,11 @@ Vector LevellingStage::to_axes(const level::Pair& rate) const {
 
 Vector LevellingStage::step(const rt::Motion& motion) {
     level::LevelInput input;
+    input.reference_age_s = motion.velocity_age_s;
+    for (std::size_t i = 0; i < 2; ++i) {
+        input.reference[i] = motion.velocity[0] * dot(channel_[i], north_east_[0]) +
+                             motion.velocity[1] * dot(channel_[i], north_east_[1]);
+    }
     for (std::uint32_t i = 0; i < std::min<std::uint32_t>(motion.dropped_before, 100); ++i) {
         input.missing = true;
         static_cast<void>(leveller_->step(input));

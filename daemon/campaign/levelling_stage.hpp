@@ -46,6 +46,7 @@ class LevellingStage {
     estimator::levelling::LevellerSettings loop_;
     std::optional<estimator::levelling::Leveller> leveller_;
     std::array<Vector, 2> channel_{};
+    std::array<Vector, 2> north_east_{};  ///< platform axes
     Vector zero_g_{};
     double largest_at_first_ = 0;  ///< |tilt|, rad
     double limit_rad_ = 0;

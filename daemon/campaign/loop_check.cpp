@@ -78,6 +78,56 @@ std::string LoopCheck::look(std::array<double, 3>& position_deg) const {
     return {};
 }
 
+namespace {
+
+double norm(const estimator::LoopReading& reading) {
+    return std::sqrt(dot(reading.force_g, reading.force_g));
+}
+
+void subtract_mean(std::vector<double>& values) {
+    double mean = 0;
+    for (const double value : values) mean += value / static_cast<double>(values.size());
+    for (double& value : values) value -= mean;
+}
+
+double rms(const std::vector<double>& values) {
+    double squares = 0;
+    for (const double value : values) squares += value * value;
+    return values.empty() ? 0 : std::sqrt(squares / static_cast<double>(values.size()));
+}
+
+}  // namespace
+
+std::vector<double> LoopCheck::motion() const {
+    const bool table = std::ranges::all_of(readings_, &estimator::LoopReading::table_good);
+    std::vector<double> values;
+    values.reserve(readings_.size());
+    for (const auto& reading : readings_) values.push_back(table ? reading.table_g : norm(reading));
+    subtract_mean(values);
+    return values;
+}
+
+LoopCheck::Noise LoopCheck::noise() const {
+    std::vector<double> platform, table;
+    for (const auto& reading : readings_) {
+        platform.push_back(norm(reading));
+        if (reading.table_good) table.push_back(reading.table_g);
+    }
+    subtract_mean(platform);
+    subtract_mean(table);
+    return {rms(platform), rms(table)};
+}
+
+drivers::Time LoopCheck::last_at_half() const {
+    const auto values = motion();
+    double highest = 0;
+    for (const double value : values) highest = std::max(highest, std::abs(value));
+    for (std::size_t i = values.size(); i-- > 0;) {
+        if (2 * std::abs(values[i]) >= highest) return drivers::from_seconds(readings_[i].time_s);
+    }
+    return 0;
+}
+
 std::span<const estimator::LoopReading> LoopCheck::readings_since(drivers::Time time) const {
     const auto first = std::ranges::lower_bound(readings_, drivers::to_seconds(time), {},
                                                 &estimator::LoopReading::time_s);

@@ -27,6 +27,15 @@ class LoopCheck {
     /// What came so far was at rest: where the gimbals are, deg as the encoders count. Why the rig
     /// cannot be checked, else empty.
     [[nodiscard]] std::string look(std::array<double, 3>& position_deg) const;
+    /// rms of the norm of the specific force, and of the table's acceleration, less their means,
+    /// over what counts, g; the table's 0 where it has no good accelerometer.
+    struct Noise {
+        double platform_g = 0, table_g = 0;
+    };
+    [[nodiscard]] Noise noise() const;
+    /// The last moment at which the table (or the platform, where the table has no accelerometer)
+    /// was beyond half of its highest; 0: nothing counts.
+    [[nodiscard]] drivers::Time last_at_half() const;
     /// From now on what counts.
     void measure() { readings_.clear(); }
     /// While the level is still coming up, linearly over `ramp_s` from when it was asked for: table
@@ -53,6 +62,8 @@ class LoopCheck {
     [[nodiscard]] static std::string beyond_limits(const Settings& settings);
 
   private:
+    /// What moves: of the table where it is known throughout, else of the platform; less its mean.
+    [[nodiscard]] std::vector<double> motion() const;
     void row(const char* name, const char* unit, double value, double low, double high);
 
     LoopCheckSettings settings_;

@@ -29,6 +29,18 @@ Vector RigFrame::up_at_deg(const Vector& encoder_deg) const {
         {kRadPerDeg * encoder_deg[0], kRadPerDeg * encoder_deg[1], kRadPerDeg * encoder_deg[2]});
 }
 
+std::array<Vector, 2> RigFrame::north_east_at_deg(const Vector& encoder_deg) const {
+    const estimator::Kinematics kinematics(settings_);
+    const auto pose = kinematics.pose(kinematics.gimbal_angles(
+        {kRadPerDeg * encoder_deg[0], kRadPerDeg * encoder_deg[1], kRadPerDeg * encoder_deg[2]}));
+    std::array<Vector, 2> axes{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        axes[0][i] = pose.level(static_cast<Eigen::Index>(i), 0);
+        axes[1][i] = pose.level(static_cast<Eigen::Index>(i), 2);
+    }
+    return axes;
+}
+
 double RigFrame::azimuth(const Vector& encoder_rad) const {
     const estimator::Kinematics kinematics(settings_);
     const auto pose = kinematics.pose(kinematics.gimbal_angles(encoder_rad));

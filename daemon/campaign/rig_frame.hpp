@@ -18,6 +18,8 @@ class RigFrame {
     /// The vertical in platform axes at these encoder angles.
     [[nodiscard]] Vector up(const Vector& encoder_rad) const;
     [[nodiscard]] Vector up_at_deg(const Vector& encoder_deg) const;
+    /// The rig's north and east axes in platform axes at these encoder angles.
+    [[nodiscard]] std::array<Vector, 2> north_east_at_deg(const Vector& encoder_deg) const;
     /// Azimuth of platform x from true east, positive about up, rad.
     [[nodiscard]] double azimuth(const Vector& encoder_rad) const;
     /// Encoder angles with the azimuth axis vertical, platform z up or down, and this turn of the

@@ -25,7 +25,8 @@ struct Stop {
 };
 
 /// Before each position: the platform's two channels across the vertical are brought level by fast
-/// external damping (Zha et al. 2019), reference velocity zero.
+/// external damping (Zha et al. 2019), reference velocity zero or, of a rig on a moving base,
+/// measured.
 struct LevellingSettings {
     double settling_s = 100;
     double residual = 0.005;
@@ -36,6 +37,10 @@ struct LevellingSettings {
     std::uint32_t block = 4;     ///< samples per step of the loop, about 0.1 s
     double slow_settling_s = 0;  ///< of the gains to go over to once settled; 0: stay fast
     double slow_ramp_s = 60;     ///< that it takes to go over
+    /// "Message.Signal" of the base's velocity along the rig's north and east axes, m/s; both or
+    /// neither: the base stands.
+    std::string velocity_north, velocity_east;
+    double velocity_noise_mps = 0;  ///< of one reading, 1 sigma
     drivers::TorquerSettings torquer;
 };
 
@@ -78,6 +83,19 @@ enum class VisitOrder : std::uint8_t {
     random
 };
 
+/// What follows when the verdict on the dwells so far becomes "not valid".
+enum class OnNotValid : std::uint8_t {
+    go_on,
+    pause,  ///< at rest
+    repeat  ///< the dwell that the verdict names, once
+};
+
+/// Of the opening check.
+struct OpeningStop {
+    std::array<double, 3> position_deg{};  ///< as the encoders count
+    bool drifts = false;                   ///< let go there; else gravity alone is looked at
+};
+
 /// What the campaign does; amplitudes are peak at the table.
 struct Settings {
     double sample_s = 0;  ///< between two samples, as configured; nothing works without it
@@ -99,6 +117,8 @@ struct Settings {
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
+    /// Before the first position; empty: no opening check.
+    std::vector<OpeningStop> opening;
     LevellingSettings level;
     ZeroingSettings zero;
     LoopCheckSettings loop;
@@ -112,7 +132,7 @@ struct Settings {
     double temperature_band_c = 0.5;    ///< largest spread within the window
     double amplitude_tolerance = 0.05;  ///< relative; measured against commanded after the ramp
     int rejected_in_a_row = 2;          ///< dwells, after which it pauses at rest
-    bool pause_when_not_valid = false;  ///< the verdict on the dwells so far
+    OnNotValid on_not_valid = OnNotValid::go_on;
     /// Gravity against encoders: beyond it nothing is ramped. A simulated rig is not commissioned.
     double gravity_refused_deg = 0.5;
     rt::RestSettings rest;

@@ -39,9 +39,32 @@ double PadRingDown::from_s(double table_g) const {
 StopMonitor::StopMonitor(const drivers::Shaker& shaker, Rest rest, const StopSettings& settings)
     : shaker_(shaker), rest_(std::move(rest)), settings_(settings) {}
 
-StopMonitor::News StopMonitor::update(Time now) {
+bool StopMonitor::uncommanded(Time now, bool handled) {
+    const auto measured = rest(now);
+    // A platform on its pads does not move by itself: where the table below it is seen to be still
+    // it was a hand.
+    const bool table_tells = measured.table.verdict == RestVerdict::still ||
+                             measured.table.verdict == RestVerdict::moving;
+    const bool moving = table_tells ? moves(measured.table) : !handled && moves(measured.platform);
+    if (!moving) {
+        moves_since_ = 0;
+        told_uncommanded_ = false;
+        return false;
+    }
+    if (moves_since_ == 0) moves_since_ = now;
+    return now - moves_since_ >= drivers::from_seconds(safety::kUnarmedMotion_s) &&
+           !std::exchange(told_uncommanded_, true);
+}
+
+StopMonitor::News StopMonitor::update(Time now, bool handled) {
     const std::uint64_t stops = shaker_.stops();  // first: one that comes meanwhile stays open
-    if (stops == rested_.load()) return News::none;
+    if (stops == rested_.load()) {
+        if (!excited()) return uncommanded(now, handled) ? News::uncommanded : News::none;
+        moves_since_ = 0;
+        return News::none;
+    }
+    moves_since_ = 0;
+    told_uncommanded_ = false;
     if (since_ == 0) since_ = now;
     took_s_ = drivers::to_seconds(now - since_);
     const auto reading = shaker_.reading();

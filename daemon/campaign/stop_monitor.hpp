@@ -30,7 +30,8 @@ struct StopSettings {
 /// amplitude is still and the accelerometers have measured rest for a whole window since; until
 /// then it is stopping, and the watchdog starves. What is not at rest in its time is disobedience,
 /// which latches. Orders are counted by the shaker itself, so that one from any thread counts at
-/// once.
+/// once. Where nothing was asked for, what the accelerometers see for a second is motion that
+/// nobody commanded, whatever the controller says.
 class StopMonitor {
   public:
     using Rest = std::function<rt::Rest(drivers::Time)>;  ///< none: nobody knows, nothing is rest
@@ -50,9 +51,10 @@ class StopMonitor {
     void at_rest() noexcept { level_g_ = 0; }
     [[nodiscard]] rt::Rest rest(drivers::Time now) const { return rest_ ? rest_(now) : rt::Rest{}; }
 
-    enum class News : std::uint8_t { none, confirmed, disobeyed };
-    /// Each is told once.
-    [[nodiscard]] News update(drivers::Time now);
+    enum class News : std::uint8_t { none, confirmed, disobeyed, uncommanded };
+    /// Each is told once. `handled`: gimbals or people move the platform, whose accelerometers then
+    /// say nothing of the table below it. Where a table accelerometer tells, they never do.
+    [[nodiscard]] News update(drivers::Time now, bool handled = false);
     [[nodiscard]] bool disobeyed() const noexcept { return disobeyed_; }
     /// Once it is at rest.
     void acknowledge() noexcept { disobeyed_ = false; }
@@ -70,6 +72,7 @@ class StopMonitor {
 
   private:
     [[nodiscard]] bool late(drivers::Time now) const;
+    [[nodiscard]] bool uncommanded(drivers::Time now, bool handled);
 
     const drivers::Shaker& shaker_;
     Rest rest_;
@@ -79,6 +82,8 @@ class StopMonitor {
     double level_g_ = 0;                    ///< highest since rest was measured
     double took_s_ = 0;
     bool disobeyed_ = false;
+    drivers::Time moves_since_ = 0;  ///< though nothing was asked for; 0: it does not
+    bool told_uncommanded_ = false;
 };
 
 }  // namespace vibrig::campaign

@@ -7,6 +7,7 @@
 #include "estimator/commissioning/consistency.hpp"
 #include "estimator/commissioning/dwell_fit.hpp"
 #include "estimator/commissioning/rig.hpp"
+#include "estimator/commissioning/suspect_search.hpp"
 #include "estimator/commissioning/words.hpp"
 #include "estimator/kinematics.hpp"
 
@@ -22,12 +23,8 @@ constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 
 class Search {
   public:
-    Search(const Settings& settings, const std::vector<DwellMean>& dwells,
-           const ConsistencyLimits& limits)
-        : as_is_(settings), dwells_(dwells), limits_(limits) {
-        const auto c = consistency(settings, dwells, limits);
-        earth_ = c.earth_known;
-    }
+    Search(const Settings& settings, const std::vector<DwellMean>& dwells, const Judge& judge)
+        : as_is_(settings), dwells_(dwells), judge_(judge) {}
 
     std::vector<Suspect> run() {
         signs_and_zeros();
@@ -48,13 +45,13 @@ class Search {
         return cost;
     }
     [[nodiscard]] double rates(const Settings& s, double time_factor) const {
-        return earth_ ? fit_rates(s, dwells_, {kEarthFixed, kLinearSigma}, time_factor).cost : 0;
+        return judge_.earth ? judge_.rates(s, time_factor) : 0;
     }
     [[nodiscard]] double cost(const Settings& s) const { return gravity(s) + rates(s, 1); }
 
     /// Takes it if all limits hold with it.
     void consider(const Settings& s, std::string what) {
-        if (!consistency(s, dwells_, limits_).contradictions.empty()) return;
+        if (!judge_.fits(s, dwells_)) return;
         found_.push_back({std::move(what), cost(s)});
     }
 
@@ -107,7 +104,7 @@ class Search {
             // Gravity tells at once; the rates do not know the accelerometers.
             double worst = 0;
             for (const Verticals& v : verticals(s, dwells_)) worst = std::max(worst, v.apart_deg());
-            if (!(worst <= limits_.gravity_deg)) continue;
+            if (!(worst <= judge_.gravity_deg)) continue;
             std::string what = "accelerometer.matrix: x, y, z are";
             for (int i = 0; i < 3; ++i) {
                 int from = 0;
@@ -144,14 +141,17 @@ class Search {
     }
 
     void site() {
-        if (!earth_) return;
+        if (!judge_.earth) return;
         Settings s = as_is_;
         s.latitude_deg = -s.latitude_deg;
         consider(s,
                  words("site.latitude_deg: %g instead of %g", s.latitude_deg, as_is_.latitude_deg));
         const auto latitude = [&](double off) {
             Settings l = as_is_;
-            l.latitude_deg = std::clamp(l.latitude_deg + off, -90.0, 90.0);
+            // Its sign was another suspect.
+            const bool south = as_is_.latitude_deg < 0;
+            l.latitude_deg =
+                std::clamp(l.latitude_deg + off, south ? -90.0 : 0.0, south ? 0.0 : 90.0);
             return l;
         };
         s = latitude(best_of(latitude, 5, 36));
@@ -168,7 +168,7 @@ class Search {
     }
 
     void time() {
-        if (!earth_) return;
+        if (!judge_.earth) return;
         for (const auto& [factor, name] : {std::pair{60.0, "minutes"},
                                            {3600.0, "hours"},
                                            {1 / 1000.0, "milliseconds"},
@@ -178,7 +178,7 @@ class Search {
             auto scaled = dwells_;
             for (DwellMean& dwell : scaled)
                 for (double& slope : dwell.slope_deg_h) slope /= factor;
-            if (!consistency(as_is_, scaled, limits_).contradictions.empty()) continue;
+            if (!judge_.fits(as_is_, scaled)) continue;
             found_.push_back(
                 {words("time_s: it is in %s", name), gravity(as_is_) + rates(as_is_, factor)});
         }
@@ -186,18 +186,31 @@ class Search {
 
     Settings as_is_;
     const std::vector<DwellMean>& dwells_;
-    ConsistencyLimits limits_;
-    bool earth_ = false;
+    const Judge& judge_;
     std::vector<Suspect> found_;
 };
 
 }  // namespace
 
-std::vector<Suspect> suspects(const Settings& settings, const std::vector<DwellMean>& dwells,
-                              const ConsistencyLimits& limits, std::size_t most) {
-    auto found = Search(settings, dwells, limits).run();
+std::vector<Suspect> search_suspects(const Settings& settings, const std::vector<DwellMean>& dwells,
+                                     const Judge& judge, std::size_t most) {
+    auto found = Search(settings, dwells, judge).run();
     if (found.size() > most) found.resize(most);
     return found;
+}
+
+std::vector<Suspect> suspects(const Settings& settings, const std::vector<DwellMean>& dwells,
+                              const ConsistencyLimits& limits, std::size_t most) {
+    Judge judge;
+    judge.fits = [&limits](const Settings& s, const std::vector<DwellMean>& of) {
+        return consistency(s, of, limits).contradictions.empty();
+    };
+    judge.rates = [&dwells](const Settings& s, double time_factor) {
+        return fit_rates(s, dwells, {kEarthFixed, kLinearSigma}, time_factor).cost;
+    };
+    judge.gravity_deg = limits.gravity_deg;
+    judge.earth = consistency(settings, dwells, limits).earth_known;
+    return search_suspects(settings, dwells, judge, most);
 }
 
 }  // namespace vibrig::estimator::commissioning

@@ -87,6 +87,28 @@ TEST_F(ArmingTest, IsNamedWhenAnotherPersonStarts) {
     EXPECT_EQ(again.message, "a campaign is running, started by Grace");
 }
 
+TEST_F(ArmingTest, OfAnEarlierLifesTripSilenceIsNoRest) {
+    // GIVEN a trip that an earlier life left, and a rig of which nobody hears anything
+    campaign->take_over_trip("the daemon ended while armed by Ada", 5);
+    shaker.stop_now();
+    shaker.now.valid = false;
+    const auto pass_silently = [this](double seconds) {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += 100 * kMillisecond;
+            campaign->step(now);
+        }
+    };
+    pass_silently(1);
+    EXPECT_FALSE(disobeyed);
+    EXPECT_FALSE(campaign->done(now));
+    pass_silently(30);
+    // THEN that is a stop which was not obeyed, and whoever ends it leaves it undone
+    EXPECT_TRUE(disobeyed);
+    campaign->shut_down(now);
+    pass_silently(30);
+    EXPECT_FALSE(campaign->done(now));
+}
+
 TEST_F(ArmingTest, IsRefusedWhileAnEarlierLifesLatchIsNotAcknowledged) {
     campaign->take_over_trip("the daemon ended while armed by Ada");
     EXPECT_EQ(status().state, CampaignState::tripped);

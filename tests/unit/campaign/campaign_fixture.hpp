@@ -50,7 +50,9 @@ struct CampaignTest : testing::Test {
     bool slewed_while_moving = false;
     FakeAccelerometers accelerometers;
     bool disobeyed = false;
-    std::function<Time()> wall_clock;  ///< people's; none: the machine's
+    std::int64_t utc_ns = 0;
+    std::function<Time()> wall_clock;        ///< people's; none: the machine's
+    std::function<rt::MeanMotion()> second;  ///< of force and angles; none: nobody asks
     double slew_started_at = -1;
     std::size_t frames_seen = 0;
     Time now = kSecond;
@@ -84,7 +86,9 @@ struct CampaignTest : testing::Test {
                     [this] { return gate; },
                     {}};
         ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
+        ports.utc_ns = [this] { return utc_ns; };
         if (wall_clock) ports.wall = wall_clock;
+        if (second) ports.second = second;
         ports.disobeyed = [this](bool now_so) { disobeyed = disobeyed || now_so; };
         campaign = std::make_unique<Campaign>(settings, ports);
     }

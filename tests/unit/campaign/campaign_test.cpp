@@ -98,6 +98,27 @@ TEST_F(CampaignTest, AnAbortStopsTheShakerAndEndsTheArming) {
     EXPECT_FALSE(complete);
 }
 
+// The server's thread stops at once and then says so: the table falls before its word is here.
+TEST_F(CampaignTest, TheReasonOfAnAbortIsWhoOrderedIt) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    shaker.stop_now();
+    run_for(0.5);
+    EXPECT_EQ(status().state, CampaignState::recording);
+    EXPECT_TRUE(command(Kind::abort).accepted);
+    EXPECT_TRUE(status().reason.starts_with("aborted by ")) << status().reason;
+}
+
+TEST_F(CampaignTest, AStopOfWhichNobodySpeaksEndsTheCampaign) {
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 60));
+    shaker.stop_now();
+    EXPECT_TRUE(run_until(CampaignState::aborted, 3));
+    EXPECT_TRUE(status().reason.starts_with("shaker off command")) << status().reason;
+}
+
 TEST_F(CampaignTest, ATripLatchesUntilAcknowledged) {
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);
@@ -424,6 +445,62 @@ TEST_F(CampaignTest, GoesOnWithWhatIsLeftOfAnotherOrder) {
     EXPECT_EQ(orders[0].dwell.begin_s, 0);
     EXPECT_NEAR(orders[1].dwell.begin_s, drivers::to_seconds(orders[1].from - orders[0].from),
                 1e-9);
+}
+
+/// As the journal has kept them, with what they repeat.
+std::vector<StopDone> stops_of(const Settings& settings,
+                               const std::vector<estimator::DwellSummary>& dwells) {
+    std::vector<StopDone> stops(dwells.size());
+    for (std::size_t i = 0; i < dwells.size(); ++i) {
+        stops[i].position_deg = settings.positions_deg.at(dwells[i].position == 1 ? 0 : 1);
+        stops[i].table_g = settings.table_g.at(static_cast<std::size_t>(dwells[i].run) - 1);
+    }
+    return stops;
+}
+
+TEST_F(CampaignTest, GoesOnAfterARestartWithADwellThatWasRepeated) {
+    // GIVEN a restart after three dwells, the third of which repeats the second
+    auto dwells = done(3);
+    dwells[2].run = 1;
+    dwells[2].position = 5;
+    EXPECT_FALSE(campaign->offer(dwells)) << "what it repeats is not known";
+    ASSERT_TRUE(campaign->offer(dwells, stops_of(settings, dwells)));
+    EXPECT_EQ(status().resume_offer, "3 of 5 positions done");
+    // WHEN it is resumed
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300));
+    // THEN the two of run 2 are left
+    ASSERT_EQ(orders.size(), 2U);
+    for (const auto& order : orders) EXPECT_EQ(order.dwell.run, 2);
+    EXPECT_EQ(status().dwells.size(), 5U);
+    // AND what repeats no stop of this campaign is refused
+    auto stops = stops_of(settings, dwells);
+    stops[2].table_g = 3;
+    EXPECT_FALSE(campaign->offer(dwells, stops));
+}
+
+TEST_F(CampaignTest, TiesBothSidesOfALongInterruptionTogetherByADwellOfBefore) {
+    const auto dwells = done(2);
+    auto stops = stops_of(settings, dwells);
+    stops[1].begun_utc_ns = 1'700'000'000 * drivers::kSecond;
+    for (const int minutes : {50, 70}) {
+        SCOPED_TRACE(minutes);
+        orders.clear();
+        stops_done.clear();
+        utc_ns = stops[1].begun_utc_ns + minutes * 60 * drivers::kSecond;
+        make();
+        ASSERT_TRUE(campaign->offer(dwells, stops));
+        ASSERT_TRUE(command(Kind::arm).accepted);
+        ASSERT_TRUE(command(Kind::resume).accepted);
+        ASSERT_TRUE(run_until(CampaignState::finished, 400));
+        ASSERT_EQ(orders.size(), minutes < 60 ? 2U : 3U);
+        if (minutes < 60) continue;
+        EXPECT_EQ(orders[0].dwell.run, 1);
+        EXPECT_EQ(orders[0].dwell.position, 5);
+        EXPECT_EQ(orders[0].dwell.table_g, settings.table_g[0]);
+        EXPECT_EQ(stops_done.at(0).position_deg, settings.positions_deg[1]);
+    }
 }
 
 TEST_F(CampaignTest, EndsAResumedCampaignThatHadOnlyItsEndToCome) {

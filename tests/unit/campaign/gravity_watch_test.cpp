@@ -48,6 +48,44 @@ TEST(GravityWatch, ARightRigWithTheErrorsOfACommissionedOneIsLetWhereverItStands
     }
 }
 
+TEST(GravityWatch, TheVibrationIsAlongTheVerticalOfTheEncodersUpToAQuarterAcrossIt) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937 random(seed);
+        const auto between = [&random](double low, double high) {
+            return std::uniform_real_distribution(low, high)(random);
+        };
+        const estimator::Settings rig;
+        const RigFrame frame(rig);
+        GravityWatch watch(rig, {});
+        for (const double share : {0.0, 0.1, 0.25, 0.3, 1.0}) {
+            // GIVEN 5 g of any phase, and so much of it across, a quarter of a period apart or not
+            const Vector at{between(-180, 180), between(-180, 180), between(-180, 180)};
+            auto second = second_at(rig, at);
+            const Vector up = frame.up_at_deg(at);
+            Vector across = cross(up, Vector{0.3, -0.5, 0.8});
+            const double size = std::sqrt(dot(across, across));
+            const double phase = between(0, 6), lead = phase + between(0, 6);
+            for (std::size_t i = 0; i < 3; ++i) {
+                across[i] *= share / size;
+                second.cosine[i] = 5 * (up[i] * std::cos(phase) + across[i] * std::cos(lead));
+                second.sine[i] = 5 * (up[i] * std::sin(phase) + across[i] * std::sin(lead));
+            }
+            second.cosine = frame.to_raw(second.cosine);
+            second.sine = frame.to_raw(second.sine);
+            const auto verdict = watch.judge(second, rig.accelerometer_zero_g, false);
+            EXPECT_NEAR(verdict.vibration_deg, std::atan(share) / kRadiansPerDegree, 1e-6);
+            EXPECT_NEAR(verdict.vibration_g, 5 * std::hypot(1, share), 1e-9);
+            EXPECT_EQ(verdict.vibration_told, share > 0.27) << watch.vibration_words();
+            EXPECT_FALSE(verdict.told) << "gravity is where it should be";
+        }
+        // what is too small to have a direction has none
+        auto second = second_at(rig, {0, 0, 0});
+        second.cosine = {0.2, 0, 0};
+        EXPECT_FALSE(watch.judge(second, rig.accelerometer_zero_g, false).vibration_told);
+    }
+}
+
 TEST(GravityWatch, NamesTheKeyThatIsWrong) {
     struct Case {
         const char* suspect;

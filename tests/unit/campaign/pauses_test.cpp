@@ -2,6 +2,7 @@
 // fit.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -49,8 +50,8 @@ struct WatchedCampaign : testing::Test {
     std::vector<std::string> events;
     std::vector<rt::Ramp> ramps;
     std::string unfit;
-    estimator::Settings truth;  ///< of the rig
-    double gravity = 1;
+    estimator::Settings truth;       ///< of the rig
+    double gravity = 1, across = 0;  ///< of 1 g; of the vibration
     bool watched = false, all_rejected = false, all_flagged = false;
     std::size_t reported = 0;
     drivers::Time now = drivers::kSecond;
@@ -105,6 +106,15 @@ struct WatchedCampaign : testing::Test {
         const RigFrame frame(truth);
         mean.force = frame.to_raw(frame.up_at_deg(deg));
         for (double& force : mean.force) force *= gravity;
+        const Vector up = frame.up_at_deg(deg);
+        Vector aside{up[1], up[2], up[0]};
+        const double part = dot(aside, up);
+        for (std::size_t i = 0; i < 3; ++i) aside[i] -= part * up[i];
+        const double size = std::sqrt(dot(aside, aside));
+        Vector shaken{};
+        for (std::size_t i = 0; i < 3; ++i)
+            shaken[i] = shaker.now.measured_g * (up[i] + across * aside[i] / size);
+        mean.sine = frame.to_raw(shaken);
         return mean;
     }
     void run_for(double seconds) {
@@ -192,6 +202,43 @@ TEST_F(WatchedCampaign, NothingIsRampedWhereGravityIsNotWhereTheEncodersSay) {
     EXPECT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
 }
 
+TEST_F(WatchedCampaign, AVibrationThatIsNotVerticalIsToldAndPausesAfterItsDwell) {
+    watched = true;
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::recording, 100));
+    EXPECT_TRUE(events.empty() || events.back().find("off the vertical") == std::string::npos);
+    // WHEN a third of the vibration goes across in one second THEN nothing is told
+    across = 1.0 / 3;
+    run_for(1);
+    across = 0;
+    run_for(2);
+    const auto told = [this] {
+        return std::ranges::count_if(events, [](const std::string& event) {
+            return event.find("is 18.4 deg off the vertical") == event.npos
+                       ? false
+                       : event.starts_with("the vibration of");
+        });
+    };
+    EXPECT_EQ(told(), 0);
+    // WHEN it stays THEN that is told within three seconds
+    across = 1.0 / 3;
+    run_for(3);
+    EXPECT_EQ(told(), 1);
+    // and the campaign pauses at rest when the dwell is over
+    ASSERT_TRUE(run_until(CampaignState::paused, 300)) << status().reason;
+    EXPECT_EQ(orders.size(), 1U);
+    EXPECT_TRUE(shaker.now.at_rest());
+    EXPECT_NE(status().reason.find("18.4 deg off the vertical"), std::string::npos)
+        << status().reason;
+    // put right, it goes on
+    across = 0;
+    ASSERT_TRUE(command(Kind::resume).accepted);
+    EXPECT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    EXPECT_EQ(told(), 1);
+}
+
 TEST_F(WatchedCampaign, AMeanForceThatIsNotOneGIsNotRampedUpon) {
     watched = true;
     gravity = 1.03;
@@ -220,7 +267,7 @@ TEST_F(WatchedCampaign, TwoRejectedDwellsInARowPauseAtRestWithTheCause) {
 }
 
 TEST_F(WatchedCampaign, DwellsThatAreNotValidTogetherPauseWhereThatIsAskedFor) {
-    settings.pause_when_not_valid = true;
+    settings.on_not_valid = OnNotValid::pause;
     make();
     ASSERT_TRUE(command(Kind::arm).accepted);
     ASSERT_TRUE(command(Kind::start).accepted);
@@ -242,6 +289,59 @@ TEST_F(WatchedCampaign, DwellsThatAreNotValidTogetherDoNotHoldItUpByThemselves) 
     ASSERT_TRUE(run_until(CampaignState::recording, 100));
     campaign->doubted("after 12 dwells not valid: azimuth");
     ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+}
+
+TEST_F(WatchedCampaign, TheDwellThatTheVerdictNamesIsRepeatedOnceWhereThatIsAskedFor) {
+    settings.on_not_valid = OnNotValid::repeat;
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    const auto recording = [this](std::size_t dwells) {
+        for (int n = 0; n < 2000 && orders.size() < dwells; ++n) step();
+        return orders.size() == dwells;
+    };
+    // WHEN the second dwell makes it "not valid" because of the first
+    ASSERT_TRUE(recording(2));
+    campaign->doubted("not valid: a step", 1, 1);
+    // THEN the first is next, at its angles and level, under a number of its own
+    ASSERT_TRUE(recording(3));
+    EXPECT_EQ(orders[2].dwell.run, 1);
+    EXPECT_EQ(orders[2].dwell.position, 5);
+    EXPECT_EQ(orders[2].dwell.table_g, orders[0].dwell.table_g);
+    EXPECT_EQ(status().position_deg, settings.positions_deg[0]);
+    EXPECT_NEAR(status().progress, 2.0 / 5, 0.21);
+    // WHEN it is named again, or none is, or one that is not done, THEN it goes on
+    campaign->doubted("not valid: a step", 1, 1);
+    ASSERT_TRUE(recording(4));
+    campaign->doubted("not valid: azimuth");
+    ASSERT_TRUE(recording(5));
+    campaign->doubted("not valid: azimuth", 7, 7);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    ASSERT_EQ(orders.size(), 5U);
+    EXPECT_EQ(status().progress, 1.0);
+    EXPECT_EQ(orders[4].dwell.run, 2);
+    EXPECT_EQ(orders[4].dwell.position, 2);
+    const auto said = [this](const char* text) {
+        return std::ranges::count_if(
+            events, [&](const std::string& event) { return event.find(text) != event.npos; });
+    };
+    EXPECT_EQ(said("run 1 position 1 is repeated, as position 5: not valid: a step"), 1);
+    EXPECT_EQ(said("run 1 position 1 was repeated before"), 1);
+    EXPECT_EQ(said("there is no dwell to repeat"), 2);
+    EXPECT_EQ(said("position 5, a repeat: 0, 0, 0 deg"), 1);
+}
+
+TEST_F(WatchedCampaign, ADwellThatTheVerdictNamesInTheEndIsRepeatedToo) {
+    settings.on_not_valid = OnNotValid::repeat;
+    make();
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    for (int n = 0; n < 4000 && orders.size() < 4; ++n) step();
+    campaign->doubted("not valid: a step", 2, 2);
+    ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    ASSERT_EQ(orders.size(), 5U);
+    EXPECT_EQ(orders[4].dwell.position, 5);
+    EXPECT_EQ(orders[4].dwell.table_g, orders[3].dwell.table_g);
 }
 
 TEST_F(WatchedCampaign, DwellsThatAreFlaggedButUsedDoNotPause) {

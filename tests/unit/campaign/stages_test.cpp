@@ -231,6 +231,10 @@ TEST_F(StagesTest, WhatCannotWorkIsRefusedBeforehandWithKeyValueAndWhatIsExpecte
     settings.level.tolerance_arcmin = 0.001;
     EXPECT_THAT(check(), HasSubstr("levelling.tolerance_arcmin: found 0.001, expected at least"));
     settings.level = {};
+    // GIVEN a velocity's noise without the velocity
+    settings.level.velocity_noise_mps = 0.01;
+    EXPECT_THAT(check(), HasSubstr("levelling.velocity_noise_mps: found 0.01, expected 0"));
+    settings.level = {};
     // GIVEN zeroings of less than what one sweep and the first fixes take; 90 s do
     settings.zero.duration_s = 60;
     EXPECT_THAT(check(),

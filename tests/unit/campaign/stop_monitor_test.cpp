@@ -76,6 +76,69 @@ TEST_F(StopMonitorTest, AControllerThatReadsZeroProvesNothing) {
     EXPECT_EQ(news, News::none) << "told once";
 }
 
+TEST_F(StopMonitorTest, ATableThatMovesUncommandedIsToldWhateverTheControllerReads) {
+    // GIVEN a stop that was confirmed, and a contactor that closes by itself afterwards
+    shake(5);
+    shaker.stop_now();
+    auto news = News::none;
+    run(5, &news);
+    ASSERT_EQ(news, News::confirmed);
+    accelerometers.table_g = 1;
+    news = News::none;
+    const double took_s = run(10, &news);
+    EXPECT_EQ(news, News::uncommanded);
+    EXPECT_LE(took_s, safety::kUnarmedMotion_s + 0.6) << "the window of rest and a second";
+    // THEN it is told once, and again when it comes again
+    news = News::none;
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+    accelerometers.table_g = 0;
+    run(2);
+    accelerometers.table_g = 1;
+    run(5, &news);
+    EXPECT_EQ(news, News::uncommanded);
+}
+
+TEST_F(StopMonitorTest, WhatIsCommandedOrABlowOfAMomentIsNotUncommanded) {
+    auto news = News::none;
+    shake(5);
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+    shaker.stop_now();
+    run(5, &news);
+    ASSERT_EQ(news, News::confirmed);
+    news = News::none;
+    accelerometers.table_g = 1;
+    run(0.3, &news);  // and half a second more in the window of rest
+    accelerometers.table_g = 0;
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+}
+
+TEST_F(StopMonitorTest, AHandOnThePlatformIsNotUncommandedWhereTheTableIsSeenStill) {
+    auto news = News::none;
+    accelerometers.platform_g = 1;
+    accelerometers.table_g = 0;
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+    // WHEN the table's accelerometer falls silent THEN the platform's speaks for it
+    accelerometers.table_good = false;
+    run(5, &news);
+    EXPECT_EQ(news, News::uncommanded);
+}
+
+TEST_F(StopMonitorTest, APlatformHasTheTimeOfItsPadsBeforeItDisobeys) {
+    // GIVEN a table that stops, and a platform that does not come to rest on its pads
+    shake(5);
+    accelerometers.platform_g = 1;
+    shaker.stop_now();
+    auto news = News::none;
+    const double took_s = run(30, &news);
+    EXPECT_EQ(news, News::disobeyed);
+    EXPECT_GT(monitor.longest_s(5), settings.deadline_s + 0.5) << "or this shows nothing";
+    EXPECT_NEAR(took_s, monitor.longest_s(5), 0.15);
+}
+
 TEST_F(StopMonitorTest, NorDoAccelerometersThatAreSilent) {
     shake(5);
     accelerometers.silent = true;

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "daemon/commission/record.hpp"
+#include "estimator/commissioning/earth.hpp"
+
+namespace vibrig::commission {
+
+using estimator::commissioning::Vec3;
+using estimator::commissioning::Verdict;
+
+inline constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
+inline constexpr std::array<const char*, 3> kLoudNames{"OUTER", "INNER", "AZIMUTH"};
+
+/// What the bus calls things, in the order of the channels.
+struct Names {
+    std::array<std::string, 3> angle;  ///< "Resolvers.Outer"
+    std::array<std::string, 3> force;  ///< "AccelerometersXY.X"
+    std::string command = "GimbalCommand";
+};
+
+/// What the configuration says that cannot be measured.
+struct Stated {
+    double latitude_deg = 0;
+    double linear_sigma = 2;
+    bool simulated = false;  ///< the rig: only one such is moved by command
+};
+
+/// A key and its value as the file has it, with what speaks for it.
+struct FoundKey {
+    std::string key, value, evidence;
+};
+
+struct Finding {
+    enum class Outcome : std::uint8_t { unfinished, decided, undecided, refused };
+    Outcome outcome = Outcome::unfinished;
+    std::string why;
+    bool second_person = false;            ///< asked for, before it is accepted
+    std::vector<FoundKey> keys;            ///< decided
+    std::vector<std::string> corrections;  ///< of the DBC, before anything is accepted
+    Json evidence = Json::object();
+    Json hypotheses = Json::array(), witnesses = Json::array(), would_separate;
+    Json sigma = Json::object();
+};
+/// The whole text is a number, and within the bounds.
+[[nodiscard]] bool number_in(const std::string& text, double low, double high, double& value);
+[[nodiscard]] const char* name_of(Finding::Outcome outcome) noexcept;
+[[nodiscard]] Json to_json(const Finding& finding);
+
+/// Of the classes that gravity leaves, best first, five at most.
+[[nodiscard]] Json hypotheses_of(const estimator::commissioning::GravityFinding& gravity);
+
+/// What is known of the commands: reading per commanded deg by channel, 0: not known, and the
+/// travel in readings.
+struct Commanded {
+    Vec3 ratio{};
+    std::array<std::array<double, 2>, 3> travel{};
+    std::array<std::size_t, 3> slot{};  ///< of the command, by channel
+    bool known = false;
+};
+/// The keys of a decided description.
+void fill_keys(Finding& finding, const estimator::commissioning::Description& description,
+               const estimator::commissioning::EarthRate& rate, const Names& names,
+               const estimator::commissioning::Statements& said, const Commanded& commanded);
+
+}  // namespace vibrig::commission

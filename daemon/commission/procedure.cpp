@@ -1,0 +1,384 @@
+// What a step is made of: asking, moving, standing, averaging; and how each is stopped.
+#include "daemon/commission/procedure.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "daemon/journal/latches.hpp"
+
+namespace vibrig::commission {
+
+using drivers::kSecond;
+using drivers::Time;
+using drivers::to_seconds;
+
+namespace {
+
+constexpr Time kPoll = 50 * drivers::kMillisecond;
+constexpr Time kStale = kSecond / 2;
+constexpr Time kStill = 20 * kSecond;  // what does not stand within it does not stand
+constexpr double kOneWay_deg = 165;    // a longer move goes by the start: there is one shorter way
+// Of the force's direction: a platform rocks when a slew ends.
+constexpr double kRocks_deg = 2;
+
+/// Of a force of 1 g, at least: where an accelerometer is dead the rest turns less.
+double turned_deg(const Vec3& a, const Vec3& b) {
+    const double chord = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+    return 2 * 57.29577951 * std::asin(std::min(1.0, chord / 2));
+}
+
+}  // namespace
+
+std::string Procedure::begin(const std::string& by, bool by_hand, Time now) {
+    if (!stated_.simulated && !by_hand)
+        return "this version moves no gimbal of a real rig by command: vibrig commission --by-hand";
+    *this = Procedure(std::move(names_), stated_, std::move(ports_));
+    by_ = by;
+    by_hand_ = by_hand;
+    now_ = now;
+    ask_yes("power", "Is the shaker's power stage off?", "the shaker's power stage is on",
+            [this] { ask_travel(); });
+    return {};
+}
+
+void Procedure::attend(const std::string& by, Time wall) {
+    if (journal::same_person(by, by_)) attended_ = wall;
+}
+
+void Procedure::tell(const std::string& line) {
+    lines_.push_back(line);
+    ports_.event(Severity::info, line);
+}
+
+void Procedure::ask(Question question, std::function<void(const std::string&)> then) {
+    question_ = std::move(question);
+    answered_ = std::move(then);
+    doing_ = Doing::asking;
+}
+
+void Procedure::ask_yes(const std::string& id, const std::string& text, const std::string& no,
+                        Then then) {
+    const auto yes_or_no = [](std::string& value) {
+        if (value == "y") value = "yes";
+        if (value == "n") value = "no";
+        return value == "yes" || value == "no" ? "" : "yes or no";
+    };
+    ask({id, text, "yes or no", "", yes_or_no},
+        [this, no, then = std::move(then)](const std::string& value) {
+            if (value == "yes") return then();
+            conclude(Verdict::undecided, no);
+            finding_.outcome = Finding::Outcome::unfinished;
+        });
+}
+
+std::string Procedure::answer(const std::string& by, const std::string& id, std::string value) {
+    if (doing_ != Doing::asking) return "nothing is asked";
+    if (!journal::same_person(by, by_))
+        return fmt::format("{} commissions it, and answers: found {}", by_, by);
+    if (id != question_.id)
+        return fmt::format("answer: found one to \"{}\", asked is \"{}\"", id, question_.id);
+    if (value.empty()) value = question_.usual;
+    const std::string given = value;
+    if (const auto expected = question_.wrong ? question_.wrong(value) : std::string();
+        !expected.empty())
+        return fmt::format("found \"{}\", expected {}", given, expected);
+    ports_.event(Severity::info,
+                 fmt::format("commissioning: {} {}, says {}", question_.text, value, by));
+    auto then = std::move(answered_);
+    doing_ = Doing::averaging;  // whatever comes next says what it does
+    question_ = {};
+    then(value);
+    return {};
+}
+
+Vec3 Procedure::within_travel(Vec3 travel) const {
+    for (std::size_t k = 0; k < 3; ++k)
+        travel[k] = std::clamp(travel[k], limits_deg_[k][0], limits_deg_[k][1]);
+    return travel;
+}
+
+Vec3 Procedure::unwrapped(const Vec3& angle, const Vec3& near) const {
+    Vec3 out = angle;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double turn = ratio_[c] != 0 ? 360 * std::abs(ratio_[c]) : 360;
+        out[c] = near[c] + std::remainder(angle[c] - near[c], turn);
+    }
+    return out;
+}
+
+void Procedure::move(const Vec3& travel, Then then) {
+    asked_ = within_travel(travel);
+    then_ = std::move(then);
+    if (by_hand_) {
+        std::string what;
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (asked_[k] == travel_[k]) continue;
+            what += fmt::format("{}{} to {:+.0f} deg", what.empty() ? "" : ", ", kLoudNames[k],
+                                asked_[k]);
+        }
+        travel_ = asked_;
+        const auto still = [this](const std::string&) {
+            since_ = now_;
+            doing_ = Doing::settling;
+        };
+        if (what.empty()) return still("");
+        return ask(
+            {"hand", "By hand, from the start, within 20 deg: " + what + "; hold still.", "done",
+             "done", [](std::string& v) { return v == "done" ? "" : "done, or an empty answer"; }},
+            still);
+    }
+    legs_.clear();
+    if (released_) travel_ = read_travel(travel_);
+    Vec3 between = asked_;
+    for (std::size_t k = 0; k < 3; ++k)
+        if (std::abs(asked_[k] - travel_[k]) >= kOneWay_deg) between[k] = 0;
+    if (between != asked_) legs_.push_back(between);
+    legs_.push_back(asked_);
+    next_leg();
+}
+
+void Procedure::next_leg() {
+    const Vec3 to = legs_.front();
+    before_ = ports_.sample();
+    moving_slot_ = 3;
+    int moved = 0;
+    Vec3 command{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        command[k] = command_0_[k] + to[k];
+        if (to[k] == travel_[k]) continue;
+        moving_slot_ = k;
+        ++moved;
+    }
+    if (moved != 1) moving_slot_ = 3;
+    since_ = now_;
+    doing_ = Doing::moving;
+    command_to(command);
+}
+
+void Procedure::command_to(const Vec3& command) {
+    commanded_ = true;
+    released_ = false;
+    ports_.slew(command, now_);
+}
+
+void Procedure::release() {
+    released_ = true;
+    ports_.release(now_);
+}
+
+void Procedure::average(double seconds, Then then) {
+    wanted_s_ = seconds;
+    seconds_.clear();
+    then_ = std::move(then);
+    since_ = now_;
+    doing_ = Doing::averaging;
+}
+
+/// Why what is seen is not what was asked; empty: it may be.
+std::string Procedure::contradiction(const Look& seen) const {
+    double asked = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+        asked = std::max(asked, std::abs(legs_.front()[k] - travel_[k]));
+    const double most =
+        (careful_ && asked <= 2 ? std::min(3 * asked, 5.0) : 3 * asked) + kRocks_deg;
+    if (const double turned = turned_deg(seen.force, before_.force); turned > most)
+        return fmt::format("gravity turned by {:.1f} deg, {:.2f} commanded", turned, asked);
+    const Vec3 angle = unwrapped(seen.angle, before_.angle);
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double change = std::abs(angle[c] - before_.angle[c]);
+        if (!holds_ && change > kHolds_deg + 20 * noise_[c])
+            return fmt::format("{} moved by {:.2f} when commanded where it is", names_.angle[c],
+                               change);
+        const bool own = moving_slot_ < 3 && channel_of_[moving_slot_] == c;
+        if (ratio_[c] != 0 && change > std::abs(ratio_[c]) * (3 * asked + 0.5) + 10 * noise_[c])
+            return fmt::format("{} moved by {:.4g}, {:.4g} expected", names_.angle[c], change,
+                               std::abs(ratio_[c]) * asked);
+        if (careful_ && moving_slot_ < 3 && channel_of_[moving_slot_] < 3 && !own &&
+            change > 10 * noise_[c] + 1e-12)
+            return fmt::format("{} moves with the {} gimbal", names_.angle[c],
+                               kLoudNames[moving_slot_]);
+    }
+    return {};
+}
+
+void Procedure::watch_move(Time now) {
+    const Look seen = ports_.sample();
+    if (!seen.good || now - seen.to > kStale) return stop("a channel is silent or not good", now);
+    if (const auto wrong = contradiction(seen); !wrong.empty())
+        return conclude(
+            Verdict::undecided,
+            fmt::format("stopped: {}: look at the rig, then by hand (--by-hand)", wrong));
+    switch (ports_.gimbal()) {
+        case drivers::GimbalState::in_position:
+            return arrive(now);
+        case drivers::GimbalState::timed_out:
+            return conclude(
+                Verdict::undecided,
+                fmt::format("the command of the {} is not obeyed: not in position within its time",
+                            moving_slot_ < 3 ? std::string(kLoudNames[moving_slot_]) + " gimbal"
+                                             : std::string("gimbals")));
+        case drivers::GimbalState::no_status:
+            return stop("no gimbal status", now);
+        default:
+            return;
+    }
+}
+
+void Procedure::arrive(Time now) {
+    travel_ = legs_.front();
+    legs_.erase(legs_.begin());
+    if (!legs_.empty()) return next_leg();
+    since_ = now;
+    doing_ = Doing::settling;
+}
+
+void Procedure::take_second(Time now) {
+    const Look second = ports_.second();
+    const bool fresh = seconds_.empty() || second.from > seconds_.back().from;
+    if (second.good && second.from >= since_ && fresh) {
+        seconds_.push_back(second);
+        if (seconds_.size() > 1) {
+            Look& last = seconds_.back();
+            last.angle = unwrapped(last.angle, seconds_.front().angle);
+        }
+    }
+    if (static_cast<double>(seconds_.size()) + 1e-9 < wanted_s_) {
+        if (now - since_ > drivers::from_seconds(wanted_s_) + kStill)
+            conclude(Verdict::refused,
+                     "the platform does not stand still, or force or angles are not good");
+        return;
+    }
+    mean_ = seconds_.front();
+    for (std::size_t i = 0; i < 3; ++i) {
+        mean_.angle[i] = mean_.force[i] = 0;
+        for (const Look& one : seconds_) {
+            mean_.angle[i] += one.angle[i] / static_cast<double>(seconds_.size());
+            mean_.force[i] += one.force[i] / static_cast<double>(seconds_.size());
+        }
+    }
+    auto then = std::move(then_);
+    then();
+}
+
+Vec3 Procedure::read_travel(const Vec3& near) const {
+    const Look seen = ports_.sample();
+    const Vec3 angle = unwrapped(seen.angle, start_);
+    Vec3 travel = near;
+    for (std::size_t k = 0; seen.good && k < 3; ++k) {
+        const std::size_t c = channel_of_[k];
+        if (c == 3 || ratio_[c] == 0) continue;
+        // Of the whole turns between the nearest to where it came from.
+        travel[k] = near[k] + std::remainder((angle[c] - start_[c]) / ratio_[c] - near[k], 360.0);
+    }
+    return travel;
+}
+
+/// What "stop" is on this rig. Where a command's effect is not known yet nothing can be held by it.
+void Procedure::stand() {
+    if (by_hand_ || !commanded_) return;
+    if (doing_ != Doing::moving) {
+        if (!hold_ && !released_) release();
+        return;
+    }
+    bool known = hold_ && holds_ && ports_.sample().good;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t c = channel_of_[k];
+        if (legs_.front()[k] != travel_[k]) known = known && c < 3 && ratio_[c] != 0;
+    }
+    if (!known) return release();
+    const Vec3 read = read_travel(travel_);
+    Vec3 command{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (legs_.front()[k] != travel_[k]) travel_[k] = read[k];
+        command[k] = command_0_[k] + travel_[k];
+    }
+    command_to(command);
+}
+
+void Procedure::stop(const std::string& why, Time now) {
+    now_ = now;
+    if (!active() || doing_ == Doing::asking) return;
+    const bool drifted = doing_ == Doing::averaging && released_;
+    stand();
+    interrupted_ = Interrupted{doing_, std::move(then_), drifted};
+    tell("stopped: " + why);
+    ask_yes("go_on", "Stopped: " + why + ". Go on?", "stopped: " + why,
+            [this] { go_on_after_stop(); });
+}
+
+void Procedure::go_on_after_stop() {
+    Interrupted was = std::move(*interrupted_);
+    interrupted_.reset();
+    if (was.doing != Doing::averaging) return move(asked_, std::move(was.then));
+    auto measure = [this, wanted = wanted_s_, then = std::move(was.then)] {
+        average(wanted, then);
+    };
+    if (by_hand_ || !released_) return measure();
+    if (!was.drifted) return move(asked_, std::move(measure));
+    move(asked_, [this, measure = std::move(measure)] {
+        release();
+        average(kLetGo_s, measure);
+    });
+}
+
+void Procedure::halt(const std::string& why, Time now) {
+    now_ = now;
+    if (!active()) return;
+    conclude(Verdict::undecided, why);
+    finding_.outcome = Finding::Outcome::unfinished;
+}
+
+void Procedure::conclude(Verdict verdict, const std::string& why) {
+    stand();
+    doing_ = Doing::nothing;
+    question_ = {};
+    interrupted_.reset();
+    finding_.outcome = verdict == Verdict::decided   ? Finding::Outcome::decided
+                       : verdict == Verdict::refused ? Finding::Outcome::refused
+                                                     : Finding::Outcome::undecided;
+    finding_.why = why;
+    if (!why.empty()) tell(why);
+}
+
+Time Procedure::step(Time now, Time wall) {
+    now_ = now;
+    if (!active()) return drivers::kNever;
+    if (doing_ != Doing::asking && !by_hand_ && wall - attended_ > kAbsent)
+        stop(fmt::format("nobody has been at the tool for {:.0f} s", to_seconds(kAbsent)), now);
+    if (doing_ == Doing::moving) watch_move(now);
+    if (doing_ == Doing::settling && now - since_ >= drivers::from_seconds(careful_ ? 1.5 : 3)) {
+        auto then = std::move(then_);
+        then();
+    }
+    if (doing_ == Doing::averaging) {
+        if (const Look sample = ports_.sample();
+            slot_ == 0 && careful_ && sample.good &&
+            (samples_.empty() || sample.to > samples_.back().to))
+            samples_.push_back(sample);
+        take_second(now);
+    }
+    return now + kPoll;
+}
+
+Json Procedure::state(std::size_t after) const {
+    Json question;
+    if (doing_ == Doing::asking)
+        question = {{"id", question_.id},
+                    {"text", question_.text},
+                    {"expected", question_.expected},
+                    {"usual", question_.usual}};
+    Json lines = Json::array();
+    for (std::size_t i = after; i < lines_.size(); ++i) lines.push_back(lines_[i]);
+    return {{"active", active()},
+            {"by", by_},
+            {"moving", doing_ == Doing::moving || doing_ == Doing::settling},
+            {"question", question},
+            {"lines", lines},
+            {"next", lines_.size()},
+            {"result", by_.empty() || active() ? Json() : to_json(finding_)}};
+}
+
+}  // namespace vibrig::commission

@@ -1,0 +1,200 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/commission/finding.hpp"
+#include "daemon/status.hpp"
+#include "drivers/gimbal.hpp"
+#include "estimator/commissioning/earth.hpp"
+
+namespace vibrig::commission {
+
+/// The newest sample, or the mean of a second, as the bus says: angles in deg, g.
+struct Look {
+    drivers::Time from = 0, to = 0;
+    Vec3 angle{}, force{};
+    bool good = false;
+};
+
+/// What it acts on. Control thread.
+struct Ports {
+    std::function<Look()> sample, second;
+    std::function<void(const Vec3& command_deg, drivers::Time now)> slew;
+    std::function<void(drivers::Time now)> release;
+    std::function<drivers::GimbalState()> gimbal;
+    std::function<void(Severity, const std::string&)> event;
+};
+
+/// Something that a person is asked.
+struct Question {
+    std::string id, text, expected;
+    std::string usual;  ///< what an empty answer means; empty: there has to be one
+    /// Why the answer is none; empty: it is. It may be changed into another form.
+    std::function<std::string(std::string&)> wrong;
+};
+
+/// Steps A to F (docs/commissioning.md): looks, moves one gimbal at a time, names the rig by
+/// gravity and the Earth's rate. What moves is decided here: nothing moves without a permission,
+/// beyond the travel that was stated, or while nobody is there. Control thread only; never waits.
+class Procedure {
+  public:
+    Procedure(Names names, Stated stated, Ports ports)
+        : names_(std::move(names)), stated_(stated), ports_(std::move(ports)) {}
+
+    /// `by_hand`: a person moves the gimbals, and nothing is commanded. Why it is not begun; empty:
+    /// it is.
+    [[nodiscard]] std::string begin(const std::string& by, bool by_hand, drivers::Time now);
+    /// Why it is not taken; empty: it is. The person who began it answers, nobody else.
+    [[nodiscard]] std::string answer(const std::string& by, const std::string& id,
+                                     std::string value);
+    /// The tool of the person who began is there, at this time of CLOCK_MONOTONIC; another's does
+    /// not count.
+    void attend(const std::string& by, drivers::Time wall);
+    /// A person's stop: it goes on with a new permission.
+    void stop(const std::string& why, drivers::Time now);
+    /// It is over, for this reason.
+    void halt(const std::string& why, drivers::Time now);
+    /// Returns when to be called next at the latest.
+    drivers::Time step(drivers::Time now, drivers::Time wall);
+
+    [[nodiscard]] bool active() const noexcept { return doing_ != Doing::nothing; }
+    [[nodiscard]] const std::string& by() const noexcept { return by_; }
+    [[nodiscard]] const Finding& finding() const noexcept { return finding_; }
+    /// Question, lines from number `after` on, and what was found.
+    [[nodiscard]] Json state(std::size_t after) const;
+
+    static constexpr drivers::Time kAbsent = 2 * drivers::kSecond;  ///< no tool: nothing moves
+
+  private:
+    static constexpr double kHolds_deg = 0.5;  ///< where nothing is to move
+    static constexpr double kDrift_s = 25;     ///< of one free drift
+    static constexpr double kLetGo_s = 3;      ///< what follows a release is not yet its drift
+
+    enum class Doing : std::uint8_t { nothing, asking, moving, settling, averaging };
+    using Then = std::function<void()>;
+
+    // procedure.cpp: what asking, moving and averaging are
+    void ask(Question question, std::function<void(const std::string&)> then);
+    void ask_yes(const std::string& id, const std::string& text, const std::string& no, Then then);
+    void move(const Vec3& travel_deg, Then then);
+    void next_leg();
+    void average(double seconds, Then then);
+    void tell(const std::string& line);
+    void conclude(Verdict verdict, const std::string& why);
+    void watch_move(drivers::Time now);
+    void arrive(drivers::Time now);
+    void take_second(drivers::Time now);
+    void stand();
+    void release();
+    void command_to(const Vec3& command);
+    void go_on_after_stop();
+    /// Where the gimbals whose readings are understood stand, as travel from the start.
+    [[nodiscard]] Vec3 read_travel(const Vec3& near) const;
+    [[nodiscard]] std::string contradiction(const Look& seen) const;
+    [[nodiscard]] Vec3 within_travel(Vec3 travel_deg) const;
+    [[nodiscard]] Vec3 unwrapped(const Vec3& angle, const Vec3& near) const;
+
+    // steps.cpp: A to D
+    void ask_travel();
+    void ask_stop_means();
+    void look();
+    void looked();
+    void hold_still();
+    void held_still();
+    void try_gimbal();
+    void nudge();
+    void nudged();
+    void small_move(std::size_t index);
+    void small_moved();
+    void confirm_name();
+    void next_gimbal();
+    void hand_moved();
+    void plan_sweeps();
+    void next_stop();
+
+    // naming.cpp: what follows from them
+    void decide_gravity();
+    [[nodiscard]] std::string wrong_name() const;
+    void separate();
+    void plan_drifts();
+    void next_drift();
+    void drifted();
+    void watch_azimuth();
+    void azimuth_turned();
+    void ask_people();
+    void ask_drawing();
+    void decide();
+    /// Travel that brings a gimbal of the description to an angle, the shorter way.
+    [[nodiscard]] double travel_to(std::size_t gimbal, double angle_deg) const;
+    [[nodiscard]] std::size_t slot_of(std::size_t gimbal) const;
+
+    Names names_;
+    Stated stated_;
+    Ports ports_;
+    std::string by_;
+    bool by_hand_ = false;
+    drivers::Time now_ = 0, attended_ = 0;
+
+    Doing doing_ = Doing::nothing;
+    Then then_;
+    std::function<void(const std::string&)> answered_;
+    Question question_;
+    struct Interrupted {
+        Doing doing = Doing::nothing;
+        Then then;
+        bool drifted = false;  ///< it was let go for a measurement
+    };
+    std::optional<Interrupted> interrupted_;  ///< by a stop
+
+    // moving
+    std::vector<Vec3> legs_;                 ///< to come, travel from the start, deg
+    Vec3 travel_{}, asked_{}, command_0_{};  ///< where it is; where it goes; the start as commanded
+    Look before_;                            ///< of the leg
+    drivers::Time since_ = 0;
+    std::size_t moving_slot_ = 3;  ///< the only gimbal that moves; 3: several
+    bool careful_ = true;          ///< B: what is not known yet moves
+    bool commanded_ = false;       ///< since the beginning; before, nothing is even released
+    bool released_ = false;        ///< since the last slew: what is let go may stand elsewhere
+    // averaging
+    double wanted_s_ = 0;
+    std::vector<Look> seconds_;
+    Look mean_;
+
+    // what is known
+    std::array<std::array<double, 2>, 3> limits_deg_{{{-130, 130}, {-30, 30}, {-175, 175}}};
+    std::array<bool, 3> free_{};  ///< cables limit nothing
+    bool hold_ = true;            ///< what "stop" is on this rig
+    bool holds_ = false;          ///< commanded where they are, the gimbals stay
+    std::vector<std::string> lines_;
+    Vec3 noise_{}, start_{};
+    std::vector<Look> samples_;
+    std::size_t slot_ = 0;
+    double amount_deg_ = 0;
+    std::vector<Look> small_;
+    std::array<std::size_t, 3> channel_of_{3, 3, 3};  ///< of a command; 3: not known
+    Vec3 ratio_{};                         ///< reading per commanded deg, by channel; 0: not known
+    std::array<int, 3> said_{-1, -1, -1};  ///< gimbal that a command moves, as a person says
+    Vec3 respond_{};                       ///< gravity's turn over the gimbal's, of the first moves
+    Vec3 from_{};                          ///< where inner and azimuth are swept
+    struct Planned {
+        Vec3 travel{};
+        int slot = -1;  ///< swept
+    };
+    std::vector<Planned> plan_;
+    std::size_t at_ = 0;
+    int extra_ = 0;
+    std::vector<estimator::commissioning::Stop> stops_;
+    std::vector<estimator::commissioning::FreeDrift> drifts_;
+    estimator::commissioning::GravityFinding gravity_;
+    estimator::commissioning::Description named_;
+    estimator::commissioning::Statements said_of_rig_;
+    Look sense_before_;
+    Finding finding_;
+};
+
+}  // namespace vibrig::commission

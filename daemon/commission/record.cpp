@@ -1,0 +1,319 @@
+#include "daemon/commission/record.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "daemon/journal/latches.hpp"
+#include "daemon/record/digest.hpp"
+#include "proto/durable_file.hpp"
+
+namespace vibrig::commission {
+
+namespace {
+
+constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+constexpr int kMeaning = 1;
+constexpr double kZeroMoved_g = 10e-3;  // `vibrig zero` may find so much anew
+constexpr const char* kDbc = "contents of can.dbc";
+constexpr const char* kZero = "accelerometer.zero_g";
+
+std::string dbc_of(const std::string& path) {
+    try {
+        return record::sha256_of_file(path);
+    } catch (const std::runtime_error&) {
+        return "unknown";
+    }
+}
+
+std::string host_name() {
+    std::array<char, 256> host{};
+    return ::gethostname(host.data(), host.size() - 1) == 0 ? host.data() : "";
+}
+
+/// Beginnings of the keys that are a part's own.
+std::vector<std::string_view> own_keys(Part part) {
+    switch (part) {
+        case Part::bus:
+            return {"can.", "gimbal.message"};
+        case Part::gimbals:
+            return {"platform.encoder_", "platform.up", "gimbal.travel_deg"};
+        case Part::accelerometers:
+            return {"accelerometer."};
+        case Part::earth:
+            return {"site.", "clock.source"};
+        case Part::gyros:
+            return {"platform.gyro_", "platform.drift_sign", "levelling.torque_"};
+    }
+    return {};
+}
+
+/// The parts that it stands on.
+std::vector<Part> below(Part part) {
+    switch (part) {
+        case Part::bus:
+            return {};
+        case Part::gimbals:
+        case Part::accelerometers:
+            return {Part::bus};
+        case Part::earth:
+        case Part::gyros:
+            return {Part::gimbals, Part::bus};
+    }
+    return {};
+}
+
+std::string text_of(const Keys& keys) {
+    std::string text;
+    for (const auto& [key, value] : keys) text += key + "=" + value + "\n";
+    return text;
+}
+
+/// Three zeros within what they may have moved.
+bool only_moved(const std::string& before, const std::string& after) {
+    const Json was = Json::parse(before, nullptr, false), is = Json::parse(after, nullptr, false);
+    if (!was.is_array() || !is.is_array() || was.size() != is.size()) return false;
+    for (std::size_t i = 0; i < was.size(); ++i) {
+        if (!was[i].is_number() || !is[i].is_number()) return false;
+        if (!(std::abs(was[i].get<double>() - is[i].get<double>()) <= kZeroMoved_g)) return false;
+    }
+    return true;
+}
+
+/// "platform.up is "+z", was proven as "+y""; empty: they are the same. `told`: it may differ.
+std::string change(const Keys& proven, const Keys& now, std::string& told) {
+    for (const auto& [key, value] : now) {
+        const auto it = proven.find(key);
+        if (it == proven.end()) return fmt::format("{} is {}, was not known then", key, value);
+        if (it->second == value) continue;
+        const auto words = fmt::format("{} is {}, was proven as {}", key, value, it->second);
+        if (key != kZero || !only_moved(it->second, value)) return words;
+        told = words;
+    }
+    for (const auto& [key, value] : proven)
+        if (!now.contains(key)) return fmt::format("{} is gone, was proven as {}", key, value);
+    return {};
+}
+
+std::string joined(const std::vector<std::string>& words) {
+    std::string text;
+    for (const auto& word : words) text += (text.empty() ? "" : ", ") + word;
+    return text;
+}
+
+std::string read_text(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+const char* name_of(Part part) noexcept {
+    constexpr std::array kNames{"bus", "gimbals", "accelerometers", "earth", "gyros"};
+    return kNames[static_cast<std::size_t>(part)];
+}
+
+std::optional<Part> part_named(std::string_view name) {
+    for (const Part part : kParts)
+        if (name == name_of(part)) return part;
+    return std::nullopt;
+}
+
+Keys keys_of(Part part, const configuration::Loaded& loaded) {
+    std::vector<Part> parts = below(part);
+    parts.push_back(part);
+    Keys keys;
+    for (const Part one : parts) {
+        for (const auto& value : loaded.effective)
+            for (const auto beginning : own_keys(one))
+                if (value.key.starts_with(beginning)) keys[value.key] = value.value;
+    }
+    if (const auto& dbc = loaded.configuration.dbc; !dbc.empty()) keys[kDbc] = dbc_of(dbc);
+    return keys;
+}
+
+std::string instant_of(std::int64_t utc_ns) {
+    const auto seconds = static_cast<std::time_t>(utc_ns / 1'000'000'000);
+    std::tm time{};
+    gmtime_r(&seconds, &time);
+    std::array<char, 32> text{};
+    std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &time);
+    return text.data();
+}
+
+std::string date_of(std::int64_t utc_ns) { return instant_of(utc_ns).substr(0, 10); }
+
+std::string to_json(const Record& record) {
+    Json parts = Json::object();
+    for (const auto& [part, r] : record.parts) {
+        Json keys = Json::object();
+        for (const auto& [key, value] : r.keys) keys[key] = value;
+        parts[name_of(part)] = {{"keys", keys},
+                                {"meaning", r.meaning},
+                                {"sha256", record::sha256_of_text(text_of(r.keys))},
+                                {"evidence", r.evidence},
+                                {"by", r.by},
+                                {"utc", instant_of(r.utc_ns)},
+                                {"utc_ns", r.utc_ns},
+                                {"vibrig", r.version}};
+    }
+    Json whole{
+        {"version", 1}, {"rig", record.rig}, {"simulated", record.simulated}, {"parts", parts}};
+    whole["sha256"] = record::sha256_of_text(whole.dump());
+    whole["signature"] = nullptr;
+    return whole.dump(1) + "\n";
+}
+
+Record record_from_json(const std::string& text) {
+    try {
+        Json whole = Json::parse(text);
+        if (const int version = whole.at("version"); version != 1)
+            throw std::invalid_argument(fmt::format("version: found {}, expected 1", version));
+        const std::string hash = whole.at("sha256");
+        whole.erase("sha256");
+        whole.erase("signature");
+        if (record::sha256_of_text(whole.dump()) != hash)
+            throw std::invalid_argument("its SHA-256 is not that of what it says");
+        Record record;
+        record.rig = whole.at("rig");
+        record.simulated = whole.at("simulated");
+        for (const auto& [name, json] : whole.at("parts").items()) {
+            const auto part = part_named(name);
+            if (!part) continue;  // of a later version
+            PartRecord& r = record.parts[*part];
+            for (const auto& [key, value] : json.at("keys").items()) r.keys[key] = value;
+            r.meaning = json.at("meaning");
+            r.evidence = json.at("evidence");
+            r.by = json.at("by").get<std::vector<std::string>>();
+            r.utc_ns = json.at("utc_ns");
+            r.version = json.at("vibrig");
+            if (json.at("sha256") != record::sha256_of_text(text_of(r.keys)))
+                throw std::invalid_argument(name + ": its SHA-256 is not that of its keys");
+        }
+        return record;
+    } catch (const nlohmann::json::exception& error) {
+        throw std::invalid_argument(std::string("not a commissioning record: ") + error.what());
+    }
+}
+
+Book::Book(const configuration::Loaded& loaded) : loaded_(loaded) {
+    for (const Part part : kParts) keys_[part] = keys_of(part, loaded);
+    std::error_code error;
+    if (!std::filesystem::exists(path(), error)) return;
+    try {
+        record_ = record_from_json(read_text(path()));
+        if (record_->simulated && !loaded.configuration.simulated())
+            trouble_ = path() +
+                       ": the record of a simulated rig, which does not count on a real "
+                       "one";
+        else if (record_->rig != host_name())
+            trouble_ = fmt::format("{}: found the record of rig \"{}\", expected that of \"{}\"",
+                                   path(), record_->rig, host_name());
+        if (!trouble_.empty()) record_.reset();
+    } catch (const std::invalid_argument& wrong) {
+        trouble_ = path() + ": " + wrong.what();
+    }
+}
+
+std::string Book::path() const {
+    return (std::filesystem::path(loaded_.configuration.commission.folder) / "record.json")
+        .string();
+}
+
+std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
+    std::vector<Standing> all;
+    for (const Part part : kParts) {
+        Standing s{part, false, "no record", {}, std::nullopt};
+        if (record_ && record_->parts.contains(part)) {
+            const PartRecord& r = record_->parts.at(part);
+            s.record = r;
+            const auto age_days = static_cast<double>(utc_ns - r.utc_ns) / kDay_ns;
+            const double valid = loaded_.configuration.commission.valid_days;
+            s.why = change(r.keys, keys_.at(part), s.told);
+            if (!s.why.empty())
+                s.why += fmt::format(" by {} on {}", joined(r.by), date_of(r.utc_ns));
+            else if (r.meaning != kMeaning)
+                s.why = fmt::format("version {} counts its keys otherwise", r.version);
+            else if (r.by.size() < 2 || journal::same_person(r.by[0], r.by[1]))
+                s.why = fmt::format("proven by {}, two persons are asked", joined(r.by));
+            else if (age_days < 0)
+                s.why = fmt::format("proven on {}, which is yet to come: look at the clock",
+                                    instant_of(r.utc_ns));
+            else if (age_days > valid)
+                s.why = fmt::format("proven on {}, {:.0f} days ago, {:g} at most",
+                                    date_of(r.utc_ns), age_days, valid);
+            s.proven = s.why.empty();
+        }
+        all.push_back(std::move(s));
+    }
+    return all;
+}
+
+std::string Book::refusal(std::int64_t utc_ns) const {
+    if (!loaded_.configuration.record_demanded()) return {};
+    if (!trouble_.empty()) return "not commissioned: " + trouble_ + ": vibrig commission";
+    std::string missing, command = "vibrig commission";
+    for (const auto& s : standing(utc_ns)) {
+        if (s.proven) continue;
+        if (s.record)  // the first that somebody has changed says most
+            return fmt::format("not commissioned: {} ({}): vibrig commission{}", s.why,
+                               name_of(s.part), s.part == Part::gyros ? " gyros" : "");
+        missing += (missing.empty() ? "" : ", ") + std::string(name_of(s.part));
+        if (missing == name_of(Part::gyros)) command = "vibrig commission gyros";
+    }
+    if (missing.empty()) return {};
+    return fmt::format("not commissioned: no record of {}: {}", missing, command);
+}
+
+void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
+                 const configuration::Loaded& as) {
+    Record fresh = record_.value_or(Record{});
+    fresh.simulated = loaded_.configuration.simulated();
+    fresh.rig = host_name();
+    for (const Part part : parts) {
+        PartRecord one = what;
+        one.keys = keys_of(part, as);
+        one.meaning = kMeaning;
+        fresh.parts[part] = std::move(one);
+    }
+    std::error_code error;  // whatever it is, the file then says it
+    std::filesystem::create_directories(loaded_.configuration.commission.folder, error);
+    proto::write_durably(path(), to_json(fresh), 0640);
+    record_ = std::move(fresh);
+    trouble_.clear();
+}
+
+Json Book::status(std::int64_t utc_ns) const {
+    Json parts = Json::object();
+    for (const auto& s : standing(utc_ns)) {
+        Json one{{"proven", s.proven}, {"why", s.why}, {"told", s.told}};
+        if (s.record) {
+            one["by"] = s.record->by;
+            one["utc"] = instant_of(s.record->utc_ns);
+            one["evidence"] = s.record->evidence;
+        }
+        parts[name_of(s.part)] = one;
+    }
+    const auto& c = loaded_.configuration;
+    return {{"demanded", c.record_demanded()},
+            {"simulated", c.simulated()},
+            {"refusal", refusal(utc_ns)},
+            {"trouble", trouble_},
+            {"file", path()},
+            {"sha256", sha256()},
+            {"parts", parts}};
+}
+
+std::string Book::sha256() const {
+    return record_ ? record::sha256_of_text(to_json(*record_)) : "";
+}
+
+}  // namespace vibrig::commission

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+
+namespace vibrig::commission {
+
+using Json = nlohmann::ordered_json;
+
+/// What is proven apart, and voided apart. What moves the table is the safe-state proof's
+/// (daemon/campaign/safety_proof.hpp).
+enum class Part : std::uint8_t { bus, gimbals, accelerometers, earth, gyros };
+inline constexpr std::array<Part, 5> kParts{Part::bus, Part::gimbals, Part::accelerometers,
+                                            Part::earth, Part::gyros};
+[[nodiscard]] const char* name_of(Part part) noexcept;
+/// Nothing if there is no such part.
+[[nodiscard]] std::optional<Part> part_named(std::string_view name);
+
+/// Key and value as --check prints it.
+using Keys = std::map<std::string, std::string>;
+
+/// That a part stands on, those of the parts below it included; a DBC by the hash of its file.
+[[nodiscard]] Keys keys_of(Part part, const configuration::Loaded& loaded);
+
+/// One part as it was proven.
+struct PartRecord {
+    Keys keys;
+    int meaning = 0;  ///< of the keys; a release that changes it voids the part
+    Json evidence = Json::object();
+    std::vector<std::string> by;
+    std::int64_t utc_ns = 0;
+    std::string version;  ///< of Vibrig
+};
+
+/// What is proven of a rig, one file for all parts.
+struct Record {
+    std::string rig;
+    bool simulated = false;
+    std::map<Part, PartRecord> parts;
+};
+
+/// "2026-11-23" and "2026-11-23T14:05:00Z".
+[[nodiscard]] std::string date_of(std::int64_t utc_ns);
+[[nodiscard]] std::string instant_of(std::int64_t utc_ns);
+
+[[nodiscard]] std::string to_json(const Record& record);
+/// Throws std::invalid_argument: no such text, or one that is not as it was written.
+[[nodiscard]] Record record_from_json(const std::string& text);
+
+/// How a part stands against a configuration.
+struct Standing {
+    Part part = Part::bus;
+    bool proven = false;
+    std::string why;   ///< not proven
+    std::string told;  ///< proven, but a zero has moved since
+    std::optional<PartRecord> record;
+};
+
+/// The record of one rig, on disk. Control thread only.
+class Book {
+  public:
+    /// Reads what there is. `loaded` must outlive this.
+    explicit Book(const configuration::Loaded& loaded);
+
+    [[nodiscard]] std::vector<Standing> standing(std::int64_t utc_ns) const;
+    /// Why nothing is armed; empty: all parts are proven, or none is demanded.
+    [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
+    /// What the file says that is not a record; empty: nothing.
+    [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
+    /// What the daemon runs with, as it was when it started.
+    [[nodiscard]] const Keys& keys(Part part) const { return keys_.at(part); }
+    /// Takes a part in and writes the file. Throws std::runtime_error that names the file.
+    void prove(const std::vector<Part>& parts, const PartRecord& what,
+               const configuration::Loaded& as);
+    [[nodiscard]] Json status(std::int64_t utc_ns) const;
+    /// SHA-256 of the file; empty: there is none.
+    [[nodiscard]] std::string sha256() const;
+
+  private:
+    [[nodiscard]] std::string path() const;
+
+    const configuration::Loaded& loaded_;
+    std::map<Part, Keys> keys_;  ///< now
+    std::optional<Record> record_;
+    std::string trouble_;
+};
+
+}  // namespace vibrig::commission

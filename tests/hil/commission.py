@@ -1,0 +1,398 @@
+#!/usr/bin/python3
+"""Commissioning by script, on the seqpacket bus and the rig's clock: a simulated rig whose wiring is unknown is moved, named, recorded
+and armed; one that hides something ends undecided or refused, with the reason.
+
+usage: commission.py PROGRAMS
+"""
+import fcntl
+import hashlib
+import json
+import math
+import os
+import pty
+import random
+import re
+import select
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+
+CAMPAIGN = {"name": "commissioned", "identify": "what-it-can", "positions_deg": [[-90, 0, 0]], "table_g": [5.0], "dwell_s": 10.0}
+ANSWERS = {"power": "yes", "permit.hold": "yes", "permit.outer": "yes", "permit.inner": "yes", "permit.azimuth": "yes"}
+
+
+def remainder(degrees):
+    return math.remainder(degrees, 360)
+
+
+def readings(status):
+    return {channel["name"]: channel.get("value") for channel in status["sample"]["channels"]}
+
+
+class Unknown:
+    """A rig with a truth of its own, of which the configuration says nothing."""
+
+    def __init__(self, checks, programs, folder, truth, speed="max"):
+        self.checks, self.truth = checks, truth
+        self.rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1)
+        self.record = os.path.join(folder, "commission", "record.json")
+        self.rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45", "--speed", speed,
+                             "--truth", self.rig.truth_file(truth))
+        self.configure()
+        self.start()
+
+    def configure(self, **tables):
+        self.rig.configure(CAMPAIGN, commission={"enforce": True, "folder": os.path.dirname(self.record)}, **tables)
+
+    def start(self):
+        self.rig.start_daemon()
+        ready = self.rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("state") == 0 and
+                                  readings(s).get("outer") is not None, 60)
+        self.checks.check(ready and ready["platform"].get("ready"), "the rig is ready", self.rig.logs())
+        return ready
+
+    def restart(self):
+        self.rig.daemon.end()
+        return self.start()
+
+    def answers(self, **others):
+        """Of people who say what is so."""
+        platform, site = self.truth["platform"], self.truth["site"]
+        sign, zero = platform["encoder_sign"], platform["encoder_zero_deg"]
+        outer = sign[0] * remainder(readings(self.rig.status())["outer"] - zero[0])
+        upright = remainder(outer + 90 * sign[0])   # the travel allows this end alone
+        matrix = self.truth["accelerometer"]["matrix"]
+        determinant = sum(matrix[0][i] * (matrix[1][(i + 1) % 3] * matrix[2][(i + 2) % 3] - matrix[1][(i + 2) % 3] * matrix[2][(i + 1) % 3])
+                          for i in range(3))
+        # The reading grows; the angle counts down when the gimbal turns anticlockwise about an upward axis.
+        told = {**ANSWERS, "travel": "-60 130 -30 30 free", "latitude": site["latitude_deg"], "compass": site["azimuth_deg"] + 7, "drawing": "yes" if determinant > 0 else "no",
+                "anticlockwise": "yes" if (sign[2] < 0) == (upright > 0) else "no", **others}
+        path = os.path.join(self.rig.folder, "answers.json")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(told, file)
+        return path
+
+    def commission(self, **others):
+        run = self.rig.tool("commission", "--by", "Ada", "--json", "--answers", self.answers(**others), timeout=300)
+        try:
+            return run, json.loads(run.stdout)
+        except ValueError:
+            self.checks.check(False, "the finding is JSON", run.stdout + run.stderr + self.rig.logs())
+            return run, {"outcome": "", "why": "", "found": {}}
+
+
+def drawn(seed):
+    """A truth; base level but for what a shim leaves."""
+    draw = random.Random(seed)
+    order = draw.sample(range(3), 3)
+    matrix = [[0.0] * 3 for _ in range(3)]
+    for i in range(3):
+        matrix[i][order[i]] = draw.choice([-1.0, 1.0])
+    return {"site": {"latitude_deg": draw.choice([-1, 1]) * draw.uniform(20, 65), "azimuth_deg": draw.uniform(25, 65),
+                     "base_tilt_deg": [0.0, draw.uniform(-0.8, 0.8)]},
+            "platform": {"encoder_sign": [draw.choice([-1, 1]) for _ in range(3)],
+                         "encoder_zero_deg": [draw.uniform(-170, 170), draw.uniform(-8, 8), draw.uniform(-170, 170)],
+                         "drift_sign": -1},
+            "accelerometer": {"matrix": matrix, "zero_g": [draw.uniform(-0.01, 0.01) for _ in range(3)]}}
+
+
+def whole(checks, programs, folder, seed):
+    """From nothing known to armed, but for the proof of the safe state."""
+    u = Unknown(checks, programs, folder, drawn(seed))
+    try:
+        tool = u.rig.tool
+        checks.equal(tool("commission", "status").returncode, 1, "nothing is proven")
+        refused = tool("arm", "--by", "Ada")
+        checks.check("not commissioned: no record of bus, gimbals" in refused.stderr, "nothing is armed without a record", refused.stderr)
+        checks.equal(tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes").returncode, 1, "nothing is accepted yet")
+        run, found = u.commission()
+        if not checks.equal(found["outcome"], "decided", f"rig {seed} is named: {found['why']}"):
+            checks.note(run.stderr + u.rig.logs())
+            return
+        keys, truth = found["found"], u.truth
+        checks.equal(run.returncode, 0, "exit code 0")
+        checks.check(found["simulated"] and "SIMULATED: DECIDED" in run.stderr, "that it is simulated is said", run.stderr)
+        # Of two ends of the outer axis the one with encoder_sign[0] = 1; the other one is a turn of everything.
+        other = truth["platform"]["encoder_sign"][0] < 0
+        azimuth = remainder(keys["site.azimuth_deg"] - truth["site"]["azimuth_deg"] - (180 if other else 0))
+        checks.check(abs(azimuth) < 1, f"north within 1 deg: {azimuth:.2f}", keys)
+        tilt = truth["site"]["base_tilt_deg"][1]
+        checks.check(abs(abs(keys["site.elevation_deg"]) - abs(tilt)) < 0.05, f"elevation within 0.05 deg of {tilt:.2f}", keys)
+        product = math.prod(truth["platform"]["encoder_sign"])
+        checks.equal(math.prod(keys["platform.encoder_sign"]), product, "the product of the signs")
+        checks.equal(keys["platform.encoder_sign"][0], 1, "the end of the outer axis is the convention's")
+        odds = [witness["ln_odds"] for witness in found["witnesses"]]
+        checks.check(all(o * sum(odds) > 0 for o in odds) and len(odds) == 4, "all four witnesses agree", found["witnesses"])
+        checks.equal(found["corrections"], [], "the DBC is right")
+        with open(u.rig.configuration, encoding="utf-8") as file:
+            before = file.read()
+        files = sorted(os.listdir(folder))
+        for second in ("Ada", " ada", ""):
+            same = tool("commission", "accept", "--by", "Ada", "--second", second, "--yes")
+            checks.check(same.returncode == 1 and "another person than Ada" in same.stderr, f"Ada and {second!r} are not two", same.stderr)
+        with open(u.rig.configuration, encoding="utf-8") as file:
+            checks.check(file.read() == before and sorted(os.listdir(folder)) == files and not os.path.exists(u.record),
+                         "and nothing is written then", os.listdir(folder))
+        os.chmod(u.rig.configuration, 0o604)
+        real = os.path.join(folder, "etc", "rig.toml")
+        os.mkdir(os.path.dirname(real))
+        os.rename(u.rig.configuration, real)
+        os.symlink(real, u.rig.configuration)
+        accepted = tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
+        checks.check(accepted.returncode == 0 and os.path.exists(u.record), "accepted by two", accepted.stdout + accepted.stderr)
+        with open(real + ".1", encoding="utf-8") as file:
+            checks.check(os.path.islink(u.rig.configuration) and os.stat(real).st_mode & 0o777 == 0o604 and file.read() == before,
+                         "the file keeps its mode, a link stays one, and the old one is beside it", os.listdir(os.path.dirname(real)))
+        checks.equal(tool("arm", "--by", "Ada").returncode, 1, "the daemon still runs with the old configuration")
+        early = tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes")
+        checks.check(early.returncode == 1 and "restart vibrigd first" in early.stderr, "what the daemon has not read is not recorded", early.stderr)
+        u.restart()
+        gyros = tool("arm", "--by", "Ada")
+        checks.check("no record of gyros: vibrig commission gyros" in gyros.stderr, "what nothing measures is asked for", gyros.stderr)
+        for typed, code, word in (("1\ndrawing 7\n2\ncertificate\nyes\n", 1, "they differ"), ("2\nd\n2\nd\nyes\n", 1, "expected 1 as both say"),
+                                  ("7\n1\n\ndrawing 7\n1\ncertificate\nyes\n", 0, "gyros recorded by Ada")):
+            said = subprocess.run([u.rig.program("vibrig"), "commission", "gyros", "--by", "Ada", "--second", "Bo", "--socket", u.rig.socket],
+                                  input=typed, capture_output=True, text=True, check=False)
+            checks.check(said.returncode == code and word in said.stdout + said.stderr, f"drift_sign is stated by two apart: {word}", said.stdout + said.stderr)
+        proven = tool("commission", "status")
+        checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
+                     proven.stdout)
+        armed = tool("arm", "--by", "Ada")
+        checks.check("not commissioned" not in armed.stderr and "proof" in armed.stderr, "what is left is the proof", armed.stderr)
+        tool("selftest", "--by", "Ada", timeout=120)
+        checks.equal(tool("arm", "--by", "Ada").returncode, 0, "commissioned and proved it is armed")
+        tool("start", "--by", "Ada")
+        last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
+        checks.equal(r.state_of(last), "finished", "and gravity is where the encoders say")
+        checks.check("opening check: the rig is what its configuration says" in u.rig.daemon.text(), "free drift and gravity agree with it", u.rig.logs())
+        with open(u.rig.configuration, encoding="utf-8") as file:
+            text = file.read()
+        checks.check("# SIMULATED: ln LR" in text, "the configuration's comments say so, too", text)
+        signs = str(keys["platform.encoder_sign"])
+        wrong = str([1, -keys["platform.encoder_sign"][1], keys["platform.encoder_sign"][2]])
+        with open(u.rig.configuration, "w", encoding="utf-8") as file:
+            file.write(text.replace("encoder_sign = " + signs, "encoder_sign = " + wrong))
+        u.restart()
+        edited = tool("arm", "--by", "Ada")
+        checks.check(f"platform.encoder_sign is {wrong}, was proven as {signs} by Ada" in edited.stderr, "an edited key voids its part",
+                     edited.stderr)
+        with open(u.record, encoding="utf-8") as file:
+            recorded = file.read()
+        for key, old, new, suspect in (("platform.encoder_sign", signs, wrong, "platform.encoder_sign"),
+                                       ("site.latitude_deg", None, None, "site.latitude_deg")):
+            with open(u.rig.configuration, "w", encoding="utf-8") as file:
+                if old is None:
+                    old = re.search(r"latitude_deg = (-?[\d.]+)", text)[1]
+                    new = old[1:] if old.startswith("-") else "-" + old
+                name = key.partition(".")[2]
+                file.write(text.replace(f"{name} = {old}", f"{name} = {new}"))
+            with open(u.record, "w", encoding="utf-8") as file:
+                file.write(recorded)
+            u.restart()
+            forge(u, key)
+            u.restart()
+            if tool("arm", "--by", "Ada").returncode:
+                tool("selftest", "--by", "Ada", timeout=120)   # its proof stands on some of the keys
+                checks.equal(tool("arm", "--by", "Ada").returncode, 0, f"{key} is wrong and the record forged: it is armed")
+            tool("start", "--by", "Ada")
+            last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
+            reason = r.state_of(last)
+            suspects = reason.partition("suspects: ")[2].rstrip(")")
+            checks.check(reason.startswith("aborted (opening check") and any(s.startswith(suspect) for s in suspects.split("; ")[:3]) and
+                         not last["campaign"].get("dwells"), f"and {key} is caught before the table moves", reason)
+    finally:
+        u.rig.stop()
+
+
+def forge(unknown, key):
+    """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit."""
+    proven = unknown.rig.tool("commission", "status", "--json")
+    now = [re.search(re.escape(key) + " is (.*), was proven as ", part["why"]) for part in json.loads(proven.stdout)["parts"].values()]
+    value = next(found[1] for found in now if found)
+    with open(unknown.record, encoding="utf-8") as file:
+        record = json.load(file)
+    for part in record["parts"].values():
+        if key in part["keys"]:
+            part["keys"][key] = value
+            part["sha256"] = hashlib.sha256("".join(f"{k}={v}\n" for k, v in sorted(part["keys"].items())).encode()).hexdigest()
+    signature = record.pop("signature")
+    record.pop("sha256")
+    whole_text = json.dumps(record, separators=(",", ":"), ensure_ascii=False)
+    record["sha256"] = hashlib.sha256(whole_text.encode()).hexdigest()
+    record["signature"] = signature
+    with open(unknown.record, "w", encoding="utf-8") as file:
+        json.dump(record, file)
+
+
+def hidden(checks, programs, folder, truth, others, outcome, word):
+    u = Unknown(checks, programs, folder, truth)
+    try:
+        run, found = u.commission(**others)
+        checks.check(found["outcome"] == outcome and word in found["why"] and run.returncode == 1 and not found["found"],
+                     f"{outcome}, {word}", found)
+    finally:
+        u.rig.stop()
+
+
+def hard_ones(checks, programs):
+    def rig_with(seed, section, **keys):
+        truth = drawn(seed)
+        truth[section].update(keys)
+        return truth
+
+    south = rig_with(11, "site", latitude_deg=-45.0)
+    for truth, others, outcome, word in (
+            (rig_with(12, "platform", stuck_gimbal="inner"), {}, "undecided", "INNER"),
+            (rig_with(13, "accelerometer", dead="+z"), {}, "refused", "accelerometer."),
+            (rig_with(14, "platform", command_offset_deg=[0, 6, 0]), {}, "undecided", "by hand"),
+            (south, {"latitude": 45.0, "compass": "-"}, "undecided", "latitude")):
+        with tempfile.TemporaryDirectory() as folder:
+            hidden(checks, programs, folder, truth, others, outcome, word)
+
+
+class Terminal:
+    """vibrig commission in a terminal of 80 columns."""
+
+    def __init__(self, rig):
+        self.pid, self.file = pty.fork()
+        if self.pid == 0:
+            os.execv(rig.program("vibrig"), ["vibrig", "commission", "--by", "Ada", "--socket", rig.socket])
+        fcntl.ioctl(self.file, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+        self.text = ""
+
+    def until(self, word, timeout_s=30):
+        """True: it was shown, and what came before is forgotten for the next one."""
+        end = time.monotonic() + timeout_s
+        while word not in self.text and time.monotonic() < end:
+            if select.select([self.file], [], [], 0.1)[0]:
+                try:
+                    self.text += os.read(self.file, 4096).decode()
+                except OSError:
+                    break
+        shown = word in self.text
+        self.seen, self.text = self.text, self.text.partition(word)[2]
+        return shown
+
+    def type(self, line):
+        os.write(self.file, (line + "\n").encode())
+
+    def kill(self):
+        os.kill(self.pid, 9)
+        os.waitpid(self.pid, 0)
+        os.close(self.file)
+
+    def end(self):
+        status = os.waitpid(self.pid, 0)[1]
+        os.close(self.file)
+        return os.waitstatus_to_exitcode(status)
+
+
+def dialogue(checks, programs, folder):
+    """A person types; the terminal is lost while a gimbal moves, and comes back."""
+    u = Unknown(checks, programs, folder, drawn(3), speed="5")
+    try:
+        t = Terminal(u.rig)
+        checks.check(t.until("power stage off?"), "it asks", t.text)
+        t.type("perhaps")
+        checks.check(t.until("expected yes or no"), "what is no answer is asked again with what was expected", t.text)
+        for question, answer in (("power stage off?", "yes"), ("or free", ""), ("hold where it is", "h"), ("present readings", "y"),
+                                 ("OUTER", "y")):
+            checks.check(t.until(question) and t.until("> "), f"it asks: {question}", t.text)
+            t.type(answer)
+        wide = [line for line in t.seen.splitlines() if len(line) > 80]
+        checks.check(not wide and "\x1b" not in t.seen, "in 80 columns and without colours", wide or t.seen)
+        time.sleep(0.5)
+        checks.equal(u.rig.status()["campaign"]["state"], "commissioning", "the status says so")
+        for command in ("arm", "selftest", "commission"):
+            refused = u.rig.tool(command, "--by", "Bo")
+            checks.check(refused.returncode == 1, f"meanwhile no {command}", refused.stderr)
+        checks.check("commissioned by Ada" in refused.stderr, "another person takes no dialogue over", refused.stderr)
+        refused = u.rig.tool("commission", "gyros", "--by", "Bo", "--second", "Cy", "--yes")
+        checks.check(refused.returncode == 1 and "found the campaign commissioning" in refused.stderr, "meanwhile nothing is recorded", refused.stderr)
+        t.kill()
+        time.sleep(4)
+        checks.check("nobody has been at the tool" in u.rig.logs(60), "a lost terminal stops it", u.rig.logs(60))
+        t = Terminal(u.rig)
+        checks.check(t.until("Going on with what Ada") and t.until("Go on?"), "it is taken up where it was, by a new permission", t.text)
+        t.type("no")
+        checks.check(t.until("UNFINISHED"), "a no ends it", t.text)
+        checks.equal(t.end(), 1, "exit code 1")
+        for what in ("nothing", "[]", '{"do": 1}', '{"do": "read", "after": "x"}', '{"do": "answer", "id": 7}', '{"do": "begin", "by_hand": []}'):
+            body = json.dumps({"kind": "commission", "by": "Ada", "argument": what})
+            with socket.socket(socket.AF_UNIX) as line:
+                line.connect(u.rig.socket)
+                line.sendall(f"POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode())
+                checks.check(line.recv(4096).startswith(b"HTTP/1.1 "), f"{what} is answered")
+        checks.check(u.rig.daemon.running(), "what makes no sense harms nobody", u.rig.logs())
+        other = subprocess.run([u.rig.program("vibrig"), "commission", "registers", "--by", "Ada", "--socket", u.rig.socket],
+                               capture_output=True, text=True, check=False)
+        checks.check(other.returncode == 2 and "safe-state proof" in other.stderr, "what is not there is said", other.stderr)
+    finally:
+        u.rig.stop()
+
+
+def real(checks, programs, folder):
+    """A configuration that does not say that its rig is simulated: nothing of it is moved by command."""
+    rig = r.Rig(programs, "seqpacket", "real", folder)
+    try:
+        rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45")
+        bus = subprocess.run([rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "2", "--json"],
+                             capture_output=True, text=True, check=False)
+        heard = {message["id"]: message for message in json.loads(bus.stdout)["messages"]} if bus.returncode == 0 else {}
+        checks.check(0x80 in heard and 20 < heard[0x80]["period_ms"] < 30 and 0 in heard[0x80]["counters"] and 4 in heard[0x101]["at_rest"],
+                     "without a daemon and a DBC the bus is listed", bus.stdout + bus.stderr)
+        rig.configure(CAMPAIGN, **r.PATIENT)
+        check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
+        stated = {}
+        for role, key, value in re.findall(r"^shaker\.registers\.(\w+)\.(type|address|table|word_order|scale|mask) +=  (\S+)", check.stdout, re.M):
+            stated.setdefault("shaker.registers." + role, {})[key] = json.loads(value)
+        rig.configure(CAMPAIGN, **r.PATIENT, **stated, commission={"simulated": False, "folder": os.path.join(folder, "commission")})
+        rig.start_daemon()
+        ready = rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("state") == 0, 60)
+        checks.check(ready and ready["platform"].get("ready") and not ready.get("simulated"), "a rig that counts as real is ready", rig.logs())
+        before = readings(rig.status())
+        run = rig.tool("commission", "--by", "Ada")
+        checks.check(run.returncode == 1 and "this version moves no gimbal of a real rig by command: vibrig commission --by-hand" in run.stderr,
+                     "a real rig is not moved by command", run.stdout + run.stderr)
+        after = readings(rig.status())
+        checks.check(all(abs(remainder(after[g] - before[g])) < 0.1 for g in ("outer", "inner", "azimuth")) and
+                     r.state_of(rig.status()) == "idle", "and does not move", (before, after))
+        for _ in range(40):   # until the stop at the daemon's start is confirmed
+            hand = rig.tool("commission", "--by", "Ada", "--by-hand")   # nobody answers
+            if "at rest only" not in hand.stderr:
+                break
+            time.sleep(0.5)
+        checks.check("power stage off?" in hand.stdout and hand.returncode == 1, "by hand it begins", hand.stdout + hand.stderr)
+        answers = os.path.join(folder, "answers.json")
+        with open(answers, "w", encoding="utf-8") as file:
+            json.dump(ANSWERS, file)
+        scripted = rig.tool("commission", "--by", "Ada", "--by-hand", "--answers", answers)
+        checks.check(scripted.returncode == 2 and "persons answer on a real rig" in scripted.stderr, "and no script answers", scripted.stderr)
+        stated = rig.tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes")
+        checks.check(stated.returncode == 2 and "--yes: persons answer on a real rig" in stated.stderr, "nor states", stated.stderr)
+    finally:
+        rig.stop()
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        whole(checks, programs, folder, 2)
+    with tempfile.TemporaryDirectory() as folder:
+        dialogue(checks, programs, folder)
+    hard_ones(checks, programs)
+    with tempfile.TemporaryDirectory() as folder:
+        real(checks, programs, folder)
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,241 @@
+#include "daemon/commission/record.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "daemon/commission/acceptance.hpp"
+
+namespace vibrig::commission {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::int64_t kNow = 1'795'000'000'000'000'000;
+constexpr std::int64_t kDay = 86'400'000'000'000;
+
+class Books : public ::testing::Test {
+  protected:
+    void SetUp() override { std::filesystem::remove_all(folder); }
+    void TearDown() override { std::filesystem::remove_all(folder); }
+    configuration::Loaded loaded(const std::string& more = {}) const {
+        return configuration::parse("[commission]\nenforce = true\nsimulated = true\nfolder = \"" +
+                                        folder.string() + "\"\n" + more,
+                                    "/rig.toml", false);
+    }
+    static std::string text_of(const std::filesystem::path& path) {
+        std::ifstream in(path);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+    void prove_all(const configuration::Loaded& as) const {
+        PartRecord what;
+        what.by = {"A. Person", "B. Person"};
+        what.utc_ns = kNow;
+        what.evidence = {{"ln_ratio", 13200}};
+        what.version = "1";
+        Book book(as);
+        book.prove({kParts.begin(), kParts.end()}, what, as);
+    }
+    const std::filesystem::path folder =
+        std::filesystem::path(::testing::TempDir()) / ("commission" + std::to_string(::getpid()));
+};
+
+TEST_F(Books, WithoutARecordNothingIsArmedAndTheCommandIsNamed) {
+    const auto as = loaded();
+    EXPECT_EQ(Book(as).refusal(kNow),
+              "not commissioned: no record of bus, gimbals, accelerometers, earth, gyros: vibrig "
+              "commission");
+}
+
+TEST_F(Books, WhatIsProvenIsArmed) {
+    const auto as = loaded();
+    prove_all(as);
+    EXPECT_EQ(Book(as).refusal(kNow + kDay), "");
+    EXPECT_EQ(Book(as).status(kNow)["parts"]["gimbals"]["by"][1], "B. Person");
+}
+
+TEST_F(Books, AKeyThatHasChangedVoidsItsPartsAndNoOthers) {
+    const auto proven = loaded();
+    prove_all(proven);
+    const auto as = loaded("[platform]\nencoder_sign = [1, -1, 1]\n");
+    const Book book(as);
+    EXPECT_EQ(book.refusal(kNow),
+              "not commissioned: platform.encoder_sign is [1, -1, 1], was proven as [1, 1, 1] by "
+              "A. Person, B. Person on 2026-11-18 (gimbals): vibrig commission");
+    std::string void_parts;
+    for (const auto& s : book.standing(kNow))
+        if (!s.proven) void_parts += std::string(name_of(s.part)) + " ";
+    EXPECT_EQ(void_parts, "gimbals earth gyros ");
+}
+
+TEST_F(Books, EachKeyOfTheTableVoidsItsPart) {
+    const auto proven = loaded();
+    prove_all(proven);
+    for (const auto& [text, key] : std::vector<std::pair<std::string, std::string>>{
+             {"[platform]\nencoder_zero_deg = [5, 0, 0]", "platform.encoder_zero_deg"},
+             {"[platform]\ngyro_x_axes = [\"+x\", \"-y\", \"-z\"]", "platform.gyro_x_axes"},
+             {"[platform]\ndrift_sign = 1", "platform.drift_sign"},
+             {"[accelerometer]\nmatrix = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]",
+              "accelerometer.matrix"},
+             {"[site]\nlatitude_deg = -45.75", "site.latitude_deg"},
+             {"[site]\nazimuth_deg = 90", "site.azimuth_deg"},
+             {"[can]\nsample_rate_hz = 100", "can.sample_rate_hz"},
+             {"[gimbal]\nmessage = \"Other\"", "gimbal.message"}}) {
+        const auto as = loaded(text + "\n");
+        EXPECT_THAT(Book(as).refusal(kNow), HasSubstr(key + " is "));
+    }
+}
+
+TEST_F(Books, AZeroThatWasFoundAnewIsToldOnly) {
+    const auto proven = loaded();
+    prove_all(proven);
+    const auto moved = loaded("[accelerometer]\nzero_g = [0.004, -0.009, 0.0]\n");
+    EXPECT_EQ(Book(moved).refusal(kNow), "");
+    EXPECT_THAT(Book(moved).standing(kNow)[2].told, HasSubstr("accelerometer.zero_g is"));
+    const auto far = loaded("[accelerometer]\nzero_g = [0.014, 0.0, 0.0]\n");
+    EXPECT_THAT(Book(far).refusal(kNow), HasSubstr("accelerometer.zero_g"));
+}
+
+TEST_F(Books, ARecordGrowsOld) {
+    const auto as = loaded();
+    prove_all(as);
+    EXPECT_EQ(Book(as).refusal(kNow + 365 * kDay), "");
+    EXPECT_THAT(Book(as).refusal(kNow + 367 * kDay), HasSubstr("367 days ago, 365 at most"));
+}
+
+TEST_F(Books, ARecordFromTheFutureIsRefused) {
+    const auto as = loaded();
+    prove_all(as);
+    EXPECT_EQ(Book(as).refusal(kNow), "");
+    EXPECT_THAT(Book(as).refusal(kNow - 1'000'000'000),
+                AllOf(HasSubstr("proven on 2026-11-18T"), HasSubstr("yet to come")));
+}
+
+TEST_F(Books, OnePersonTwiceIsNotTwo) {
+    const auto as = loaded();
+    PartRecord what;
+    what.by = {"Ada Lovelace (uid 0)", " ada  lovelace"};
+    what.utc_ns = kNow;
+    Book(as).prove({kParts.begin(), kParts.end()}, what, as);
+    EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("two persons are asked"));
+    EXPECT_NE(not_two("Ada Lovelace (uid 0)", "ada lovelace"), "");
+    EXPECT_NE(not_two("Ada (uid 0)", "  "), "");
+    EXPECT_NE(not_two("Ada (uid 0)", " (uid 1)"), "");
+    EXPECT_EQ(not_two("Ada (uid 0)", "Bo"), "");
+}
+
+TEST_F(Books, ARecordOfAnotherRigIsNone) {
+    const auto as = loaded();
+    prove_all(as);
+    const auto path = folder / "record.json";
+    Record record = record_from_json(text_of(path));
+    record.rig += "-b";
+    std::ofstream(path) << to_json(record);
+    EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("found the record of rig \"" + record.rig));
+}
+
+TEST_F(Books, WhatNobodyHasMeasuredIsNotRecorded) {
+    const auto ran = loaded();
+    const Book book(ran);
+    Finding finding;
+    finding.keys = {{"platform.encoder_sign", "[1, -1, 1]", ""}};
+    const std::vector<Part> parts{Part::bus, Part::gimbals, Part::accelerometers, Part::earth};
+    const auto found = loaded("[platform]\nencoder_sign = [1, -1, 1]\n");
+    EXPECT_EQ(not_as_found(finding, found), "");
+    EXPECT_EQ(not_as_running(parts, finding, book, found), "");
+    EXPECT_THAT(not_as_found(finding, ran), HasSubstr("platform.encoder_sign: found [1, 1, 1]"));
+    for (const auto& [text, key] : std::vector<std::pair<std::string, std::string>>{
+             {"[accelerometer]\nrange_g = 12", "accelerometer.range_g"},
+             {"[can]\nsample_rate_hz = 100", "can.sample_rate_hz"},
+             {"[gimbal]\ntravel_deg = [[-100, 100], [-30, 30], [-175, 175]]", "gimbal.travel_deg"},
+             {"[site]\nazimuth_deg = 90", "site.azimuth_deg"}}) {
+        const auto file = loaded("[platform]\nencoder_sign = [1, -1, 1]\n" + text + "\n");
+        EXPECT_EQ(not_as_found(finding, file), "");
+        EXPECT_THAT(not_as_running(parts, finding, book, file),
+                    AllOf(HasSubstr(key + " is "), HasSubstr("when vibrigd started")));
+    }
+    // Of what nothing measures all of it is as the daemon runs.
+    EXPECT_EQ(not_as_running({Part::gyros}, {}, book, ran), "");
+    EXPECT_THAT(not_as_running({Part::gyros}, {}, book, loaded("[platform]\ndrift_sign = 1\n")),
+                HasSubstr("platform.drift_sign is 1"));
+}
+
+TEST_F(Books, DriftSignIsWhatTwoPersonsSayApart) {
+    const auto with = [this](int sign, const std::string& torque = "[1, 1, 1]") {
+        return loaded("[platform]\ndrift_sign = " + std::to_string(sign) +
+                      "\n[levelling]\ntorque_sign = " + torque + "\n");
+    };
+    const auto doubt = [](int ada, int bo, const configuration::Loaded& file,
+                          const std::string& source = "drawing 7") {
+        return doubt_of_drift_sign({{"Ada", source, ada}, {"Bo", "certificate", bo}}, "Ada (uid 0)",
+                                   "Bo", file);
+    };
+    EXPECT_EQ(doubt(1, 1, with(-1)), "");
+    EXPECT_EQ(doubt(2, 2, with(1)), "");
+    EXPECT_EQ(doubt(3, 3, with(-1)), "");
+    EXPECT_EQ(doubt(3, 3, with(1, "[-1, -1, -1]")), "");
+    EXPECT_EQ(doubt(1, 2, with(-1)),
+              "drift_sign: Ada says 1 (drawing 7), Bo says 2 (certificate): they differ");
+    EXPECT_THAT(doubt(2, 2, with(-1)),
+                HasSubstr("platform.drift_sign: found -1, expected 1 as both say"));
+    EXPECT_THAT(doubt(3, 3, with(-1, "[1, -1, 1]")), HasSubstr("whose signs differ"));
+    EXPECT_THAT(doubt(4, 4, with(-1)), HasSubstr("found 4, expected 1, 2 or 3"));
+    EXPECT_THAT(doubt(1, 1, with(-1), " "), HasSubstr("found no source"));
+    EXPECT_THAT(doubt_of_drift_sign({}, "Ada", "Bo", with(-1)), HasSubstr("each alone"));
+    EXPECT_THAT(doubt_of_drift_sign({{"Ada", "d", 1}, {"Ada", "d", 1}}, "Ada", "Bo", with(-1)),
+                HasSubstr("each alone"));
+    EXPECT_EQ(sign_statements(Json::parse(R"([{"by":"Ada","says":1,"source":"d"},7])")).size(), 2U);
+    EXPECT_TRUE(sign_statements(Json::parse("{}")).empty());
+}
+
+TEST_F(Books, ADbcThatWasEditedMeanwhileIsNotWhatWasMeasured) {
+    std::filesystem::create_directories(folder);
+    const auto dbc = folder / "rig.dbc";
+    std::ofstream(dbc) << "one";
+    auto as = loaded();
+    as.configuration.dbc = dbc.string();
+    const Book book(as);
+    EXPECT_EQ(not_as_running({Part::bus}, {}, book, as), "");
+    std::ofstream(dbc) << "two";
+    EXPECT_THAT(not_as_running({Part::bus}, {}, book, as), HasSubstr("contents of can.dbc is "));
+}
+
+TEST_F(Books, ARecordThatWasEditedIsNone) {
+    const auto as = loaded("[platform]\nencoder_sign = [1, -1, 1]\n");
+    prove_all(loaded());
+    const auto path = folder / "record.json";
+    std::string text = text_of(path);
+    const auto at = text.find("[1, 1, 1]");
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, 9, "[1, -1, 1]");
+    std::ofstream(path) << text;
+    EXPECT_THAT(Book(as).refusal(kNow), AllOf(HasSubstr("record.json"), HasSubstr("SHA-256")));
+    std::ofstream(path) << "nonsense";
+    EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("not a commissioning record"));
+}
+
+TEST_F(Books, ARecordOfASimulatedRigDoesNotCountOnARealOne) {
+    prove_all(loaded());
+    auto real = loaded();
+    real.configuration.commission.simulated = false;
+    EXPECT_THAT(Book(real).refusal(kNow), HasSubstr("of a simulated rig"));
+}
+
+TEST_F(Books, ASimulatedRigNeedsNoneUnlessItIsEnforcedWithAFolder) {
+    auto as = loaded();
+    as.configuration.commission.enforce = false;
+    EXPECT_EQ(Book(as).refusal(kNow), "");
+    as.configuration.commission.enforce = true;
+    as.configuration.commission.folder = configuration::kCommissionFolder;
+    EXPECT_EQ(Book(as).refusal(kNow), "");
+    as.configuration.commission.simulated = false;
+    EXPECT_THAT(Book(as).refusal(kNow), Not(""));
+}
+
+}  // namespace
+}  // namespace vibrig::commission
