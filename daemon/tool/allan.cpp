@@ -29,7 +29,9 @@ struct Options {
     std::vector<double> reference;
     CLI::Option* known_mean = nullptr;
     std::string plot;
+    std::string shape = "rectangular";
     bool json = false;
+    bool live = false;
 };
 
 /// A number within [low, high]. CLI11's own checks let nan through.
@@ -74,6 +76,12 @@ int run(Options& options) {
             }
             request.reference = terms;
         }
+        const std::map<std::string, allan::WindowShape> shapes{
+            {"rectangular", allan::WindowShape::rectangular},
+            {"hann", allan::WindowShape::hann},
+            {"exponential", allan::WindowShape::exponential}};
+        request.shape = shapes.at(options.shape);
+        if (options.live) return allan_live(request, options.json, options.plot) ? kAlarms : 0;
         analysis = analyse(request);
         if (!options.plot.empty()) {
             allan_plot(analysis, options.plot);
@@ -100,6 +108,12 @@ void add_dynamic_options(CLI::App& command, Options& options) {
         ->check(seconds());
     command.add_option("--overlap", request.overlap, "of neighbouring windows (0.5)")
         ->check(number_in(0, 0.9999, "a number from 0 to 0.9999"));
+    command
+        .add_option("--shape", options.shape,
+                    "weights within a window: rectangular (default), hann, exponential")
+        ->check(CLI::IsMember({"rectangular", "hann", "exponential"}));
+    command.add_flag("--live", options.live,
+                     "with FILE - and --dynamic: prints each window as soon as it is complete");
     command
         .add_option("--mean", options.mean,
                     "classical variance about: corrected (default), known-mean, window-mean (the "
@@ -150,10 +164,18 @@ void add_allan(CLI::App& app, int& exit_code) {
     command->add_flag("--drop-outliers", request.drop_outliers, "treat outliers as missing");
     add_dynamic_options(*command, *options);
     command->add_flag("--json", options->json, "print the result as JSON");
-    command->add_option("--plot", options->plot,
-                        "an SVG file (with --dynamic the surface), or a folder for every chart");
+    command->add_option(
+        "--plot", options->plot,
+        "an SVG file (with --dynamic the surface), or a folder for every chart; with "
+        "--live an .html file of both charts, which loads itself again");
+    // A window is printed and gone.
+    for (const char* whole :
+         {"--fit", "--taus", "--type", "--drop-outliers", "--column", "--time"}) {
+        command->get_option("--live")->excludes(command->get_option(whole));
+    }
     command->footer(
         "Example: vibrig allan gyro.csv.gz --column rate --tau0 0.01 --fit --plot gyro.svg\n"
+        "         some-stream | vibrig allan - --tau0 0.025 --dynamic 600 --live --json\n"
         "dev has the data's unit (phase: per second; tdev: of the phase). Fit and windows: deg/h.\n"
         "Exit codes: 0 done, 1 a window was refused or raised an alarm, 2 bad usage or input.");
     command->callback([options, &exit_code] { exit_code = run(*options); });

@@ -22,22 +22,6 @@ constexpr std::size_t kFitGrid = 30;
     throw std::runtime_error(message.str());
 }
 
-/// 1 arcsec/s is 1 deg/h.
-double unit_factor(const std::string& unit, bool phase) {
-    constexpr double kArcsecPerRad = 3600 * 180 / std::numbers::pi;
-    if (unit.empty() || unit == (phase ? "arcsec" : "deg/h")) {
-        return 1;
-    }
-    if (unit == (phase ? "deg" : "deg/s")) {
-        return 3600;
-    }
-    if (unit == (phase ? "rad" : "rad/s")) {
-        return kArcsecPerRad;
-    }
-    throw std::runtime_error("--unit: \"" + unit + "\" found, expected " +
-                             (phase ? "arcsec, deg or rad" : "deg/h, deg/s or rad/s"));
-}
-
 /// Samples on a uniform grid by their time stamps; what is not there becomes NaN. Sets tau0 to the
 /// median step if it is 0.
 std::vector<double> on_grid(const ColumnFile& file, const std::string& name, double& tau0) {
@@ -148,12 +132,7 @@ allan::Fit fit(const allan::Series& series, double to_deg_h) {
 
 void run_windows(const std::vector<double>& values, AllanAnalysis& analysis) {
     const AllanRequest& request = analysis.request;
-    allan::DynamicSettings settings;
-    settings.tau0 = request.tau0;
-    settings.window = static_cast<std::size_t>(std::llround(request.window_s / request.tau0));
-    settings.overlap = request.overlap;
-    settings.mode = request.mode;
-    settings.known_mean = request.known_mean;
+    const allan::DynamicSettings settings = dynamic_settings(request);
     const std::size_t rates = request.phase ? values.size() - 1 : values.size();
     if (settings.window > rates) {
         std::ostringstream message;
@@ -205,11 +184,37 @@ void warn(const allan::Inspection& found, std::vector<double>& values, AllanAnal
 
 }  // namespace
 
+double to_deg_per_hour(const std::string& unit, bool phase) {
+    constexpr double kArcsecPerRad = 3600 * 180 / std::numbers::pi;
+    if (unit.empty() || unit == (phase ? "arcsec" : "deg/h")) {
+        return 1;
+    }
+    if (unit == (phase ? "deg" : "deg/s")) {
+        return 3600;
+    }
+    if (unit == (phase ? "rad" : "rad/s")) {
+        return kArcsecPerRad;
+    }
+    throw std::runtime_error("--unit: \"" + unit + "\" found, expected " +
+                             (phase ? "arcsec, deg or rad" : "deg/h, deg/s or rad/s"));
+}
+
+allan::DynamicSettings dynamic_settings(const AllanRequest& request) {
+    allan::DynamicSettings settings;
+    settings.tau0 = request.tau0;
+    settings.window = static_cast<std::size_t>(std::llround(request.window_s / request.tau0));
+    settings.overlap = request.overlap;
+    settings.shape = request.shape;
+    settings.mode = request.mode;
+    settings.known_mean = request.known_mean;
+    return settings;
+}
+
 AllanAnalysis analyse(const AllanRequest& asked) {
     AllanAnalysis analysis;
     analysis.request = asked;
     AllanRequest& request = analysis.request;
-    analysis.to_deg_h = unit_factor(request.unit, request.phase);
+    analysis.to_deg_h = to_deg_per_hour(request.unit, request.phase);
     ColumnFile file;
     {
         Progress progress("reading " + request.file);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/tool/plot/chart.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/monitor.hpp"
 
@@ -30,6 +31,7 @@ struct AllanRequest {
     bool fit = false;
     double window_s = 0;  ///< 0: not dynamic
     double overlap = 0.5;
+    allan::WindowShape shape = allan::WindowShape::rectangular;
     allan::MeanMode mode = allan::MeanMode::corrected;
     double known_mean = 0;  ///< deg/h
     double alpha = 1e-3;
@@ -62,9 +64,24 @@ struct AllanAnalysis {
 
 /// Reads and analyses. Throws std::exception with what to tell the user.
 [[nodiscard]] AllanAnalysis analyse(const AllanRequest& request);
+/// Windows of rates that come on standard input, one a line: each is printed when it is complete.
+/// True if one was refused or raised an alarm. `page`: an HTML file with the surface of the newest
+/// windows and their coefficients, which loads itself again; empty: none. Throws as above.
+[[nodiscard]] bool allan_live(const AllanRequest& request, bool json, const std::string& page);
+/// 1 arcsec/s is 1 deg/h. Throws for a unit that is none.
+[[nodiscard]] double to_deg_per_hour(const std::string& unit, bool phase);
+[[nodiscard]] allan::DynamicSettings dynamic_settings(const AllanRequest& request);
 
 [[nodiscard]] std::string allan_table(const AllanAnalysis& analysis);
 [[nodiscard]] std::string allan_json(const AllanAnalysis& analysis);
+/// One window of the dynamic part, on one line.
+[[nodiscard]] std::string allan_window_json(const allan::WindowRow& row,
+                                            const std::vector<allan::Alarm>& alarms,
+                                            const allan::DynamicAllan& dynamic, double to_deg_h);
+[[nodiscard]] plot::Chart deviation_chart(const AllanAnalysis& analysis);
+/// Time, tau, deviation of the windows.
+[[nodiscard]] plot::Chart surface_chart(const AllanAnalysis& analysis);
+[[nodiscard]] plot::Chart traces_chart(const AllanAnalysis& analysis);
 /// An SVG file, or every chart in a folder when `path` does not end in ".svg".
 void allan_plot(const AllanAnalysis& analysis, const std::string& path);
 

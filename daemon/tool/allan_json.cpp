@@ -26,6 +26,25 @@ Json fit_json(const allan::Fit& fit) {
     return terms;
 }
 
+/// What there is beside white noise, of whatever kind, and the sets of terms that explain the
+/// curve.
+Json slow_json(const allan::Fit& fit) {
+    Json models = Json::array();
+    for (const allan::NoiseModel& model : fit.models) {
+        std::string terms;
+        for (std::size_t j = 0; j < allan::kTerms; ++j)
+            terms += model.terms[j] ? allan::kTermNames[j] : "";
+        models.push_back({{"terms", terms}, {"weight", model.weight}});
+    }
+    const bool where = fit.slow.tau > 0;
+    return {{"found", fit.slow.found},
+            {"kind_determined", fit.slow.determined},
+            {"tau", where ? Json(fit.slow.tau) : Json(nullptr)},
+            {"ratio", where ? number(fit.slow.ratio) : Json(nullptr)},
+            {"verdict", fit.verdict()},
+            {"models", std::move(models)}};
+}
+
 /// Without a known mean the slow class is known up to the constant a0, which is left out.
 Json class_sums_json(const allan::ClassicalFit& fit, const std::vector<double>& taus) {
     allan::Polynomial a = fit.a;
@@ -67,6 +86,22 @@ Json alarms_json(const std::vector<allan::Alarm>& alarms) {
     return list;
 }
 
+Json deviations(const std::vector<double>& variances, double to_deg_h) {
+    Json list = Json::array();
+    for (const double variance : variances) list.push_back(number(std::sqrt(variance) / to_deg_h));
+    return list;
+}
+
+/// What is the same of a window in a file and of one that has just come: deviations in the unit of
+/// the input.
+Json window_json(const allan::WindowRow& row, double to_deg_h) {
+    return {{"t", row.centre_s},
+            {"mean", number(row.mean)},
+            {"missing", row.missing},
+            {"refused", row.refused},
+            {"dev", deviations(row.allan, to_deg_h)}};
+}
+
 Json dynamic_json(const AllanAnalysis& analysis) {
     const double tau0 = analysis.request.tau0;
     std::vector<double> taus;
@@ -75,25 +110,18 @@ Json dynamic_json(const AllanAnalysis& analysis) {
     }
     Json rows = Json::array();
     for (const auto& [row, alarms] : analysis.windows) {
-        Json dev = Json::array();
-        for (const double variance : row.allan) {
-            dev.push_back(number(std::sqrt(variance) / analysis.to_deg_h));
-        }
-        rows.push_back(
-            {{"t", row.centre_s},
-             {"mean", number(row.mean)},
-             {"missing", row.missing},
-             {"refused", row.refused},
-             {"dev", std::move(dev)},
-             {"fit", row.refused ? Json(nullptr) : fit_json(row.fit)},
-             {"classical", row.refused ? Json(nullptr) : classical_json(row.classical_fit, taus)},
-             {"alarms", alarms_json(alarms)}});
+        Json window = window_json(row, analysis.to_deg_h);
+        window["fit"] = row.refused ? Json(nullptr) : fit_json(row.fit);
+        window["classical"] = row.refused ? Json(nullptr) : classical_json(row.classical_fit, taus);
+        window["alarms"] = alarms_json(alarms);
+        rows.push_back(std::move(window));
     }
     Json summary = nullptr;
     if (analysis.summary && analysis.summary->windows > 0) {
         summary = {{"windows", analysis.summary->windows},
                    {"refused", analysis.summary->refused},
                    {"fit", fit_json(analysis.summary->fit)},
+                   {"slow_noise", slow_json(analysis.summary->fit)},
                    {"classical", classical_json(analysis.summary->classical, taus)},
                    {"recomputation_faults", analysis.summary->faults}};
     }
@@ -128,12 +156,25 @@ std::string allan_json(const AllanAnalysis& analysis) {
     root["points"] = std::move(points);
     if (analysis.fit) {
         root["fit"] = fit_json(*analysis.fit);
+        root["slow_noise"] = slow_json(*analysis.fit);
     }
     if (analysis.request.window_s > 0) {
         root["dynamic"] = dynamic_json(analysis);
     }
     root["warnings"] = analysis.warnings;
     return root.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string allan_window_json(const allan::WindowRow& row, const std::vector<allan::Alarm>& alarms,
+                              const allan::DynamicAllan& dynamic, double to_deg_h) {
+    Json window = window_json(row, to_deg_h);
+    Json tau = Json::array();
+    for (const std::size_t m : dynamic.factors())
+        tau.push_back(static_cast<double>(m) * dynamic.settings().tau0);
+    window["tau"] = std::move(tau);
+    window["classical_dev"] = deviations(row.classical, to_deg_h);
+    window["alarms"] = alarms_json(alarms);
+    return window.dump();
 }
 
 }  // namespace vibrig::tool

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "daemon/tool/allan_analysis.hpp"
-#include "daemon/tool/plot/chart.hpp"
 
 namespace vibrig::tool {
 
@@ -51,6 +50,20 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
         model.y.push_back(std::sqrt(allan::model_variance(terms, tau)) / analysis.to_deg_h);
     }
     chart.curves.push_back(model);
+    if (analysis.fit->slow.found && !analysis.fit->slow.determined) {
+        plot::Curve slow{"slow noise", {}, {}, {}, {}, plot::Look::dashed};
+        allan::Terms rest = terms;
+        rest[static_cast<std::size_t>(allan::Term::Q)] = 0;
+        rest[static_cast<std::size_t>(allan::Term::N)] = 0;
+        for (std::size_t i = 0; i < model.x.size(); ++i) {
+            const double y = std::sqrt(allan::model_variance(rest, model.x[i])) / analysis.to_deg_h;
+            slow.x.push_back(model.x[i]);
+            slow.y.push_back(y > 0.05 * model.y[i] ? y : kNaN);
+        }
+        chart.curves.push_back(slow);
+    }
+    if (const auto verdict = analysis.fit->verdict(); !verdict.empty())
+        chart.notes.push_back(verdict);
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         if (!analysis.fit->terms[j].detected) {
             continue;
@@ -75,6 +88,8 @@ void add_fit(const AllanAnalysis& analysis, plot::Chart& chart) {
         chart.curves.push_back(term);
     }
 }
+
+}  // namespace
 
 plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     const std::string name = upper(allan::name_of(analysis.request.statistic));
@@ -103,6 +118,8 @@ plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     return chart;
 }
 
+namespace {
+
 /// Borders halfway between neighbours, in the logarithm for tau.
 std::vector<double> borders(const std::vector<double>& centres, bool log) {
     std::vector<double> at;
@@ -118,6 +135,8 @@ std::vector<double> borders(const std::vector<double>& centres, bool log) {
     at.push_back(unfold(fold(centres[n - 1]) + last / 2));
     return at;
 }
+
+}  // namespace
 
 plot::Chart surface_chart(const AllanAnalysis& analysis) {
     plot::Chart chart;
@@ -186,8 +205,6 @@ plot::Chart traces_chart(const AllanAnalysis& analysis) {
     chart.notes.emplace_back("No dot: not detected in that window. Bars: 1 sigma.");
     return chart;
 }
-
-}  // namespace
 
 void allan_plot(const AllanAnalysis& analysis, const std::string& path) {
     const std::filesystem::path where(path);

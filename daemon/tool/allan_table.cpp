@@ -8,6 +8,8 @@ namespace vibrig::tool {
 
 namespace {
 
+constexpr double kShownWeight = 0.05;
+
 template <typename... Values>
 std::string line(const char* format, Values... values) {
     std::array<char, 256> text{};
@@ -39,7 +41,16 @@ std::string fit_table(const allan::Fit& fit) {
                              : line("  %s  not detected, below %.2g %s\n", allan::kTermNames[j],
                                     term.below, allan::kTermUnits[j]);
     }
-    return out;
+    if (const std::string verdict = fit.verdict(); !verdict.empty()) out += "  " + verdict + "\n";
+    out += "  terms that explain the curve:";
+    for (const allan::NoiseModel& model : fit.models) {
+        if (model.weight < kShownWeight) continue;
+        out += ' ';
+        for (std::size_t j = 0; j < allan::kTerms; ++j)
+            out += model.terms[j] ? allan::kTermNames[j] : "";
+        out += line(" %.0f %%", 100 * model.weight);
+    }
+    return out + "\n";
 }
 
 std::string windows_table(const AllanAnalysis& analysis) {

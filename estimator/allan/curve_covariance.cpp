@@ -141,34 +141,71 @@ std::size_t CurveCovariance::index_of(std::size_t factor) const {
     return static_cast<std::size_t>(at - factors_.begin());
 }
 
-Eigen::MatrixXd CurveCovariance::of(std::span<const std::size_t> factors,
-                                    const Terms& terms) const {
-    // 1 arcsec = 1 deg/h times 1 s.
-    const Values scale{std::pow(terms[q], 2), std::pow(60 * terms[n], 2) * tau0_,
-                       std::pow(terms[b] * tau0_, 2),
-                       std::pow(terms[k] / 60, 2) * std::pow(tau0_, 3)};
-    const double ramp = terms[static_cast<std::size_t>(Term::R)] / 3600;
+CurveCovariance::At CurveCovariance::at(std::span<const std::size_t> factors) const {
+    At at;
+    at.tau0_ = tau0_;
     const auto count = static_cast<Eigen::Index>(factors.size());
-    Eigen::MatrixXd covariance(count, count);
+    for (Eigen::MatrixXd& part : at.pair_) part.resize(count, count);
+    for (Eigen::MatrixXd& part : at.ramp_) part.resize(count, count);
     for (Eigen::Index row = 0; row < count; ++row) {
-        for (Eigen::Index column = 0; column <= row; ++column) {
+        for (Eigen::Index column = 0; column < count; ++column) {
             const std::size_t i = index_of(factors[static_cast<std::size_t>(row)]);
             const std::size_t j = index_of(factors[static_cast<std::size_t>(column)]);
             const auto [low, high] = std::minmax(i, j);
             const Sums& sums = sums_[high * (high + 1) / 2 + low];
-            const double m = std::pow(static_cast<double>(factors_[i]) * tau0_, 2);
-            const double l = std::pow(static_cast<double>(factors_[j]) * tau0_, 2);
-            double squares = 0;
+            // The divisors 2 tau^2 of both variances.
+            const double scale = 1 / (4 * std::pow(static_cast<double>(factors_[i]) * tau0_, 2) *
+                                      std::pow(static_cast<double>(factors_[j]) * tau0_, 2));
+            std::size_t pair = 0;
             for (std::size_t x = 0; x < kNoises; ++x) {
-                squares += 4 * ramp * m * ramp * l * scale[x] * sums.single[x];
-                for (std::size_t y = 0; y < kNoises; ++y) {
-                    squares += 2 * scale[x] * scale[y] * sums.product[x][y];
+                at.ramp_[x](row, column) = sums.single[x];
+                for (std::size_t y = 0; y <= x; ++y) {
+                    at.pair_[pair++](row, column) = (x == y ? 2 : 4) * sums.product[x][y] * scale;
                 }
             }
-            covariance(row, column) = covariance(column, row) = squares / (4 * m * l);
+        }
+    }
+    return at;
+}
+
+CurveCovariance::Values CurveCovariance::At::scale(const Terms& terms) const {
+    // 1 arcsec = 1 deg/h times 1 s.
+    return {std::pow(terms[q], 2), std::pow(60 * terms[n], 2) * tau0_,
+            std::pow(terms[b] * tau0_, 2), std::pow(terms[k] / 60, 2) * std::pow(tau0_, 3)};
+}
+
+Eigen::MatrixXd CurveCovariance::At::of(const Terms& terms) const {
+    const Values s = scale(terms);
+    const double ramp = terms[static_cast<std::size_t>(Term::R)] / 3600;
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(ramp_[0].rows(), ramp_[0].cols());
+    std::size_t pair = 0;
+    for (std::size_t x = 0; x < kNoises; ++x) {
+        if (ramp > 0 && s[x] > 0) covariance += ramp * ramp * s[x] * ramp_[x];
+        for (std::size_t y = 0; y <= x; ++y, ++pair) {
+            if (s[x] * s[y] > 0) covariance += s[x] * s[y] * pair_[pair];
         }
     }
     return covariance;
+}
+
+Eigen::MatrixXd CurveCovariance::At::slope(const Terms& terms, std::size_t term) const {
+    const Values s = scale(terms);
+    const double ramp = terms[static_cast<std::size_t>(Term::R)] / 3600;
+    Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(ramp_[0].rows(), ramp_[0].cols());
+    std::size_t pair = 0;
+    for (std::size_t x = 0; x < kNoises; ++x) {
+        if (term == x || term == kNoises) slope += ramp * ramp * s[x] * ramp_[x];
+        for (std::size_t y = 0; y <= x; ++y, ++pair) {
+            const int power = (term == x ? 1 : 0) + (term == y ? 1 : 0);
+            if (power > 0 && s[x] * s[y] > 0) slope += power * s[x] * s[y] * pair_[pair];
+        }
+    }
+    return slope;
+}
+
+Eigen::MatrixXd CurveCovariance::of(std::span<const std::size_t> factors,
+                                    const Terms& terms) const {
+    return at(factors).of(terms);
 }
 
 }  // namespace vibrig::estimator::allan

@@ -22,7 +22,26 @@ namespace vibrig::estimator::allan {
 /// The sums over lags of the products of the terms' C do not depend on the coefficients: they are
 /// made once, sampled where C is smooth (within about 1 %).
 class CurveCovariance {
+    static constexpr std::size_t kNoises = 4;  ///< Q, N, B, K
+
   public:
+    /// The covariance at chosen factors as a function of the coefficients: cheap to take again.
+    class At {
+      public:
+        /// (deg/h)^4, for a record without gaps.
+        [[nodiscard]] Eigen::MatrixXd of(const Terms& terms) const;
+        /// Derivative by the logarithm of the term's square.
+        [[nodiscard]] Eigen::MatrixXd slope(const Terms& terms, std::size_t term) const;
+
+      private:
+        friend class CurveCovariance;
+        [[nodiscard]] std::array<double, kNoises> scale(const Terms& terms) const;
+        double tau0_ = 1;
+        /// By pairs of Q, N, B, K, the lower triangle; then with the ramp.
+        std::array<Eigen::MatrixXd, kNoises*(kNoises + 1) / 2> pair_;
+        std::array<Eigen::MatrixXd, kNoises> ramp_;
+    };
+
     /// `points` phase points at steps of tau0 (s). Factors above half of the record are ignored.
     CurveCovariance(std::span<const std::size_t> factors, std::size_t points, double tau0);
 
@@ -30,12 +49,12 @@ class CurveCovariance {
     /// std::out_of_range for a factor that the constructor was not given.
     [[nodiscard]] Eigen::MatrixXd of(std::span<const std::size_t> factors,
                                      const Terms& terms) const;
+    [[nodiscard]] At at(std::span<const std::size_t> factors) const;
 
     [[nodiscard]] std::size_t points() const { return points_; }
     [[nodiscard]] double tau0() const { return tau0_; }
 
   private:
-    static constexpr std::size_t kNoises = 4;  ///< Q, N, B, K
     struct Sums {
         /// Over all pairs of differences, of C_a C_b and of C_a; both over M(m) M(l).
         std::array<std::array<double, kNoises>, kNoises> product{};

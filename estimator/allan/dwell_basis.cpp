@@ -67,6 +67,7 @@ DwellBasis::DwellBasis(std::vector<std::size_t> present) : present_(std::move(pr
         const double curve = (a - centre) * (a - centre) * (b - centre) * (b - centre);
         return curve / (4 * 3600.0 * 3600.0);
     }));
+    for (std::size_t t = 0; t < slow.size(); ++t) slow_squares[t] = slow[t].cwiseProduct(slow[t]);
     add_octaves(walking);
 }
 

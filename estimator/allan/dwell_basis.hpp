@@ -24,6 +24,7 @@ class DwellBasis {
     Eigen::VectorXd walk;
     /// Their covariances for unit B, K, R: times block^2, block^3, block^4.
     std::array<Eigen::MatrixXd, 3> slow;
+    std::array<Eigen::MatrixXd, 3> slow_squares;  ///< element by element
 
     /// Second differences of averages of m blocks: the numerator of MDEV. Sums of their squares are
     /// expected to be white * trace + walk * block * trace; edf = trace(S)^2 / |S|^2.

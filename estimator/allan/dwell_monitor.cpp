@@ -42,14 +42,18 @@ std::size_t DwellMonitor::dwells_at(std::size_t level) const {
         dwells_.begin(), dwells_.end(), [&](const Kept& kept) { return kept.level == level; }));
 }
 
-void DwellMonitor::learn(const DwellAngles& dwell) {
+void DwellMonitor::learn(const DwellAngles& dwell, bool all) {
     const auto same = [&](double level) {
         return std::abs(level - dwell.level) <= kSameLevel * std::max(level, dwell.level);
     };
     const auto at = std::find_if(levels_.begin(), levels_.end(), same);
     const auto level = static_cast<std::size_t>(at - levels_.begin());
     if (at == levels_.end()) levels_.push_back(dwell.level);
-    dwells_.push_back({dwell, dwell.basis->contrasts(dwell.angle_arcsec), level});
+    std::vector<double> measured;
+    for (const DwellBasis::Octave& octave : dwell.basis->octaves)
+        measured.push_back((octave.differences * centred(dwell)).squaredNorm());
+    dwells_.push_back(
+        {dwell, dwell.basis->contrasts(dwell.angle_arcsec), level, std::move(measured)});
     if (dwells_.size() > settings_.keep) dwells_.pop_front();
 
     solution_ = solve({});
@@ -63,6 +67,7 @@ void DwellMonitor::learn(const DwellAngles& dwell) {
     n.sigma = n.value > 0 ? solution_.walk_sigma / (2 * 3600 * n.value) : 0;
     q.below = std::sqrt(solution_.white[level] + kBound * solution_.white_sigma[level]);
     n.below = n_of(solution_.walk + kBound * solution_.walk_sigma);
+    if (!all) return;
     test_slow_terms(solution_);
     find_smallest_change();
 }
@@ -137,11 +142,15 @@ void DwellMonitor::test_slow_terms(const Solution& solution) {
             const VectorXd z = kept.contrasts.cwiseProduct(weight);
             const double scale = scale_of(t, kept.dwell.block_s);
             const Eigen::MatrixXd& c = kept.dwell.basis->slow[t];
+            const Eigen::MatrixXd& squares = kept.dwell.basis->slow_squares[t];
             const VectorXd diagonal = c.diagonal().cwiseProduct(weight);
             const VectorXd walk = kept.dwell.block_s * kept.dwell.basis->walk.cwiseProduct(weight);
             const VectorXd white = kept.dwell.white_share * weight;
             score += scale * (z.dot(c * z) - diagonal.sum());
-            tt += squared(scale) * weight.dot(c.cwiseProduct(c) * weight);
+            VectorXd of_squares = VectorXd::Zero(weight.size());
+            for (Eigen::Index k = 0; k < weight.size(); ++k)
+                of_squares += weight[k] * squares.col(k);
+            tt += squared(scale) * weight.dot(of_squares);
             tq += scale * diagonal.dot(walk);
             qq += walk.squaredNorm();
             tr[kept.level] += scale * diagonal.dot(white);
@@ -184,6 +193,18 @@ std::array<double, 2> DwellMonitor::bounds(const DwellAngles& dwell,
             chi_square_quantile(1 - tail, degrees) / degrees};
 }
 
+std::vector<DwellPoint> DwellMonitor::curve_of(const DwellAngles& dwell) {
+    const VectorXd angles = centred(dwell);
+    std::vector<DwellPoint> curve;
+    for (const DwellBasis::Octave& octave : dwell.basis->octaves) {
+        const double tau = static_cast<double>(octave.m) * dwell.block_s;
+        const auto differences = static_cast<double>(octave.differences.rows());
+        const double sum = (octave.differences * angles).squaredNorm();
+        curve.push_back({tau, std::sqrt(sum / (2 * differences)) / tau, 0});
+    }
+    return curve;
+}
+
 std::vector<DwellPoint> DwellMonitor::points() const {
     struct Sums {
         double measured = 0, expected = 0, differences = 0;
@@ -191,9 +212,10 @@ std::vector<DwellPoint> DwellMonitor::points() const {
     std::map<double, Sums> by_tau;
     for (const Kept& kept : dwells_) {
         const DwellAngles& dwell = kept.dwell;
-        for (const DwellBasis::Octave& octave : dwell.basis->octaves) {
+        for (std::size_t i = 0; i < kept.measured.size(); ++i) {
+            const DwellBasis::Octave& octave = dwell.basis->octaves[i];
             Sums& sums = by_tau[static_cast<double>(octave.m) * dwell.block_s];
-            sums.measured += (octave.differences * centred(dwell)).squaredNorm();
+            sums.measured += kept.measured[i];
             sums.expected += dwell.white_share * solution_.white[kept.level] * octave.white_trace +
                              solution_.walk * dwell.block_s * octave.walk_trace;
             sums.differences += static_cast<double>(octave.differences.rows());

@@ -52,12 +52,16 @@ class DwellMonitor {
     }
     /// Octaves whose MDEV is not that of the earlier dwells of the same level. Changes nothing.
     [[nodiscard]] std::vector<Alarm> check(const DwellAngles& dwell) const;
-    void learn(const DwellAngles& dwell);
+    /// `all`: not Q and N alone but all terms and the smallest change, which takes longer.
+    void learn(const DwellAngles& dwell, bool all = true);
 
     [[nodiscard]] std::size_t dwells() const { return dwells_.size(); }
     /// In the units of kTermUnits, `below` two standard errors above the estimate; Q is the one of
     /// the newest dwell's level. Zeros before learn().
     [[nodiscard]] const std::array<FittedTerm, kTerms>& terms() const { return terms_; }
+    /// Of one dwell alone, by growing averaging time; `expected` stays 0. One row of the dynamic
+    /// surface (docs/theory/dynamic-allan.md).
+    [[nodiscard]] static std::vector<DwellPoint> curve_of(const DwellAngles& dwell);
     /// Measured, by growing averaging time; none before learn().
     [[nodiscard]] std::vector<DwellPoint> points() const;
     /// How many times N must grow for one dwell like the newest to raise an alarm when its ratio is
@@ -71,6 +75,7 @@ class DwellMonitor {
         DwellAngles dwell;
         Eigen::VectorXd contrasts;
         std::size_t level = 0;
+        std::vector<double> measured;  ///< squared differences of each octave, summed
     };
     struct Solution {
         double walk = 0;  ///< q, arcsec^2/s

@@ -91,8 +91,8 @@ WindowRow DynamicAllan::row() const {
     const double centre = settings_.mode == MeanMode::known_mean ? settings_.known_mean : row.mean;
     std::vector<ClassicalPoint> classical;
     for (std::size_t k = 0; k < factors.size(); ++k) {
-        row.allan.push_back(near_.allan(k));
-        row.share.push_back(near_.share(k));
+        row.allan.push_back(near_.allan(k, settings_.shape));
+        row.share.push_back(near_.share(k) * share_of(settings_.shape));
         const double tau = static_cast<double>(factors[k]) * tau0;
         if (settings_.mode == MeanMode::corrected) {
             const SlidingVariance::Tiled tiled = near_.tiled(k);
@@ -113,7 +113,7 @@ WindowRow DynamicAllan::row() const {
         static_cast<double>(row.missing) > kMostMissing * static_cast<double>(settings_.window) ||
         curve.size() < 2 || classical.size() < kPowers.size();
     if (!row.refused) {
-        row.fit = fit_noise(curve, covariance_, settings_.wanted);
+        if (settings_.fits) row.fit = fit_noise(curve, covariance_, settings_.wanted);
         row.classical_fit = fit_classical(classical, settings_.mode);
     }
     return row;

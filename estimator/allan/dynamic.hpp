@@ -18,6 +18,8 @@ struct DynamicSettings {
     MeanMode mode = MeanMode::corrected;
     double known_mean = 0;  ///< deg/h, for MeanMode::known_mean
     std::array<bool, kTerms> wanted = kAllTerms;
+    WindowShape shape = WindowShape::rectangular;  ///< of the Allan variance
+    bool fits = true;                              ///< of Q to R to each window's curve
     bool long_records = false;  ///< a second ring, decimated by 16, for tau beyond the window
 };
 

@@ -3,132 +3,207 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <sstream>
+#include <utility>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/allan/series.hpp"
 
 namespace vibrig::estimator::allan {
 
 namespace {
 
-constexpr int kReweightings = 12;
-constexpr double kRounding = 1e-9;  // relative, of a point of the curve
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLeastWeight = 0.01;  // of a set that is named
+constexpr double kNoWeight = 1e-6;     // its terms are not there at all
+// Of the search for a bound, in ln(square).
+constexpr double kStretch = 1.5;
+constexpr double kFineEnough = 0.01;
+constexpr int kMostSections = 12;
+constexpr double kWidest = 2;
+constexpr std::size_t kFollowed = 2;
+constexpr double kGuess = 0.01;
 
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, static_cast<int>(kTerms)>;
-using Vector = Eigen::VectorXd;
-using Squares = Eigen::Matrix<double, static_cast<int>(kTerms), 1>;  // squared coefficients
+std::size_t at(Term term) { return static_cast<std::size_t>(term); }
 
-using Columns = std::vector<int>;
+/// -2 ln(likelihood) so many standard errors away.
+double deviance_at(double errors) { return errors * errors; }
 
-/// Columns differ by many decades in scale: X of min |part diag(1 / scale) X - b|, or nothing when
-/// a column is zero.
-struct Scaled {
-    Eigen::MatrixXd part;
-    Vector scale;
-};
-std::optional<Scaled> scaled(const Matrix& a, const Columns& columns) {
-    Eigen::MatrixXd part = a(Eigen::all, columns);
-    const Vector scale = part.colwise().norm();
-    if (!(scale.minCoeff() > 0)) {
-        return {};
-    }
-    return Scaled{part * scale.cwiseInverse().asDiagonal(), scale};
+bool is_slow(std::size_t term) { return term > at(Term::N); }
+
+bool white(const TermSet& set) {
+    return !set[at(Term::B)] && !set[at(Term::K)] && !set[at(Term::R)];
 }
 
-/// With five unknowns every set of non-zero terms can be tried: the best feasible one is the
-/// non-negative least-squares solution, without an iteration that could stall.
-Squares non_negative(const Matrix& a, const Vector& b, const std::array<bool, kTerms>& wanted) {
-    Squares best = Squares::Zero();
-    double least = b.squaredNorm();
-    for (unsigned set = 1; set < (1U << kTerms); ++set) {
-        Columns columns;
+std::vector<TermFit> fits_of(const CurveLikelihood& likelihood, const TermSet& wanted) {
+    std::vector<TermFit> fits;
+    for (unsigned bits = 1; bits < (1U << kTerms); ++bits) {
+        TermSet set{};
         bool all_wanted = true;
-        for (unsigned j = 0; j < kTerms; ++j) {
-            if ((set >> j & 1U) != 0) {
-                columns.push_back(static_cast<int>(j));
-                all_wanted = all_wanted && wanted[j];
-            }
+        for (std::size_t j = 0; j < kTerms; ++j) {
+            set[j] = (bits >> j & 1U) != 0;
+            all_wanted = all_wanted && (!set[j] || wanted[j]);
         }
-        if (!all_wanted || static_cast<Eigen::Index>(columns.size()) > a.rows()) {
-            continue;
-        }
-        const std::optional<Scaled> part = scaled(a, columns);
-        if (!part) {
-            continue;
-        }
-        const Vector x = linear_algebra::least_squares(part->part, b);
-        const double rest = (part->part * x - b).squaredNorm();
-        if (!x.allFinite() || x.minCoeff() <= 0 || rest >= least) {
-            continue;
-        }
-        least = rest;
-        best.setZero();
-        for (std::size_t k = 0; k < columns.size(); ++k) {
-            const auto at = static_cast<Eigen::Index>(k);
-            best[columns[k]] = x[at] / part->scale[at];
-        }
+        if (!all_wanted) continue;
+        if (const auto fit = likelihood.best(set)) fits.push_back(*fit);
     }
-    return best;
+    return fits;
 }
 
-/// Standard error of the squared coefficient `j` in a fit of the terms that are not zero and it;
-/// infinite when the curve cannot tell.
-double error_of(int j, const Squares& squares, const Matrix& a, const Eigen::MatrixXd& covariance) {
-    Columns columns{j};
-    for (int other = 0; other < static_cast<int>(kTerms); ++other) {
-        if (other != j && squares[other] > 0) {
-            columns.push_back(other);
+/// Least deviance of the sets that `where` holds for; infinite without any.
+template <typename Where>
+double least(const std::vector<TermFit>& fits, const Where& where) {
+    double deviance = kInfinity;
+    for (const TermFit& fit : fits) {
+        if (where(fit)) deviance = std::min(deviance, fit.deviance);
+    }
+    return deviance;
+}
+
+/// Where the least deviance over the other terms of `from` has risen to the bound: ln(square) of
+/// term j, from `start` on.
+double bound_from(const TermFit& from, std::size_t j, double start,
+                  const CurveLikelihood& likelihood) {
+    const auto excess = [&](double x) {
+        return likelihood.profile(from, j, std::exp(x)) - from.deviance -
+               deviance_at(is_slow(j) ? kBoundSlow : kBound);
+    };
+    const double least = std::log(1e-12 * likelihood.largest_square(j));
+    const double most = std::log(1e3 * likelihood.largest_square(j));
+    double low = std::clamp(start, least, most);
+    double at_low = excess(low);
+    double high = low;
+    double at_high = at_low;
+    while (at_high < 0 && high < most) {
+        low = std::exchange(high, high + kStretch);
+        at_low = std::exchange(at_high, excess(high));
+    }
+    while (at_low >= 0 && low > least) {
+        high = std::exchange(low, low - kStretch);
+        at_high = std::exchange(at_low, excess(low));
+    }
+    // False position; a side that stays counts half (Illinois).
+    for (int i = 0; i < kMostSections && high - low > kFineEnough && at_low < 0; ++i) {
+        const double middle = std::isfinite(at_high)
+                                  ? (low * at_high - high * at_low) / (at_high - at_low)
+                                  : (low + high) / 2;
+        const double found = excess(middle);
+        if (found < 0) {
+            low = middle;
+            at_low = found;
+            at_high /= 2;
+        } else {
+            high = middle;
+            at_high = found;
+            at_low /= 2;
         }
     }
-    const std::optional<Scaled> part = scaled(a, columns);
-    if (!part || part->part.cols() > part->part.rows()) {
-        return kInfinity;
-    }
-    const Eigen::MatrixXd unit = Eigen::MatrixXd::Identity(a.rows(), a.rows());
-    const Vector gain =
-        linear_algebra::least_squares(part->part, unit).row(0).transpose() / part->scale[0];
-    return std::sqrt(std::max(0.0, gain.dot(covariance * gain)));
+    return std::exp(high);
 }
 
-/// Of the weighted curve.
-Eigen::MatrixXd weighted_covariance(std::span<const VariancePoint> curve, const Vector& weight,
-                                    const CurveCovariance& covariance, const Terms& terms) {
-    std::vector<std::size_t> factors;
-    for (const VariancePoint& point : curve) {
-        factors.push_back(point.m);
+/// Largest square of the term that a set which is not excluded allows, by its own likelihood. Those
+/// are followed that allow most by their errors, and the best of those in which the term went to
+/// zero.
+double bound_of(std::size_t j, const std::vector<TermFit>& fits, double excluded,
+                const CurveLikelihood& likelihood) {
+    struct Candidate {
+        double start;  ///< about the bound, ln(square)
+        const TermFit* fit;
+    };
+    std::vector<Candidate> with;
+    const TermFit* zero = nullptr;
+    for (const TermFit& fit : fits) {
+        if (fit.deviance > excluded) continue;
+        if (fit.has[j]) {
+            const double error = std::min(fit.log_sigma[j], kWidest);
+            with.push_back({std::log(fit.square[j]) + 2 * error, &fit});
+            continue;
+        }
+        TermSet set = fit.has;
+        set[j] = true;
+        const bool fitted =
+            std::any_of(fits.begin(), fits.end(), [&](const TermFit& f) { return f.has == set; });
+        if (!fitted && (zero == nullptr || fit.deviance < zero->deviance)) zero = &fit;
     }
-    Eigen::MatrixXd c = covariance.of(factors, terms);
-    for (Eigen::Index i = 0; i < c.rows(); ++i) {
-        const VariancePoint& point = curve[static_cast<std::size_t>(i)];
-        const double scale = weight[i] / std::sqrt(point.share);
-        c.row(i) *= scale;
-        c.col(i) *= scale;
+    std::sort(with.begin(), with.end(),
+              [](const Candidate& a, const Candidate& b) { return a.start > b.start; });
+    if (with.size() > kFollowed) with.erase(with.begin() + kFollowed, with.end());
+    if (zero != nullptr) with.push_back({std::log(kGuess * likelihood.largest_square(j)), zero});
+    double square = 0;
+    for (const Candidate& candidate : with) {
+        square = std::max(square, bound_from(*candidate.fit, j, candidate.start, likelihood));
     }
-    // A ramp alone has no error, but the sums were rounded.
-    for (Eigen::Index i = 0; i < c.rows(); ++i) {
-        const VariancePoint& point = curve[static_cast<std::size_t>(i)];
-        c(i, i) += std::pow(kRounding * weight[i] * point.variance, 2);
-    }
-    return c;
+    return square;
 }
 
-double edf_at(const VariancePoint& point, const Terms& terms, std::size_t points) {
-    return std::max(1.0, point.share * edf(Statistic::oadev, dominant_noise(terms, point.tau),
-                                           points, point.m));
+/// Mean and spread over the sets; weights by Akaike's criterion.
+void average(const std::vector<TermFit>& fits, Fit& out) {
+    const auto criterion = [](const TermFit& fit) {
+        return fit.deviance + 2 * static_cast<double>(fit.parameters);
+    };
+    double lowest = kInfinity;
+    for (const TermFit& fit : fits) lowest = std::min(lowest, criterion(fit));
+    double sum = 0;
+    for (const TermFit& fit : fits) {
+        out.models.push_back({fit.has, std::exp((lowest - criterion(fit)) / 2)});
+        sum += out.models.back().weight;
+    }
+    for (NoiseModel& model : out.models) {
+        model.weight = model.weight > kNoWeight * sum ? model.weight / sum : 0;
+    }
+    for (std::size_t j = 0; j < kTerms; ++j) {
+        double mean = 0;
+        for (std::size_t k = 0; k < fits.size(); ++k) {
+            mean += out.models[k].weight * std::sqrt(fits[k].square[j]);
+        }
+        double spread = 0;
+        for (std::size_t k = 0; k < fits.size(); ++k) {
+            const double value = std::sqrt(fits[k].square[j]);
+            // d(ln c^2) = 2 d(ln c).
+            const double own = fits[k].has[j] ? value * fits[k].log_sigma[j] / 2 : 0;
+            spread += out.models[k].weight * (own * own + (value - mean) * (value - mean));
+        }
+        out.terms[j].value = mean;
+        out.terms[j].sigma = std::sqrt(spread);
+    }
+    std::erase_if(out.models, [](const NoiseModel& m) { return m.weight < kLeastWeight; });
+    std::stable_sort(out.models.begin(), out.models.end(),
+                     [](const NoiseModel& a, const NoiseModel& b) { return a.weight > b.weight; });
+}
+
+SlowNoise slow_noise(const std::vector<TermFit>& fits, double best,
+                     const CurveLikelihood& likelihood) {
+    SlowNoise slow;
+    const double alone = least(fits, [](const TermFit& fit) { return white(fit.has); });
+    slow.deviance = alone - best;
+    slow.found = slow.deviance > kLongTerm;
+    if (!slow.found || !std::isfinite(alone)) return slow;
+    const auto fit = std::find_if(fits.begin(), fits.end(), [&](const TermFit& f) {
+        return white(f.has) && f.deviance == alone;
+    });
+    double most = -kInfinity;
+    for (std::size_t i = 0; i < likelihood.points(); ++i) {
+        const double excess = likelihood.excess(fit->square, i);
+        if (excess <= most) continue;
+        most = excess;
+        const VariancePoint& point = likelihood.curve()[i];
+        Terms terms{};
+        for (std::size_t j = 0; j < kTerms; ++j) terms[j] = std::sqrt(fit->square[j]);
+        slow.tau = point.tau;
+        slow.ratio = std::sqrt(point.variance / model_variance(terms, point.tau));
+    }
+    return slow;
 }
 
 void note_ramp(Fit& fit, double record_h) {
     const FittedTerm& k = fit.terms[static_cast<std::size_t>(Term::K)];
     FittedTerm& r = fit.terms[static_cast<std::size_t>(Term::R)];
-    const double walk = k.value;
-    // A ramp is known no better than the walk over the record lets it: K / sqrt(T).
+    // A ramp is known no better than the walk over the record lets it: K / sqrt(T), also when the
+    // walk is only known to be below something.
+    const double walk = k.detected ? k.value : k.below;
     const double bound = walk / std::sqrt(record_h);
-    if (!k.detected) {
-        return;
-    }
     r.sigma = r.value > 0 ? std::max(r.sigma, bound) : r.sigma;
+    if (r.detected) r.below = r.value + 2 * r.sigma;
+    if (!k.detected) return;
     r.below = std::max(r.below, bound);
     if (!r.detected || r.value < 2 * bound) {
         std::ostringstream note;
@@ -153,59 +228,61 @@ Terms Fit::values() const {
     return values;
 }
 
+std::string Fit::verdict() const {
+    if (!slow.found) return "no noise slower than white is detected";
+    if (slow.determined) return {};
+    std::ostringstream text;
+    text.precision(3);
+    text << "slow noise";
+    if (slow.tau > 0) text << " of " << slow.ratio << " times white at " << slow.tau << " s";
+    text << "; kind not determined";
+    return text.str();
+}
+
 Fit fit_noise(std::span<const VariancePoint> curve, const CurveCovariance& covariance,
-              const std::array<bool, kTerms>& wanted) {
-    const auto rows = static_cast<Eigen::Index>(curve.size());
-    if (rows < 2) {
-        throw DataError("fit: a curve of " + std::to_string(rows) +
+              const TermSet& wanted) {
+    if (curve.size() < 2) {
+        throw DataError("fit: a curve of " + std::to_string(curve.size()) +
                         " points found, at least 2 needed");
     }
-    Vector model(rows);
-    for (Eigen::Index i = 0; i < rows; ++i) {
-        model[i] = curve[static_cast<std::size_t>(i)].variance;
+    const CurveLikelihood likelihood(curve, covariance);
+    Fit out;
+    const std::vector<TermFit> fits =
+        likelihood.points() > 0 ? fits_of(likelihood, wanted) : std::vector<TermFit>{};
+    if (fits.empty()) {
+        throw DataError("fit: no set of the terms fits the curve, every variance is zero");
     }
-    Vector weight(rows);
-    Matrix a(rows, static_cast<int>(kTerms));
-    Vector b(rows);
-    Terms terms{};
-    Squares squares;
-    for (int round = 0; round <= kReweightings; ++round) {
-        for (Eigen::Index i = 0; i < rows; ++i) {
-            const VariancePoint& point = curve[static_cast<std::size_t>(i)];
-            weight[i] = model[i] > 0
-                            ? std::sqrt(edf_at(point, terms, covariance.points()) / 2) / model[i]
-                            : 0;
-            b[i] = weight[i] * point.variance;
-            for (std::size_t j = 0; j < kTerms; ++j) {
-                a(i, static_cast<Eigen::Index>(j)) =
-                    weight[i] * term_variance(static_cast<Term>(j), point.tau);
-            }
-        }
-        squares = non_negative(a, b, wanted);
-        for (std::size_t j = 0; j < kTerms; ++j) {
-            terms[j] = std::sqrt(squares[static_cast<Eigen::Index>(j)]);
-        }
-        for (Eigen::Index i = 0; i < rows; ++i) {
-            model[i] = model_variance(terms, curve[static_cast<std::size_t>(i)].tau);
-        }
-    }
-    const Eigen::MatrixXd errors = weighted_covariance(curve, weight, covariance, terms);
-    Fit fit;
+    const double best = least(fits, [](const TermFit&) { return true; });
+    average(fits, out);
+    out.slow = slow_noise(fits, best, likelihood);
+    const double hours = static_cast<double>(covariance.points() - 1) * covariance.tau0() / 3600;
     for (std::size_t j = 0; j < kTerms; ++j) {
-        FittedTerm& term = fit.terms[j];
-        const double square = squares[static_cast<Eigen::Index>(j)];
-        const double error = error_of(static_cast<int>(j), squares, a, errors);
-        term.value = terms[j];
-        term.detected = square > kDetected * error;
-        term.sigma = term.value > 0 ? error / (2 * term.value) : 0;  // d(c^2) = 2 c dc
-        term.below = std::sqrt(square + kBound * error);
+        FittedTerm& term = out.terms[j];
+        const double without = least(fits, [&](const TermFit& fit) { return !fit.has[j]; });
+        term.detected = without - best > deviance_at(is_slow(j) ? kDetectedSlow : kDetected);
+        // One question comes first: is there anything?
+        if (is_slow(j)) term.detected = term.detected && out.slow.found;
     }
-    note_ramp(fit, static_cast<double>(covariance.points() - 1) * covariance.tau0() / 3600);
-    return fit;
+    // A random walk makes a ramp of K / sqrt(T) by itself, 1 sigma.
+    FittedTerm& ramp = out.terms[at(Term::R)];
+    ramp.detected =
+        ramp.detected && ramp.value > 3 * out.terms[at(Term::K)].value / std::sqrt(hours);
+    for (std::size_t j = 0; j < kTerms; ++j) {
+        FittedTerm& term = out.terms[j];
+        out.slow.determined = out.slow.determined || (is_slow(j) && term.detected);
+        if (term.detected) {
+            term.below = term.value + 2 * term.sigma;
+        } else if (wanted[j]) {
+            term.below = std::sqrt(bound_of(
+                j, fits, best + deviance_at(is_slow(j) ? kDetectedSlow : kDetected), likelihood));
+        }
+    }
+    note_ramp(out, hours);
+    return out;
 }
 
 Fit fit_noise(std::span<const VariancePoint> curve, std::size_t points, double tau0,
-              const std::array<bool, kTerms>& wanted) {
+              const TermSet& wanted) {
     std::vector<std::size_t> factors;
     for (const VariancePoint& point : curve) {
         factors.push_back(point.m);

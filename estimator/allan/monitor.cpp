@@ -24,6 +24,8 @@ const char* words_of(Reading reading) {
 StationarityMonitor::StationarityMonitor(const MonitorSettings& settings,
                                          const DynamicAllan& dynamic)
     : settings_(settings),
+      covariance_(dynamic.covariance()),
+      window_share_(share_of(dynamic.settings().shape)),
       tau0_(dynamic.settings().tau0),
       window_(dynamic.settings().window),
       back_(std::max<std::size_t>(
@@ -46,17 +48,29 @@ void StationarityMonitor::set_reference(const Terms& terms) {
     set_bounds(terms, 0);
 }
 
+double StationarityMonitor::share_of_alpha() const {
+    return settings_.alpha / static_cast<double>(octaves_.size() + 1);
+}
+
 void StationarityMonitor::set_bounds(const Terms& terms, double reference_windows) {
-    const double tail = settings_.alpha / static_cast<double>(octaves_.size()) / 2;
-    for (Octave& octave : octaves_) {
-        const double tau = static_cast<double>(octave.m) * tau0_;
-        double degrees = edf(Statistic::oadev, dominant_noise(terms, tau), window_ + 1, octave.m);
+    std::vector<std::size_t> factors;
+    for (const Octave& octave : octaves_) factors.push_back(octave.m);
+    const Eigen::VectorXd spread = covariance_.of(factors, terms).diagonal();
+    const double tail = share_of_alpha() / 2;
+    for (std::size_t i = 0; i < octaves_.size(); ++i) {
+        Octave& octave = octaves_[i];
+        const double mean = model_variance(terms, static_cast<double>(octave.m) * tau0_);
+        // A ramp alone does not vary at all; half the window is what any noise has at least.
+        const double degrees =
+            std::clamp(window_share_ * 2 * mean * mean / spread[static_cast<Eigen::Index>(i)], 0.5,
+                       static_cast<double>(window_));
         if (reference_windows > 0) {
-            // The reference is uncertain too; variances of the logarithm add.
-            degrees *= reference_windows / (1 + reference_windows);
+            octave.low = f_quantile(tail, degrees, degrees * reference_windows);
+            octave.high = f_quantile(1 - tail, degrees, degrees * reference_windows);
+        } else {
+            octave.low = chi_square_quantile(tail, degrees) / degrees;
+            octave.high = chi_square_quantile(1 - tail, degrees) / degrees;
         }
-        octave.low = chi_square_quantile(tail, degrees) / degrees;
-        octave.high = chi_square_quantile(1 - tail, degrees) / degrees;
     }
     mean_sigma_ = std::sqrt(2 * model_variance(terms, static_cast<double>(window_) * tau0_));
 }
@@ -67,18 +81,40 @@ void StationarityMonitor::learn(const WindowRow& row) {
         return;
     }
     const auto n = static_cast<double>(lessons_.size());
+    const double windows = 1 + (n - 1) * (1 - overlap_);
     std::vector<VariancePoint> curve;
     for (Octave& octave : octaves_) {
+        octave.reference = 0;
         for (const WindowRow& lesson : lessons_) {
             octave.reference += lesson.allan[octave.k] / n;
         }
         if (octave.reference > 0) {
-            curve.push_back(
-                {static_cast<double>(octave.m) * tau0_, octave.m, octave.reference, 1.0});
+            curve.push_back({static_cast<double>(octave.m) * tau0_, octave.m, octave.reference,
+                             windows * window_share_});
         }
     }
-    set_bounds(fit_noise(curve, window_ + 1, tau0_).values(), 1 + (n - 1) * (1 - overlap_));
     lessons_.clear();
+    if (curve.size() < 2) return;
+    const Fit fit = fit_noise(curve, covariance_);
+    const double tau = static_cast<double>(window_) * tau0_;
+    const auto variance_of = [tau](double value, Term term) {
+        return value * value * term_variance(term, tau);
+    };
+    // In a few windows a ramp cannot be told from a walk, and a ramp varies from one to the next by
+    // nothing: it counts as the walk that does as much over a window.
+    Terms terms = fit.values();
+    double& walk = terms[static_cast<std::size_t>(Term::K)];
+    double& ramp = terms[static_cast<std::size_t>(Term::R)];
+    walk = std::hypot(walk, std::sqrt(variance_of(ramp, Term::R) / term_variance(Term::K, tau)));
+    ramp = 0;
+    set_bounds(terms, windows);
+    // The windows' mean varies by what is slow, and all that is not excluded may be there.
+    double slow = 0;
+    for (const Term term : {Term::B, Term::K, Term::R}) {
+        slow = std::max(slow, variance_of(fit.terms[static_cast<std::size_t>(term)].below, term));
+    }
+    terms[static_cast<std::size_t>(Term::B)] = walk = 0;
+    mean_sigma_ = std::sqrt(2 * (model_variance(terms, tau) + slow));
 }
 
 std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
@@ -109,7 +145,7 @@ std::vector<Alarm> StationarityMonitor::check(const WindowRow& row) {
     const double step = means_.size() > back_ && mean_sigma_ > 0
                             ? (means_.back() - means_.front()) / mean_sigma_
                             : 0;
-    const double limit = normal_quantile(1 - settings_.alpha / 2);
+    const double limit = normal_quantile(1 - share_of_alpha() / 2);
     if (std::abs(step) <= limit) {
         step_since_.reset();
         return alarms;

@@ -8,7 +8,7 @@
 namespace vibrig::estimator::allan {
 
 struct MonitorSettings {
-    double alpha = 1e-3;                ///< of one window, shared by the octaves
+    double alpha = 1e-3;                ///< of one window, shared by the octaves and the mean
     std::size_t reference_windows = 5;  ///< that teach the reference when none is given
 };
 
@@ -28,7 +28,14 @@ struct Alarm {
     double since_s = 0;
 };
 
-/// Compares windows with a reference, octave by octave: ratio x edf follows chi-square(edf).
+/// Compares windows with a reference, octave by octave. Model: the record is one mixture of Q, N,
+/// B, K and R throughout. The variance of a window at an octave then has mean mu and the degrees of
+/// freedom nu = 2 mu^2 / C of that mixture (CurveCovariance). Against an accepted calibration
+/// ratio x nu follows chi-square(nu); against a learnt reference, the mean of n windows that
+/// overlap, the ratio follows F(nu, nu n_eff), n_eff = 1 + (n - 1) (1 - overlap), and a ramp, which
+/// a few windows cannot tell from a walk, counts as the walk that does as much over a window. The
+/// mean of a window less that of the one before it has variance 2 AVAR(T), with a learnt reference
+/// the largest that its slow noise may have. Each gets an equal share of alpha.
 class StationarityMonitor {
   public:
     StationarityMonitor(const MonitorSettings& settings, const DynamicAllan& dynamic);
@@ -54,9 +61,12 @@ class StationarityMonitor {
     };
     void learn(const WindowRow& row);
     void set_bounds(const Terms& terms, double reference_windows);
+    [[nodiscard]] double share_of_alpha() const;
     [[nodiscard]] Reading reading_of(std::size_t octave) const;
 
     MonitorSettings settings_;
+    CurveCovariance covariance_;
+    double window_share_;  ///< of the degrees of freedom, by the window's shape
     double tau0_;
     std::size_t window_;
     std::size_t back_;  ///< rows from one window to the adjacent one

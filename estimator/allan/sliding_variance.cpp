@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "estimator/allan/series.hpp"
@@ -14,6 +15,29 @@ namespace {
 constexpr double kLargestRelativeError = 1e-9;
 
 }  // namespace
+
+namespace {
+
+constexpr double kFalls = 3;  // e-folds of the exponential window
+
+/// `at`: 0 oldest, 1 newest.
+double weight_of(WindowShape shape, double at) noexcept {
+    return shape == WindowShape::hann ? std::pow(std::sin(std::numbers::pi * at), 2)
+                                      : std::exp(kFalls * (at - 1));
+}
+
+}  // namespace
+
+double share_of(WindowShape shape) noexcept {
+    switch (shape) {
+        case WindowShape::hann:
+            return 2.0 / 3;  // (1/2)^2 / (3/8)
+        case WindowShape::exponential:
+            return 2 / kFalls * std::tanh(kFalls / 2);
+        default:
+            return 1;
+    }
+}
 
 SlidingVariance::SlidingVariance(double tau0, std::size_t window, std::vector<std::size_t> factors)
     : tau0_(tau0),
@@ -138,6 +162,26 @@ double SlidingVariance::allan(std::size_t k) const noexcept {
     return sums.seconds > 0
                ? std::max(0.0, sums.second) / (2 * tau * tau * static_cast<double>(sums.seconds))
                : 0;
+}
+
+double SlidingVariance::allan(std::size_t k, WindowShape shape) const noexcept {
+    if (shape == WindowShape::rectangular) return allan(k);
+    const std::size_t m = factors_[k];
+    const double tau = static_cast<double>(m) * tau0_;
+    const std::uint64_t from = oldest();
+    const auto length = static_cast<double>(newest_ - from);
+    double squares = 0;
+    double weights = 0;
+    for (std::uint64_t i = from + 2 * m; i <= newest_; ++i) {
+        // Nothing spans a gap.
+        if (start_[i & mask_] > i - 2 * m) continue;
+        const double w = weight_of(shape, static_cast<double>(i - m - from) / length);
+        const double d =
+            angle_[i & mask_] - 2 * angle_[(i - m) & mask_] + angle_[(i - 2 * m) & mask_];
+        squares += w * d * d;
+        weights += w;
+    }
+    return weights > 0 ? squares / (2 * tau * tau * weights) : 0;
 }
 
 double SlidingVariance::classical(std::size_t k, double mean) const noexcept {

@@ -6,6 +6,13 @@
 
 namespace vibrig::estimator::allan {
 
+/// Weights of a window's differences by where their centre lies: alike; sin^2, so that what enters
+/// and leaves counts little; or falling by e in a third of the window, so that the newest count
+/// most.
+enum class WindowShape : unsigned char { rectangular, hann, exponential };
+/// Degrees of freedom over those of a rectangular window: (sum w)^2 / (n sum w^2).
+[[nodiscard]] double share_of(WindowShape shape) noexcept;
+
 /// Overlapping Allan and classical variance of the last `window` samples of a stream. One addition
 /// costs a fixed number of operations per averaging factor; add() allocates and throws nothing.
 class SlidingVariance {
@@ -26,6 +33,8 @@ class SlidingVariance {
     [[nodiscard]] double mean() const noexcept;
     /// Rate unit squared, 0 without terms.
     [[nodiscard]] double allan(std::size_t k) const noexcept;
+    /// The same with the weights of `shape`. Costs one pass over the window.
+    [[nodiscard]] double allan(std::size_t k, WindowShape shape) const noexcept;
     /// Of overlapping averages about `mean`.
     [[nodiscard]] double classical(std::size_t k, double mean) const noexcept;
     struct Tiled {

@@ -247,6 +247,89 @@ TEST_F(AllanCommand, BadInputNamesFileLineAndValue) {
     expect_refusal("allan ok.txt --tau0 1 --plot none/x.svg", {"none/x.svg"});
 }
 
+TEST_F(AllanCommand, ChartAndWordsSayTheSame) {
+    // GIVEN white noise of .06 deg/h with random walks from none to one that rules
+    for (const double step : {0.0, 4e-4, 2e-3, 1e-2}) {
+        std::ostringstream text;
+        const auto white = vibrig::test::white(4000, 0.06, 7);
+        const auto steps = vibrig::test::white(4000, step > 0 ? step : 1, 8);
+        double walk = 0;
+        for (std::size_t i = 0; i < white.size(); ++i) {
+            walk += step > 0 ? steps[i] : 0;
+            text << white[i] + walk << '\n';
+        }
+        write("walk.txt", text.str());
+        ASSERT_EQ(vibrig("allan walk.txt --tau0 1 --fit --json --plot plot.svg"), 0) << error;
+        const Json result = Json::parse(out);
+        const std::string chart = content_of(folder_ / "plot.svg");
+        ASSERT_EQ(vibrig("allan walk.txt --tau0 1 --fit"), 0) << error;
+        const Json& slow = result["slow_noise"];
+        if (step == 0 || step > 1e-3) {
+            EXPECT_EQ(slow["found"].get<bool>(), step > 0) << step << " " << slow;
+        }
+        // WHEN the verdict says something THEN table and chart do
+        const auto verdict = slow["verdict"].get<std::string>();
+        EXPECT_NE(out.find(verdict), std::string::npos) << out;
+        EXPECT_NE(chart.find(verdict), std::string::npos) << verdict;
+        const bool undetermined = slow["found"] && !slow["kind_determined"];
+        EXPECT_EQ(chart.find(">slow noise<") != std::string::npos, undetermined) << slow;
+        // AND a term has a line of its own where the words give it a value
+        for (const auto& [name, term] : result["fit"].items()) {
+            const bool detected = !term["value"].is_null();
+            EXPECT_EQ(chart.find(">" + name + " = ") != std::string::npos, detected) << name;
+            EXPECT_EQ(out.find("  " + name + "  not detected") == std::string::npos, detected)
+                << name << "\n"
+                << out;
+        }
+    }
+}
+
+TEST_F(AllanCommand, LivePrintsWindowsAsTheyComplete) {
+    write("louder.txt", noise(6000, 0.06) + noise(2000, 0.12));
+    for (const std::string unit : {"", " --unit deg/s"}) {
+        const std::string options = " --tau0 1 --dynamic 500 --json" + unit;
+        ASSERT_EQ(vibrig("allan -" + options + " --live <louder.txt"), 1) << error;
+        std::istringstream lines(out);
+        std::vector<Json> rows;
+        for (std::string line; std::getline(lines, line);) rows.push_back(Json::parse(line));
+        // The same windows as from a file
+        ASSERT_EQ(vibrig("allan louder.txt" + options), 1) << error;
+        const Json whole = Json::parse(out)["dynamic"]["rows"];
+        ASSERT_EQ(rows.size(), whole.size());
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            EXPECT_EQ(rows[i]["dev"], whole[i]["dev"]) << unit;
+            EXPECT_EQ(rows[i]["mean"], whole[i]["mean"]) << unit;
+            EXPECT_EQ(rows[i]["alarms"], whole[i]["alarms"]) << unit;
+        }
+    }
+    EXPECT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live --shape hann <louder.txt"), 1);
+    write("word.txt", "1\n2\nthree\n");
+    expect_refusal("allan - --tau0 1 --dynamic 500 --live <word.txt",
+                   {"standard input:3", "'three'", "expected a number"});
+    expect_refusal("allan - --tau0 1 --dynamic 500 --live", {"0 samples came", "500"});
+    expect_refusal("allan word.txt --tau0 1 --dynamic 500 --live", {"--live", "standard input"});
+    expect_refusal("allan - --tau0 1 --dynamic 500 --shape square --live", {"--shape", "square"});
+    expect_refusal("allan - --tau0 1 --dynamic 500 --live --plot x.svg", {"x.svg", ".html"});
+    expect_refusal("allan - --tau0 1 --dynamic 500 --live --plot no/x.html <louder.txt",
+                   {"no/x.html"});
+}
+
+TEST_F(AllanCommand, LiveShowsTheSurfaceOnAPage) {
+    // WHEN three windows have come
+    write("quiet.txt", noise(1000, 0.06));
+    ASSERT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live --plot live.html <quiet.txt"), 0)
+        << error;
+    // THEN there is a page with surface and coefficients, which loads itself again
+    const std::string page = content_of(folder_ / "live.html");
+    for (const char* part : {"http-equiv=\"refresh\"", "Dynamic Allan deviation", "</html>"})
+        EXPECT_NE(page.find(part), std::string::npos) << part;
+    std::size_t charts = 0;
+    for (std::size_t at = page.find("<svg"); at != std::string::npos;
+         at = page.find("<svg", at + 1))
+        ++charts;
+    EXPECT_EQ(charts, 2U);
+}
+
 TEST_F(AllanCommand, ReproducesThePublishedTable) {
     ASSERT_EQ(vibrig("reproduce allan --seeds 4 --json"), 0) << out << error;
     const Json table = Json::parse(out)["reproductions"][0];

@@ -96,6 +96,26 @@ TEST(DwellMonitor, PointsAreTheDeviationThatTheNoiseHas) {
     EXPECT_TRUE(DwellMonitor({}).points().empty());
 }
 
+TEST(DwellMonitor, TheCurvesOfTheDwellsAreThePointsOfAll) {
+    // GIVEN dwells of one length, WHEN each gives its curve, THEN their mean square is the points'
+    std::mt19937_64 generator(33);
+    DwellMonitor monitor({});
+    constexpr std::size_t kDwells = 7;
+    std::vector<double> squares(whole()->octaves.size(), 0);
+    for (std::size_t d = 0; d < kDwells; ++d) {
+        const DwellAngles dwell = dwell_of({5, 1e-3, 0, 0}, generator, 9);
+        const auto curve = DwellMonitor::curve_of(dwell);
+        ASSERT_EQ(curve.size(), squares.size());
+        for (std::size_t i = 0; i < curve.size(); ++i)
+            squares[i] += curve[i].deviation * curve[i].deviation / kDwells;
+        monitor.learn(dwell);
+    }
+    const auto points = monitor.points();
+    ASSERT_EQ(points.size(), squares.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+        EXPECT_NEAR(std::sqrt(squares[i]) / points[i].deviation, 1, 1e-12) << points[i].tau_s;
+}
+
 TEST(DwellMonitor, MonteCarloErrorsOfNAreThoseItStates) {
     // GIVEN campaigns of 28 dwells of 100 s at two levels, the noise of the default rig
     constexpr int kRuns = 24;

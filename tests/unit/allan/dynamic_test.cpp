@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "estimator/allan/dynamic.hpp"
@@ -193,6 +194,65 @@ TEST(Monitor, LearnsAReferenceAndReadsTheAlarm) {
     EXPECT_GT(monitor.smallest_change(), 0.02);
     EXPECT_LT(monitor.smallest_change(), 0.3);
 }
+
+struct Alarms {
+    int windows = 0;
+    int alarmed = 0;
+    int steps = 0;
+};
+
+/// Windows after a learnt reference, level `alpha`.
+Alarms learnt(const Terms& terms, double alpha, int runs, std::uint64_t seed) {
+    constexpr std::size_t kWindow = 256;
+    constexpr std::size_t kHops = 46;  // of half a window: 45 windows, the first five teach
+    Alarms out;
+    for (int run = 0; run < runs; ++run) {
+        DynamicSettings wanted = settings(kWindow);
+        wanted.fits = false;
+        DynamicAllan dynamic(wanted);
+        StationarityMonitor monitor({alpha, 5}, dynamic);
+        for (const double y : synthetic_rate(terms, kHops * kWindow / 2, 1.0,
+                                             seed + static_cast<std::uint64_t>(run))) {
+            if (!dynamic.add(y)) continue;
+            const bool taught = monitor.has_reference();
+            const auto alarms = monitor.check(dynamic.row());
+            out.windows += taught ? 1 : 0;
+            out.alarmed += alarms.empty() ? 0 : 1;
+            for (const Alarm& alarm : alarms) out.steps += alarm.reading == Reading::mean_step;
+        }
+    }
+    return out;
+}
+
+void expect_rate(double alpha, int runs, double least) {
+    // GIVEN stationary mixtures whose slow part rises beyond the white one within a window
+    constexpr std::uint64_t kSeed = 8100;
+    int windows = 0;
+    int alarmed = 0;
+    for (const Terms& terms :
+         {Terms{0, kN, 0, 0, 0}, Terms{0.05, kN, 0.01, 0, 0}, Terms{0, kN, 0, 0.05, 0},
+          Terms{0, kN, 0, 0.3, 0}, Terms{0, kN, 0, 0, 0.3}, Terms{0.05, kN, 0.01, 0.05, 0.2}}) {
+        // WHEN 40 windows are compared with the first five
+        const Alarms found = learnt(terms, alpha, runs, kSeed);
+        std::printf("alpha %g, B %g K %g R %g: %d of %d windows alarmed, %d steps\n", alpha,
+                    terms[2], terms[3], terms[4], found.alarmed, found.windows, found.steps);
+        windows += found.windows;
+        alarmed += found.alarmed;
+        // THEN at most twice the stated share has an alarm, and three standard errors of a count
+        // in clusters of two: the windows of one record share their reference
+        const double expected = alpha * found.windows;
+        EXPECT_LE(found.alarmed, 2 * expected + 3 * std::sqrt(2 * expected))
+            << "B " << terms[2] << " K " << terms[3] << " R " << terms[4] << ", seeds from "
+            << kSeed;
+    }
+    EXPECT_LE(alarmed, 2 * alpha * windows) << "seeds from " << kSeed;
+    EXPECT_GE(alarmed, least * alpha * windows) << "seeds from " << kSeed;
+}
+
+TEST(Monitor, MonteCarloALearntReferenceHoldsItsRateOnAnyMixture) { expect_rate(0.02, 60, 0.5); }
+
+// Too few for a limit from below: 2.4 of each mixture expected, and those share their seeds.
+TEST(Monitor, MonteCarloALearntReferenceHoldsTheDefaultRate) { expect_rate(1e-3, 60, 0); }
 
 TEST(Monitor, AnAlarmEndsWithItsCause) {
     DynamicAllan dynamic(settings(512, 0.0));

@@ -3,15 +3,19 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "estimator/allan/classical.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/fit.hpp"
 #include "estimator/allan/synthetic.hpp"
+#include "tests/unit/allan/support.hpp"
 
 namespace {
 
 using namespace vibrig::estimator::allan;
+using vibrig::test::binomial_limit;
+using vibrig::test::kNaN;
 
 constexpr std::size_t kPoints = 36001;
 
@@ -35,14 +39,15 @@ Fit fit_record(const std::vector<double>& rate, const CurveCovariance* covarianc
 }
 
 TEST(Fit, RecoversEachCoefficientFromAnExactCurve) {
-    // GIVEN the curve without noise WHEN fitted THEN all five come back
+    // GIVEN the curve without noise WHEN fitted THEN all five come back. A record has no such
+    // curve: cube roots of variances lie below that of the mean, by less than a standard error.
     const Terms truth{0.1, 0.001, 0.01, 0.02, 0.02};
     const Fit fit = fit_noise(exact_curve(truth), kPoints, 1.0);
     for (std::size_t j = 0; j < kTerms; ++j) {
         // K and R of this size are known to about 48 % only in 10 h.
         EXPECT_EQ(fit.terms[j].detected, j < 3) << kTermNames[j];
         EXPECT_GT(fit.terms[j].below, truth[j]) << kTermNames[j];
-        EXPECT_NEAR(fit.terms[j].value, truth[j], 1e-6 * truth[j]) << kTermNames[j];
+        EXPECT_NEAR(fit.terms[j].value, truth[j], 1.2 * fit.terms[j].sigma) << kTermNames[j];
         EXPECT_GT(fit.terms[j].sigma, 0) << kTermNames[j];
     }
 }
@@ -120,7 +125,7 @@ TEST(Fit, CovarianceOfTheCurveIsTheSumOverAllPairsOfDifferences) {
     }
 }
 
-TEST(Fit, StatedErrorsAreThoseOfWhiteNoise) {
+TEST(Fit, MonteCarloStatedErrorsAreThoseOfWhiteNoise) {
     // GIVEN 200 records of white noise of one kind
     constexpr int kRuns = 200;
     constexpr std::size_t kSamples = 20000;
@@ -173,11 +178,19 @@ TEST(Fit, MonteCarloErrorsStayWithinTheirLimits) {
     const Terms truth{0.1, 0.001, 0.01, 0.02, 0.02};
     Terms squares{};
     Terms scores{};
+    std::array<int, kTerms> detected{}, outside{}, above{};
+    const CurveCovariance covariance(log_factors((kPoints - 1) / 2, 30), kPoints, 1.0);
     for (int run = 0; run < kRuns; ++run) {
         const Fit fit =
-            fit_record(synthetic_rate(truth, kPoints - 1, 1.0, kSeed + static_cast<unsigned>(run)));
+            fit_record(synthetic_rate(truth, kPoints - 1, 1.0, kSeed + static_cast<unsigned>(run)),
+                       &covariance);
         for (std::size_t j = 0; j < kTerms; ++j) {
             squares[j] += std::pow(fit.values()[j] / truth[j] - 1, 2) / kRuns;
+            const FittedTerm& term = fit.terms[j];
+            const bool off = std::abs(term.value - truth[j]) > 2 * term.sigma;
+            detected[j] += term.detected ? 1 : 0;
+            outside[j] += term.detected && off ? 1 : 0;
+            above[j] += !term.detected && truth[j] > term.below ? 1 : 0;
             if (j < 3) {
                 scores[j] +=
                     std::pow((fit.terms[j].value - truth[j]) / fit.terms[j].sigma, 2) / kRuns;
@@ -188,6 +201,11 @@ TEST(Fit, MonteCarloErrorsStayWithinTheirLimits) {
     const Terms limit{0.02, 0.03, 0.10, 0.60, 0.60};
     for (std::size_t j = 0; j < kTerms; ++j) {
         EXPECT_LT(std::sqrt(squares[j]), limit[j]) << kTermNames[j] << ", seeds from " << kSeed;
+        // two sigma miss in 4.6 %, the bounds of the others in 2.3 %
+        EXPECT_LE(outside[j], binomial_limit(detected[j], 0.0455))
+            << kTermNames[j] << " of " << detected[j] << " detected, seeds from " << kSeed;
+        EXPECT_LE(above[j], binomial_limit(kRuns - detected[j], 0.02275))
+            << kTermNames[j] << " of " << kRuns - detected[j] << " bounds, seeds from " << kSeed;
     }
     // and those of what can be detected are as stated: band of 60 runs at 1e-3 (0.3), 0.05 as above
     for (std::size_t j = 0; j < 3; ++j) {
@@ -195,13 +213,40 @@ TEST(Fit, MonteCarloErrorsStayWithinTheirLimits) {
     }
 }
 
+/// The number behind `words` in the text; NaN without.
+double number_behind(const std::string& text, const std::string& words) {
+    const std::size_t begin = text.find(words);
+    return begin == std::string::npos ? kNaN : std::stod(text.substr(begin + words.size()));
+}
+
 TEST(Fit, TellsWhenARampCannotBeSeparatedFromARandomWalk) {
-    // GIVEN a strong random walk and a weak ramp
-    const Fit fit = fit_noise(exact_curve({0, 0.001, 0, 0.5, 0.05}), kPoints, 1.0);
-    // THEN the bound K / sqrt(T) = 0.158 deg/h^2 and a record length are named
-    EXPECT_NE(fit.ramp_note.find("0.158"), std::string::npos) << fit.ramp_note;
-    EXPECT_NE(fit.ramp_note.find("a record of 400 h"), std::string::npos) << fit.ramp_note;
-    EXPECT_GE(fit.terms[4].sigma, 0.158);
+    // GIVEN a strong random walk and a weak ramp, 10 h at 1 s
+    constexpr double kWalk = 0.5;
+    constexpr double kRamp = 0.05;
+    const Terms truth{0, 0.001, 0, kWalk, kRamp};
+    const Fit fit = fit_noise(exact_curve(truth), kPoints, 1.0);
+    EXPECT_FALSE(fit.terms[4].detected);
+    // THEN the note's bound is the standard deviation of the slope that such a walk makes by
+    // itself in 10 h, its record 4 K^2 / R^2 with the ramp that was found
+    EXPECT_NEAR(number_behind(fit.ramp_note, "K/sqrt(T) = "), kWalk / std::sqrt(10), 0.02);
+    const double found = fit.terms[4].value;
+    const double hours = number_behind(fit.ramp_note, "a record of ");
+    EXPECT_NEAR(hours, 4 * kWalk * kWalk / (found * found), 0.2 * hours);
+    EXPECT_GE(fit.terms[4].below, kRamp);
+    // AND it is so: in a record ten times longer than what the true ramp needs it is found, in one
+    // of a tenth of that it is not
+    const double needed = 4 * kWalk * kWalk / (kRamp * kRamp);
+    for (const double times : {0.1, 10.0}) {
+        const double tau0 = 3600 * times * needed / static_cast<double>(kPoints - 1);
+        std::vector<VariancePoint> curve;
+        for (const std::size_t m : log_factors((kPoints - 1) / 2, 30)) {
+            const double tau = tau0 * static_cast<double>(m);
+            curve.push_back({tau, m, model_variance(truth, tau), 1.0});
+        }
+        const Fit longer = fit_noise(curve, kPoints, tau0);
+        EXPECT_EQ(longer.terms[4].detected, times > 1) << times;
+        EXPECT_EQ(longer.ramp_note.empty(), times > 1) << longer.ramp_note;
+    }
     EXPECT_TRUE(fit_noise(exact_curve({0, 0.001, 0, 0, 5}), kPoints, 1.0).ramp_note.empty());
 }
 

@@ -109,4 +109,36 @@ TEST(SlidingVariance, RefusesAWindowTooShortForItsFactors) {
     EXPECT_THROW(SlidingVariance(kNaN, 10, {1}), DataError);
 }
 
+TEST(WindowShape, WeighsAndKnowsWhatItCosts) {
+    // GIVEN 2000 windows of white noise
+    constexpr std::size_t kWindow = 128;
+    constexpr int kRuns = 2000;
+    const std::vector<std::size_t> factors{1, 2};
+    for (const WindowShape shape :
+         {WindowShape::rectangular, WindowShape::hann, WindowShape::exponential}) {
+        double sum = 0;
+        double squares = 0;
+        for (unsigned run = 0; run < kRuns; ++run) {
+            SlidingVariance sliding(1.0, kWindow, factors);
+            for (const double y : vibrig::test::white(kWindow, 1, 6200 + run)) sliding.add(y);
+            const double v = sliding.allan(0, shape);
+            sum += v / kRuns;
+            squares += v * v / kRuns;
+        }
+        // THEN none is biased: edf by SP 1065 times the share, 1 sigma sqrt(2 / edf / runs)
+        const double degrees = edf(Statistic::oadev, 0, kWindow + 1, 1) * share_of(shape);
+        EXPECT_NEAR(sum, 1, 4 * std::sqrt(2 / degrees / kRuns)) << "seeds from 6200";
+        // and the spread is as stated, 1 sigma sqrt(2 / runs) = 3.2 %, ends of the window 3 %
+        EXPECT_NEAR(2 * sum * sum / (squares - sum * sum) / degrees, 1, 4 * 0.032 + 0.03)
+            << static_cast<int>(shape) << ", seeds from 6200";
+    }
+    // A step of the noise in the newest quarter shows most in the exponential window
+    SlidingVariance sliding(1.0, kWindow, factors);
+    auto rate = vibrig::test::white(kWindow, 1, 6100);
+    for (std::size_t i = 3 * kWindow / 4; i < kWindow; ++i) rate[i] *= 3;
+    for (const double y : rate) sliding.add(y);
+    EXPECT_GT(sliding.allan(0, WindowShape::exponential), 1.3 * sliding.allan(0));
+    EXPECT_LT(sliding.allan(0, WindowShape::hann), sliding.allan(0));
+}
+
 }  // namespace

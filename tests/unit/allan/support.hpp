@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <random>
@@ -17,6 +18,18 @@ inline std::vector<double> white(std::size_t n, double sigma, std::uint64_t seed
         value = normal(generator);
     }
     return values;
+}
+
+/// The number of events of n that is exceeded with probability 1e-3 at most.
+inline int binomial_limit(int n, double probability) {
+    double term = std::pow(1 - probability, n);
+    double sum = term;
+    int k = 0;
+    for (; k < n && sum < 1 - 1e-3; ++k) {
+        term *= (n - k) / (k + 1.0) * probability / (1 - probability);
+        sum += term;
+    }
+    return k;
 }
 
 }  // namespace vibrig::test
