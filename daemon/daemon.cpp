@@ -168,9 +168,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                if (journal_) journal_->campaign_resumed(interrupted_->id, by);
                interrupted_.reset();
                record_begin(by, identification_.result().dwells.size());
-               auto result = identification_.result();
-               const std::lock_guard lock(mutex_);
-               result_ = std::move(result);
+               keep(identification_.result());
            },
            torquer_.get(),
            &stage_feed_,
@@ -182,6 +180,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
            [this](double measured) { interlock_.transmission(measured); },
            [this](Time now) { return rest_.rest(now); },
            [this](bool disobeyed) { on_disobeyed(disobeyed); },
+           [this] { interlock_.uncommanded(); },
            [this](campaign::Proving what) {
                starving_.store(what == campaign::Proving::watchdog);
                interlock_.proving(what != campaign::Proving::nothing);
@@ -209,14 +208,17 @@ std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& he
     // tenths of a second, on a busy machine more than this thread may be away. The rig's clock
     // waits for this thread, so that there the time is none.
     std::optional<plan::AdaptivePlan::Decision> decision;
+    const auto choose = [this, here_deg, elapsed_s, covariance = identification_.covariance(),
+                         result = whole_result()] {
+        return adaptive_->next(plan::widened(covariance, configuration_.estimator, result),
+                               here_deg, elapsed_s, result.rows.size());
+    };
     if (rig_clock_) {
-        decision = adaptive_->next(identification_.covariance(), here_deg, elapsed_s);
+        decision = choose();
     } else if (planning_.asked()) {
         decision = planning_.take();
     } else {
-        planning_.ask([this, here_deg, elapsed_s, covariance = identification_.covariance()] {
-            return adaptive_->next(covariance, here_deg, elapsed_s);
-        });
+        planning_.ask(choose);
     }
     if (!decision) return {};
     campaign::Next next;
@@ -230,6 +232,7 @@ std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& he
 Daemon::~Daemon() {
     shut_down();
     join();
+    paging_.store(nullptr);
 }
 
 void Daemon::start() {
@@ -250,6 +253,10 @@ void Daemon::start() {
         configuration_.annunciator, [this](bool good, const std::string& text) {
             log(good ? Severity::info : Severity::alarm, "annunciator", text);
         });
+    paging_.store(annunciator_.get());
+    if (latches_.tripped())
+        annunciator_->announce(drivers::HornPattern::abort,
+                               "not acknowledged: " + latches_.causes());
     if (!configuration_.guard_socket.empty())
         guard_link_ = std::make_unique<watch::GuardLink>(configuration_.guard_socket,
                                                          [this] { return word_for_guard(); });
@@ -322,6 +329,15 @@ void Daemon::on_port_state(drivers::PortState state, const char* text) noexcept 
 }
 
 void Daemon::log(Severity severity, const std::string& source, const std::string& text) {
+    enter(severity, source, text);
+    // A pager that fails is not told so by itself; of a fit whoever looks in the morning reads.
+    drivers::Annunciator* const annunciator = paging_.load();
+    if (severity == Severity::alarm && annunciator != nullptr && source != "annunciator" &&
+        source != "fit")
+        annunciator->announce(drivers::HornPattern::alarm, text);
+}
+
+void Daemon::enter(Severity severity, const std::string& source, const std::string& text) {
     EventRecord record;
     record.utc_ns = utc_now();
     record.time = clock_.now();
@@ -349,12 +365,11 @@ void Daemon::take_done_dwells() {
     rt::DwellDone done;
     while (estimator_stage_.take_done(done)) {
         if (--dwells_with_estimator_ == 0) take_noise(done.summary);
-        record_dwell(done.summary);
-        campaign_.on_dwell_done(done.summary);
         auto result = identification_.result();
+        record_dwell(done.summary, result);
+        campaign_.on_dwell_done(done.summary);
         campaign_.qualify(result);
-        const std::lock_guard lock(mutex_);
-        result_ = std::move(result);
+        keep(std::move(result));
         verdict_due_ = true;
     }
     take_verdict();
@@ -383,6 +398,7 @@ void Daemon::control_loop() {
         }
         if (first_reading_known_.load() && !std::exchange(first_reading_judged_, true))
             judge_first_reading(now);
+        watch_emergency_stop(now);
         tell_alarms();
         tell_controller();
         tell_watchdog();
@@ -399,6 +415,7 @@ void Daemon::control_loop() {
         // a campaign on the rig's clock depend on the machine's load.
         if (stirred || now >= next)
             next = std::min(campaign_.step(now), now + drivers::kSecond / 2);
+        const Time commissioning = step_commissioning(now);
         take_done_dwells();
         watch_arming();
         check_balance(now);
@@ -414,13 +431,14 @@ void Daemon::control_loop() {
             done = campaign_.done(now) && to_write_ == ToWrite::nothing;
             if (done) break;
         }
-        control_waiter_->wait_until(next);
+        control_waiter_->wait_until(std::min(next, commissioning));
     }
     if (to_write_ != ToWrite::nothing && dwells_with_estimator_ == 0) {
         assessing_.abandon();
-        write_result(estimator::uncertainty::assess(configuration_.estimator, result_));
+        write_result(judge(configuration_.estimator, whole_result(), again()));
     }
     give_up_arming("the daemon is shutting down");
+    finish_acknowledging(true);
     if (done) end_arming("the daemon has ended in order");
     const std::lock_guard lock(mutex_);
     ended_ = done;
@@ -429,8 +447,10 @@ void Daemon::control_loop() {
     commands_.clear();
 }
 
-void Daemon::write_result(const estimator::uncertainty::Assessment& assessed) {
+void Daemon::write_result(const Judged& judged) {
     const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
+    const auto& assessed = judged.assessed;
+    take_anew(judged);
     if (!result_.dwells.empty())  // of no data nothing is to be said
         log(severity_of(assessed.verdict.level), "campaign", "result " + assessed.verdict.sentence);
     std::string text;
@@ -438,7 +458,8 @@ void Daemon::write_result(const estimator::uncertainty::Assessment& assessed) {
         const std::lock_guard lock(mutex_);
         if (!campaign_.mark().empty())
             result_.warnings.push_back("campaign marked: " + campaign_.mark());
-        text = tool::result_json(result_, assessed);
+        text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
+                                 judged.live.get());
     }
     StatusData ended;
     campaign_.fill(ended, clock_.now());

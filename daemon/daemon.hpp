@@ -12,7 +12,9 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign_forecast.hpp"
+#include "daemon/commission/procedure.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/dwells/anew.hpp"
 #include "daemon/fleet/publisher.hpp"
 #include "daemon/journal/journal.hpp"
 #include "daemon/log/log_queue.hpp"
@@ -107,8 +109,27 @@ class Daemon final : public StatusSource {
     void answer(WaitingCommand& waiting, const CommandReply& reply);
     /// An arming is accepted once the journal has it on disk; nobody waits for that but who asked.
     void begin_arming(WaitingCommand waiting, drivers::Time now);
+    /// What commissioning asks, tells and records (daemon_commission.cpp).
+    void commission(WaitingCommand waiting, drivers::Time now);
+    [[nodiscard]] CommandReply do_commission(const CommandRequest& request,
+                                             const commission::Json& what, drivers::Time now);
+    [[nodiscard]] CommandReply enter_in_record(const CommandRequest& request,
+                                               const commission::Json& what, drivers::Time now);
+    [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
+                                                    const std::string& second,
+                                                    const configuration::Loaded& file);
+    [[nodiscard]] CommandReply record_parts(const CommandRequest& request,
+                                            const std::string& second,
+                                            const std::vector<commission::Part>& parts,
+                                            const commission::Json& evidence,
+                                            const configuration::Loaded& as);
+    [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
+    /// Returns when to be called next at the latest.
+    [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);
     void finish_arming(drivers::Time now);
     void give_up_arming(const std::string& why);
+    /// Answers who acknowledged, once that is on disk; at the end of the daemon, all of them.
+    void finish_acknowledging(bool at_once);
     void watch_arming();
     void end_arming(const std::string& why);
     [[nodiscard]] std::string journal_being_verified() const;
@@ -116,17 +137,19 @@ class Daemon final : public StatusSource {
                                              drivers::Time now) const;
     void take_over_latches();
     void judge_first_reading(drivers::Time now);
+    void watch_emergency_stop(drivers::Time now);
     void latch(Latch latch);
     CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void on_port_state(drivers::PortState state, const char* text) noexcept;
+    /// An alarm is for the pager, too.
     void log(Severity severity, const std::string& source, const std::string& text);
+    void enter(Severity severity, const std::string& source, const std::string& text);
     void tell_log();
     /// Accepted if it was for an alarm; a trip is the campaign's.
     CommandReply acknowledge_alarm(const CommandRequest& request);
     /// Why there is nothing of the name it gives; empty: there is, or it gives none.
     [[nodiscard]] std::string unknown_to_acknowledge(const CommandRequest& request) const;
     void tell_alarms();
-    void raise_alarm(const std::string& text);
     void tell_controller();
     void tell_watchdog();
     void tell_journal();
@@ -147,12 +170,32 @@ class Daemon final : public StatusSource {
                                                   const rt::EstimatorView& estimated) const;
     void take_done_dwells();
     void take_noise(estimator::DwellSummary& dwell);
+    /// What is to be made of the dwells at the end: they are in the journal.
+    struct Again {
+        noise::Found found;
+        std::string journal;
+        std::uint64_t configuration_hash = 0;
+    };
+    /// What can be believed of the dwells, or of the same identified anew.
+    struct Judged {
+        estimator::uncertainty::Assessment assessed;
+        std::optional<estimator::Result> anew;
+        std::shared_ptr<const dwells::Live> live;  ///< what `anew` replaces
+        std::string not_anew;                      ///< why not, though it should be
+    };
+    [[nodiscard]] std::optional<Again> again() const;
+    [[nodiscard]] static Judged judge(const estimator::Settings& settings,
+                                      const estimator::Result& result,
+                                      const std::optional<Again>& again);
     [[nodiscard]] bool verdict_wanted();
+    void keep(estimator::Result result);
+    [[nodiscard]] estimator::Result whole_result() const;
     /// What can be believed of the dwells so far; the verdict on all of them writes the result.
     void take_verdict();
     [[nodiscard]] static Severity severity_of(estimator::uncertainty::Level level);
     void tell_verdict(const estimator::uncertainty::Assessment& assessed);
-    void write_result(const estimator::uncertainty::Assessment& assessed);
+    void write_result(const Judged& judged);
+    void take_anew(const Judged& judged);
     void write_result_file(const std::string& text, bool complete);
     [[nodiscard]] std::optional<campaign::Next> next_dwell(const std::array<double, 3>& here_deg,
                                                            double elapsed_s);
@@ -170,7 +213,7 @@ class Daemon final : public StatusSource {
     [[nodiscard]] record::ConditionRow conditions() const;
     /// Instruments whose certificate has run out, for whoever arms.
     std::string tell_overdue();
-    void record_dwell(const estimator::DwellSummary& summary);
+    void record_dwell(const estimator::DwellSummary& summary, const estimator::Result& result);
     void offer_unfinished(journal::Unfinished& campaign);
     [[nodiscard]] std::string resume_gate() const;
     /// Why rig and daemon have no time in common; empty: they have.
@@ -222,6 +265,8 @@ class Daemon final : public StatusSource {
         [this] { control_waiter_->notify(); }};  ///< what the control thread may not wait for
     const PlanData plan_;
     campaign::Campaign campaign_;
+    commission::Book book_{loaded_};                     ///< control thread
+    std::unique_ptr<commission::Procedure> procedure_;   ///< made when it is asked for; likewise
     const std::unique_ptr<fleet::Publisher> publisher_;  ///< null: no broker
 
     journal::Latches latches_;  ///< control thread
@@ -232,11 +277,21 @@ class Daemon final : public StatusSource {
         drivers::Time since_wall = 0;
     };
     std::optional<Arming> arming_;  ///< control thread
-    std::string armed_by_;          ///< as last looked at; control thread
+    /// What was acknowledged and is not answered yet: "acknowledged" outlives a power cut.
+    struct Acknowledging {
+        WaitingCommand waiting;
+        CommandReply reply;
+        std::uint64_t entry = 0;
+        drivers::Time since_wall = 0;
+    };
+    std::vector<Acknowledging> acknowledging_;    ///< control thread
+    std::uint64_t entry_of_acknowledgement_ = 0;  ///< the newest; 0: none
+    std::string armed_by_;                        ///< as last looked at; control thread
     /// As the shaker's controller was before the stop at the start, which clears its faults.
     drivers::ShakerReading first_reading_;
     std::atomic<bool> first_reading_known_{false};
-    bool first_reading_judged_ = false;  ///< control thread
+    bool first_reading_judged_ = false;       ///< control thread
+    std::optional<bool> emergency_was_open_;  ///< as last judged; control thread
 
     std::atomic<bool> shut_down_{false};
     std::atomic<bool> give_up_{false};
@@ -244,8 +299,7 @@ class Daemon final : public StatusSource {
     std::atomic<bool> excitation_{false};  ///< the campaign is between ramp and rest
     int dwells_with_estimator_ = 0;        ///< ordered, not yet reported done; control thread
     /// Tens of milliseconds, with hundreds of dwells seconds.
-    plan::Aside<estimator::uncertainty::Assessment> assessing_{
-        [this] { control_waiter_->notify(); }};
+    plan::Aside<Judged> assessing_{[this] { control_waiter_->notify(); }};
     bool verdict_due_ = false;  ///< on the dwells so far; control thread
     bool concluding_ = false;   ///< the last verdict is asked for; control thread
     std::string verdict_told_;  ///< control thread
@@ -266,6 +320,7 @@ class Daemon final : public StatusSource {
     bool log_was_blocked_ = false;                  ///< control thread
     std::unique_ptr<watch::GuardLink> guard_link_;  ///< start() makes it; null: there is no guard
     std::unique_ptr<drivers::Annunciator> annunciator_;           ///< made by start()
+    std::atomic<drivers::Annunciator*> paging_{nullptr};          ///< it, while there are threads
     bool guard_was_heard_ = false, guard_was_disobeyed_ = false;  ///< control thread
     bool disobeyed_ = false;                ///< by the table, now; control thread
     std::uint64_t guard_finding_ = 0;       ///< the one that tripped; control thread
@@ -276,7 +331,7 @@ class Daemon final : public StatusSource {
     std::deque<WaitingCommand> commands_;
     StatusData campaign_status_;
     ServerStatus server_status_;
-    estimator::Result result_;
+    estimator::Result result_;  ///< without its rows
     bool ended_ = false;
     rt::ThreadSetup acquisition_setup_, estimator_setup_;
     std::condition_variable ended_changed_;

@@ -69,8 +69,9 @@ void Daemon::check_bindings(const configuration::Loaded& loaded) {
                                                  [](const drivers::Sample&) {});
     });
     collect([&] { const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port); });
+    std::string why;
+    collect([&] { why = campaign::check_stages(configuration.campaign, dbc, *port); });
     if (!missing.empty()) throw configuration::ConfigurationError(missing);
-    const auto why = campaign::check_stages(configuration.campaign, dbc, *port);
     if (!why.empty()) throw configuration::ConfigurationError(why);
     check_zeroing_travel(configuration);
 }

@@ -2,6 +2,7 @@
 // and end there by name.
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/configuration/cross_checks.hpp"
 #include "daemon/daemon.hpp"
 
 namespace vibrig {
@@ -10,8 +11,9 @@ using drivers::Time;
 
 namespace {
 
-// For the journal to have an arming on disk; the server waits for an answer for 5 s.
-constexpr Time kArmingPatience = 2 * drivers::kSecond;
+// For the journal to have an arming or an acknowledgement on disk; the server waits for an answer
+// for 5 s.
+constexpr Time kDiskPatience = 2 * drivers::kSecond;
 
 }  // namespace
 
@@ -22,18 +24,27 @@ void Daemon::take_commands(Time now) {
         taken.swap(commands_);
     }
     finish_arming(now);
+    finish_acknowledging(false);
     for (auto& waiting : taken) {
         if (waiting.abandoned->exchange(true)) continue;
         const auto kind = waiting.request.kind;
         if (kind == CommandRequest::Kind::abort) give_up_arming("aborted by " + waiting.request.by);
-        if (kind == CommandRequest::Kind::arm || kind == CommandRequest::Kind::selftest) {
+        if (kind == CommandRequest::Kind::commission) {
+            commission(std::move(waiting), now);
+        } else if (kind == CommandRequest::Kind::arm || kind == CommandRequest::Kind::selftest) {
             begin_arming(std::move(waiting), now);
+        } else if (kind == CommandRequest::Kind::acknowledge) {
+            entry_of_acknowledgement_ = 0;
+            auto reply = acknowledge(waiting.request, now);
+            if (entry_of_acknowledgement_ == 0)
+                answer(waiting, reply);
+            else
+                acknowledging_.push_back({std::move(waiting), std::move(reply),
+                                          entry_of_acknowledgement_, rt::wall_clock()});
         } else {
             const auto guarded = guard_refuses(waiting.request);
-            answer(waiting, kind == CommandRequest::Kind::acknowledge
-                                ? acknowledge(waiting.request, now)
-                            : guarded.empty() ? campaign_.command(waiting.request, now)
-                                              : CommandReply{false, guarded});
+            answer(waiting, guarded.empty() ? campaign_.command(waiting.request, now)
+                                            : CommandReply{false, guarded});
         }
     }
 }
@@ -46,10 +57,22 @@ void Daemon::answer(WaitingCommand& waiting, const CommandReply& reply) {
         if (started) journal_->campaign_begun(configuration_.campaign.name, request.by);
     }
     if (started) record_begin(request.by, 0);
+    if (started && configuration_.simulated())
+        log(Severity::info, "campaign",
+            "SIMULATED: the rig is a program, nothing of this is a measurement");
     waiting.reply.set_value(reply);
 }
 
 std::string Daemon::not_fit_to_arm(const CommandRequest& request, Time now) const {
+    // The adapter may have been plugged in since the configuration was read.
+    if (const auto& can = configuration_.can;
+        configuration_.commission.simulated &&
+        can.kind == drivers::CanPortSettings::Kind::socketcan &&
+        configuration::is_hardware(can.interface))
+        return fmt::format("commission.simulated is true, and the CAN interface {} is a device",
+                           can.interface);
+    // First: what is proved of a rig that is not the one described says little.
+    if (auto why = book_.refusal(utc_now()); !why.empty()) return why;
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
     if (auto why = guard_refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
@@ -86,11 +109,11 @@ void Daemon::begin_arming(WaitingCommand waiting, Time now) {
 void Daemon::finish_arming(Time now) {
     if (!arming_) return;
     if (!journal_->on_disk(arming_->entry)) {
-        if (rt::wall_clock() - arming_->since_wall < kArmingPatience) return;
+        if (rt::wall_clock() - arming_->since_wall < kDiskPatience) return;
         const auto status = journal_->status();
         return give_up_arming(
             fmt::format("the journal has not written the arming within {:g} s: {}",
-                        drivers::to_seconds(kArmingPatience),
+                        drivers::to_seconds(kDiskPatience),
                         status.running ? "the disk does not answer" : status.note));
     }
     Arming arming = std::move(*arming_);
@@ -113,6 +136,19 @@ void Daemon::give_up_arming(const std::string& why) {
     arming_.reset();
     journal_->disarmed(arming.waiting.request.by, why);
     answer(arming.waiting, {false, why});
+}
+
+void Daemon::finish_acknowledging(bool at_once) {
+    std::erase_if(acknowledging_, [&](Acknowledging& one) {
+        if (!journal_->on_disk(one.entry)) {
+            if (!at_once && rt::wall_clock() - one.since_wall < kDiskPatience) return false;
+            one.reply.message +=
+                "; the journal has not written it yet: after a restart it may have to be said "
+                "again";
+        }
+        answer(one.waiting, one.reply);
+        return true;
+    });
 }
 
 void Daemon::watch_arming() {
@@ -140,7 +176,10 @@ void Daemon::take_over_latches() {
         log(Severity::alarm, "journal",
             fmt::format("not acknowledged: {}: {}", latch.name, latch.cause));
     }
-    if (latches_.tripped()) campaign_.take_over_trip(latches_.causes());
+    const auto& campaign = configuration_.campaign;
+    double level_g = campaign.loop.table_g;
+    for (const double g : campaign.table_g) level_g = std::max(level_g, g);
+    if (latches_.tripped()) campaign_.take_over_trip(latches_.causes(), level_g);
 }
 
 /// The stop at the start makes the controller forget its faults, which is nobody's acknowledgement.
@@ -159,6 +198,33 @@ void Daemon::judge_first_reading(Time now) {
            {},
            {},
            emergency && configuration_.campaign.second_person});
+    campaign_.on_trip(latches_.causes(), now);
+    annunciator_->announce(drivers::HornPattern::abort, cause);
+}
+
+/// The emergency stop comes after a trip, or where nothing is guarded, too: it is no interlock's
+/// then, and still wants its persons.
+void Daemon::watch_emergency_stop(Time now) {
+    const auto reading = shaker_->reading();
+    if (!reading.valid || !first_reading_judged_) return;
+    const bool open = reading.emergency_stop_open;
+    if (emergency_was_open_ == open) return;
+    const bool at_start = !emergency_was_open_;
+    const bool tripped = latches_.tripped();
+    // Its own row trips, or has tripped and is told next.
+    if (open && !tripped && (interlock_.latched() || !campaign_.armed_by().empty())) return;
+    emergency_was_open_ = open;
+    const char* const name = rt::condition_of(rt::Trip::emergency_stop).name;
+    if (!open || at_start || latches_.find(name) != nullptr) return;
+    if (!tripped && !configuration_.campaign.second_person) return;
+    std::string armed_by = campaign_.armed_by();
+    for (const Latch& latch : latches_.open())
+        if (armed_by.empty()) armed_by = latch.armed_by;
+    const std::string text = rt::text_of(rt::Trip::emergency_stop);
+    log(Severity::warning, "interlock", text + (tripped ? " after the trip" : ""));
+    annunciator_->announce(drivers::HornPattern::abort, text);
+    latch({name, text, armed_by, {}, configuration_.campaign.second_person});
+    if (tripped) return campaign_.take_over_trip(latches_.causes());
     campaign_.on_trip(latches_.causes(), now);
 }
 
@@ -213,7 +279,8 @@ CommandReply Daemon::acknowledge(const CommandRequest& request, Time now) {
         if (!answer.accepted) return {false, answer.words};
         for (const auto& [names, last] : {std::pair(&answer.over, true), {&answer.first, false}}) {
             for (const std::string& name : *names) {
-                if (journal_) journal_->acknowledged(name, request.by, last);
+                if (journal_)
+                    entry_of_acknowledgement_ = journal_->acknowledged(name, request.by, last);
             }
         }
         if (of_journal || latches_.tripped()) {

@@ -47,7 +47,7 @@ std::string Daemon::guard_refuses(const CommandRequest& request) const {
 }
 
 void Daemon::tell_campaign(Severity severity, const std::string& text) {
-    log(severity, "campaign", text);
+    enter(severity, "campaign", text);
     // Whoever is not there wants to know that it does not go on.
     if (severity == Severity::alarm) annunciator_->announce(HornPattern::abort, text);
 }
@@ -87,7 +87,7 @@ void Daemon::watch_outside() {
 void Daemon::show_state() {
     auto pattern = HornPattern::none;
     if (std::ranges::find(raised_, true) != raised_.end()) pattern = HornPattern::alarm;
-    if (interlock_.latched()) pattern = HornPattern::abort;
+    if (interlock_.latched() || latches_.tripped()) pattern = HornPattern::abort;
     if (disobeyed_) pattern = HornPattern::disobeyed;
     if (guard_link_ && guard_link_->heard()) {
         const auto guard = guard_link_->word();

@@ -12,6 +12,7 @@ bool Daemon::in_real_time() const noexcept {
 }
 
 rt::MemoryLock Daemon::lock_memory() const {
+    rt::give_large_blocks_back();
     if (!in_real_time()) return {false, "not asked for: the rig owns the time"};
     if (!configuration_.lock_memory) return {false, "not asked for: threads.lock_memory is false"};
     return rt::lock_memory();

@@ -164,6 +164,7 @@ void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {
     head.utc_ns = utc_ns;
     head.utc_offset_ns = (utc_ns - clock_.now()) / drivers::kMicrosecond * drivers::kMicrosecond;
     head.clock = rig_clock_ ? "rig" : "real";
+    head.simulated = configuration_.simulated();
     head.version = kVersion;
     head.compiler = estimator::compiler();
     head.instruction_set = estimator::instruction_set();
@@ -186,7 +187,7 @@ void Daemon::record_begin(const std::string& by, std::size_t dwells_before) {
     recorder_->campaign_begun(std::move(head));
 }
 
-void Daemon::record_dwell(const estimator::DwellSummary& summary) {
+void Daemon::record_dwell(const estimator::DwellSummary& summary, const estimator::Result& result) {
     if (!recorder_) return;
     // The identification is this thread's: the dwell is over and no other is ordered.
     estimator::Estimate estimate;
@@ -199,6 +200,9 @@ void Daemon::record_dwell(const estimator::DwellSummary& summary) {
     dwell.sigma = estimate.sigma;
     dwell.observable = estimate.observable;
     dwell.covariance = identification_.covariance();
+    if (!summary.left_out && !result.rows.empty() && result.rows.back().run == summary.run &&
+        result.rows.back().position == summary.position)
+        dwell.row = result.rows.back();
     recorder_->dwell_done(std::move(dwell));
 }
 

@@ -52,6 +52,7 @@ void Daemon::open_journal() {
         }
     }
     campaign_.take_over_proofs(std::move(proofs));
+    if (!book_.trouble().empty()) log(Severity::warning, "commissioning", book_.trouble());
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign) offer_unfinished(*campaign);
     journal_->on_written([this] { control_waiter_->wake(); });
@@ -194,6 +195,12 @@ std::string Daemon::rate_misfit() const {
         view.sample.time != 0 && clock_.now() - view.sample.time <= 2 * drivers::kSecond;
     const auto rate = sampled ? view.rate : rt::RateMeter{};
     const double configured = 1 / drivers::to_seconds(configuration_.assembler.sample_period);
+    if (const auto link = port_->state(); link != drivers::PortState::running) {
+        const auto& port = configuration_.can;
+        return fmt::format("the CAN bus is lost: {}: {}",
+                           port.path.empty() ? port.interface : port.path, drivers::name_of(link));
+    }
+    if (!sampled) return "the rig is silent: no complete sample for 2 s";
     const auto measured = [&rate] {
         return rate.hz() == 0 ? std::string("no sample rate measured yet")
                               : fmt::format("{:.4g} samples/s measured", rate.hz());
@@ -261,17 +268,14 @@ void Daemon::tell_alarms() {
         if (!row.raised) {
             log(Severity::info, "interlock", fmt::format("{}: over", row.rule->name));
         } else if (condition.has_limit()) {
-            raise_alarm(fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name,
-                                    condition.text, row.value, row.rule->limit, condition.unit));
+            log(Severity::alarm, "interlock",
+                fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
+                            row.value, row.rule->limit, condition.unit));
         } else {
-            raise_alarm(fmt::format("{}: {}", row.rule->name, condition.text));
+            log(Severity::alarm, "interlock",
+                fmt::format("{}: {}", row.rule->name, condition.text));
         }
     }
-}
-
-void Daemon::raise_alarm(const std::string& text) {
-    log(Severity::alarm, "interlock", text);
-    annunciator_->announce(drivers::HornPattern::alarm, text);
 }
 
 void Daemon::tell_controller() {

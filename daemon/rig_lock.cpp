@@ -1,6 +1,6 @@
 #include "daemon/rig_lock.hpp"
 
-#include <arpa/inet.h>
+#include <netdb.h>
 #include <poll.h>
 #include <spdlog/fmt/chrono.h>
 #include <sys/socket.h>
@@ -52,18 +52,26 @@ std::string absolute(const std::string& path) {
     return error ? path : found.string();
 }
 
-/// One spelling of an address; a name stays a name.
+std::string in_lower_case(std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+/// One spelling of the address that the name leads to now; where it leads nowhere, the name.
 std::string host_of(std::string host) {
-    std::ranges::transform(host, host.begin(), [](unsigned char c) { return std::tolower(c); });
-    if (host == "localhost") return "127.0.0.1";
-    for (const int family : {AF_INET, AF_INET6}) {
-        std::array<unsigned char, sizeof(in6_addr)> raw{};
-        std::array<char, INET6_ADDRSTRLEN> text{};
-        if (::inet_pton(family, host.c_str(), raw.data()) == 1 &&
-            ::inet_ntop(family, raw.data(), text.data(), text.size()) != nullptr)
-            return text.data();
-    }
-    return host;
+    host = in_lower_case(host);
+    addrinfo hints{};
+    hints.ai_family = AF_UNSPEC;
+    hints.ai_socktype = SOCK_STREAM;
+    addrinfo* found = nullptr;
+    if (::getaddrinfo(host.c_str(), nullptr, &hints, &found) != 0) return host;
+    std::array<char, NI_MAXHOST> text{};
+    // The first, which is the one that is connected to.
+    if (::getnameinfo(found->ai_addr, found->ai_addrlen, text.data(), text.size(), nullptr, 0,
+                      NI_NUMERICHOST) == 0)
+        host = text.data();
+    ::freeaddrinfo(found);
+    return host == "::1" ? "127.0.0.1" : host;
 }
 
 int make_socket() {
@@ -101,9 +109,14 @@ std::vector<std::string> RigLock::resources(const configuration::Configuration& 
     const auto& shaker = configuration.shaker;
     const bool socketcan = can.kind == CanPortSettings::Kind::socketcan;
     const bool tcp = shaker.transport == ShakerSettings::Transport::tcp;
-    return {"can:" + (socketcan ? can.interface : absolute(can.path)),
-            "modbus:" + (tcp ? host_of(shaker.host) + ":" + std::to_string(shaker.port)
-                             : absolute(shaker.device))};
+    const std::string port = ":" + std::to_string(shaker.port);
+    std::vector<std::string> all{
+        "can:" + (socketcan ? can.interface : absolute(can.path)),
+        "modbus:" + (tcp ? host_of(shaker.host) + port : absolute(shaker.device))};
+    // The name too: it may lead elsewhere the next time, or nowhere.
+    if (const auto name = "modbus:" + in_lower_case(shaker.host) + port; tcp && name != all[1])
+        all.push_back(name);
+    return all;
 }
 
 RigLock::RigLock(const configuration::Configuration& configuration, const std::string& path) {

@@ -37,6 +37,8 @@ const char* name_of(CampaignState state) noexcept {
             return "levelling";
         case CampaignState::checking:
             return "checking";
+        case CampaignState::commissioning:
+            return "commissioning";
     }
     return "unknown";
 }

@@ -31,12 +31,13 @@ enum class CampaignState : std::uint8_t {
     paused,   ///< at rest between positions, by command
     finished,
     aborted,
-    tripped,    ///< stopped by an interlock; latched until acknowledged
-    zeroing,    ///< azimuth slews at rest, for the accelerometers' zeros
-    levelling,  ///< at rest in position
-    checking,   ///< the loop, at a small level
+    tripped,        ///< stopped by an interlock; latched until acknowledged
+    zeroing,        ///< azimuth slews at rest, for the accelerometers' zeros
+    levelling,      ///< at rest in position
+    checking,       ///< the loop, at a small level
+    commissioning,  ///< gimbals move by a person's permission, the shaker rests
 };
-inline constexpr CampaignState kLastCampaignState = CampaignState::checking;
+inline constexpr CampaignState kLastCampaignState = CampaignState::commissioning;
 [[nodiscard]] const char* name_of(CampaignState state) noexcept;
 
 /// Latched until named persons acknowledge it; kept over restarts.
@@ -178,7 +179,18 @@ struct NoiseStatus {
         double tau_s = 0, ratio = 1, limit = 1;  ///< of a step of the mean in standard deviations
         const char* reading = "";
     };
+    /// Of one dwell, those with an alarm too.
+    struct Curve {
+        int run = 0, position = 0;
+        bool alarm = false;
+        std::vector<double> tau_s;
+        std::array<std::vector<double>, 3> deviation_deg_h;  ///< by gyro
+    };
+    static constexpr std::size_t kMostCurves = 128;
     std::array<Gyro, 3> gyros;
+    /// The dynamic surface: the newest dwells, oldest first; never null.
+    std::shared_ptr<const std::vector<Curve>> surface =
+        std::make_shared<const std::vector<Curve>>();
     double angle_in_force_arcsec = 0;
     double block_s = 0;
     std::uint32_t dwells = 0, dwells_left_out = 0;  ///< left out: flagged, too short or alarmed
@@ -419,7 +431,8 @@ struct CommandRequest {
         resume,
         abort,
         acknowledge,
-        selftest
+        selftest,
+        commission  ///< argument: what, as JSON
     } kind = Kind::abort;
     std::string by;        ///< named person
     std::string argument;  ///< what is acknowledged

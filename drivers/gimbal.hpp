@@ -57,6 +57,8 @@ class Gimbal {
                  bool increments = false) noexcept;
     /// Somebody may have turned the gimbals: the next slew takes no short cut.
     void forget_position() noexcept { here_deg_.reset(); }
+    /// Somebody knows from the readings: the next slew takes the direct way where that is shorter.
+    void stands_at(const std::array<double, 3>& position_deg) noexcept { here_deg_ = position_deg; }
     /// Lets the platform drift freely under its gyros: no torquing.
     void release(Time now) noexcept;
     /// Follows the platform's status; sends again what was not echoed. To be called at

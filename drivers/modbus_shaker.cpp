@@ -138,7 +138,7 @@ void ModbusShaker::run() noexcept {
 void ModbusShaker::work(Time now) {
     drop_void_set_point();
     const bool stop = stop_pending();
-    if (!stop) stop_tried_ = connect_tried_for_stop_ = ramp_tried_ = false;
+    if (!stop) stop_tried_ = connect_tried_for_stop_ = ramp_tried_ = joint_in_vain_ = false;
     if (!link_.connected()) {
         if (now >= next_attempt_ || (stop && !connect_tried_for_stop_)) return try_connect(now);
         return sleep_until(next_attempt_);
@@ -171,7 +171,8 @@ void ModbusShaker::try_connect(Time now) {
     const bool again = std::exchange(was_connected_, true);
     if (again) ++counts_.reconnects;
     polled_ = poll_refused_ = feed_refused_ = false;
-    stop_tried_ = joint_refused_ = false;
+    stop_tried_ = false;
+    if (!stop_pending()) joint_refused_ = false;
     timeout_seen_ = WatchdogTimeout::unread;
     timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
     // A lost reply must not cost the device a feed that it still waits for.
@@ -278,6 +279,8 @@ ModbusShaker::Written ModbusShaker::verify(const char* role, const proto::Regist
 
 /// Ramp 0 and run 0: down as fast as the controller's own soft stop. In one request where they lie
 /// side by side; else the ramp gets one short try, and then run 0 goes out whatever came back.
+/// After one request for both that did not end in run 0 read back they go as if they lay apart: a
+/// controller may take its ramp when run changes.
 Reply ModbusShaker::order_stop(std::span<const std::uint16_t> run) {
     const proto::ShakerRegisters& map = settings_.registers;
     Words ramp_words = present(map.ramp_time);
@@ -285,7 +288,8 @@ Reply ModbusShaker::order_stop(std::span<const std::uint16_t> run) {
     static_cast<void>(proto::encode(map.ramp_time, 0, ramp));  // fits every type
     const bool ramp_first = map.ramp_time.address + ramp.size() == map.run.address;
     const bool run_first = map.run.address + run.size() == map.ramp_time.address;
-    if ((ramp_first || run_first) && !joint_refused_) {
+    if ((ramp_first || run_first) && !joint_refused_ && !joint_in_vain_) {
+        joint_in_vain_ = true;  // until the stop is done
         std::array<std::uint16_t, 4> words{};
         const auto second = std::ranges::copy(ramp_first ? ramp : run, words.begin()).out;
         std::ranges::copy(ramp_first ? run : ramp, second);
@@ -294,22 +298,27 @@ Reply ModbusShaker::order_stop(std::span<const std::uint16_t> run) {
                                std::span(words).first(ramp.size() + run.size()));
         });
         if (reply.kind != ReplyKind::exception) return reply;
+        // It is there and takes one register at a time.
         joint_refused_ = true;
+        joint_in_vain_ = false;
     }
-    if (!std::exchange(ramp_tried_, true)) {
-        link_.respond_within(std::min(settings_.stop_ramp_timeout, settings_.response_timeout));
-        const Reply reply = write(map.ramp_time, ramp);
-        link_.respond_within(settings_.response_timeout);
-        if (!link_.connected()) {
-            next_attempt_ = clock_.now();  // run 0 is next, on a link without a late reply
-            return reply;
-        }
-    }
-    return write(map.run, run);
+    const Reply reply = try_ramp(ramp);
+    return link_.connected() ? write(map.run, run) : reply;
+}
+
+/// Once a stop. Without a link after it, run 0 is next on another, where no late reply is.
+Reply ModbusShaker::try_ramp(std::span<const std::uint16_t> ramp) {
+    if (std::exchange(ramp_tried_, true)) return {};
+    link_.respond_within(std::min(settings_.stop_ramp_timeout, settings_.response_timeout));
+    const Reply reply = write(settings_.registers.ramp_time, ramp);
+    link_.respond_within(settings_.response_timeout);
+    if (!link_.connected()) next_attempt_ = clock_.now();
+    return reply;
 }
 
 void ModbusShaker::write_stop(Time now) {
     stop_tried_ = true;
+    told_.reset();
     next_stop_ = now + settings_.backoff_min;
     // A stop at rest may make the device forget the fault that it holds. What a process finds at
     // its first connection is looked at before; one look, whatever comes of it.
@@ -321,15 +330,21 @@ void ModbusShaker::write_stop(Time now) {
     Words words = present(run);
     const auto raw = std::span(words).first(run.words());
     static_cast<void>(proto::encode(run, 0, raw));
+    const bool alone = joint_in_vain_;
     const Reply reply = order_stop(raw);
     if (reply.kind == ReplyKind::exception) {
         write_failed_ = true;
         settle("stop refused: " + reply.text());
     }
-    if (!reply.ok()) return;
-    ++counts_.stops_written;
-    if (on_stop_written_) on_stop_written_();
-    if (verify("run", run, raw) != Written::as_told) return;
+    if (reply.ok()) {
+        ++counts_.stops_written;
+        if (on_stop_written_) on_stop_written_();
+    }
+    const bool done =
+        reply.ok() && link_.connected() && verify("run", run, raw) == Written::as_told;
+    // What one request for both did not do waits for no turn.
+    if (!done && joint_in_vain_ && !alone) next_stop_ = next_attempt_ = clock_.now();
+    if (!done) return;
     orders_.stop_done();
     drop_void_set_point();
     write_failed_ = false;
@@ -347,10 +362,12 @@ void ModbusShaker::drop_void_set_point() noexcept {
 void ModbusShaker::write_set_point() {
     const auto set_point = orders_.take();
     if (!set_point) return;
+    told_.reset();
     if (!write_steps(*set_point)) {
         if (outranked() || !link_.connected()) ++counts_.set_points_discarded;
     } else {
         ++counts_.set_points_written;
+        if (set_point->amplitude_g > 0) told_ = set_point;
     }
     if (link_.connected() && !outranked())
         poll(clock_.now());  // a reading newer than the set-point, then not busy
@@ -475,9 +492,41 @@ void ModbusShaker::poll(Time now) {
     ShakerReading reading = image_.reading(now);
     reading.watchdog = timeout_seen_;
     reading.watchdog_timeout_s = timeout_read_s_;
-    latest_.store(reading);
-    settle("read back");
+    if (const auto changed = changed_by_others(reading); !changed.empty()) {
+        ++counts_.read_back_mismatches;
+        write_failed_ = true;
+        told_.reset();  // told once
+        latest_.store(reading);
+        settle(changed);
+    } else {
+        latest_.store(reading);
+        settle("read back");
+    }
     if (on_reading_) on_reading_();
+}
+
+std::string ModbusShaker::changed_by_others(const ShakerReading& reading) {
+    // A device that has stopped by itself and says so has a trip of its own.
+    if (!told_ || stop_pending() || reading.fault != 0 || reading.state == kShakerFault ||
+        reading.emergency_stop_open)
+        return {};
+    const proto::ShakerRegisters& map = settings_.registers;
+    const auto differs = [&](const char* role, const proto::Register& reg, double told) {
+        Words words = present(reg);
+        const auto ours = std::span(words).first(reg.words());
+        static_cast<void>(proto::encode(reg, told, ours));
+        const auto read = image_.words_of(reg);
+        return same_raw(reg, ours, read)
+                   ? std::string()
+                   : std::string(role) + " was changed by another: reads back as " +
+                         std::to_string(proto::decode(reg, read)) + ", was told " +
+                         std::to_string(proto::decode(reg, ours));
+    };
+    std::string found = differs("frequency", map.frequency, told_->frequency_hz);
+    if (found.empty()) found = differs("amplitude", map.amplitude, told_->amplitude_g);
+    if (found.empty()) found = differs("ramp time", map.ramp_time, told_->ramp_s);
+    if (found.empty()) found = differs("run", map.run, 1);
+    return found;
 }
 
 void ModbusShaker::settle(const std::string& why) {

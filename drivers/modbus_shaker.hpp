@@ -4,6 +4,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -75,6 +76,7 @@ class ModbusShaker final : public Shaker {
 
     void write_stop(Time now);
     [[nodiscard]] Reply order_stop(std::span<const std::uint16_t> run);
+    [[nodiscard]] Reply try_ramp(std::span<const std::uint16_t> ramp);
     void write_set_point();
     [[nodiscard]] bool write_steps(const ShakerSetPoint& set_point);
     void drop_void_set_point() noexcept;
@@ -85,6 +87,8 @@ class ModbusShaker final : public Shaker {
     /// After so long without a feed the device stops.
     [[nodiscard]] Time watchdog_timeout() const noexcept { return 3 * settings_.watchdog_period; }
     void poll(Time now);
+    /// Registers that no longer hold what the table was told; empty: they do.
+    [[nodiscard]] std::string changed_by_others(const ShakerReading& reading);
 
     void settle(const std::string& why);
     void set_state(LinkState state, const std::string& text);
@@ -119,9 +123,11 @@ class ModbusShaker final : public Shaker {
     bool stop_tried_ = false, connect_tried_for_stop_ = false;
     bool ramp_tried_ = false;     ///< of the stop at hand
     bool joint_refused_ = false;  ///< the device takes one register at a time
+    bool joint_in_vain_ = false;  ///< of the stop at hand: ordered so, and not read back as done
     bool timeout_due_ = false;    ///< the watchdog's timeout is to be written
     WatchdogTimeout timeout_seen_ = WatchdogTimeout::unread;
     double timeout_read_s_ = 0;
+    std::optional<ShakerSetPoint> told_;  ///< what the table does by our word; none: at rest
     std::uint16_t feed_ = 0;
     Time backoff_ = 0;
     Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0, next_look_ = 0;

@@ -38,6 +38,8 @@ struct ShakerSettings {
 /// them are the timeout.
 inline constexpr Time kLongestWatchdogTimeout = 3 * kSecond;
 inline constexpr Time kLongestWatchdogPeriod = kLongestWatchdogTimeout / 3;
+/// An emergency-stop chain that opens is to be seen within half a second.
+inline constexpr Time kLongestPollPeriod = 500 * kMillisecond;
 
 /// What is asked of the shaker. Frequency may only change while the amplitude is zero (checked by
 /// the campaign).

@@ -5,6 +5,7 @@
 
 #include "estimator/drift_filter.hpp"
 #include "estimator/dwell_row.hpp"
+#include "estimator/normal_sums.hpp"
 #include "estimator/two_step.hpp"
 
 namespace vibrig::estimator {
@@ -38,12 +39,14 @@ class BatchSolver {
     /// Coefficients, a drift of each gyro that grows along the dwell, the angles.
     static constexpr Eigen::Index kRamps = static_cast<Eigen::Index>(kParameters);
     static constexpr Eigen::Index kColumns = kRamps + 4;
-    static constexpr Eigen::Index kReadingsPerBlock = 8;
-    using Columns = Eigen::Matrix<double, 3, kColumns>;
+    static constexpr std::size_t kReadingsPerBlock = NormalSums::kRows / 3;
+    static_assert(kColumns <= static_cast<Eigen::Index>(NormalSums::kColumns));
     using Sums = Eigen::Matrix<double, kColumns, kColumns>;
 
     void add_block() noexcept;
+    [[nodiscard]] Sums of_dwell() const noexcept;
 
+    const NormalSums* kernel_ = &normal_sums();
     Kinematics kinematics_;
     DriftModel model_;
     FilterNoise noise_;
@@ -56,11 +59,12 @@ class BatchSolver {
     bool started_ = false;
     /// Integrated regressors and, last, the angles less the Earth's share, arcsec; each less the
     /// local level that random walk and encoder noise leave known.
-    Columns difference_ = Columns::Zero();
+    alignas(64) NormalSums::Angles difference_{};
     Eigen::Matrix3d walked_ = Eigen::Matrix3d::Zero();  ///< variance of that level, arcsec^2
-    Eigen::Matrix<double, 3 * kReadingsPerBlock, kColumns> block_;
-    Eigen::Index in_block_ = 0;
-    Sums of_dwell_ = Sums::Zero(), kept_ = Sums::Zero();
+    alignas(64) double block_[NormalSums::kRows][NormalSums::kColumns]{};
+    std::size_t in_block_ = 0;  ///< readings
+    alignas(64) double of_dwell_[NormalSums::kColumns][NormalSums::kColumns]{};
+    Sums kept_ = Sums::Zero();
 };
 
 }  // namespace vibrig::estimator

@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 
+#include "estimator/product.hpp"
+
 namespace vibrig::estimator {
 
 DriftModel::DriftModel(const Settings& settings) : axes_{}, sign_(settings.drift_sign) {
@@ -70,7 +72,7 @@ Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, const Eigen::Matrix3d& mo
         q(i, s) = q(s, i) = 0.5 * si * ss * d(kDis);
         q(i, o) = q(o, i) = 0.5 * si * so * d(kDio);
         q(o, s) = q(s, o) = 0.5 * so * ss * d(kDos);
-        const Eigen::Matrix3d a = moment * q;
+        const Eigen::Matrix3d a = product(moment, q);
         turning.row(static_cast<Eigen::Index>(j)) =
             pose.up.cross(linear) +
             2.0 * Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0));

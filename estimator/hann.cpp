@@ -6,23 +6,31 @@
 
 namespace vibrig::estimator {
 
-HannMeans hann_means(const double* ring, std::size_t capacity, std::size_t begin,
-                     std::size_t count) noexcept {
-    if (count == 0) return {};
+void HannWindow::weigh(std::size_t count) noexcept {
+    weights_.clear();
     // cos(2 pi (i + 1/2) / n) by rotation: one sine and cosine per call.
     const double step = 2.0 * kPi / static_cast<double>(count);
     const double cs = std::cos(step), sn = std::sin(step);
     double c = std::cos(step / 2.0), s = std::sin(step / 2.0);
-    double sum = 0, square = 0;
-    std::size_t at = begin;
     for (std::size_t i = 0; i < count; ++i) {
-        const double value = ring[at];
-        const double weighted = (1.0 - c) * value;
-        sum += weighted;
-        square += weighted * value;
+        weights_.push_back(1.0 - c);
         const double next = c * cs - s * sn;
         s = s * cs + c * sn;
         c = next;
+    }
+}
+
+HannMeans HannWindow::means(const double* ring, std::size_t capacity, std::size_t begin,
+                            std::size_t count) noexcept {
+    if (count == 0) return {};
+    if (weights_.size() != count) weigh(count);
+    double sum = 0, square = 0;
+    std::size_t at = begin;
+    for (const double weight : weights_) {
+        const double value = ring[at];
+        const double weighted = weight * value;
+        sum += weighted;
+        square += weighted * value;
         if (++at == capacity) at = 0;
     }
     // A single sample has weight 2; otherwise the cosines sum to zero.

@@ -11,9 +11,19 @@ struct HannMeans {
     double mean = 0, mean_square = 0;
 };
 
-/// Mean over `count` samples of a ring of `capacity`, the first at index `begin`.
-[[nodiscard]] HannMeans hann_means(const double* ring, std::size_t capacity, std::size_t begin,
-                                   std::size_t count) noexcept;
+/// Over a window of a ring. The weights stay for the next window if that is as long. Never
+/// allocates after construction.
+class HannWindow {
+  public:
+    explicit HannWindow(std::size_t most) { weights_.reserve(most); }
+    /// Means over `count` samples of a ring of `capacity`, the first at index `begin`.
+    [[nodiscard]] HannMeans means(const double* ring, std::size_t capacity, std::size_t begin,
+                                  std::size_t count) noexcept;
+
+  private:
+    void weigh(std::size_t count) noexcept;
+    std::vector<double> weights_;
+};
 
 /// The same over all samples given, however many: n is not known in advance, so moments of blocks
 /// are kept and the weight is developed to second order about each block's centre. Blocks merge in

@@ -31,8 +31,9 @@ bool finite(const Container& values) noexcept {
 Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
     : settings(checked(s)),
       prior(prior_sigma(s)),
-      filters{RunFilter(s, s.method == Method::joint ? prior : two_step_prior(prior)),
-              RunFilter(s, two_step_prior(prior))},
+      filters{
+          RunFilter(s, s.method == Method::joint || s.all_at_once ? prior : two_step_prior(prior)),
+          RunFilter(s, two_step_prior(prior))},
       noise(noise_levels(s)),
       kinematics_(s),
       accelerometer_zero_(s.accelerometer_zero_g[0], s.accelerometer_zero_g[1],
@@ -257,7 +258,8 @@ void Identification::Impl::refresh_vibration() noexcept {
 
 StepResult Identification::Impl::through_filter(const Reading& reading) noexcept {
     StepResult step;
-    if (reading.force_good) paper_.add(reading.time_s, reading.force.squaredNorm());
+    if (reading.force_good && settings.method == Method::two_step)
+        paper_.add(reading.time_s, reading.force.squaredNorm());
     if (!reading.angles_good) {
         step.outcome = StepOutcome::bad_angles;
     } else {
@@ -426,6 +428,8 @@ void Identification::set_noise(const NoiseLevels& levels) noexcept {
 }
 const NoiseLevels& Identification::noise() const noexcept { return impl_->noise; }
 Result Identification::result() const { return impl_->result(); }
+
+const std::vector<DwellRow>& Identification::rows() const noexcept { return impl_->rows; }
 
 std::vector<double> Identification::covariance() const {
     std::vector<double> rows;

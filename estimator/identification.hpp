@@ -67,6 +67,8 @@ struct Settings {
     double accelerometer_g = 1e-4;
     // estimator
     Method method = Method::joint;
+    /// Two-step: D_OO is not fixed, as in a run of its own (Tang et al. 2009, trial 3).
+    bool all_at_once = false;
     double prior_bias = 10.0;      ///< deg/h, 1 sigma
     double prior_linear = 10.0;    ///< deg/h/g
     double prior_quadratic = 1.0;  ///< deg/h/g^2
@@ -90,6 +92,7 @@ struct Measurement {
 struct NoiseLevels {
     double angle_arcsec = 0;  ///< of one encoder reading, quantisation included
     std::array<double, 3> gyro_random_walk_deg_per_rt_h{};
+    bool operator==(const NoiseLevels&) const = default;
 };
 [[nodiscard]] NoiseLevels noise_levels(const Settings& settings) noexcept;
 
@@ -221,6 +224,8 @@ class Identification {
     [[nodiscard]] const NoiseLevels& noise() const noexcept;
     /// Final result over all ended dwells. Allocates; does not change the filter.
     [[nodiscard]] Result result() const;
+    /// Those of result(), without a copy.
+    [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
     /// Of the coefficients after the last ended dwell, 30 x 30 row-major in the order of
     /// parameter_names(), whether or not they are observable. Allocates.
     [[nodiscard]] std::vector<double> covariance() const;

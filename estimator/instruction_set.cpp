@@ -88,6 +88,12 @@ void use_instruction_set(std::string_view name) {
                         " on this processor");
 }
 
-const UdKernel& ud_kernel() noexcept { return *chosen()->kernel; }
+const UdKernel& ud_kernel() noexcept {
+#ifdef VIBRIG_X86_KERNELS
+    static const bool wide = __builtin_cpu_supports("avx2") != 0;
+    if (wide && chosen()->kernel == &kUdKernelBaseline) return kUdKernelBaselineWide;
+#endif
+    return *chosen()->kernel;
+}
 
 }  // namespace vibrig::estimator

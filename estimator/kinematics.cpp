@@ -2,14 +2,18 @@
 
 #include <cmath>
 
+#include "estimator/product.hpp"
+
 namespace vibrig::estimator {
 namespace {
 constexpr double kRadPerDeg = kPi / 180.0;
 }
 
 double wrap(double angle_rad) noexcept {
-    // std::remainder gives the same, slowly.
-    return std::abs(angle_rad) <= kPi ? angle_rad : std::remainder(angle_rad, 2.0 * kPi);
+    // std::remainder gives the same, slowly: up to one and a half turns the difference is exact.
+    if (std::abs(angle_rad) <= kPi) return angle_rad;
+    if (std::abs(angle_rad) < 9.4) return angle_rad - std::copysign(2.0 * kPi, angle_rad);
+    return std::remainder(angle_rad, 2.0 * kPi);
 }
 
 double wrap_next_to(double angle_rad, double reference_rad) noexcept {
@@ -93,7 +97,7 @@ Pose Kinematics::pose(const Eigen::Vector3d& angles_rad) const noexcept {
     pose.axis[0] = {cg * cb, sg * cb, -sb};
     pose.axis[1] = {-sg, cg, 0.0};
     pose.axis[2] = {0.0, 0.0, 1.0};
-    pose.level = pose.c * level_;
+    pose.level = product(pose.c, level_);
     pose.up = pose.level.col(1);
     pose.earth_rate = pose.c * earth_rate_;
     return pose;

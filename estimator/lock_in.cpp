@@ -62,43 +62,90 @@ double phasor_slope(const Window& w, double w0, double mean) noexcept {
     return det > 1e-12 * sw * stt ? w0 + (sw * stp - st * sp) / det : w0;
 }
 
-/// Least squares of [1, cos wt, sin wt, cos 2wt, sin 2wt, d/dw] about the present frequency;
-/// returns the change of w.
-double refine(const Window& w, double omega, bool with_frequency, Vibration& v) noexcept {
-    Matrix6 normal = Matrix6::Zero();
-    Vector6 right = Vector6::Zero();
+/// The valid readings with c = cos wt, s = sin wt, by turning.
+template <typename Take>
+void each_reading(const Window& w, double omega, Take&& take) noexcept {
     const double c1 = std::cos(omega * w.period_s), s1 = std::sin(omega * w.period_s);
     double c = 1, s = 0;
     std::size_t at = w.begin;
     for (std::size_t i = 0; i < w.count; ++i) {
-        if (w.valid[at]) {
-            const double t = static_cast<double>(i) * w.period_s;
-            const double slope =
-                with_frequency ? t * (v.sine * c - v.cosine * s +
-                                      2.0 * (v.sine2 * (c * c - s * s) - 2.0 * v.cosine2 * s * c))
-                               : 0.0;
-            Vector6 row;
-            row << 1.0, c, s, c * c - s * s, 2.0 * s * c, slope;
-            normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
-            right += row * w.value[at];
-        }
+        if (w.valid[at]) take(static_cast<double>(i) * w.period_s, c, s, w.value[at]);
         const double next = c * c1 - s * s1;
         s = s * c1 + c * s1;
         c = next;
         if (++at == w.capacity) at = 0;
     }
-    // Columns that coincide at this sampling (2f on f, or constant) share their part instead of
-    // exploding.
-    const double ridge = 1e-9 * static_cast<double>(w.count);
-    for (int k = 0; k < 6; ++k) normal(k, k) += ridge;
-    const Vector6 x = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
-    v.mean = x[0];
-    v.cosine = x[1];
-    v.sine = x[2];
-    v.cosine2 = x[3];
-    v.sine2 = x[4];
-    return with_frequency ? x[5] : 0.0;
 }
+
+Eigen::Vector4d lines_of(double c, double s) noexcept { return {c, s, c * c - s * s, 2.0 * s * c}; }
+
+/// Least squares of [1, cos wt, sin wt, cos 2wt, sin 2wt, d/dw] about a frequency. What the last
+/// column does not take part in is summed once for both fits there.
+class LineFit {
+  public:
+    LineFit(const Window& window, double omega) noexcept : window_(window), omega_(omega) {
+        double count = 0, value = 0;
+        Eigen::Vector4d lines = Eigen::Vector4d::Zero(), right = lines;
+        Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
+        each_reading(window, omega, [&](double, double c, double s, double reading) {
+            const Eigen::Vector4d row = lines_of(c, s);
+            count += 1.0;
+            value += reading;
+            lines += row;
+            right += row * reading;
+            // All of it, unrolled: rankUpdate() of half costs more than all the rest here.
+            products.noalias() += row.lazyProduct(row.transpose());
+        });
+        normal_(0, 0) = count;
+        normal_.block<4, 1>(1, 0) = lines;
+        normal_.block<4, 4>(1, 1) = products;
+        right_[0] = value;
+        right_.segment<4>(1) = right;
+    }
+
+    void solve(Vibration& v) const noexcept { static_cast<void>(solve(normal_, right_, v)); }
+
+    /// With the last column, about `v`, which is refined; returns the change of w.
+    [[nodiscard]] double solve_for_frequency(Vibration& v) const noexcept {
+        double one = 0, square = 0, value = 0;
+        Eigen::Vector4d lines = Eigen::Vector4d::Zero();
+        each_reading(window_, omega_, [&](double t, double c, double s, double reading) {
+            const double slope = t * (v.sine * c - v.cosine * s +
+                                      2.0 * (v.sine2 * (c * c - s * s) - 2.0 * v.cosine2 * s * c));
+            one += slope;
+            lines += slope * lines_of(c, s);
+            square += slope * slope;
+            value += slope * reading;
+        });
+        Matrix6 normal = normal_;
+        normal(5, 0) = one;
+        normal.block<1, 4>(5, 1) = lines.transpose();
+        normal(5, 5) = square;
+        Vector6 right = right_;
+        right[5] = value;
+        return solve(normal, right, v);
+    }
+
+  private:
+    double solve(Matrix6 normal, const Vector6& right, Vibration& v) const noexcept {
+        // Columns that coincide at this sampling (2f on f, or constant) share their part instead of
+        // exploding.
+        const double ridge = 1e-9 * static_cast<double>(window_.count);
+        for (int k = 0; k < 6; ++k) normal(k, k) += ridge;
+        const Vector6 x = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+        v.mean = x[0];
+        v.cosine = x[1];
+        v.sine = x[2];
+        v.cosine2 = x[3];
+        v.sine2 = x[4];
+        return x[5];
+    }
+
+    Window window_;
+    double omega_;
+    Matrix6 normal_ = Matrix6::Zero();  ///< on and below the diagonal
+    Vector6 right_ = Vector6::Zero();
+};
 
 }  // namespace
 
@@ -135,13 +182,15 @@ Vibration lock_in(const Window& window, double nominal_hz) noexcept {
     double omega = phasor_slope(window, nominal, v.mean);
     // More than one step of the phasor per 2 s away is no lock.
     if (!std::isfinite(omega) || std::abs(omega - nominal) > 2.0 * kPi * 3.0) omega = nominal;
-    refine(window, omega, false, v);
+    LineFit fit(window, omega);
+    fit.solve(v);
     const double span = static_cast<double>(window.count) * window.period_s;
     for (int pass = 0; pass < 2 && std::hypot(v.cosine, v.sine) > kLeastAmplitude; ++pass) {
-        const double change = refine(window, omega, true, v);
+        const double change = fit.solve_for_frequency(v);
         if (!std::isfinite(change) || std::abs(change) > 2.0 / span) break;
         omega += change;
-        refine(window, omega, false, v);
+        fit = LineFit(window, omega);
+        fit.solve(v);
     }
     v.frequency_hz = omega / (2.0 * kPi);
     v.amplitude = std::hypot(v.cosine, v.sine);

@@ -1,8 +1,8 @@
 #include "estimator/saturation_detector.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace vibrig::estimator {
 namespace {
@@ -38,11 +38,9 @@ void SaturationDetector::add(const std::array<double, 3>& force_g) noexcept {
     for (std::size_t k = 0; k < 3; ++k) {
         Axis& a = axes_[k];
         const double reading = force_g[k];
-        double nearest = std::numeric_limits<double>::infinity();
-        for (std::size_t i = 0; i < std::min<std::size_t>(a.count, kKept); ++i) {
-            nearest = std::min(nearest, std::abs(reading - a.kept[i]));
-        }
-        if (a.count > 0 && nearest > kSame * noise_g_) ++a.moved;
+        const auto kept = Eigen::Map<const Eigen::ArrayXd>(
+            a.kept.data(), static_cast<Eigen::Index>(std::min<std::size_t>(a.count, kKept)));
+        if (a.count > 0 && (reading - kept).abs().minCoeff() > kSame * noise_g_) ++a.moved;
         if (range_g_ > 0 && std::abs(reading) >= range_g_ * (1 - kRounding)) ++a.beyond;
         a.kept[a.count % kKept] = reading;
         ++a.count;

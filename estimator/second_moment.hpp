@@ -4,6 +4,7 @@
 
 #include "estimator/identification.hpp"
 #include "estimator/kinematics.hpp"
+#include "estimator/product.hpp"
 
 namespace vibrig::estimator {
 
@@ -17,7 +18,7 @@ namespace vibrig::estimator {
     level << excess * g[0], excess * g[3], excess * g[4],   //
         excess * g[3], 1.0 + excess * g[1], excess * g[5],  //
         excess * g[4], excess * g[5], excess * g[2];
-    return pose.level * level * pose.level.transpose();
+    return product(product(pose.level, level), pose.level.transpose());
 }
 
 }  // namespace vibrig::estimator

@@ -17,6 +17,8 @@ struct UdKernel {
 
 extern const UdKernel kUdKernelBaseline;  ///< any machine of this architecture (x86-64: SSE2)
 #ifdef VIBRIG_X86_KERNELS
+/// What the baseline computes, to the last bit, with AVX2's registers.
+extern const UdKernel kUdKernelBaselineWide;
 extern const UdKernel kUdKernelAvx2;  ///< with FMA
 extern const UdKernel kUdKernelAvx512;
 #endif

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/kinematics.hpp"
 
@@ -22,7 +23,8 @@ VibrationLevel::VibrationLevel(double window_s, double noise_g, double nominal_h
       noise_g_(noise_g),
       nominal_hz_(nominal_hz),
       ring_(static_cast<std::size_t>(window_s * kHighestRate_hz)),
-      valid_(std::make_unique<bool[]>(ring_.size())) {}
+      valid_(std::make_unique<bool[]>(ring_.size())),
+      hann_(ring_.size()) {}
 
 void VibrationLevel::begin(double period_s) noexcept {
     period_s_ = period_s;
@@ -32,10 +34,12 @@ void VibrationLevel::begin(double period_s) noexcept {
     next_ = filled_ = since_refresh_ = since_fit_ = fit_age_ = 0;
     whole_.clear();
     fit_ = {};
+    fit_is_due_ = false;
     kappa_ = 1;
 }
 
 void VibrationLevel::push(double value, bool valid) noexcept {
+    if (fit_age_ >= ring_.size()) static_cast<void>(fitted());  // before its window is written over
     ring_[next_] = value;
     valid_[next_] = valid;
     if (++next_ == ring_.size()) next_ = 0;
@@ -45,7 +49,7 @@ void VibrationLevel::push(double value, bool valid) noexcept {
 void VibrationLevel::prime() noexcept {
     fit(filled_);
     for (std::size_t i = 0; i < filled_; ++i) {
-        if (!valid_[i]) ring_[i] = fit_.at(static_cast<double>(i) * period_s_);
+        if (!valid_[i]) ring_[i] = fitted().at(static_cast<double>(i) * period_s_);
         whole_.add(ring_[i]);
     }
     refresh();
@@ -61,7 +65,7 @@ void VibrationLevel::add(double vertical_force_g) noexcept {
 void VibrationLevel::add_missing() noexcept {
     // A hole would not average out: one missing peak of 6 g in 400 samples moves the mean by 3 %.
     if (since_fit_ >= refresh_every_) fit(std::min(filled_, samples_in(kFirstWindow_s, period_s_)));
-    const double value = fit_.at(static_cast<double>(fit_age_) * period_s_);
+    const double value = fitted().at(static_cast<double>(fit_age_) * period_s_);
     push(value, false);
     whole_.add(value);
     ++fit_age_;
@@ -78,13 +82,13 @@ void VibrationLevel::refresh() noexcept {
     since_refresh_ = 0;
     const std::size_t n = std::min(filled_, window_);
     const std::size_t begin = (next_ + ring_.size() - n) % ring_.size();
-    HannMeans means = hann_means(ring_.data(), ring_.size(), begin, n);
+    HannMeans means = hann_.means(ring_.data(), ring_.size(), begin, n);
     if (n <= 2 * samples_in(kFirstWindow_s, period_s_)) remove_leakage(means, n);
     kappa_ = kappa_of(means);
 }
 
 void VibrationLevel::remove_leakage(HannMeans& means, std::size_t n) const noexcept {
-    if (!(fit_.amplitude > 0) || fit_age_ < n) return;
+    if (fit_age_ < n || !(fitted().amplitude > 0)) return;
     // Lines that alias on one another are not told apart by the fit.
     const double span_s = static_cast<double>(n) * period_s_;
     for (const int order : {2, 3, 4}) {
@@ -106,10 +110,16 @@ void VibrationLevel::remove_leakage(HannMeans& means, std::size_t n) const noexc
 
 void VibrationLevel::fit(std::size_t samples) noexcept {
     since_fit_ = 0;
-    const std::size_t begin = (next_ + ring_.size() - samples) % ring_.size();
-    fit_ =
-        lock_in({ring_.data(), valid_.get(), ring_.size(), begin, samples, period_s_}, nominal_hz_);
-    fit_age_ = samples;
+    fit_begin_ = (next_ + ring_.size() - samples) % ring_.size();
+    fit_samples_ = fit_age_ = samples;
+    fit_is_due_ = true;
+}
+
+const Vibration& VibrationLevel::fitted() const noexcept {
+    if (!std::exchange(fit_is_due_, false)) return fit_;
+    return fit_ = lock_in(
+               {ring_.data(), valid_.get(), ring_.size(), fit_begin_, fit_samples_, period_s_},
+               nominal_hz_);
 }
 
 double VibrationLevel::kappa_of(const HannMeans& means) const noexcept {
@@ -127,7 +137,7 @@ VibrationLevel::Whole VibrationLevel::whole() const noexcept {
 double VibrationLevel::amplitude_g() const noexcept { return std::sqrt(2.0 * (kappa_ - 1.0)); }
 
 double VibrationLevel::frequency_hz() const noexcept {
-    return kappa_ > 1.0 ? fit_.frequency_hz : 0.0;
+    return kappa_ > 1.0 ? fitted().frequency_hz : 0.0;
 }
 
 bool VibrationLevel::excluded(double frequency_hz, double period_s, double window_s,

@@ -40,7 +40,7 @@ class VibrationLevel {
     [[nodiscard]] double frequency_hz() const noexcept;
     /// Phase, rad, of A1 = a0 sin(w t + phase) with t from the first sample of the window of the
     /// last fit.
-    [[nodiscard]] const Vibration& vibration() const noexcept { return fit_; }
+    [[nodiscard]] const Vibration& vibration() const noexcept { return fitted(); }
     [[nodiscard]] std::size_t count() const noexcept { return whole_.count(); }
 
     struct Whole {
@@ -64,7 +64,9 @@ class VibrationLevel {
     void push(double value, bool valid) noexcept;
     void after_push() noexcept;
     void refresh() noexcept;
+    /// To the newest samples; done when somebody asks for it, mostly nobody does.
     void fit(std::size_t samples) noexcept;
+    const Vibration& fitted() const noexcept;
     /// Takes out of short windows what the lines of the fitted vibration leak into the means.
     void remove_leakage(HannMeans& means, std::size_t n) const noexcept;
     [[nodiscard]] double kappa_of(const HannMeans& means) const noexcept;
@@ -73,11 +75,14 @@ class VibrationLevel {
     double period_s_ = 0;  ///< begin() knows it
     std::vector<double> ring_;
     std::unique_ptr<bool[]> valid_;
+    HannWindow hann_;
     std::size_t next_ = 0, filled_ = 0;
     std::size_t window_ = 0, refresh_every_ = 1, fit_every_ = 1;
     std::size_t since_refresh_ = 0, since_fit_ = 0;
     GrowingHann whole_;
-    Vibration fit_;
+    mutable Vibration fit_;
+    mutable bool fit_is_due_ = false;
+    std::size_t fit_begin_ = 0, fit_samples_ = 0;  ///< its window in the ring
     std::size_t fit_age_ = 0;  ///< samples since the first sample of the fitted window
     double kappa_ = 1;
 };

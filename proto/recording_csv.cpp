@@ -85,6 +85,12 @@ class RecordingReader {
         return rows;
     }
 
+    /// Of the header alone.
+    bool has(std::string_view column) {
+        read_header();
+        return std::ranges::any_of(fields_, [&](auto name) { return same(column, name); });
+    }
+
   private:
     [[noreturn]] void fail(std::string_view column, const std::string& what) const {
         throw RecordingError(path_, lines_.line(), std::string(column), what);
@@ -297,5 +303,7 @@ RecordingError::RecordingError(const std::string& file, std::size_t line, const 
 std::vector<RecordingRow> read_recording(const std::string& path) {
     return RecordingReader(path).run();
 }
+
+bool says_simulated(const std::string& path) { return RecordingReader(path).has("simulated"); }
 
 }  // namespace vibrig::proto

@@ -40,8 +40,11 @@ class RecordingError : public std::runtime_error {
 /// begins a new dwell. Throws RecordingError.
 [[nodiscard]] std::vector<RecordingRow> read_recording(const std::string& path);
 
-/// Writes what read_recording() reads, every number with the digits that give it back exactly.
-/// Throws RecordingError.
-void write_recording(const std::string& path, std::span<const RecordingRow> rows);
+/// Writes what read_recording() reads, every number with the digits that give it back exactly. Of a
+/// simulated rig each row says so, in a last column `simulated`. Throws RecordingError.
+void write_recording(const std::string& path, std::span<const RecordingRow> rows,
+                     bool simulated = false);
+/// True where the header names the column `simulated`. Throws RecordingError.
+[[nodiscard]] bool says_simulated(const std::string& path);
 
 }  // namespace vibrig::proto

@@ -24,13 +24,14 @@ void append(std::string& text, Number value, char after) {
 
 }  // namespace
 
-void write_recording(const std::string& path, std::span<const RecordingRow> rows) {
+void write_recording(const std::string& path, std::span<const RecordingRow> rows, bool simulated) {
     const auto fail = [&](const char* what) {
         throw RecordingError(path, 0, "", std::string(what) + std::strerror(errno));
     };
     std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "wb"));
     if (!file) fail("cannot be opened for writing: ");
-    std::string text = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
+    std::string text = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g";
+    text += simulated ? ",simulated\n" : "\n";
     const auto flush = [&] {
         if (std::fwrite(text.data(), 1, text.size(), file.get()) != text.size()) {
             fail("cannot be written: ");
@@ -45,7 +46,8 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
         for (const double angle : row.angle_deg) append(text, angle, ',');
         append(text, row.force_g[0], ',');
         append(text, row.force_g[1], ',');
-        append(text, row.force_g[2], '\n');
+        append(text, row.force_g[2], simulated ? ',' : '\n');
+        if (simulated) text += "1\n";
         if (text.size() > kChunk) flush();
     }
     flush();

@@ -79,6 +79,13 @@ std::string utf8_from_latin1(std::string_view text) {
     return out;
 }
 
+std::string_view trimmed(std::string_view field) noexcept {
+    constexpr std::string_view kAround = " \t\r\"";
+    const std::size_t first = field.find_first_not_of(kAround);
+    if (first == std::string_view::npos) return {};
+    return field.substr(first, field.find_last_not_of(kAround) - first + 1);
+}
+
 std::string read_whole_file(const std::string& path, std::size_t limit) {
     const auto close = [](std::FILE* file) { (void)std::fclose(file); };
     const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);

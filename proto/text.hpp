@@ -12,6 +12,9 @@ namespace vibrig::proto {
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;
 [[nodiscard]] std::string utf8_from_latin1(std::string_view text);
 
+/// Without the blanks and quotes around a field of a CSV file.
+[[nodiscard]] std::string_view trimmed(std::string_view field) noexcept;
+
 /// True if all of the text is one number that the type holds, without sign '+' or spaces.
 template <typename Number>
 [[nodiscard]] bool read_number(std::string_view text, Number& out) noexcept {

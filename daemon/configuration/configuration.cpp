@@ -17,6 +17,8 @@
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
 #include "daemon/plan/plan_file.hpp"
+#include "estimator/commissioning/opening.hpp"
+#include "estimator/kinematics.hpp"
 
 namespace vibrig::configuration {
 
@@ -186,6 +188,41 @@ void to_readings(Configuration& c) {
     for (auto& stop : c.campaign.stops) convert(stop.position_deg);
 }
 
+/// Where the opening check looks, as far as the travel allows it: the azimuth axis upright this way
+/// or that, and all gimbals turned.
+std::vector<campaign::OpeningStop> opening_stops(const Configuration& c) {
+    namespace room = estimator::commissioning;
+    const auto reach = [&c](std::array<double, 3> angle, bool drifts,
+                            std::vector<campaign::OpeningStop>& into) {
+        angle = estimator::encoder_deg(c.estimator, angle);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto& travel = c.gimbal.travel_deg[i];
+            const bool free = travel[1] - travel[0] >= 360;
+            const auto reading =
+                drivers::within_travel(angle[i], free ? std::array{-180.0, 180.0} : travel);
+            if (!reading) return false;
+            angle[i] = *reading;
+        }
+        into.push_back({angle, drifts});
+        return true;
+    };
+    std::vector<campaign::OpeningStop> best;
+    for (const double way : {1.0, -1.0}) {
+        std::vector<campaign::OpeningStop> stops;
+        for (auto angle : room::kOpeningDrifts_deg) {
+            angle[0] *= way;
+            static_cast<void>(reach(angle, true, stops));
+        }
+        if (stops.size() > best.size()) best = std::move(stops);
+    }
+    const auto& turned = room::kOpeningGravity_deg;
+    for (unsigned signs = 0; signs < 8; ++signs) {
+        const auto way = [signs](unsigned bit) { return (signs >> bit) % 2 == 0 ? 1.0 : -1.0; };
+        if (reach({way(0) * turned[0], way(1) * turned[1], way(2) * turned[2]}, false, best)) break;
+    }
+    return best;
+}
+
 /// What a proof of the safe state stands on: "key=value\n" each, sorted.
 std::string covered_by_proof(const std::vector<EffectiveValue>& effective) {
     static constexpr std::array<std::string_view, 8> kSections{
@@ -204,6 +241,17 @@ std::string covered_by_proof(const std::vector<EffectiveValue>& effective) {
     std::string text;
     for (const auto& line : lines) text += line;
     return text;
+}
+
+/// FNV-1a, 64 bits: tells whether a file is the one of that day, not whether somebody forged it.
+std::string fingerprint_of_file(const std::string& path) {
+    std::error_code error;
+    std::ifstream file(path, std::ios::binary);
+    if (!file || !std::filesystem::is_regular_file(path, error)) return "unknown";
+    std::uint64_t hash = 0xcbf29ce484222325U;
+    for (std::istreambuf_iterator<char> at(file), end; at != end; ++at)
+        hash = (hash ^ static_cast<unsigned char>(*at)) * 0x100000001b3U;
+    return std::to_string(hash);
 }
 
 }  // namespace
@@ -250,6 +298,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         throw ConfigurationError(problems.text(name));
     }
 
+    if (c.record_demanded() && c.commission.opening_check) c.campaign.opening = opening_stops(c);
     // A simulated rig is not commissioned.
     if (c.simulated()) c.campaign.gravity_refused_deg = 2;
     if (c.campaign.resonance_hz <= 0) {
@@ -261,6 +310,8 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         c.campaign.unit += (c.campaign.unit.empty() ? "" : " ") + c.paperwork.unit_serial;
     const std::filesystem::path folder = std::filesystem::path(name).parent_path();
     resolve(c.dbc, folder);
+    if (!c.dbc.empty())
+        c.campaign.proof.keys += "contents of can.dbc=" + fingerprint_of_file(c.dbc) + "\n";
     resolve(c.results, folder);
     resolve(c.server.certificate, folder);
     resolve(c.server.key, folder);
@@ -268,6 +319,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     resolve(c.server.revoked, folder);
     for (auto* const path : {&c.mqtt.ca, &c.mqtt.certificate, &c.mqtt.key, &c.mqtt.password_file})
         resolve(*path, folder);
+    resolve(c.commission.folder, folder);
     resolve(c.journal, folder);
     resolve(c.log_file, folder);
     return loaded;
@@ -277,7 +329,9 @@ Loaded load(const std::string& path, bool daemon) {
     if (path.empty()) {
         return parse("", "built-in configuration", daemon);
     }
-    return parse(read_file(path), path, daemon);
+    Loaded loaded = parse(read_file(path), path, daemon);
+    loaded.path = path;
+    return loaded;
 }
 
 }  // namespace vibrig::configuration

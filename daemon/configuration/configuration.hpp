@@ -24,6 +24,8 @@ class ConfigurationError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+inline constexpr const char* kCommissionFolder = "/var/lib/vibrig/commission";
+
 /// Relative paths of the file (dbc, results, log file) are relative to its folder; here they are
 /// resolved.
 struct Configuration {
@@ -47,10 +49,18 @@ struct Configuration {
     struct Commission {
         bool simulated = false;  ///< a simulated rig on the real clock
         bool enforce = false;    ///< a simulated rig is held to what a real one is held to
+        std::string folder = kCommissionFolder;  ///< of the record
+        double valid_days = 365;                 ///< so long a part of it counts
+        double linear_sigma = 2;                 ///< of the gyros' linear drift terms, deg/h/g
+        bool opening_check = true;  ///< before the first ramp, where the record is demanded
     } commission;
     /// Nothing that could hurt anybody: the rig is a program.
     [[nodiscard]] bool simulated() const { return clock == ClockKind::rig || commission.simulated; }
     [[nodiscard]] bool proofs_demanded() const { return !simulated() || commission.enforce; }
+    /// A simulated rig has a record only where a folder for it is stated.
+    [[nodiscard]] bool record_demanded() const {
+        return !simulated() || (commission.enforce && commission.folder != kCommissionFolder);
+    }
     std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
     /// [server]: who may command at the socket, and where else is listened; empty: all, nowhere
     struct Server {
@@ -81,6 +91,7 @@ struct EffectiveValue {
 };
 
 struct Loaded {
+    std::string path;  ///< of the file; empty: none
     Configuration configuration;
     std::vector<EffectiveValue> effective;
 };

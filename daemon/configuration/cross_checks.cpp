@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
+#include <system_error>
 #include <utility>
 
 #include "daemon/configuration/value.hpp"
@@ -45,6 +47,7 @@ void CrossCheck::refuse(std::initializer_list<std::string> keys, const std::stri
 
 void CrossCheck::everywhere() {
     bus();
+    inputs();
     if (sound({"shaker.backoff_min_ms", "shaker.backoff_max_ms"}) &&
         c_.shaker.backoff_min > c_.shaker.backoff_max) {
         refuse({"shaker.backoff_min_ms", "shaker.backoff_max_ms"},
@@ -72,6 +75,12 @@ void CrossCheck::for_daemon() {
                plain(period_ms) + " ms, so that the table would shake on for " +
                    rounded(3e-3 * period_ms) + " s after a daemon that died",
                "1000 ms at most: three of them are the controller's timeout, 3 s at most");
+    }
+    if (sound({"shaker.poll_period_ms"}) && c_.shaker.poll_period > drivers::kLongestPollPeriod) {
+        refuse({"shaker.poll_period_ms"},
+               plain(static_cast<double>(c_.shaker.poll_period) / 1e6) +
+                   " ms, so that an open emergency-stop chain would be seen as late as that",
+               "500 ms at most");
     }
     if (sound({"shaker.registers"}) &&
         c_.shaker.registers.watchdog_timeout.access == proto::Access::write) {
@@ -102,7 +111,6 @@ void CrossCheck::for_daemon() {
     set_points_fit();
     limits();
     frequency();
-    inputs();
     travel();
 }
 
@@ -215,6 +223,10 @@ void CrossCheck::adaptive() {
         refuse({"campaign.adaptive"}, "true without campaign.targets",
                "a target for bias, linear or quadratic terms");
     }
+    if (c_.campaign.on_not_valid == campaign::OnNotValid::repeat) {
+        refuse({"campaign.adaptive", "campaign.on_not_valid"}, "true with \"repeat\"",
+               "\"go-on\" or \"pause\": an adaptive campaign chooses what it repeats");
+    }
     if (c_.estimator.method != estimator::Method::joint) {
         refuse({"campaign.adaptive", "estimator.method"}, "true with the two-step route",
                "estimator.method \"joint\"");
@@ -254,6 +266,11 @@ void CrossCheck::bus() {
     }
 }
 
+bool is_hardware(const std::string& interface, const std::string& folder) {
+    std::error_code ignored;
+    return std::filesystem::exists(std::filesystem::path(folder) / interface / "device", ignored);
+}
+
 void CrossCheck::simulated_rig() {
     if (!c_.commission.simulated || !sound({"commission.simulated"})) return;
     // A switch that takes a demand away must not be set on a rig that can hurt: vcan alone is no
@@ -261,6 +278,13 @@ void CrossCheck::simulated_rig() {
     const bool serial = c_.shaker.transport == drivers::ShakerSettings::Transport::rtu;
     const bool here =
         serial ? starts_with(c_.shaker.device, "/dev/pts/") : loopback(c_.shaker.host);
+    if (sound({"can.port", "can.interface"}) &&
+        c_.can.kind == drivers::CanPortSettings::Kind::socketcan && is_hardware(c_.can.interface)) {
+        // A gateway on this machine may lead to a real controller.
+        refuse({"commission.simulated"},
+               "true on the CAN interface " + c_.can.interface + ", which is a device",
+               "can.port \"seqpacket\" or a virtual interface");
+    }
     if (sound({"shaker.host", "shaker.transport", "shaker.device"}) && !here) {
         refuse({"commission.simulated"},
                "true with the shaker on " + (serial ? c_.shaker.device : c_.shaker.host),

@@ -9,6 +9,10 @@
 
 namespace vibrig::configuration {
 
+/// A network interface that belongs to a device: nothing virtual. `folder`: the kernel's list.
+[[nodiscard]] bool is_hardware(const std::string& interface,
+                               const std::string& folder = "/sys/class/net");
+
 /// What single bounds cannot tell. A rule whose keys have a problem of their own already is left
 /// out, so that one mistake is told once.
 class CrossCheck {

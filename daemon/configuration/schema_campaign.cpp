@@ -29,6 +29,16 @@ void add_levelling_keys(std::vector<Key>& keys) {
           &L::tolerance_arcmin);
     level("torquer_limit_deg_h", "deg/h", {0.1, 1e6}, "largest rate commanded",
           &L::torquer_limit_deg_h);
+    level("velocity_noise_mps", "m/s", {0, 10}, "of one reading of the base's velocity, 1 sigma",
+          &L::velocity_noise_mps);
+    keys.push_back(text(
+        "levelling.velocity_north", "\"Message.Signal\" or empty",
+        "velocity of a moving base along the rig's north axis, m/s; empty: it stands", binding_rule,
+        [](C & c) -> auto& { return c.campaign.level.velocity_north; }));
+    keys.push_back(text(
+        "levelling.velocity_east", "\"Message.Signal\" or empty",
+        "velocity of a moving base along the rig's east axis, m/s; with velocity_north only",
+        binding_rule, [](C & c) -> auto& { return c.campaign.level.velocity_east; }));
     keys.push_back(text(
         "levelling.torque_message", "a message name",
         "command with signals X, Y, Z in deg/h, Counter", identifier_rule,
@@ -83,7 +93,7 @@ void add_loop_check_keys(std::vector<Key>& keys) {
     loop("table_g", "g", {0.05, 0.5}, "peak acceleration at the table during the loop check",
          &S::table_g);
     loop("measure_s", "s", {2, 20}, "that the loop check measures at its level", &S::measure_s);
-    loop("transmission_tolerance", "", {0.001, 1}, "about vibration.transmission, relative",
+    loop("transmission_tolerance", "", {0.001, 0.2}, "about vibration.transmission, relative",
          &S::transmission_tolerance);
     loop("frequency_tolerance_hz", "Hz", {0.001, 0.5}, "about vibration.frequency_hz",
          &S::frequency_tolerance_hz);
@@ -183,11 +193,15 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(integer("campaign.rejected_in_a_row", "", 1, 1000,
                            "rejected dwells, after which it pauses at rest and says why",
                            [](C& c) -> int& { return c.campaign.rejected_in_a_row; }));
-    keys.push_back(choice<bool>(
-        "campaign.on_not_valid", {{"go-on", false}, {"pause", true}},
-        "when the verdict on the dwells so far becomes \"not valid\"; the pause is at rest, before "
-        "the next position",
-        [](C & c) -> auto& { return c.campaign.pause_when_not_valid; }));
+    using campaign::OnNotValid;
+    keys.push_back(choice<OnNotValid>(
+        "campaign.on_not_valid",
+        {{"go-on", OnNotValid::go_on},
+         {"pause", OnNotValid::pause},
+         {"repeat", OnNotValid::repeat}},
+        "when the verdict on the dwells so far becomes \"not valid\": nothing; a pause at rest, "
+        "before the next position; the dwell that it names once more, next",
+        [](C & c) -> auto& { return c.campaign.on_not_valid; }));
     keys.push_back(number("campaign.arming_valid_s", "s", {10, 86'400},
                           "an arming ends after so long without a start",
                           [](C& c) -> double& { return c.campaign.arming_valid_s; }));

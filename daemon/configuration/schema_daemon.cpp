@@ -84,6 +84,22 @@ void add_daemon_keys(std::vector<Key>& keys) {
                            "a simulated rig, too, is armed only with what a real one needs",
                            [](C& c) -> bool& { return c.commission.enforce; }));
     keys.push_back(text(
+        "commission.folder", "a path",
+        "of the commissioning record; a simulated rig is held to one with enforce and a folder "
+        "that is not the default",
+        path_rule, [](C & c) -> auto& { return c.commission.folder; }));
+    keys.push_back(number("commission.valid_days", "d", {1, 3660},
+                          "how long a part of the commissioning record counts",
+                          [](C& c) -> double& { return c.commission.valid_days; }));
+    keys.push_back(number("commission.linear_sigma", "deg/h/g", {0.01, 100},
+                          "how large linear drift terms are believed to be while north is sought, "
+                          "1 sigma",
+                          [](C& c) -> double& { return c.commission.linear_sigma; }));
+    keys.push_back(boolean("commission.opening_check",
+                           "hold the configuration against free drift and gravity before the first "
+                           "ramp, 4 min; of rigs that are armed by the record",
+                           [](C& c) -> bool& { return c.commission.opening_check; }));
+    keys.push_back(text(
         "server.socket", "absolute or \"@name\"", "Unix socket of the status server", socket_rule,
         [](C & c) -> auto& { return c.socket; }));
     keys.push_back(text(

@@ -62,7 +62,7 @@ void add_link_keys(std::vector<Key>& keys) {
                           "from the order to stop to rest measured at table and controller; the "
                           "platform rings down longer",
                           [](C& c) -> double& { return c.campaign.stop.deadline_s; }));
-    keys.push_back(number("shaker.rest_g", "g", {1e-6, 1},
+    keys.push_back(number("shaker.rest_g", "g", {1e-6, safety::kMoving_g},
                           "at rest: rms of the accelerometers below; 6 noise.accelerometer_g at "
                           "least",
                           [](C& c) -> double& { return c.campaign.rest.limit_g; }));

@@ -33,6 +33,7 @@ std::vector<Reading> readings_of(const StatusData& s) {
     std::vector<Reading> readings{
         {"Properties/Version", "", s.version},
         {"Properties/Clock", "", s.clock},
+        {"Properties/SIMULATED", "", s.simulated},
         {"Uptime", "s", drivers::to_seconds(s.uptime)},
         {"Campaign/Name", "", s.campaign_name},
         {"Campaign/State", "", std::string(name_of(s.state))},

@@ -1,8 +1,5 @@
 #include "daemon/guard/guard.hpp"
 
-#include <poll.h>
-#include <unistd.h>
-
 #include <utility>
 
 namespace vibrig::guard {
@@ -26,13 +23,6 @@ std::uint64_t first_finding() {
 
 }  // namespace
 
-void say(const char* severity, const std::string& text) {
-    pollfd out{STDERR_FILENO, POLLOUT, 0};
-    if (::poll(&out, 1, 0) != 1 || (out.revents & POLLOUT) == 0) return;
-    const std::string line = std::string(severity) + ": " + text + "\n";
-    (void)!::write(STDERR_FILENO, line.data(), line.size());
-}
-
 Guard::Guard(boost::asio::io_context& io, const Settings& settings)
     : settings_(settings),
       timer_(io),
@@ -41,9 +31,7 @@ Guard::Guard(boost::asio::io_context& io, const Settings& settings)
       shaker_(settings.shaker),
       meeting_(settings.socket),
       judge_(settings.judge, first_finding()),
-      annunciator_(settings.annunciator, [](bool good, const std::string& text) {
-          say(good ? "info" : "warning", text);
-      }) {}
+      alarm_(settings.alarm) {}
 
 void Guard::start() {
     port_->start(
@@ -71,7 +59,7 @@ void Guard::look() {
     sight_ = witnesses_.sight(now);
     judge_.judge(
         {now, witnesses_.time(now), sight_, shaker_.word(now), meeting_.word(), meeting_.heard()});
-    annunciator_.show(judge_.pattern());
+    alarm_.show(judge_.tune());
     // Before the shaker, whose answer may take its time.
     if (asked) meeting_.tell(word(now));
     tell_findings();
@@ -89,20 +77,18 @@ void Guard::acknowledge() {
 }
 
 void Guard::tell_findings() {
-    using drivers::HornPattern;
     if (judge_.cause() != proto::GuardCause::none && judge_.finding() != told_finding_) {
         told_finding_ = judge_.finding();
         told_disobeyed_ = told_over_ = false;
         const std::string text = std::string(proto::name_of(judge_.cause())) + ": " +
                                  proto::text_of(judge_.cause()) + "; " + words();
         say("alarm", text);
-        if (judge_.cause() != proto::GuardCause::stop_disobeyed)
-            annunciator_.announce(HornPattern::abort, text);
+        if (judge_.cause() != proto::GuardCause::stop_disobeyed) alarm_.page(Tune::stop, text);
     }
     if (judge_.disobeyed() && !std::exchange(told_disobeyed_, true)) {
         const std::string text = proto::text_of(proto::GuardCause::stop_disobeyed);
         say("alarm", text);
-        annunciator_.announce(HornPattern::disobeyed, text);
+        alarm_.page(Tune::disobeyed, text);
     }
     if (judge_.cause() == proto::GuardCause::none && !std::exchange(told_over_, true))
         say("info", "acknowledged, watching");
@@ -131,7 +117,7 @@ proto::GuardWord Guard::word(drivers::Time now) const {
     word.sees = sight_.known();
     word.rest = judge_.rests();
     word.reaches_shaker = shaker_.word(now).known;
-    word.horn_confirms = annunciator_.status().confirms;
+    word.horn_confirms = alarm_.confirms();
     word.table_g = sight_.table_g;
     return word;
 }

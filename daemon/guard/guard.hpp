@@ -6,12 +6,12 @@
 #include <memory>
 #include <string>
 
+#include "daemon/guard/alarm.hpp"
 #include "daemon/guard/judge.hpp"
 #include "daemon/guard/meeting.hpp"
 #include "daemon/guard/settings.hpp"
 #include "daemon/guard/shaker_line.hpp"
 #include "daemon/guard/witnesses.hpp"
-#include "drivers/annunciator.hpp"
 #include "drivers/can_port.hpp"
 
 namespace vibrig::guard {
@@ -43,15 +43,12 @@ class Guard {
     ShakerLine shaker_;
     Meeting meeting_;
     Judge judge_;
-    drivers::Annunciator annunciator_;
+    Alarm alarm_;
     Sight sight_;
 
     std::uint64_t told_finding_ = 0;
     bool told_disobeyed_ = false, told_over_ = true;
     bool told_silent_ = true, told_blind_ = true, told_shaker_ = true;
 };
-
-/// One line on standard error, and none where it would have to wait for it.
-void say(const char* severity, const std::string& text);
 
 }  // namespace vibrig::guard

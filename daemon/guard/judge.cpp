@@ -125,9 +125,9 @@ bool Judge::acknowledge() noexcept {
     return true;
 }
 
-drivers::HornPattern Judge::pattern() const noexcept {
-    if (cause_ == GuardCause::none) return drivers::HornPattern::none;
-    return disobeyed_ && !rests_ ? drivers::HornPattern::disobeyed : drivers::HornPattern::abort;
+Tune Judge::tune() const noexcept {
+    if (cause_ == GuardCause::none) return Tune::none;
+    return disobeyed_ && !rests_ ? Tune::disobeyed : Tune::stop;
 }
 
 }  // namespace vibrig::guard

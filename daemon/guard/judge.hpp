@@ -7,7 +7,6 @@
 #include "daemon/guard/settings.hpp"
 #include "daemon/guard/witnesses.hpp"
 #include "drivers/clock.hpp"
-#include "drivers/horn.hpp"
 #include "proto/guard_words.hpp"
 
 namespace vibrig::guard {
@@ -50,7 +49,7 @@ class Judge {
     [[nodiscard]] bool disobeyed() const noexcept { return disobeyed_; }
     /// Run is to be written as 0, again and again.
     [[nodiscard]] bool stop_wanted() const noexcept { return stop_wanted_; }
-    [[nodiscard]] drivers::HornPattern pattern() const noexcept;
+    [[nodiscard]] Tune tune() const noexcept;
     [[nodiscard]] bool rests() const noexcept { return rests_; }
 
   private:

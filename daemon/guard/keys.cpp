@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <sstream>
@@ -12,7 +13,7 @@ namespace vibrig::guard {
 
 namespace {
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
     std::ostringstream out;
     const toml::value<std::string> node{text};
     out << toml::toml_formatter{node, toml::format_flags::none};
@@ -34,7 +35,7 @@ std::string written(double value) {
 
 /// The value as a person wrote it, with its type.
 std::string described(const toml::node& node) {
-    if (const auto* text = node.as_string()) return quoted(text->get()) + " (a string)";
+    if (const auto* text = node.as_string()) return in_quotes(text->get()) + " (a string)";
     if (const auto* whole = node.as_integer()) return std::to_string(whole->get());
     if (const auto* real = node.as_floating_point()) return written(real->get());
     if (const auto* flag = node.as_boolean()) return flag->get() ? "true" : "false";
@@ -48,26 +49,77 @@ Keys::Keys(const std::string& text, std::string file) : file_(std::move(file)) {
     try {
         table_ = toml::parse(text, file_);
     } catch (const toml::parse_error& error) {
-        const auto& place = error.source().begin;
-        throw SettingsError(file_ + ":" + std::to_string(place.line) + ":" +
-                            std::to_string(place.column) +
+        throw SettingsError(placed(error.source()) +
                             ": not TOML: " + std::string(error.description()));
     }
 }
 
 void Keys::wrong(const std::string& key, const toml::node* node, const std::string& found,
                  const std::string& expected) {
-    problems_ += file_;
-    if (node != nullptr) {
-        const auto& place = node->source().begin;
-        problems_ += ":" + std::to_string(place.line) + ":" + std::to_string(place.column);
-    }
-    problems_ += ": " + key + ": found " + found + ", expected " + expected + "\n";
+    problems_ += (node != nullptr ? placed(node->source()) : file_) + ": " +
+                 told(key, found, expected) + "\n";
+}
+
+std::string Keys::placed(const toml::source_region& source) const {
+    return file_ + ":" + std::to_string(source.begin.line) + ":" +
+           std::to_string(source.begin.column);
+}
+
+std::string Keys::place(const std::string& key) {
+    const auto* node = at(key).node();
+    return node == nullptr ? std::string() : placed(node->source());
 }
 
 void Keys::refuse(const std::string& key, const std::string& found, const std::string& expected) {
     const auto* node = at(key).node();
     wrong(key, node, node == nullptr ? found + " (default)" : found, expected);
+}
+
+void Keys::refuse_unknown(const std::set<std::string>& keys, const std::set<std::string>& tables) {
+    known_.insert(keys.begin(), keys.end());
+    for (const auto& name : tables) known_.insert(name);
+    look_for_unknown(table_, "");
+}
+
+void Keys::look_for_unknown(const toml::table& table, const std::string& prefix) {
+    for (const auto& [name, node] : table) {
+        const std::string word(name.str());
+        const std::string key = prefix + word;
+        // A dot in a quoted name parts nothing.
+        const bool plain_name = word.find_first_of(".[") == std::string::npos;
+        const bool section = plain_name && is_table(key);
+        if (section && node.is_table()) {
+            look_for_unknown(*node.as_table(), key + ".");
+        } else if (plain_name && known_.contains(key)) {
+            continue;
+        } else if (section) {
+            wrong(key, &node, described(node), "a table");
+        } else {
+            const bool bare = std::all_of(word.begin(), word.end(), [](unsigned char letter) {
+                return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
+            });
+            problems_ +=
+                placed(name.source()) + ": " +
+                told(prefix + (bare ? word : in_quotes(word)),
+                     node.is_table() ? "an unknown table" : "an unknown key", names_in(prefix)) +
+                "\n";
+        }
+    }
+}
+
+bool Keys::is_table(const std::string& key) const {
+    const auto next = known_.lower_bound(key + ".");
+    return next != known_.end() && next->starts_with(key + ".");
+}
+
+std::string Keys::names_in(const std::string& prefix) const {
+    std::set<std::string> names;
+    for (const auto& key : known_)
+        if (key.starts_with(prefix))
+            names.insert(key.substr(prefix.size(), key.find('.', prefix.size()) - prefix.size()));
+    std::string list;
+    for (const auto& name : names) list += (list.empty() ? "" : ", ") + name;
+    return (names.size() > 1 ? "one of " : "") + list;
 }
 
 void Keys::believe(const std::string& key, const std::string& value) {
@@ -88,7 +140,7 @@ std::string Keys::text(const std::string& key, const std::string& otherwise) {
         }
     }
     if (value.find('\0') != std::string::npos) refuse(key, "a zero byte", "text");
-    believe(key, quoted(value));
+    believe(key, in_quotes(value));
     return value;
 }
 
@@ -154,7 +206,7 @@ std::size_t Keys::choice(const std::string& key, std::size_t otherwise,
             wrong(key, node, described(*node), expected);
         }
     }
-    believe(key, quoted(words[value]));
+    believe(key, in_quotes(words[value]));
     return value;
 }
 

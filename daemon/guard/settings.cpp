@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "daemon/guard/keys.hpp"
+#include "daemon/guard/known_keys.hpp"
 
 namespace vibrig::guard {
 
@@ -37,9 +38,10 @@ proto::Register read_register(Keys& keys, const std::string& role, proto::Regist
 /// What would be written to a controller that is not Vibrig's own must not be Vibrig's own map.
 void insist_on_registers(Keys& keys, bool rig_time) {
     if (keys.boolean("commission.simulated", false) || rig_time) return;
-    for (const char* key : {"shaker.registers.run.address", "shaker.registers.run.type",
-                            "shaker.registers.measured_amplitude.address",
-                            "shaker.registers.measured_amplitude.type"})
+    for (const char* key :
+         {"shaker.registers.run.address", "shaker.registers.run.type",
+          "shaker.registers.measured_amplitude.address", "shaker.registers.measured_amplitude.type",
+          "shaker.registers.ramp_time.address", "shaker.registers.ramp_time.type"})
         if (!keys.stated(key))
             keys.refuse(key, "nothing",
                         "it stated: Vibrig's own map is for the simulated rig only");
@@ -51,16 +53,20 @@ void read_shaker(Keys& keys, Settings& s) {
                     "\"tcp\": a serial line has one master, and that is vibrigd; the guard needs a "
                     "controller (or a gateway) that both reach over TCP");
     s.shaker.host = keys.text("shaker.host", s.shaker.host);
+    s.shaker.host_place = keys.place("shaker.host");
     if (s.shaker.host.empty()) keys.refuse("shaker.host", "\"\"", "a host");
     s.shaker.port = keys.integer("shaker.port", s.shaker.port, 1, 65'535);
     s.shaker.unit = keys.integer("shaker.unit", s.shaker.unit, 1, 255);
     if (s.shaker.unit > 247 && s.shaker.unit != 255)
         keys.refuse("shaker.unit", std::to_string(s.shaker.unit), "1 to 247, or 255 (Modbus/TCP)");
     const proto::ShakerRegisters defaults;
+    s.shaker.ramp_time = read_register(keys, "ramp_time", defaults.ramp_time);
     s.shaker.run = read_register(keys, "run", defaults.run);
-    if (s.shaker.run.table != proto::RegisterTable::holding)
-        keys.refuse("shaker.registers.run.table", "\"input\"",
-                    "\"holding\": the guard has to write it");
+    for (const auto& [role, reg] :
+         {std::pair("ramp_time", s.shaker.ramp_time), {"run", s.shaker.run}})
+        if (reg.table != proto::RegisterTable::holding)
+            keys.refuse(std::string("shaker.registers.") + role + ".table", "\"input\"",
+                        "\"holding\": the guard has to write it");
     s.shaker.measured_amplitude =
         read_register(keys, "measured_amplitude", defaults.measured_amplitude);
     const double gravity = keys.number("site.gravity_mps2", 9.80665, 9.7, 9.9);
@@ -71,25 +77,33 @@ void read_shaker(Keys& keys, Settings& s) {
     s.judge.stop_deadline_s =
         keys.number("shaker.stop_deadline_s", s.judge.stop_deadline_s, safety::kLeastStopDeadline_s,
                     safety::kMostStopDeadline_s);
-    s.judge.rest_g = keys.number("shaker.rest_g", s.judge.rest_g, 1e-4, 1);
+    s.judge.rest_g = keys.number("shaker.rest_g", s.judge.rest_g, 1e-6, safety::kMoving_g);
     s.witness.window_s = keys.number("shaker.rest_window_s", s.witness.window_s, 0.1, 10);
 }
 
 void read_witness(Keys& keys, WitnessSettings& w) {
+    const auto keep_place = [&keys, &w](const std::string& key) {
+        if (keys.stated(key)) w.places[key] = keys.place(key);
+    };
     w.dbc = keys.text("can.dbc", w.dbc);
+    keep_place("can.dbc");
     w.sample_rate_hz = keys.number("can.sample_rate_hz", w.sample_rate_hz, 1, 1000);
     constexpr std::array<const char*, 3> kAxes{"accel_x", "accel_y", "accel_z"};
     for (std::size_t i = 0; i < 3; ++i) {
         const std::string key = std::string("can.signals.") + kAxes[i];
         w.platform[i] = keys.text(key, w.platform[i]);
         w.platform_valid[i] = keys.text(key + "_valid", w.platform_valid[i]);
+        keep_place(key);
+        keep_place(key + "_valid");
     }
     w.table = keys.text("can.signals.table_accel", w.table);
+    keep_place("can.signals.table_accel");
     w.transmission = keys.number("vibration.transmission", w.transmission, 0.001, 10);
     keys.numbers("accelerometer.zero_g", w.zero_g.data(), 3);
     for (std::size_t i = 0; i < 3; ++i)
         keys.numbers("accelerometer.matrix[" + std::to_string(i) + "]", w.matrix[i].data(), 3);
     w.rig_time = keys.choice("clock.source", 0, {"real", "rig"}) == 1;
+    keep_place("clock.source");
 }
 
 void read_bus(Keys& keys, drivers::CanPortSettings& can) {
@@ -103,19 +117,17 @@ void read_bus(Keys& keys, drivers::CanPortSettings& can) {
         keys.refuse("can.path", '"' + can.path + '"', "an absolute path or \"@name\"");
 }
 
-void read_annunciator(Keys& keys, drivers::AnnunciatorSettings& a) {
-    a.source = "vibrig-guard";
-    auto& horn = a.horn;
-    horn.host = keys.text("annunciator.modbus.host", horn.host);
-    horn.port = keys.integer("annunciator.modbus.port", horn.port, 1, 65'535);
-    horn.unit = keys.integer("annunciator.modbus.unit", horn.unit, 1, 255);
-    if (horn.unit > 247 && horn.unit != 255)
-        keys.refuse("annunciator.modbus.unit", std::to_string(horn.unit),
+void read_alarm(Keys& keys, AlarmSettings& a) {
+    a.host = keys.text("annunciator.modbus.host", a.host);
+    a.port = keys.integer("annunciator.modbus.port", a.port, 1, 65'535);
+    a.unit = keys.integer("annunciator.modbus.unit", a.unit, 1, 255);
+    if (a.unit > 247 && a.unit != 255)
+        keys.refuse("annunciator.modbus.unit", std::to_string(a.unit),
                     "1 to 247, or 255 (Modbus/TCP)");
-    horn.horn_coil = keys.integer("annunciator.modbus.horn_coil", horn.horn_coil, 0, 65'535);
-    horn.lamp_coil = keys.integer("annunciator.modbus.lamp_coil", horn.lamp_coil, -1, 65'535);
-    if (horn.lamp_coil == horn.horn_coil)
-        keys.refuse("annunciator.modbus.lamp_coil", std::to_string(horn.lamp_coil),
+    a.horn_coil = keys.integer("annunciator.modbus.horn_coil", a.horn_coil, 0, 65'535);
+    a.lamp_coil = keys.integer("annunciator.modbus.lamp_coil", a.lamp_coil, -1, 65'535);
+    if (a.lamp_coil == a.horn_coil)
+        keys.refuse("annunciator.modbus.lamp_coil", std::to_string(a.lamp_coil),
                     "another coil than the horn's, or -1: none");
     a.command = keys.text("annunciator.command", a.command);
     if (!a.command.empty() && a.command.front() != '/')
@@ -127,9 +139,14 @@ void read_annunciator(Keys& keys, drivers::AnnunciatorSettings& a) {
 
 }  // namespace
 
+std::string told(const std::string& key, const std::string& found, const std::string& expected) {
+    return key + ": found " + found + ", expected " + expected;
+}
+
 Settings parse_settings(const std::string& text, const std::string& file) {
     Keys keys(text, file);
     Settings s;
+    s.witness.file = file;
     s.socket = keys.text("guard.socket", s.socket);
     if (!is_socket(s.socket))
         keys.refuse("guard.socket", '"' + s.socket + '"',
@@ -138,7 +155,8 @@ Settings parse_settings(const std::string& text, const std::string& file) {
     read_witness(keys, s.witness);
     read_shaker(keys, s);
     insist_on_registers(keys, s.witness.rig_time);
-    read_annunciator(keys, s.annunciator);
+    read_alarm(keys, s.alarm);
+    keys.refuse_unknown(keys_of_the_daemon(), tables_of_the_daemon());
     if (!keys.problems().empty()) throw SettingsError(keys.problems());
     s.believed = keys.believed();
     const auto folder = std::filesystem::path(file).parent_path();

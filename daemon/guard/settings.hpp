@@ -1,10 +1,11 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <stdexcept>
 #include <string>
 
-#include "drivers/annunciator.hpp"
+#include "daemon/guard/alarm.hpp"
 #include "drivers/can_port.hpp"
 #include "proto/register_map.hpp"
 #include "proto/safety.hpp"
@@ -16,6 +17,10 @@ class SettingsError : public std::runtime_error {
   public:
     using std::runtime_error::runtime_error;
 };
+
+/// "key: found X, expected Y"
+[[nodiscard]] std::string told(const std::string& key, const std::string& found,
+                               const std::string& expected);
 
 /// Where the accelerometers are on the bus, as "Message.Signal"; empty: there is none.
 struct WitnessSettings {
@@ -30,7 +35,9 @@ struct WitnessSettings {
     double sample_rate_hz = 40;
     double transmission = 0.6667;  ///< platform over table
     double window_s = safety::kRestWindow_s;
-    bool rig_time = false;  ///< the simulated rig owns the time and sends it
+    bool rig_time = false;                        ///< the simulated rig owns the time and sends it
+    std::string file{};                           ///< of the keys
+    std::map<std::string, std::string> places{};  ///< "file:line:column" by key, where it is stated
 };
 
 /// The shaker's controller, over Modbus/TCP.
@@ -38,7 +45,9 @@ struct ShakerLineSettings {
     std::string host = "127.0.0.1";
     int port = 502;
     int unit = 1;
-    proto::Register run, measured_amplitude;  ///< scale in g peak
+    proto::Register ramp_time, run;
+    proto::Register measured_amplitude;  ///< scale in g peak
+    std::string host_place{};            ///< "file:line:column"; empty: it is not stated
 };
 
 struct JudgeSettings {
@@ -54,7 +63,7 @@ struct Settings {
     WitnessSettings witness;
     ShakerLineSettings shaker;
     JudgeSettings judge;
-    drivers::AnnunciatorSettings annunciator;
+    AlarmSettings alarm;
     std::string believed;  ///< every key that was read, as TOML with its origin
 };
 

@@ -12,41 +12,68 @@ double window_of(const WitnessSettings& settings) {
     return std::max(settings.window_s, kSamples / settings.sample_rate_hz);
 }
 
+/// With the key's place in the file; a default that does not fit is the fault of the DBC's.
+std::string placed(const WitnessSettings& settings, const std::string& key,
+                   const std::string& found, const std::string& expected) {
+    auto at = settings.places.find(key);
+    const bool stated = at != settings.places.end();
+    if (!stated) at = settings.places.find("can.dbc");
+    const auto& place = at == settings.places.end() ? settings.file : at->second;
+    const bool by_default = !stated && !settings.file.empty();
+    return (place.empty() ? "" : place + ": ") +
+           told(key, by_default ? found + " (default)" : found, expected) + "\n";
+}
+
+proto::Dbc dbc_of(const WitnessSettings& settings) {
+    if (settings.dbc.empty()) return proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    try {
+        return proto::read_dbc(settings.dbc);
+    } catch (const proto::DbcError& error) {
+        // What is in the file has a place of its own.
+        if (error.line() > 0) throw;
+        std::string why = error.what();
+        if (why.starts_with(settings.dbc + ": ")) why.erase(0, settings.dbc.size() + 2);
+        throw SettingsError(placed(settings, "can.dbc", '"' + settings.dbc + "\" (" + why + ")",
+                                   "a DBC file that can be read"));
+    }
+}
+
 }  // namespace
 
 Witnesses::Witnesses(const WitnessSettings& settings)
     : settings_(settings),
-      dbc_(settings.dbc.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")
-                                : proto::read_dbc(settings.dbc)),
+      dbc_(dbc_of(settings)),
       platform_motion_(window_of(settings), 3),
       table_motion_(window_of(settings), 1) {
     constexpr std::array<const char*, 3> kKeys{"can.signals.accel_x", "can.signals.accel_y",
                                                "can.signals.accel_z"};
+    std::string problems;
     for (std::size_t i = 0; i < 3; ++i) {
-        platform_[i] = find(kKeys[i], settings.platform[i]);
+        platform_[i] = find(kKeys[i], settings.platform[i], problems);
         if (platform_[i] && !settings.platform_valid[i].empty()) {
-            const Place valid = find(std::string(kKeys[i]) + "_valid", settings.platform_valid[i]);
+            const Place valid =
+                find(std::string(kKeys[i]) + "_valid", settings.platform_valid[i], problems);
             // One that comes in another message would have to be joined; it is left out.
             if (valid.message == platform_[i].message) platform_[i].valid = valid.value;
         }
     }
-    table_ = find("can.signals.table_accel", settings.table);
-    if (!table_ && !(platform_[0] && platform_[1] && platform_[2]))
-        throw SettingsError(
-            "can.signals: found neither a table accelerometer nor three on the platform, expected "
-            "one of them at least: the guard would see nothing");
-    if (!settings.rig_time) return;
-    rig_time_ = dbc_.find("RigTime");
-    if (rig_time_ != nullptr)
-        for (const auto& signal : rig_time_->signals)
-            if (signal.name == "TimeUs") rig_time_us_ = &signal;
-    if (rig_time_us_ == nullptr)
-        throw SettingsError(
-            "clock.source: found \"rig\" and no RigTime.TimeUs in the DBC, expected the simulated "
-            "rig's message");
+    table_ = find("can.signals.table_accel", settings.table, problems);
+    if (problems.empty() && !table_ && !(platform_[0] && platform_[1] && platform_[2]))
+        problems += placed(settings, "can.signals.table_accel",
+                           "\"\" and not three accelerometers on the platform",
+                           "one of both at least: the guard would see nothing");
+    if (settings.rig_time) {
+        rig_time_ = dbc_.find("RigTime");
+        if (rig_time_ != nullptr) rig_time_us_ = rig_time_->find("TimeUs");
+        if (rig_time_us_ == nullptr)
+            problems += placed(settings, "clock.source", "\"rig\" and no RigTime.TimeUs in the DBC",
+                               "the simulated rig's message");
+    }
+    if (!problems.empty()) throw SettingsError(problems);
 }
 
-Witnesses::Place Witnesses::find(const std::string& key, const std::string& name) const {
+Witnesses::Place Witnesses::find(const std::string& key, const std::string& name,
+                                 std::string& problems) const {
     if (name.empty()) return {};
     const auto dot = name.find('.');
     const auto* message = dbc_.find(std::string_view(name).substr(0, dot));
@@ -54,8 +81,9 @@ Witnesses::Place Witnesses::find(const std::string& key, const std::string& name
         for (const auto& signal : message->signals)
             if (signal.name == std::string_view(name).substr(dot + 1))
                 return {message, &signal, nullptr};
-    throw SettingsError(key + ": found \"" + name + "\", expected a signal of the DBC, as \"" +
-                        "Message.Signal\"");
+    problems +=
+        placed(settings_, key, '"' + name + '"', "a signal of the DBC, as \"Message.Signal\"");
+    return {};
 }
 
 std::optional<double> Witnesses::value_of(const Place& place,

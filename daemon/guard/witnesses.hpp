@@ -40,7 +40,7 @@ struct Sight {
 /// The accelerometers on the bus, decoded anew from the DBC.
 class Witnesses {
   public:
-    /// Throws SettingsError, DbcError.
+    /// Throws SettingsError with all that is wrong, DbcError for a DBC that is none.
     explicit Witnesses(const WitnessSettings& settings);
     void take(std::span<const drivers::ReceivedFrame> frames);
     [[nodiscard]] Sight sight(drivers::Time now) const;
@@ -56,7 +56,8 @@ class Witnesses {
         const proto::Signal* valid = nullptr;
         explicit operator bool() const noexcept { return value != nullptr; }
     };
-    [[nodiscard]] Place find(const std::string& key, const std::string& name) const;
+    [[nodiscard]] Place find(const std::string& key, const std::string& name,
+                             std::string& problems) const;
     void take(const drivers::ReceivedFrame& frame);
     void take_platform(std::size_t axis, double value, double time_s);
     [[nodiscard]] static std::optional<double> value_of(

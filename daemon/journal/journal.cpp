@@ -36,6 +36,8 @@ const char* word_of(CommandRequest::Kind kind) {
             return "acknowledge";
         case Kind::selftest:
             return "selftest";
+        case Kind::commission:
+            return "commission";
     }
     return "unknown";
 }

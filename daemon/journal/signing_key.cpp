@@ -11,8 +11,9 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <stdexcept>
+
+#include "proto/durable_file.hpp"
 
 namespace vibrig::journal {
 
@@ -82,12 +83,7 @@ void SigningKey::keep() {
     if (!made_) return;
     if (::rename(unfinished.c_str(), path_.c_str()) != 0) fail(unfinished, std::strerror(errno));
     // The journal names this key from now on: its name has to survive a power cut as well.
-    const std::string folder = std::filesystem::absolute(path_).parent_path().string();
-    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    const bool synced = fd >= 0 && ::fsync(fd) == 0;
-    const int why = errno;
-    if (fd >= 0) ::close(fd);
-    if (!synced) fail(folder, std::strerror(why));
+    proto::sync_folder_of(path_);
     made_ = false;
 }
 

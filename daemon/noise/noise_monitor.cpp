@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "estimator/allan/edf.hpp"
@@ -21,7 +22,9 @@ constexpr std::array<char, 3> kNames{'x', 'y', 'z'};
 constexpr std::size_t kMostAlarmsShown = 32;
 // Safeguards of what is handed to the filter.
 constexpr std::size_t kFewestDwells = 8;
-constexpr double kContradiction = 4;    // standard errors
+constexpr double kContradiction = 4;  // standard errors
+// Identified anew with what was found, a campaign loses nothing where that was a chance.
+constexpr double kContradictionAtEnd = 3;
 constexpr double kLargestSigma = 0.25;  // of the new value
 constexpr double kLargestFactor = 2;
 constexpr double kKnown = 0.01;  // share of the prior's variance of a rate
@@ -141,7 +144,9 @@ bool NoiseMonitor::end_dwell(const estimator::DwellSummary& dwell, Knowledge now
     }
     status_.block_s = angles[0].block_s;
     const bool stepped = mean_has_stepped(dwell, before, usable, angles);
-    if (check(dwell, angles)) {
+    const bool other = check(dwell, angles);
+    if (event_) draw(dwell, angles, other || stepped);
+    if (other) {
         ++status_.dwells_left_out;
         return true;
     }
@@ -155,6 +160,7 @@ void NoiseMonitor::raise(const NoiseStatus::Alarm& alarm, const std::string& wha
     ++status_.alarms_total;
     status_.alarms.push_back(alarm);
     if (status_.alarms.size() > kMostAlarmsShown) status_.alarms.erase(status_.alarms.begin());
+    if (!event_) return;
     event_(Severity::alarm, fmt::format("gyro {}, run {} position {}: {}; worth repeating",
                                         kNames[alarm.gyro], alarm.run, alarm.position, what));
 }
@@ -244,7 +250,7 @@ void NoiseMonitor::levelled(const LevelDrift& drift) {
         (s[0][0] * s[1][1] - s[0][1] * s[1][0]);
     level_squares_ += square / 2;
     level.mean_square = level_squares_ / ++level.samples;
-    if (square <= chi_square_quantile(1 - DwellMonitorSettings{}.alpha, 2)) return;
+    if (!event_ || square <= chi_square_quantile(1 - DwellMonitorSettings{}.alpha, 2)) return;
     event_(Severity::alarm,
            fmt::format("run {} position {}: while it was levelled the platform drifted by {:+.3g} "
                        "and {:+.3g} deg/h more than the coefficients say (sigma {:.2g}, {:.2g}): "
@@ -276,7 +282,8 @@ void NoiseMonitor::learn(const std::array<DwellAngles, 3>& angles) {
             return of(gyros_[j], Term::K).detected || of(gyros_[j], Term::R).detected;
         };
         const bool before = slow_detected();
-        gyros_[j].learn(angles[j]);
+        gyros_[j].learn(angles[j], event_ != nullptr);
+        if (!event_) continue;
         status_.gyros[j].terms = gyros_[j].terms();
         status_.gyros[j].smallest_change = gyros_[j].smallest_change();
         status_.gyros[j].points = gyros_[j].points();
@@ -290,13 +297,42 @@ void NoiseMonitor::learn(const std::array<DwellAngles, 3>& angles) {
     }
 }
 
+void NoiseMonitor::draw(const estimator::DwellSummary& dwell,
+                        const std::array<DwellAngles, 3>& angles, bool alarm) {
+    NoiseStatus::Curve curve{dwell.run, dwell.position, alarm, {}, {}};
+    for (std::size_t j = 0; j < 3; ++j) {
+        for (const auto& point : DwellMonitor::curve_of(angles[j])) {
+            if (j == 0) curve.tau_s.push_back(point.tau_s);
+            curve.deviation_deg_h[j].push_back(point.deviation);
+        }
+    }
+    // Readers keep what they have: a status is taken by other threads.
+    const auto& old = *status_.surface;
+    const auto gone = static_cast<std::ptrdiff_t>(old.size() >= NoiseStatus::kMostCurves);
+    auto next = std::make_shared<std::vector<NoiseStatus::Curve>>(old.begin() + gone, old.end());
+    next->push_back(std::move(curve));
+    status_.surface = std::move(next);
+}
+
+NoiseMonitor::MeanAngle NoiseMonitor::mean_angle() const {
+    double value = 0, variance = 0;
+    for (const DwellMonitor& gyro : gyros_) {
+        const FittedTerm& q = of(gyro, Term::Q);
+        value += q.value / 3;
+        variance += q.sigma * q.sigma / 9;
+    }
+    return {value, std::sqrt(variance)};
+}
+
+template <typename Words>
+void NoiseMonitor::tell(const Words& words) const {
+    if (event_) event_(Severity::warning, words());
+}
+
 void NoiseMonitor::propose_levels() {
     if (status_.dwells < kFewestDwells) return;
-    double angle = 0, angle_variance = 0;
+    const auto [angle, angle_sigma] = mean_angle();
     for (std::size_t j = 0; j < 3; ++j) {
-        const FittedTerm& q = of(gyros_[j], Term::Q);
-        angle += q.value / 3;
-        angle_variance += q.sigma * q.sigma / 9;
         const FittedTerm& n = of(gyros_[j], Term::N);
         double& present = in_force_.gyro_random_walk_deg_per_rt_h[j];
         if (!n.detected || n.sigma > kLargestSigma * n.value ||
@@ -304,21 +340,24 @@ void NoiseMonitor::propose_levels() {
             continue;
         }
         const double next = limited(n.value, present);
-        event_(
-            Severity::warning,
-            fmt::format("gyro {}: the filter takes N = {:.3g} instead of {:.3g} deg/sqrt(h) from "
-                        "the next position on (identified {}, {} dwells)",
-                        kNames[j], next, present, words(n, "deg/sqrt(h)"), status_.dwells));
+        tell([&] {
+            return fmt::format(
+                "gyro {}: the filter takes N = {:.3g} instead of {:.3g} deg/sqrt(h) from the next "
+                "position on (identified {}, {} dwells)",
+                kNames[j], next, present, words(n, "deg/sqrt(h)"), status_.dwells);
+        });
         present = status_.gyros[j].in_force = next;
         changed_ = true;
     }
     double& present = in_force_.angle_arcsec;
-    if (std::abs(angle - present) > kContradiction * std::sqrt(angle_variance)) {
+    if (std::abs(angle - present) > kContradiction * angle_sigma) {
         const double next = limited(angle, present);
-        event_(Severity::warning,
-               fmt::format("the filter takes {:.3g} instead of {:.3g} arcsec of angle noise from "
-                           "the next position on ({} dwells)",
-                           next, present, status_.dwells));
+        tell([&] {
+            return fmt::format(
+                "the filter takes {:.3g} instead of {:.3g} arcsec of angle noise from the next "
+                "position on ({} dwells)",
+                next, present, status_.dwells);
+        });
         present = status_.angle_in_force_arcsec = next;
         changed_ = true;
     }
@@ -327,6 +366,27 @@ void NoiseMonitor::propose_levels() {
 std::optional<NoiseLevels> NoiseMonitor::take_new_levels() {
     if (!std::exchange(changed_, false)) return {};
     return in_force_;
+}
+
+std::optional<Found> NoiseMonitor::found() const {
+    if (status_.dwells < kFewestDwells) return {};
+    const NoiseLevels configured = estimator::noise_levels(settings_);
+    Found out{configured, std::numeric_limits<double>::infinity()};
+    const auto [angle, angle_sigma] = mean_angle();
+    for (std::size_t j = 0; j < 3; ++j) {
+        const FittedTerm& n = of(gyros_[j], Term::N);
+        const double was = configured.gyro_random_walk_deg_per_rt_h[j];
+        const bool other = in_force_.gyro_random_walk_deg_per_rt_h[j] != was ||
+                           std::abs(gyros_[j].distance_from(was)) > kContradictionAtEnd;
+        if (!other || !n.detected || n.sigma > kLargestSigma * n.value) continue;
+        out.levels.gyro_random_walk_deg_per_rt_h[j] = n.value;
+        out.dof = std::min(out.dof, n.value * n.value / (2 * n.sigma * n.sigma));
+    }
+    if (in_force_.angle_arcsec != configured.angle_arcsec ||
+        std::abs(angle - configured.angle_arcsec) > kContradictionAtEnd * angle_sigma)
+        out.levels.angle_arcsec = angle;
+    if (out.levels == configured) return {};
+    return out;
 }
 
 void NoiseMonitor::conclude(estimator::DwellSummary& dwell,
@@ -347,7 +407,7 @@ void NoiseMonitor::continue_from(NoiseMonitor&& other) {
 }
 
 void NoiseMonitor::report() const {
-    if (status_.dwells == 0) return;
+    if (!event_ || status_.dwells == 0) return;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto word = [&](Term term, const char* unit) {
             return words(of(gyros_[j], term), unit);

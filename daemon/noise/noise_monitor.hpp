@@ -15,6 +15,13 @@
 
 namespace vibrig::noise {
 
+/// Noise that the data of a whole campaign show, where it is not the configured one.
+struct Found {
+    estimator::NoiseLevels levels;
+    double dof = 0;  ///< 1/2 (N / u(N))^2 of the worst known of its gyros' N
+    bool operator==(const Found&) const = default;
+};
+
 /// Watches the gyros' noise over a campaign: takes the block means of each dwell, lets the drift
 /// model with the newest coefficients leave the residual, compares it with the earlier dwells,
 /// learns from it, and says what the filter should use from the next dwell on. Control thread only.
@@ -26,6 +33,8 @@ class NoiseMonitor {
         std::array<double, estimator::kParameters> coefficients{};
         std::vector<double> covariance;
     };
+    /// Without an `event` nobody hears or looks: of the terms only Q and N are found, what they are
+    /// taken for is the same.
     NoiseMonitor(const estimator::Settings& settings, Event event);
 
     /// A new campaign: everything is forgotten, the settings' noise is in force.
@@ -40,6 +49,9 @@ class NoiseMonitor {
     /// level changes only if the data contradict it, by a factor of 2 at most, never by a dwell
     /// with an alarm.
     [[nodiscard]] std::optional<estimator::NoiseLevels> take_new_levels();
+    /// What all dwells say, once they contradict the settings: with it the campaign is to be
+    /// identified anew. Nothing: the settings' noise was right all the time, or nobody knows.
+    [[nodiscard]] std::optional<Found> found() const;
     /// All of that between two dwells: flags a dwell whose noise is not that of the earlier ones,
     /// and the filter takes what it should use from the next one on.
     void conclude(estimator::DwellSummary& dwell, estimator::Identification& identification);
@@ -61,7 +73,16 @@ class NoiseMonitor {
     bool check(const estimator::DwellSummary& dwell,
                const std::array<estimator::allan::DwellAngles, 3>& angles);
     void learn(const std::array<estimator::allan::DwellAngles, 3>& angles);
+    void draw(const estimator::DwellSummary& dwell,
+              const std::array<estimator::allan::DwellAngles, 3>& angles, bool alarm);
+    struct MeanAngle {
+        double value, sigma;  ///< arcsec
+    };
+    /// Of the three gyros' fits: the resolvers are of one kind.
+    [[nodiscard]] MeanAngle mean_angle() const;
     void propose_levels();
+    template <typename Words>
+    void tell(const Words& words) const;
 
     estimator::Settings settings_;
     Event event_;

@@ -9,6 +9,7 @@
 #include "estimator/kinematics.hpp"
 #include "estimator/parameters.hpp"
 #include "estimator/plan/positions.hpp"
+#include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::plan {
 
@@ -16,6 +17,8 @@ namespace {
 
 /// A plan that needs more is not foreseen to its end.
 constexpr std::size_t kFarthest = 60;
+// Targets come nearer by a fifth at a time, down to 1e-5 of them.
+constexpr int kNearest = 50;
 
 std::size_t kind_of(std::size_t parameter) {
     const std::size_t term = parameter % 10;
@@ -25,6 +28,22 @@ std::size_t kind_of(std::size_t parameter) {
 constexpr std::array<const char*, 3> kKinds{"bias", "linear", "quadratic"};
 
 }  // namespace
+
+std::vector<double> widened(std::vector<double> covariance, const estimator::Settings& settings,
+                            const estimator::Result& result) {
+    if (result.rows.size() < kFewestDwells) return covariance;
+    const auto assessed = estimator::uncertainty::assess(settings, result);
+    std::array<double, estimator::kParameters> factor{};
+    for (std::size_t i = 0; i < factor.size(); ++i) {
+        const auto& c = assessed.coefficients[i];
+        factor[i] = c.u_a > c.sigma ? c.u_a / c.sigma : 1;
+    }
+    for (std::size_t i = 0; i < factor.size(); ++i) {
+        for (std::size_t j = 0; j < factor.size(); ++j)
+            covariance[i * factor.size() + j] *= factor[i] * factor[j];
+    }
+    return covariance;
+}
 
 AdaptivePlan::AdaptivePlan(const estimator::Settings& settings, const AdaptiveSettings& adaptive)
     : adaptive_(adaptive) {
@@ -63,14 +82,20 @@ double AdaptivePlan::time_of(const PlannedRun& run, const std::array<double, 3>&
 }
 
 AdaptivePlan::Decision AdaptivePlan::outlook() const {
-    return next(planning::covariance_after(prior_, experiments_, {}), {}, 0);
+    return next(planning::covariance_after(prior_, experiments_, {}), {}, 0, 0);
 }
 
 AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
-                                          const std::array<double, 3>& here_deg,
-                                          double elapsed_s) const {
+                                          const std::array<double, 3>& here_deg, double elapsed_s,
+                                          std::size_t dwells) const {
     Decision decision;
-    const auto plan = planning::augment(covariance, experiments_, target_, kFarthest);
+    auto plan = planning::augment(covariance, experiments_, target_, kFarthest);
+    const bool too_few = plan.runs.empty() && dwells < kFewestDwells;
+    auto nearer = target_;
+    for (int step = 0; step < kNearest && plan.runs.empty() && dwells < kFewestDwells; ++step) {
+        for (double& one : nearer) one *= 0.8;
+        plan = planning::augment(covariance, experiments_, nearer, kFarthest);
+    }
     std::array<double, 3> worst{};
     for (std::size_t i = 0; i < target_.size(); ++i) {
         const double sigma = std::sqrt(covariance[i * target_.size() + i]);
@@ -95,12 +120,14 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
         return decision;
     }
     decision.run = candidates_[plan.runs.front()];
-    decision.left = plan.runs.size();
+    const std::size_t fewest = kFewestDwells - std::min(dwells, kFewestDwells);
+    decision.left = std::max(plan.runs.size(), fewest);
     auto at = here_deg;
     for (const std::size_t j : plan.runs) {
         decision.left_s += time_of(candidates_[j], at);
         at = candidates_[j].position_deg;
     }
+    decision.left_s *= static_cast<double>(decision.left) / static_cast<double>(plan.runs.size());
     const double limit_s = adaptive_.time_limit_s - adaptive_.closing_s;
     const bool limited = adaptive_.time_limit_s > 0;
     if (limited && elapsed_s + time_of(decision.run, here_deg) > limit_s) {
@@ -112,6 +139,9 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
     std::snprintf(text.data(), text.size(), "; %s%zu more dwells, %.0f s",
                   plan.met ? "" : "more than ", decision.left, decision.left_s);
     decision.words = state + text.data();
+    if (too_few)
+        decision.words += "; every target is met, but fewer than " + std::to_string(kFewestDwells) +
+                          " dwells do not tell what the bias did";
     if (limited && elapsed_s + decision.left_s > limit_s)
         decision.words += ": the time limit will come first";
     return decision;

@@ -25,9 +25,18 @@ struct AdaptiveSettings {
     planning::GimbalLimits limits;   ///< readings
 };
 
-/// Chooses a campaign's dwells one by one from the filter's own covariance: the cheapest plan that
-/// still brings every coefficient to its target, of which the most informative dwell is done next.
-/// Candidates are the 26 directions of the cube at every level.
+/// Of fewer nobody can tell what the bias did.
+inline constexpr std::size_t kFewestDwells = 14;
+
+/// The filter's covariance (30 x 30, row-major) with each standard error as large as u_a, where the
+/// dwells of the result say that noise is not all: scatter, walk or steps of the bias.
+[[nodiscard]] std::vector<double> widened(std::vector<double> covariance,
+                                          const estimator::Settings& settings,
+                                          const estimator::Result& result);
+
+/// Chooses a campaign's dwells one by one from a covariance: the cheapest plan that still brings
+/// every coefficient to its target, of which the most informative dwell is done next. Candidates
+/// are the 26 directions of the cube at every level.
 class AdaptivePlan {
   public:
     /// Throws std::runtime_error if the levels cannot determine all coefficients or no target is
@@ -44,9 +53,11 @@ class AdaptivePlan {
     };
 
     /// `covariance` 30 x 30, row-major, order of parameter_names(); `here` the present gimbal
-    /// angles. Takes some tenths of a second: not for a thread that must answer at once.
+    /// angles; `dwells` kept so far. Takes some tenths of a second: not for a thread that must
+    /// answer at once.
     [[nodiscard]] Decision next(const std::vector<double>& covariance,
-                                const std::array<double, 3>& here_deg, double elapsed_s) const;
+                                const std::array<double, 3>& here_deg, double elapsed_s,
+                                std::size_t dwells = kFewestDwells) const;
 
     /// Before anything is measured, with the prior of the settings.
     [[nodiscard]] Decision outlook() const;

@@ -31,14 +31,14 @@ class Aside {
     }
 
     /// Takes the place of whatever was asked before.
-    void ask(std::function<Result()> compute) {
-        const std::lock_guard lock(mutex_);
-        ++generation_;
-        asked_ = true;
-        result_.reset();
-        waiting_ = std::move(compute);
-        if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
-        changed_.notify_all();
+    void ask(std::function<Result()> compute) { ask(std::move(compute), false); }
+    /// For somebody who may wait; nobody is told.
+    [[nodiscard]] Result compute(std::function<Result()> what) {
+        ask(std::move(what), true);
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [this] { return result_.has_value(); });
+        asked_ = false;
+        return *std::exchange(result_, std::nullopt);
     }
     void abandon() {
         const std::lock_guard lock(mutex_);
@@ -59,6 +59,16 @@ class Aside {
     }
 
   private:
+    void ask(std::function<Result()> compute, bool waited_for) {
+        const std::lock_guard lock(mutex_);
+        ++generation_;
+        asked_ = true;
+        waited_for_ = waited_for;
+        result_.reset();
+        waiting_ = std::move(compute);
+        if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+        changed_.notify_all();
+    }
     void run() {
         std::unique_lock lock(mutex_);
         for (;;) {
@@ -71,6 +81,8 @@ class Aside {
             lock.lock();
             if (mine != generation_) continue;
             result_ = std::move(found);
+            changed_.notify_all();
+            if (waited_for_) continue;
             lock.unlock();
             done_();
             lock.lock();
@@ -83,7 +95,7 @@ class Aside {
     std::function<Result()> waiting_;
     std::optional<Result> result_;
     std::uint64_t generation_ = 0;
-    bool asked_ = false, over_ = false;
+    bool asked_ = false, waited_for_ = false, over_ = false;
     std::thread thread_;
 };
 

@@ -11,19 +11,12 @@ namespace vibrig::plan {
 namespace {
 
 constexpr std::size_t kLargestFile = 16U << 20U;
-constexpr std::string_view kBlank = " \t\r\"";
-
-std::string_view trimmed(std::string_view field) {
-    const std::size_t first = field.find_first_not_of(kBlank);
-    if (first == std::string_view::npos) return {};
-    return field.substr(first, field.find_last_not_of(kBlank) - first + 1);
-}
 
 std::vector<std::string_view> split(std::string_view line) {
     std::vector<std::string_view> fields;
     for (;;) {
         const std::size_t end = std::min(line.find(','), line.size());
-        fields.push_back(trimmed(line.substr(0, end)));
+        fields.push_back(proto::trimmed(line.substr(0, end)));
         if (end == line.size()) return fields;
         line.remove_prefix(end + 1);
     }

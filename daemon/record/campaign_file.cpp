@@ -297,6 +297,11 @@ void read_head(const File& file, Campaign& to) {
     head.configuration = file.read_text("/configuration");
     head.dbc = file.read_text("/dbc");
     head.plan = file.read_text("/plan");
+    try {
+        head.simulated = file.number("/", "simulated") != 0;
+    } catch (const hdf5::Error&) {  // of vibrigd 0.1.0
+        head.simulated = of_simulated_rig(head.configuration);
+    }
     if (file.has("/interlocks")) head.interlocks = file.read_text("/interlocks");
     if (file.has("/proof")) head.proof = file.read_text("/proof");
     try {
@@ -313,6 +318,18 @@ void read_head(const File& file, Campaign& to) {
 }
 
 }  // namespace
+
+bool of_simulated_rig(const std::string& configuration) {
+    std::istringstream lines(configuration);
+    for (std::string line; std::getline(lines, line);) {
+        std::istringstream words(line);
+        std::string key, equals, value;
+        if (!(words >> key >> equals >> value)) continue;
+        if (key == "commission.simulated" && value == "true") return true;
+        if (key == "clock.source" && value == "\"rig\"") return true;
+    }
+    return false;
+}
 
 bool is_hdf5(const std::string& path) {
     std::array<char, 8> head{};

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/noise/noise_monitor.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/records.hpp"
 
@@ -29,6 +30,8 @@ struct Campaign {
     std::size_t restarted_at = 0;  ///< dwells done when the daemon was last started
     std::int64_t ended_utc_ns = 0;
     std::string result_json;
+    /// Of the result: with what noise it was identified anew; nothing: it is the live one.
+    std::optional<noise::Found> found;
     std::vector<drivers::Sample> samples;
     std::vector<Order> orders;
     std::vector<Dwell> dwells;
@@ -79,6 +82,8 @@ void close_part(const std::string& path, const std::string& next);
 /// HDF5 by its first bytes; false for what cannot be read.
 [[nodiscard]] bool is_hdf5(const std::string& path);
 [[nodiscard]] std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign);
+/// That of a rig that is a program, by its effective configuration.
+[[nodiscard]] bool of_simulated_rig(const std::string& configuration);
 /// Of the effective configuration, the sections on which the identification depends,
 /// and what a report states.
 [[nodiscard]] std::string identification_sections(const std::string& configuration);

@@ -6,6 +6,7 @@
 #include <functional>
 #include <set>
 
+#include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "proto/text.hpp"
@@ -235,6 +236,7 @@ Campaign read_parts(const std::string& path) {
             join(campaign, std::move(part));
         }
     }
+    campaign.found = dwells::noise_found_in(campaign.result_json);
     return campaign;
 }
 

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "estimator/parameters.hpp"
+
 namespace vibrig::record {
 
 using hdf5::ColumnSpec;
@@ -15,6 +17,9 @@ using hdf5::Type;
 namespace {
 
 constexpr std::size_t kN = estimator::kParameters;
+constexpr std::size_t kTerms = kN / 3;
+const char* const kRegressorText =
+    "rate is their product with a gyro's ten coefficients: F, I, O, S, II, OO, SS, IO, IS, OS";
 const char* const kTimeText = "daemon's clock; UTC is this plus the file's utc_offset_ns";
 
 std::vector<ColumnSpec> order_columns() {
@@ -51,7 +56,15 @@ std::vector<ColumnSpec> dwell_columns() {
             {"value", Type::f64, {kN}, "deg/h, deg/h/g, deg/h/g^2", "coefficients after the dwell"},
             {"sigma", Type::f64, {kN}, "deg/h, deg/h/g, deg/h/g^2", "their standard deviations"},
             {"observable", Type::u8, {kN}, "", "1: determined by the data"},
-            {"covariance", Type::f64, {kN, kN}, "products of the units", "of the coefficients"}};
+            {"covariance", Type::f64, {kN, kN}, "products of the units", "of the coefficients"},
+            {"middle_s", Type::f64, {}, "s", "since the campaign began; NaN: it is left out"},
+            {"rate", Type::f64, {3}, "deg/h", "mean drift of gyros x, y, z, Earth rate taken out"},
+            {"rate_covariance", Type::f64, {3, 3}, "(deg/h)^2", "of noise"},
+            {"rate_regressors", Type::f64, {3, kTerms}, "1, g, g^2", kRegressorText},
+            {"ramp", Type::f64, {3}, "deg/h per 100 s", "of the drift along the dwell"},
+            {"ramp_sigma", Type::f64, {3}, "deg/h per 100 s", "of noise"},
+            {"gamma", Type::f64, {6}, "", "second moment NN, UU, EE, NU, NE, UE over UU"},
+            {"sync_arcsec", Type::f64, {}, "arcsec", "of the angles in step with the vibration"}};
 }
 
 std::vector<ColumnSpec> estimate_columns() {
@@ -80,6 +93,46 @@ void put(Table& table, const std::array<T, N>& values) {
 
 std::uint8_t byte(bool value) { return value ? 1 : 0; }
 
+/// What the dwell says of the coefficients, all in numbers.
+void put_row(Table& table, const std::optional<estimator::DwellRow>& of) {
+    std::array<double, 3> rate{}, ramp{}, ramp_sigma{};
+    std::array<double, 9> covariance{};
+    std::array<double, kN> regressors{};
+    estimator::LevelTensor gamma{};
+    double middle_s = 0, sync = 0;
+    if (of) {
+        middle_s = of->middle_s;
+        sync = of->sync_arcsec;
+        gamma = of->vibration.gamma;
+        for (std::size_t j = 0; j < 3; ++j) {
+            const auto g = static_cast<Eigen::Index>(j);
+            rate[j] = of->rate[g];
+            ramp[j] = of->ramp[g];
+            ramp_sigma[j] = std::sqrt(of->ramp_variance(g, g));
+            for (std::size_t k = 0; k < 3; ++k)
+                covariance[3 * j + k] = of->variance(g, static_cast<Eigen::Index>(k));
+            for (std::size_t t = 0; t < kTerms; ++t)
+                regressors[kTerms * j + t] = of->regressors(
+                    g, static_cast<Eigen::Index>(estimator::internal_of(kTerms * j + t) / 3));
+        }
+    } else {
+        const double none = std::nan("");
+        middle_s = sync = none;
+        for (auto* values : {&rate, &ramp, &ramp_sigma}) values->fill(none);
+        covariance.fill(none);
+        regressors.fill(none);
+        gamma.fill(none);
+    }
+    table.put(middle_s);
+    put(table, rate);
+    put(table, covariance);
+    put(table, regressors);
+    put(table, ramp);
+    put(table, ramp_sigma);
+    put(table, gamma);
+    table.put(sync);
+}
+
 /// For programs that read no attributes, such as GNU Octave. Numbers of 64 bits are texts: few keep
 /// them whole.
 std::string head_json(const Head& head, const nlohmann::ordered_json& units) {
@@ -87,6 +140,7 @@ std::string head_json(const Head& head, const nlohmann::ordered_json& units) {
                                       {"started_by", head.started_by},
                                       {"started_utc_ns", std::to_string(head.utc_ns)},
                                       {"utc_offset_ns", std::to_string(head.utc_offset_ns)},
+                                      {"simulated", head.simulated},
                                       {"version", head.version},
                                       {"campaign", head.campaign},
                                       {"part", head.part},
@@ -227,6 +281,7 @@ void CampaignWriter::write_head(const Head& head) {
     file_->set("/", "started_utc_ns", head.utc_ns);
     file_->set("/", "utc_offset_ns", head.utc_offset_ns);
     file_->set("/", "clock", head.clock);
+    file_->set("/", "simulated", static_cast<std::int64_t>(head.simulated));
     file_->set("/", "version", head.version);
     file_->set("/", "compiler", head.compiler);
     file_->set("/", "instruction_set", head.instruction_set);
@@ -273,6 +328,7 @@ void CampaignWriter::dwell(const Dwell& dwell) {
     std::vector<double> covariance = dwell.covariance;
     covariance.resize(kN * kN);
     dwells_->put_bytes(covariance.data(), covariance.size() * sizeof(double));
+    put_row(*dwells_, dwell.row);
 }
 
 void CampaignWriter::estimate(const EstimateRow& row) {

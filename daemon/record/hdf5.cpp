@@ -106,8 +106,9 @@ Handle access_list() {
     Handle list(H5Pcreate(H5P_FILE_ACCESS), close_list);
     H5Pset_libver_bounds(list.get(), H5F_LIBVER_LATEST, H5F_LIBVER_LATEST);
     // Of each column a chunk or two, the full ones given up first. The library's 1 MB would fill
-    // with what is written already, for hours, in every one of some forty columns.
-    constexpr std::size_t kSlots = 521, kBytes = 32 * 1024;
+    // with what is written already, for hours, in every one of some forty columns; and where a
+    // chunk is four dwells, a column of them would hold a thousand: it has room for a few.
+    constexpr std::size_t kSlots = 7, kBytes = 32 * 1024;
     H5Pset_cache(list.get(), 0, kSlots, kBytes, 1.0);
     // What stands in it is read again by nobody: it stays as large as it begins.
     H5AC_cache_config_t metadata{};

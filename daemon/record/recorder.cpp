@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
 
@@ -496,6 +497,8 @@ void Recorder::take(const Ended& ended) {
     late_sent_.clear();
     commit(true);
     if (raw_) raw_->close();
+    const auto found = dwells::noise_found_in(ended.result_json);
+    if (settings_.raw && found) append_dwells(kAnewLine + dwells::noise_in_json(*found) + "\n");
     if (writer_) {
         try {
             Ended signed_end = ended;

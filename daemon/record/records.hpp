@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct Head {
     std::int64_t utc_ns = 0;
     std::int64_t utc_offset_ns = 0;  ///< UTC of the beginning minus the daemon's clock, whole us
     std::string clock;               ///< "real" or "rig"
+    bool simulated = false;          ///< the rig was a program: nothing here was measured
     std::string version, compiler, instruction_set;
     std::string configuration;  ///< effective, TOML
     std::string configuration_hash;
@@ -59,6 +61,9 @@ inline constexpr const char* kDwellsHeader =
 /// In it, with a number: the daemon was started again and went on after so many dwells.
 inline constexpr const char* kRestartLine = "# restart after dwells: ";
 
+/// In it, at the end, with JSON: the result is not the live one, but identified anew.
+inline constexpr const char* kAnewLine = "# result: ";
+
 /// A dwell that is over, and what was known after it.
 struct Dwell {
     drivers::Time time = 0;
@@ -66,7 +71,8 @@ struct Dwell {
     std::string reason;  ///< of the summary's flag
     std::array<double, estimator::kParameters> value{}, sigma{};
     std::array<bool, estimator::kParameters> observable{};
-    std::vector<double> covariance;  ///< 30 x 30, row-major
+    std::vector<double> covariance;               ///< 30 x 30, row-major
+    std::optional<estimator::DwellRow> row = {};  ///< none: it was left out
 };
 
 /// How a campaign ended.

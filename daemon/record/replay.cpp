@@ -15,10 +15,8 @@
 #include <utility>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/dwells/player.hpp"
 #include "daemon/record/raw_log.hpp"
-#include "daemon/rt/estimator_stage.hpp"
-#include "daemon/rt/rig_clock.hpp"
 #include "drivers/assembler.hpp"
 #include "proto/candump.hpp"
 #include "proto/text.hpp"
@@ -38,84 +36,38 @@ void set_noise(estimator::Identification& identification, const estimator::Noise
         identification.set_noise(levels);
 }
 
-/// The control thread's: it is this one, and it never sleeps there.
-class Awake final : public drivers::Waiter {
-  public:
-    void notify() noexcept override {}
-    bool wait_until(Time) noexcept override { return true; }
-};
+void take_estimate(const estimator::Identification& identification, Dwell& to) {
+    estimator::Estimate estimate;
+    identification.estimate(estimate);
+    to.value = estimate.value;
+    to.sigma = estimate.sigma;
+    to.observable = estimate.observable;
+    to.covariance = identification.covariance();
+}
 
-/// The estimator's thread with what feeds it.
-class Player {
-  public:
-    Player(const estimator::Settings& settings)
-        : identification_(settings),
-          waiter_(clock_.make_waiter()),
-          stage_(ring_, *waiter_, awake_, identification_),
-          noise_(settings, [](Severity, const std::string&) {}),
-          thread_([this] { stage_.run(); }) {
-        rest();
+/// One dwell, with the noise levels in force.
+void feed_as_it_is(estimator::Identification& identification, const Campaign& campaign,
+                   const RecordedDwell& dwell, const OnStep& on_step) {
+    const Order& order = *dwell.order;
+    identification.begin_dwell({order.run, order.position, order.table_g, order.begin_s});
+    for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
+        const auto step =
+            identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
+        if (on_step) on_step(i, step);
     }
-    ~Player() {
-        stage_.stop();
-        thread_.join();
-    }
-    Player(const Player&) = delete;
-    Player& operator=(const Player&) = delete;
+    static_cast<void>(identification.end_dwell());
+}
 
-    void order(const rt::DwellOrder& order) {
-        if (!stage_.order(order)) throw std::runtime_error("the estimator takes no order");
-        rest();
-    }
-    void push(std::span<const drivers::Sample> samples) {
-        if (samples.empty()) return;
-        clock_.set(samples.back().time);
-        if (ring_.push_n(samples) != samples.size())
-            throw std::runtime_error("the estimator's ring is full");
-        waiter_->notify();
-        rest();
-    }
-    /// Between two dwells: the levels that the recording says.
-    void take_noise(const estimator::NoiseLevels& levels) { set_noise(identification_, levels); }
-    /// As the daemon does between two dwells. `decide`: what the noise monitor says is done.
-    bool take_done(Dwell& dwell, bool decide) {
-        rt::DwellDone done;
-        if (!stage_.take_done(done)) return false;
-        rt::BlockRecord block;
-        while (stage_.take_block(block)) noise_.add(block);
-        if (decide) noise_.conclude(done.summary, identification_);
-        dwell.time = clock_.now();
-        dwell.summary = done.summary;
-        dwell.reason = done.summary.reason;
-        estimator::Estimate estimate;
-        identification_.estimate(estimate);
-        dwell.value = estimate.value;
-        dwell.sigma = estimate.sigma;
-        dwell.observable = estimate.observable;
-        dwell.covariance = identification_.covariance();
-        return true;
-    }
-    [[nodiscard]] estimator::Result result() const { return identification_.result(); }
-
-    static constexpr std::size_t kMost = 2048;  ///< samples at a time
-
-  private:
-    void rest() {
-        while (!clock_.at_rest()) {
-            clock_.rest().wait(-1);
-            clock_.rest().clear();
-        }
-    }
-
-    rt::RigClock clock_;
-    Awake awake_;
-    rt::Ring<drivers::Sample> ring_{4096};
-    estimator::Identification identification_;
-    std::unique_ptr<drivers::Waiter> waiter_;
-    rt::EstimatorStage stage_;
-    noise::NoiseMonitor noise_;
-    std::thread thread_;
-};
+/// One finished dwell as a recording has it, if there is one.
+bool take_done(dwells::Player& player, Dwell& dwell, bool decide) {
+    rt::DwellDone done;
+    if (!player.take_done(done, decide)) return false;
+    dwell.time = player.now();
+    dwell.summary = done.summary;
+    dwell.reason = done.summary.reason;
+    take_estimate(player.identification(), dwell);
+    return true;
+}
 
 bool same(double a, double b) {
     // To the last bit; and what is not a number is so on both sides.
@@ -319,6 +271,14 @@ void read_dwells(const std::string& path, Campaign& to) {
             keep_dwells(to, count);
             continue;
         }
+        if (line.starts_with(kAnewLine)) {
+            to.found = dwells::noise_found_in(line.substr(std::strlen(kAnewLine)));
+            if (!to.found)
+                throw std::runtime_error(place + ": found '" +
+                                         proto::printable(line.substr(0, 80)) +
+                                         "', expected the noise of the result as JSON");
+            continue;
+        }
         const auto fields = fields_of(line);
         Order order;
         std::int64_t offset_us = 0;
@@ -374,19 +334,32 @@ bool noise_known(const Campaign& campaign) {
 
 void forget_noise(Campaign& campaign) {
     for (Order& order : campaign.orders) order.noise = {};
+    campaign.found.reset();
 }
 
 void feed(estimator::Identification& identification, const Campaign& campaign,
           const RecordedDwell& dwell, const OnStep& on_step) {
-    const Order& order = *dwell.order;
-    set_noise(identification, order.noise);
-    identification.begin_dwell({order.run, order.position, order.table_g, order.begin_s});
-    for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
-        const auto step =
-            identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
-        if (on_step) on_step(i, step);
+    set_noise(identification, campaign.found ? campaign.found->levels : dwell.order->noise);
+    feed_as_it_is(identification, campaign, dwell, on_step);
+}
+
+dwells::Anew anew(const Campaign& campaign, const estimator::Settings& settings,
+                  const noise::Found& found, const OnStep& on_step) {
+    const auto dwells = recorded_dwells(campaign);
+    dwells::Anew out(settings, found, dwells.size());
+    for (const RecordedDwell& dwell : dwells)
+        feed_as_it_is(out.identification(), campaign, dwell, on_step);
+    return out;
+}
+
+estimator::Result live_result(const Campaign& campaign, const estimator::Settings& settings) {
+    const auto dwells = recorded_dwells(campaign);
+    estimator::Identification identification(settings, dwells.size());
+    for (const RecordedDwell& dwell : dwells) {
+        set_noise(identification, dwell.order->noise);
+        feed_as_it_is(identification, campaign, dwell, {});
     }
-    static_cast<void>(identification.end_dwell());
+    return identification.result();
 }
 
 ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,
@@ -398,11 +371,11 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     out.samples = samples.size();
     if (!samples.empty())
         out.recorded_s = drivers::to_seconds(samples.back().time - samples.front().time);
-    Player player(settings);
+    dwells::Player player(settings);
     std::size_t at = 0;
     const auto play_until = [&](std::size_t end) {
         while (at < end) {
-            std::size_t n = std::min(end - at, Player::kMost);
+            std::size_t n = std::min(end - at, dwells::Player::kMost);
             if (options.speed > 0) {
                 // A tenth of a second of wall time at once.
                 const Time step = drivers::from_seconds(0.1 * options.speed);
@@ -420,7 +393,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     };
     const bool decide = !noise_known(campaign);
     const auto take = [&] {
-        for (Dwell dwell; player.take_done(dwell, decide);) {
+        for (Dwell dwell; take_done(player, dwell, decide);) {
             if (out.dwells.size() < campaign.dwells.size()) {
                 ++out.compared;
                 const Dwell& was = campaign.dwells[out.dwells.size()];
@@ -438,7 +411,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     };
     for (const RecordedDwell& dwell : recorded_dwells(campaign)) {
         play_until(std::max(at, dwell.first));
-        player.take_noise(dwell.order->noise);
+        set_noise(player.identification(), dwell.order->noise);
         rt::DwellOrder order;
         order.from = dwell.order->from;
         order.to = dwell.order->to;
@@ -459,8 +432,15 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     }
     play_until(samples.size());
     take();
-    out.result = player.result();
+    out.result = player.identification().result();
     qualify(campaign, out);
+    out.found = decide ? player.noise_found() : campaign.found;
+    if (out.found) {
+        const dwells::Anew again = anew(campaign, settings, *out.found);
+        out.live = std::exchange(out.result, again.result());
+        take_estimate(again.identification(), out.anew.emplace());
+        qualify(campaign, out);
+    }
     out.took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;
 }
@@ -480,6 +460,7 @@ Campaign campaign_from_candump(const std::vector<std::string>& logs, const std::
     Campaign campaign;
     campaign.path = logs.front();
     campaign.head.configuration = configuration;
+    campaign.head.simulated = of_simulated_rig(configuration);
     read_dwells(dwells, campaign);
     FrameReader reader(dbc, configuration, campaign.head.utc_offset_ns, campaign.samples);
     for (const auto& path : in_order(logs)) reader.read(path);

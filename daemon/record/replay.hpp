@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
 
 namespace vibrig::record {
@@ -16,7 +17,12 @@ struct ReplayOptions {
 
 struct ReplayResult {
     estimator::Result result;
-    std::vector<Dwell> dwells;
+    std::vector<Dwell> dwells;  ///< as they were shown live
+    /// Where the result was identified anew: what it replaces, and the coefficients as a dwell has
+    /// them.
+    std::optional<noise::Found> found;
+    estimator::Result live;
+    std::optional<Dwell> anew;
     std::size_t samples = 0;
     double recorded_s = 0, took_s = 0;
     /// Estimates after each dwell that are not those of the recording to the last bit.
@@ -31,12 +37,20 @@ struct ReplayResult {
 void forget_noise(Campaign& campaign);
 
 using OnStep = std::function<void(std::size_t sample, const estimator::StepResult&)>;
-/// One dwell into a filter, with the zeros and the noise levels of the recording.
+/// One dwell into a filter, with the zeros of the recording and the noise levels of its result.
 void feed(estimator::Identification& identification, const Campaign& campaign,
           const RecordedDwell& dwell, const OnStep& on_step = {});
 
-/// The recorded samples and orders through the daemon's estimator thread, its noise monitor and
-/// what the control thread does between dwells, on a virtual clock. Throws.
+/// All dwells once more with this noise, as the daemon does at a campaign's end.
+[[nodiscard]] dwells::Anew anew(const Campaign& campaign, const estimator::Settings& settings,
+                                const noise::Found& found, const OnStep& on_step = {});
+
+/// With the noise that was in force in each dwell.
+[[nodiscard]] estimator::Result live_result(const Campaign& campaign,
+                                            const estimator::Settings& settings);
+
+/// The recorded samples and orders through the daemon's estimator stage, its noise monitor and
+/// what the control thread does between dwells, without a clock. Throws.
 [[nodiscard]] ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,
                                   const ReplayOptions& options);
 

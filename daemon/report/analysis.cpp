@@ -113,7 +113,8 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
                                 const std::set<int>& left_out) {
     std::vector<HeldOut> judged;
     const Coefficients others = without(campaign, settings, dwells, left_out);
-    const estimator::NoiseLevels noise = estimator::noise_levels(settings);
+    const estimator::NoiseLevels noise =
+        campaign.found ? campaign.found->levels : estimator::noise_levels(settings);
     for (std::size_t d = 0; d < dwells.size() && d < replayed.dwells.size(); ++d) {
         const RecordedDwell& dwell = dwells[d];
         if (!left_out.contains(dwell.order->position)) continue;
@@ -245,9 +246,17 @@ void allan_of(const Campaign& campaign, const std::vector<RecordedDwell>& dwells
 }  // namespace
 
 estimator::Settings settings_of(const Campaign& campaign) {
-    return configuration::parse(record::identification_sections(campaign.head.configuration),
-                                "configuration in " + campaign.path, false)
-        .configuration.estimator;
+    return dwells::Anew::settings_of(
+        configuration::parse(record::identification_sections(campaign.head.configuration),
+                             "configuration in " + campaign.path, false)
+            .configuration.estimator,
+        campaign.found);
+}
+
+Coefficients final_coefficients(const std::string& path, const record::ReplayResult& replayed) {
+    if (!replayed.anew) return final_coefficients(path, replayed.dwells);
+    const record::Dwell& anew = *replayed.anew;
+    return {anew.value, anew.sigma, anew.observable, anew.covariance};
 }
 
 Coefficients final_coefficients(const std::string& path, const std::vector<record::Dwell>& dwells) {
@@ -256,14 +265,24 @@ Coefficients final_coefficients(const std::string& path, const std::vector<recor
     return {last.value, last.sigma, last.observable, last.covariance};
 }
 
+Coefficients recorded_coefficients(const Campaign& campaign) {
+    if (!campaign.found) return final_coefficients(campaign.path, campaign.dwells);
+    const auto anew = record::anew(campaign, settings_of(campaign), *campaign.found);
+    estimator::Estimate estimate;
+    anew.identification().estimate(estimate);
+    return {estimate.value, estimate.sigma, estimate.observable,
+            anew.identification().covariance()};
+}
+
 Analysis analyse(const Campaign& campaign, const estimator::Settings& settings,
                  const Progress& progress) {
     Analysis out;
     out.settings = settings;
     progress(0);
     out.replayed = record::replay(campaign, settings, {});
-    out.coefficients = final_coefficients(campaign.path, out.replayed.dwells);
-    out.assessed = estimator::uncertainty::assess(settings, out.replayed.result);
+    out.coefficients = final_coefficients(campaign.path, out.replayed);
+    out.assessed = estimator::uncertainty::assess(
+        dwells::Anew::settings_of(settings, out.replayed.found), out.replayed.result);
     progress(0.2);
     const auto dwells = record::recorded_dwells(campaign);
     std::set<int> positions;

@@ -53,8 +53,13 @@ using Progress = std::function<void(double fraction)>;
 [[nodiscard]] Analysis analyse(const record::Campaign& campaign,
                                const estimator::Settings& settings, const Progress& progress);
 
+/// The same of a recording that is not replayed.
+[[nodiscard]] Coefficients recorded_coefficients(const record::Campaign& campaign);
 [[nodiscard]] estimator::Settings settings_of(const record::Campaign& campaign);
-/// Coefficients after the last dwell of the recording; throws without one.
+/// Coefficients of a campaign's result.
+[[nodiscard]] Coefficients final_coefficients(const std::string& path,
+                                              const record::ReplayResult& replayed);
+/// Coefficients after the last dwell of the recording, as shown live; throws without one.
 [[nodiscard]] Coefficients final_coefficients(const std::string& path,
                                               const std::vector<record::Dwell>& dwells);
 

@@ -187,7 +187,7 @@ Json certificate_of(const Campaign& campaign, const Json& result,
     Json root;
     root["title"] = "Calibration certificate";
     root["number"] = issue.number;
-    root["simulated"] = simulated(campaign);
+    root["simulated"] = campaign.head.simulated;
     root["laboratory"] = {{"name", issue.laboratory},
                           {"address", issue.laboratory_address},
                           {"accreditation", issue.accreditation}};

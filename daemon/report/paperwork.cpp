@@ -3,8 +3,6 @@
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 
-#include <sstream>
-
 #include "daemon/configuration/configuration.hpp"
 
 namespace vibrig::report {
@@ -19,18 +17,6 @@ std::string or_dash(const std::string& text) { return text.empty() ? "not stated
 
 std::string unit_text(const record::Paperwork& unit) {
     return or_dash(unit.unit_type) + ", serial number " + or_dash(unit.unit_serial);
-}
-
-bool simulated(const record::Campaign& campaign) {
-    if (campaign.head.clock == "rig") return true;
-    std::istringstream lines(campaign.head.configuration);
-    for (std::string line; std::getline(lines, line);) {
-        std::istringstream words(line);
-        std::string key, equals, value;
-        if (words >> key >> equals >> value && key == "commission.simulated")
-            return value == "true";
-    }
-    return false;
 }
 
 std::string utc_text(std::int64_t utc_ns) {

@@ -14,8 +14,6 @@ namespace vibrig::report {
 [[nodiscard]] std::string or_dash(const std::string& text);
 /// Type and serial number.
 [[nodiscard]] std::string unit_text(const record::Paperwork& unit);
-/// The rig was a program: nothing measured is to be believed of a platform.
-[[nodiscard]] bool simulated(const record::Campaign& campaign);
 /// "2026-03-01 08:00:00 UTC"
 [[nodiscard]] std::string utc_text(std::int64_t utc_ns);
 

@@ -561,13 +561,13 @@ Earlier earlier_of(const Campaign& earlier, const Campaign& now, bool same_unit)
                 "compare a unit with itself (--same-unit: it is the same)");
     }
     return {earlier.path, earlier.head.name, utc_text(earlier.head.utc_ns), paperwork_of(earlier),
-            final_coefficients(earlier.path, earlier.dwells)};
+            recorded_coefficients(earlier)};
 }
 
 std::string make_page(const Campaign& campaign, const Analysis& analysis,
                       const std::optional<Earlier>& earlier) {
     Page page;
-    if (simulated(campaign)) page.mark("SIMULATED");
+    if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
     add_uncertainty(page, analysis.assessed);
     add_coefficients(page, analysis);

@@ -15,15 +15,19 @@ EstimatorStage::EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& 
 
 void EstimatorStage::run() noexcept {
     while (!stop_.load()) {
-        const Time since = handed_over_.taken();
-        orders_.consume([this](const DwellOrder& order) { take_order(order); });
-        while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
-        }
-        if (since != 0 && clock_ != nullptr) shown_.lateness.add(clock_->now() - since);
-        if (shown_.sample_time - published_at_ >= kPublishPeriod) publish();
+        work();
         self_.wait_until(drivers::kNever);
     }
     if (begun_) finish();
+}
+
+void EstimatorStage::work() noexcept {
+    const Time since = handed_over_.taken();
+    orders_.consume([this](const DwellOrder& order) { take_order(order); });
+    while (samples_.consume([this](const drivers::Sample& s) { take_sample(s); }) > 0) {
+    }
+    if (since != 0 && clock_ != nullptr) shown_.lateness.add(clock_->now() - since);
+    if (shown_.sample_time - published_at_ >= kPublishPeriod) publish();
 }
 
 void EstimatorStage::stop() noexcept {

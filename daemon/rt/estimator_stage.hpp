@@ -35,6 +35,8 @@ class EstimatorStage {
 
     /// The thread's body; returns after stop(). Neither allocates, locks, logs nor formats.
     void run() noexcept;
+    /// In place of run(), where one thread does all: what waits in the rings, and no more.
+    void work() noexcept;
     void stop() noexcept;  ///< any thread
 
     /// Before run(): what goes into the filter goes there too.

@@ -138,6 +138,7 @@ void Interlock::check(const drivers::Sample& sample,
                       const drivers::PlatformStatus& platform) noexcept {
     const Time now = sample.time;
     const Guard guard = follow_guard();
+    table_bound_ = sample.of(Channel::table_accel) != drivers::Quality::unbound;
     if (seconds_.add(sample)) second_.publish(seconds_.mean());
     if (guard == Guard::excitation) {
         judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
@@ -220,6 +221,8 @@ void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) 
                              Channel::accel_y, Channel::accel_z}) {
             stale = stale || assembler.stale(c, now);
         }
+        // Without it the amplitude has one witness less.
+        stale = stale || (table_bound_ && assembler.stale(Channel::table_accel, now));
         judge(By::sample, Trip::stale_channel, stale, now);
         judge(By::sample, Trip::stale_platform, now - assembler.platform().time > platform_age_,
               now);
@@ -260,6 +263,16 @@ void Interlock::check(const drivers::ShakerReading& reading) noexcept {
     if (const double commanded = commanded_g_.load(); commanded > 0) {
         judge(By::read_back, Trip::amplitude_off,
               std::abs(20 * std::log10(reading.measured_g / commanded)), now);
+    }
+}
+
+/// It has lasted already: no row's dwell is waited for.
+void Interlock::uncommanded() noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition != Trip::uncommanded) continue;
+        states_[i].value.store(1);
+        states_[i].raised.store(true);
+        trip(Trip::uncommanded, i, 1, drivers::kChannels);
     }
 }
 

@@ -126,6 +126,8 @@ class Interlock {
     void stop_disobeyed(bool disobeyed) noexcept {
         judge(By::read_back, Trip::stop_disobeyed, disobeyed, wall_clock());
     }
+    /// Control thread: the accelerometers see motion where nothing was asked for.
+    void uncommanded() noexcept;
     /// Any thread. The first cause stays.
     void trip(Trip cause) noexcept { trip(cause, 0, 0, drivers::kChannels); }
     /// Shaker thread: a stop was written and confirmed.
@@ -177,6 +179,7 @@ class Interlock {
     drivers::Shaker& shaker_;
     drivers::Waiter& control_;
     double table_g_;
+    bool table_bound_ = false;  ///< there is an accelerometer on the table; acquisition thread
     drivers::Time platform_age_;
     std::vector<Rule> rules_;
     std::array<State, kMostRules> states_;

@@ -29,12 +29,17 @@ bool MeanMotionMeter::add(const drivers::Sample& sample) noexcept {
             mean_.angle[i] = first_[i] + angle_sum_[i] / std::max(good_, 1.0);
             mean_.force[i] = sum_[i] / std::max(good_, 1.0);
         }
+        mean_.cosine = mean_.sine = {};
         mean_.good = stood && good_ >= kFewestGood && good_ >= (1 - kMostBad) * all_;
         // A second need not be a whole number of periods, nor of those of the samples' alias.
         if (excited_) {
             LockIn<3>::Fit fit;
             mean_.good = mean_.good && lock_in_.fit(fit, kFewestGood);
-            if (mean_.good) mean_.force = fit.mean;
+            if (mean_.good) {
+                mean_.force = fit.mean;
+                mean_.cosine = fit.cosine;
+                mean_.sine = fit.sine;
+            }
         }
         begun_ = false;
     }

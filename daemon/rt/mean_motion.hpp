@@ -11,9 +11,10 @@ namespace vibrig::rt {
 /// One second of the platform: where its gimbals were and what its accelerometers showed.
 struct MeanMotion {
     drivers::Time from = 0, to = 0;
-    std::array<double, 3> force{};  ///< raw, g; the vibration is taken out
-    std::array<double, 3> angle{};  ///< encoders, rad
-    bool good = false;              ///< half of the samples were, and the gimbals stood
+    std::array<double, 3> force{};           ///< raw, g; the vibration is taken out
+    std::array<double, 3> cosine{}, sine{};  ///< that vibration: raw, g, peak; 0 at rest
+    std::array<double, 3> angle{};           ///< encoders, rad
+    bool good = false;                       ///< half of the samples were, and the gimbals stood
 };
 
 /// Second by second. Acquisition thread; no allocation.

@@ -17,7 +17,7 @@ namespace {
 // 64 MB count in full, although little of them is ever touched.
 constexpr std::size_t kRoom = std::size_t{1} << 30;
 /// Blocks as large are mapped and given back whole, bytes.
-constexpr int kLargeBlock = 64 * 1024;
+constexpr int kLargeBlock = 8 * 1024;
 constexpr std::size_t kStack = std::size_t{256} * 1024;  // deeper than any real-time thread goes
 constexpr std::size_t kPage = 4096;                      // the smallest there is
 
@@ -105,12 +105,18 @@ MemoryLock lock_memory() {
         ::mmap(nullptr, kRoom, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (room == MAP_FAILED) return not_locked("1 GB of address space for later");
     ::munmap(room, kRoom);
-    // Memory given back interrupts every CPU that runs a thread of ours. But what a campaign has
-    // large (its filter, half a megabyte at a time) goes with it: small blocks that outlive it
-    // would take a piece of each place it leaves, and every campaign would need a new one.
+    // Memory given back interrupts every CPU that runs a thread of ours.
     ::mallopt(M_TRIM_THRESHOLD, -1);
-    ::mallopt(M_MMAP_THRESHOLD, kLargeBlock);
     return {true, {}};
 }
+
+void give_large_blocks_back() {
+    // What a campaign has large (its filter, half a megabyte at a time; the matrices of a verdict,
+    // which grow with the dwells) goes with it: small blocks that outlive it would take a piece of
+    // each place it leaves, and each time it would need a new one.
+    ::mallopt(M_MMAP_THRESHOLD, kLargeBlock);
+}
+
+void give_free_memory_back() { ::malloc_trim(0); }
 
 }  // namespace vibrig::rt

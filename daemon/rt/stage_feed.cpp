@@ -1,10 +1,12 @@
 #include "daemon/rt/stage_feed.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <span>
 
-#include "drivers/signal_binding.hpp"
+#include "drivers/assembler.hpp"
 
 namespace vibrig::rt {
 
@@ -51,6 +53,30 @@ StageFeed::StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings,
         status_ = message;
         torquing_ = message->find("Torquing");
         torque_echo_ = message->find("TorqueEcho");
+    }
+    constexpr std::array kVelocity{"levelling.velocity_north", "levelling.velocity_east"};
+    for (std::size_t i = 0; i < 2; ++i) {
+        if (settings_.velocity[i].empty() && !settings_.velocity[1 - i].empty()) {
+            throw drivers::BindingError(kVelocity[i], "",
+                                        std::string("a signal as for ") + kVelocity[1 - i] +
+                                            ", or neither: the base's velocity has two components");
+        }
+        velocity_[i] = drivers::bind_signal(dbc, kVelocity[i], settings_.velocity[i]);
+    }
+    if (velocity_[0] && velocity_[0].signal == velocity_[1].signal)
+        throw drivers::BindingError(kVelocity[1], settings_.velocity[1],
+                                    "another signal than that of levelling.velocity_north");
+}
+
+void StageFeed::take_velocity(const drivers::ReceivedFrame& received) noexcept {
+    const std::span<const std::uint8_t> payload(received.frame.data, received.frame.len);
+    for (std::size_t i = 0; i < 2; ++i) {
+        if (!is(velocity_[i].message, received.frame)) continue;
+        const double value = proto::decode(*velocity_[i].signal, payload).value_or(std::nan(""));
+        // What the device itself says is none grows old.
+        if (!std::isfinite(value) || proto::out_of_range(*velocity_[i].signal, value)) continue;
+        base_velocity_[i] = value;
+        base_velocity_at_[i] = received.time;
     }
 }
 
@@ -108,6 +134,13 @@ void StageFeed::take(const drivers::Sample& sample) noexcept {
     block_.time = sample.time;
     block_.angle = angle_;
     block_.generation = order >> 2;
+    if (velocity_[0]) {
+        block_.velocity = base_velocity_;
+        const Time oldest = std::min(base_velocity_at_[0], base_velocity_at_[1]);
+        block_.velocity_age_s = oldest < 0
+                                    ? std::numeric_limits<double>::infinity()
+                                    : std::max(0.0, drivers::to_seconds(sample.time - oldest));
+    }
     ring_.try_push(block_);
     block_ = {};
     in_block_ = good_in_block_ = 0;
@@ -116,6 +149,7 @@ void StageFeed::take(const drivers::Sample& sample) noexcept {
 
 bool StageFeed::take(const drivers::ReceivedFrame& received) noexcept {
     const canfd_frame& frame = received.frame;
+    if (velocity_[0]) take_velocity(received);
     if (torquing_ != nullptr && is(status_, frame)) {
         const std::span<const std::uint8_t> payload(frame.data, frame.len);
         TorqueView view;

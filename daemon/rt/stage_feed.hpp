@@ -10,6 +10,7 @@
 #include "drivers/can_port.hpp"
 #include "drivers/clock.hpp"
 #include "drivers/sample.hpp"
+#include "drivers/signal_binding.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::rt {
@@ -26,6 +27,8 @@ struct Motion {
     bool increment = false;
     double table = 0;  ///< table accelerometer of a single sample, g
     bool table_good = false;
+    std::array<double, 2> velocity{};  ///< of the base, north and east, the newest, m/s
+    double velocity_age_s = 0;         ///< at `time`; infinite: none has come
 };
 
 /// The platform's word on its torquers.
@@ -48,6 +51,8 @@ struct StageFeedSettings {
     /// Carries Torquing and TorqueEcho; what the DBC does not have is not bound.
     std::string status_message = "GimbalStatus";
     std::uint32_t block = 4;  ///< samples per mean
+    /// "Message.Signal" of the base's velocity, m/s; empty: the base stands.
+    std::array<std::string, 2> velocity;
 };
 
 /// Acquisition to control: means of the specific force, increments, or samples one by one, while a
@@ -82,10 +87,12 @@ class StageFeed {
                                      const std::string& message);
     void pair(const Layout& layout, const canfd_frame& frame, drivers::Time arrived) noexcept;
     void begin(std::uint32_t order) noexcept;
+    void take_velocity(const drivers::ReceivedFrame& received) noexcept;
 
     StageFeedSettings settings_;
     drivers::Waiter* control_;
     Layout gyro_, accelerometer_;
+    std::array<drivers::BoundSignal, 2> velocity_;
     const proto::Message* status_ = nullptr;
     const proto::Signal* torquing_ = nullptr;
     const proto::Signal* torque_echo_ = nullptr;
@@ -99,6 +106,8 @@ class StageFeed {
     std::uint32_t taken_order_ = 0;
     Motion block_;
     std::uint32_t in_block_ = 0, good_in_block_ = 0;
+    std::array<double, 2> base_velocity_{};
+    std::array<drivers::Time, 2> base_velocity_at_{-1, -1};  ///< -1: none has come
     std::array<double, 3> angle_{};
     bool angle_known_ = false;
     std::array<double, 3> turn_{};

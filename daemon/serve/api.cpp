@@ -19,11 +19,13 @@ namespace vibrig::serve {
 namespace {
 
 constexpr std::string_view kCommands = "/api/v1/commands";
-constexpr std::array<std::string_view, 13> kReadable{
-    "/api/v1/status",   "/api/v1/parameters", "/api/v1/campaign", "/api/v1/events",
-    "/api/v1/history",  "/api/v1/config",     "/api/v1/plan",     "/api/v1/openapi.json",
-    "/api/v1/selftest", "/api/v1/stream",     "/metrics",         "/healthz",
-    "/readyz"};
+constexpr std::array<std::string_view, 14> kReadable{"/api/v1/status",   "/api/v1/parameters",
+                                                     "/api/v1/campaign", "/api/v1/events",
+                                                     "/api/v1/history",  "/api/v1/config",
+                                                     "/api/v1/plan",     "/api/v1/openapi.json",
+                                                     "/api/v1/selftest", "/api/v1/surface",
+                                                     "/api/v1/stream",   "/metrics",
+                                                     "/healthz",         "/readyz"};
 constexpr int kDeepestBody = 8;                 // levels of JSON; a command has one
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
@@ -131,8 +133,8 @@ std::string asked_by(const ApiRequest& request) {
 }
 
 const char* word_of(CommandRequest::Kind kind) {
-    constexpr std::array<const char*, 7> kNames{"arm",   "start",       "pause",   "resume",
-                                                "abort", "acknowledge", "selftest"};
+    constexpr std::array<const char*, 8> kNames{"arm",   "start",       "pause",    "resume",
+                                                "abort", "acknowledge", "selftest", "commission"};
     return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -352,6 +354,8 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
         answer.body = parameters_json(source_.result());
     } else if (path == "/api/v1/campaign") {
         answer.body = campaign_json(source_.status());
+    } else if (path == "/api/v1/surface") {
+        answer.body = surface_json(source_.status().noise);
     } else if (path == "/api/v1/config") {
         answer.body = configuration_json(source_.effective_configuration());
     } else {
@@ -388,6 +392,9 @@ std::variant<ApiAnswer, CommandRequest> Api::command_of(const ApiRequest& reques
     }
     if (caller.expired && parsed.kind != CommandRequest::Kind::abort)
         return refuse(403, caller, what, "the certificate has expired: only an abort is taken");
+    // Whoever lets gimbals move stands beside them.
+    if (parsed.kind == CommandRequest::Kind::commission && (caller.encrypted || caller.browser))
+        return refuse(403, caller, what, "a rig is commissioned at the local socket only");
     // A stop is never one too many.
     const auto now = std::chrono::steady_clock::now();
     if (parsed.kind != CommandRequest::Kind::abort &&

@@ -19,6 +19,7 @@ bool is_active(CampaignState state) {
         case CampaignState::aborted:
         case CampaignState::tripped:
         case CampaignState::checking:
+        case CampaignState::commissioning:
             return false;
         default:
             return true;

@@ -92,6 +92,7 @@ void add_campaign(Families& to, const StatusData& s) {
     }
     to.gauge("vibrig_build_info", "Version of the daemon, and which clock it follows.",
              {{{{"clock", s.clock}, {"version", s.version}}, 1}});
+    to.gauge("vibrig_simulated", "1: the rig is a program.", s.simulated ? 1 : 0);
     to.gauge("vibrig_uptime_seconds", "Since the start, by the daemon's clock.",
              drivers::to_seconds(s.uptime));
     to.gauge("vibrig_campaign_state", "1 for the state the campaign is in.", states);

@@ -112,7 +112,7 @@ constexpr const char* kHistoryParameters =
     R"({"name":"channel","in":"query","required":true,"description":"one or more, with commas","schema":{"type":"string"}},)"
     R"({"name":"from","in":"query","description":"s of the daemon's clock","schema":{"type":"number"}})";
 
-constexpr std::array<Path, 12> kPaths{{
+constexpr std::array<Path, 13> kPaths{{
     {"/api/v1/status", "The whole status.", "application/json", "Status"},
     {"/api/v1/parameters", "The result so far: 30 coefficients with their covariance.",
      "application/json", "Parameters"},
@@ -123,6 +123,10 @@ constexpr std::array<Path, 12> kPaths{{
      "The campaign so far as curves: least, greatest and mean of each channel in at most 1200 "
      "steps of equal length; null where nothing is known.",
      "application/json", nullptr, kHistoryParameters},
+    {"/api/v1/surface",
+     "Modified Allan deviation of the residuals of each gyro in each of the newest 128 dwells, by "
+     "averaging time; those with an alarm too.",
+     "application/json", "Surface"},
     {"/api/v1/config", "The configuration in force, as vibrigd --check prints it.",
      "application/json", "Configuration"},
     {"/api/v1/plan", "What the campaign does, and the standard errors to be expected.",
@@ -172,7 +176,8 @@ std::string make() {
     for (const pb::Descriptor* message :
          {v1::Status::descriptor(), v1::Parameters::descriptor(), v1::Events::descriptor(),
           v1::Configuration::descriptor(), v1::Plan::descriptor(), v1::Readiness::descriptor(),
-          v1::Command::descriptor(), v1::CommandReply::descriptor(), v1::Problem::descriptor()}) {
+          v1::Surface::descriptor(), v1::Command::descriptor(), v1::CommandReply::descriptor(),
+          v1::Problem::descriptor()}) {
         std::string one;
         add_schema(*message, done, one);
         if (!one.empty()) schemas += (schemas.empty() ? "" : ",") + one;

@@ -231,6 +231,18 @@ std::string cell(const v1::Parameter& parameter) {
            format(sigma == 0 || (sigma >= 0.001 && sigma < 100) ? " +-%-7.4f" : " +-%-7.1e", sigma);
 }
 
+/// At the end of every line about a rig that is a program.
+constexpr const char* kSimulated = "  SIMULATED";
+constexpr int kSimulatedColumns = 11;
+
+int room(const v1::Status& status, int width) {
+    return std::max(width, kNarrowest) - (status.simulated() ? kSimulatedColumns : 0);
+}
+
+std::string marked(const v1::Status& status, const std::string& line, int width) {
+    return clipped(line, room(status, width)) + (status.simulated() ? kSimulated : "");
+}
+
 std::string padded(std::string text, std::size_t width) {
     if (text.size() < width) text.append(width - text.size(), ' ');
     return text;
@@ -255,7 +267,6 @@ Rates rates_between(const v1::Status& before, const v1::Status& after, double wa
 }
 
 Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
-    width = std::max(width, kNarrowest);
     const v1::Campaign& campaign = status.campaign();
     const v1::Shaker& shaker = status.shaker();
     Lines lines;
@@ -266,7 +277,7 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     if (!campaign.reason().empty()) lines.push_back("why: " + campaign.reason());
     if (const std::string stage = stage_line(campaign); !stage.empty())
         lines.push_back(labelled("stage", stage));
-    lines.push_back(progress_line(campaign, width));
+    lines.push_back(progress_line(campaign, room(status, width)));
     lines.push_back(labelled(
         "campaign",
         campaign.name() + (campaign.armed_by().empty() ? std::string(", not armed")
@@ -327,14 +338,14 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
                                             : mqtt.note())));
     lines.push_back(labelled("daemon", "vibrigd " + status.version() + ", clock " + status.clock() +
                                            ", up " + render_duration(status.uptime_s())));
-    for (std::string& line : lines) line = clipped(line, width);
+    for (std::string& line : lines) line = marked(status, line, width);
     return lines;
 }
 
 Lines render_coefficients(const v1::Status& status, int width) {
-    width = std::max(width, kNarrowest);
+    const int room_for_them = room(status, width);
     const auto& parameters = status.estimate().parameters();
-    const int columns = std::clamp(width / kCell, 1, kGyros);
+    const int columns = std::clamp(room_for_them / kCell, 1, kGyros);
     // Three columns are the three gyros with one kind in a row; fewer just list what there is.
     const int rows = columns == kGyros ? kKinds : (parameters.size() + columns - 1) / columns;
     Lines lines;
@@ -348,9 +359,9 @@ Lines render_coefficients(const v1::Status& status, int width) {
             line += padded(cell(*last), kCell);
         }
         if (last == nullptr) continue;
-        if (columns == kGyros && width >= columns * kCell + 10) line += last->unit();
+        if (columns == kGyros && room_for_them >= columns * kCell + 10) line += last->unit();
         line.erase(line.find_last_not_of(' ') + 1);
-        lines.push_back(clipped(line, width));
+        lines.push_back(marked(status, line, width));
     }
     return lines;
 }
@@ -381,7 +392,7 @@ std::string render_line(const v1::Status& status) {
     }
     if (!campaign.reason().empty()) text += "  " + campaign.reason();
     if (const std::string stage = stage_line(campaign); !stage.empty()) text += "  " + stage;
-    return clipped(text, 500);
+    return marked(status, text, 500);
 }
 
 bool same_place(const v1::Status& a, const v1::Status& b) {

@@ -9,7 +9,7 @@ class Status;
 }  // namespace vibrig::v1
 
 /// The status as people read it in a terminal. Pure: message in, text out; no line is wider than
-/// `width` columns.
+/// `width` columns. Of a simulated rig every line ends with SIMULATED.
 namespace vibrig::serve {
 
 /// From two statuses of one daemon. Per second of the daemon's clock, since a simulated rig may run

@@ -75,12 +75,14 @@ CommandRequest::Kind kind_of(v1::Command::Kind kind) {
             return CommandRequest::Kind::acknowledge;
         case v1::Command::selftest:
             return CommandRequest::Kind::selftest;
+        case v1::Command::commission:
+            return CommandRequest::Kind::commission;
         default:
             break;
     }
     throw std::invalid_argument(
-        "kind: missing or unknown, expected arm, start, pause, resume, abort, acknowledge or "
-        "selftest");
+        "kind: missing or unknown, expected arm, start, pause, resume, abort, acknowledge, "
+        "selftest or commission");
 }
 
 /// As to_json(), the campaign's dwells one by one: protobuf makes an object of every field before
@@ -119,6 +121,25 @@ std::string campaign_json(const StatusData& status) {
 std::string parameters_json(const estimator::Result& result) {
     v1::Parameters message;
     fill(message, result);
+    return to_json(message);
+}
+
+std::string surface_json(const NoiseStatus& noise) {
+    v1::Surface message;
+    for (const NoiseStatus::Curve& curve : *noise.surface) {
+        v1::Surface::Curve& to = *message.add_curves();
+        to.set_run(static_cast<std::uint32_t>(curve.run));
+        to.set_position(static_cast<std::uint32_t>(curve.position));
+        to.set_alarm(curve.alarm);
+        for (std::size_t i = 0; i < curve.tau_s.size(); ++i) {
+            const auto& [x, y, z] = curve.deviation_deg_h;
+            if (!std::isfinite(x[i] + y[i] + z[i])) continue;
+            to.add_tau_s(curve.tau_s[i]);
+            to.add_x_deg_h(x[i]);
+            to.add_y_deg_h(y[i]);
+            to.add_z_deg_h(z[i]);
+        }
+    }
     return to_json(message);
 }
 

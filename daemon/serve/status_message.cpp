@@ -16,7 +16,7 @@ Wire wire_enum(Enum value) {
     const int number = static_cast<int>(value) + 1;
     return static_cast<Wire>(number);
 }
-static_assert(static_cast<int>(CampaignState::checking) + 1 == v1::Campaign::checking);
+static_assert(static_cast<int>(CampaignState::commissioning) + 1 == v1::Campaign::commissioning);
 static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);

@@ -15,6 +15,8 @@
 #include <system_error>
 #include <utility>
 
+#include "proto/text.hpp"
+
 namespace vibrig::tool {
 
 namespace {
@@ -23,15 +25,6 @@ constexpr std::size_t kChunk = 1 << 20;
 constexpr std::size_t kLongestLine = 1 << 16;
 constexpr std::size_t kNoColumn = std::numeric_limits<std::size_t>::max();
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-
-std::string_view trimmed(std::string_view text) {
-    constexpr std::string_view kBlank = " \t\r\"";
-    const std::size_t first = text.find_first_not_of(kBlank);
-    if (first == std::string_view::npos) {
-        return {};
-    }
-    return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
 
 bool is_missing(std::string_view field) {
     return field.empty() || field == "nan" || field == "NaN" || field == "NAN" || field == "NA";
@@ -64,7 +57,7 @@ class Parser {
         if (number_ == 1 && text.substr(0, 3) == "\xEF\xBB\xBF") {
             text.remove_prefix(3);
         }
-        const std::string_view content = trimmed(text);
+        const std::string_view content = proto::trimmed(text);
         if (content.empty()) {
             // The only field of the row is empty; at the end of the file it is no row.
             blank_ += single_ && !file_.values.empty() ? 1U : 0U;
@@ -98,14 +91,14 @@ class Parser {
     /// Next field of `rest`, which loses it.
     std::string_view next(std::string_view& rest) const {
         if (separator_ == ' ') {
-            rest = trimmed(rest);
+            rest = proto::trimmed(rest);
         }
         std::size_t end = separator_ == ' ' ? rest.find_first_of(" \t") : rest.find(separator_);
         end = std::min(end, rest.size());
         const std::string_view found = rest.substr(0, end);
         // Nothing after the last field differs from an empty field after the last separator.
         rest = end == rest.size() ? std::string_view() : rest.substr(end + 1);
-        return trimmed(found);
+        return proto::trimmed(found);
     }
 
     double field(std::string_view text, std::size_t index, const std::string& name) const {

@@ -16,11 +16,14 @@ void add_calibrate(CLI::App& app, int& exit_code);
 void add_level(CLI::App& app, int& exit_code);
 void add_zero(CLI::App& app, int& exit_code);
 void add_reproduce(CLI::App& app, int& exit_code);
+void add_study(CLI::App& app, int& exit_code);    ///< study plan, run, submit, status, merge
 void add_journal(CLI::App& app, int& exit_code);  ///< journal verify
 void add_pki(CLI::App& app, int& exit_code);
 void add_remote(
     CLI::App& app,
     int& exit_code);  ///< status, selftest, watch, events, arm, start, pause, resume, abort, ack
+void add_commission(CLI::App& app, int& exit_code);  ///< commission, its status and accept
+void add_commission_bus(CLI::App& commissioning, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_reports(CLI::App& app, int& exit_code);  ///< report, compensate
 void add_certificate(CLI::App& app, int& exit_code);

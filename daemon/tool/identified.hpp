@@ -1,7 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "daemon/dwells/anew.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {
@@ -11,6 +13,8 @@ struct Identified {
     estimator::Settings settings;
     estimator::Result result;
     estimator::uncertainty::Assessment assessed;
+    bool simulated = false;            ///< the rig was a program
+    std::optional<dwells::Live> live;  ///< of a campaign that was identified anew at its end
 };
 
 /// Identifies FILE: a CSV recording, or a campaign (folder, HDF5 file or name). `config`: a TOML

@@ -25,6 +25,7 @@
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
 #include "daemon/tool/rig_doubts.hpp"
+#include "daemon/tool/simulated.hpp"
 #include "estimator/hann.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
@@ -214,7 +215,10 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
             seen.add(
                 rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
     });
-    estimator::Identification identification(settings, dwells.size());
+    std::optional<dwells::Anew> anew;
+    if (campaign.found) anew.emplace(settings, *campaign.found, dwells.size());
+    estimator::Identification as_recorded(settings, dwells.size());
+    auto& identification = anew ? anew->identification() : as_recorded;
     RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
@@ -227,11 +231,12 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }
-    return with_doubts(identification.result(), doubts);
+    return with_doubts(anew ? anew->result() : identification.result(), doubts);
 }
 
 Found identify_campaign(const std::string& path, const std::string& config,
-                        estimator::Settings& settings) {
+                        estimator::Settings& settings, bool& simulated,
+                        std::optional<dwells::Live>& live) {
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
@@ -241,6 +246,12 @@ Found identify_campaign(const std::string& path, const std::string& config,
                                    "configuration in " + campaign.path, false)
             : configuration::load(config, false);
     settings = loaded.configuration.estimator;
+    simulated = campaign.head.simulated;
+    if (campaign.found) {
+        live = {*campaign.found, record::live_result(campaign, settings), {}};
+        live->assessed = estimator::uncertainty::assess(settings, live->result);
+    }
+    settings = dwells::Anew::settings_of(settings, campaign.found);
     return identify(campaign, settings);
 }
 
@@ -286,10 +297,13 @@ int run(const IdentifyOptions& options) {
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
-    std::cout << (options.json ? result_json(identified.result, assessed, check) + "\n"
-                               : result_table(identified.result, assessed) +
-                                     (check != nullptr ? monte_carlo_text(*check) : ""))
-              << std::flush;
+    const auto* live = identified.live ? &*identified.live : nullptr;
+    std::cout
+        << (options.json
+                ? result_json(identified.result, assessed, identified.simulated, check, live) + "\n"
+                : simulated_line(identified.simulated) + result_table(identified.result, assessed) +
+                      (check != nullptr ? monte_carlo_text(*check) : ""))
+        << std::flush;
     return exit_status(assessed.verdict.level, options.strict);
 }
 
@@ -299,9 +313,12 @@ Identified identify_recording(const std::string& file, const std::string& config
     Identified identified;
     Found found;
     if (is_campaign(file)) {
-        found = identify_campaign(file, config, identified.settings);
+        found = identify_campaign(file, config, identified.settings, identified.simulated,
+                                  identified.live);
     } else {
-        identified.settings = configuration::load(config, false).configuration.estimator;
+        const auto loaded = configuration::load(config, false);
+        identified.settings = loaded.configuration.estimator;
+        identified.simulated = loaded.configuration.simulated() || proto::says_simulated(file);
         found = identify(read(file), identified.settings);
     }
     identified.result = std::move(found.result);

@@ -25,14 +25,22 @@ Progress::~Progress() {
     }
 }
 
-void Progress::show(std::size_t done, std::size_t all) {
-    if (!terminal_ || Clock::now() < next_) {
-        return;
-    }
+bool Progress::is_time() {
+    if (!terminal_ || Clock::now() < next_) return false;
     next_ = Clock::now() + kRefresh;
-    shown_ = true;
+    return shown_ = true;
+}
+
+void Progress::show(std::size_t done, std::size_t all) {
+    if (!is_time()) return;
     const std::size_t percent = all == 0 ? 100 : done * 100 / all;
     std::fprintf(stderr, "\r%s %zu %%\033[K", what_.c_str(), percent);
+    std::fflush(stderr);
+}
+
+void Progress::show(const std::string& line) {
+    if (!is_time()) return;
+    std::fprintf(stderr, "\r%s\033[K", line.c_str());
     std::fflush(stderr);
 }
 

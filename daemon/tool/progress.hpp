@@ -10,14 +10,18 @@ namespace vibrig::tool {
 /// wonder.
 class Progress {
   public:
-    explicit Progress(std::string what);
+    explicit Progress(std::string what = {});
     ~Progress();  ///< clears the line
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
 
     void show(std::size_t done, std::size_t all);
+    void show(const std::string& line);
+    [[nodiscard]] bool on_terminal() const { return terminal_; }
 
   private:
+    [[nodiscard]] bool is_time();
+
     using Clock = std::chrono::steady_clock;
     std::string what_;
     bool terminal_;

@@ -53,7 +53,7 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
     if (rows.empty())
         throw std::runtime_error(campaign.path +
                                  ": found no good sample in a dwell, expected some");
-    proto::write_recording(path, rows);
+    proto::write_recording(path, rows, campaign.head.simulated);
     std::cerr << path << ": " << rows.size() << " samples of "
               << record::recorded_dwells(campaign).size() << " dwells";
     if (left_out > 0) std::cerr << "; " << left_out << " without good quality are left out";
@@ -85,6 +85,7 @@ void export_mat(const record::Campaign& campaign, const std::string& path) {
     file.add("name", campaign.head.name);
     file.add("configuration", campaign.head.configuration);
     file.add("result_json", campaign.result_json);
+    file.add("simulated", std::vector<double>{campaign.head.simulated ? 1.0 : 0.0});
     file.add("start_utc_s",
              std::vector<double>{drivers::to_seconds(origin + campaign.head.utc_offset_ns)});
     file.add("time_s", time);

@@ -157,7 +157,7 @@ void show_loop_check(serve::Client& client, const v1::Status& then) {
             asked = status.proof().asks();
             if (!asked.empty()) std::cout << ">>> " << asked << std::endl;
         }
-        if (status.loop_check().verdict() != "running") ++looks;
+        if (status.loop_check().verdict() != "running" && asked.empty()) ++looks;
     } while (looks == 0 || (status.proof().utc_ns() == before && looks < kLooks));
     show_rows(status.loop_check().rows());
     show_rows(status.proof().rows());

@@ -20,6 +20,7 @@
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
+#include "daemon/tool/simulated.hpp"
 #include "estimator/instruction_set.hpp"
 #include "proto/text.hpp"
 
@@ -100,8 +101,14 @@ record::Campaign replayed_campaign(const ReplayArguments& arguments) {
 
 /// The result; where it is not the recording's, with a word about that.
 std::string replayed_json(const record::ReplayResult& replayed,
-                          const estimator::uncertainty::Assessment& assessed, bool same_build) {
-    std::string text = result_json(replayed.result, assessed);
+                          const estimator::uncertainty::Assessment& assessed,
+                          const estimator::Settings& settings, bool simulated, bool same_build) {
+    std::optional<dwells::Live> live;
+    if (replayed.found)
+        live = {*replayed.found, replayed.live,
+                estimator::uncertainty::assess(settings, replayed.live)};
+    std::string text =
+        result_json(replayed.result, assessed, simulated, nullptr, live ? &*live : nullptr);
     if (replayed.different == 0) return text;
     const nlohmann::ordered_json replay{{"dwells", replayed.compared},
                                         {"not_as_recorded", replayed.different},
@@ -137,9 +144,12 @@ int replay(const ReplayArguments& arguments) {
     const bool same_build = campaign.head.version == VIBRIG_VERSION &&
                             campaign.head.compiler == estimator::compiler() &&
                             campaign.head.instruction_set == estimator::instruction_set();
-    const auto assessed = estimator::uncertainty::assess(settings, replayed.result);
-    std::cout << (arguments.json ? replayed_json(replayed, assessed, same_build) + "\n"
-                                 : result_table(replayed.result, assessed))
+    const auto assessed = estimator::uncertainty::assess(
+        dwells::Anew::settings_of(settings, replayed.found), replayed.result);
+    const bool simulated = campaign.head.simulated;
+    std::cout << (arguments.json
+                      ? replayed_json(replayed, assessed, settings, simulated, same_build) + "\n"
+                      : simulated_line(simulated) + result_table(replayed.result, assessed))
               << std::flush;
     std::array<char, 160> text{};
     std::snprintf(text.data(), text.size(),

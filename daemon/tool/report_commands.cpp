@@ -24,6 +24,7 @@
 #include "daemon/tool/print_pdf.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/result_table.hpp"
+#include "daemon/tool/simulated.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {
@@ -110,6 +111,8 @@ Json prediction_json(const report::Prediction& predicted, const CompensateArgume
 std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
                               const estimator::Settings& settings, const Json& prediction) {
     Json root;
+    root["simulated"] = campaign.head.simulated;
+    if (campaign.head.simulated) root["note"] = kSimulatedRig;
     root["campaign"] = campaign.head.name;
     root["started"] = report::utc_text(campaign.head.utc_ns);
     root["file"] = campaign.path;
@@ -183,12 +186,14 @@ std::string coefficients_header(const record::Campaign& campaign, const report::
     std::string name;
     for (const char ch : campaign.head.name)
         name += std::isalnum(static_cast<unsigned char>(ch)) != 0 ? ch : '_';
-    std::string text = "/* Gyro error coefficients of campaign " + name + ", " +
-                       report::utc_text(campaign.head.utc_ns) +
-                       ".\n * deg/h, deg/h/g, deg/h/g^2. Drift about the input axis of a gyro:\n"
-                       " *   D = c[0] + c[1] aI + c[2] aO + c[3] aS + c[4] aI^2 + c[5] aO^2 + c[6] "
-                       "aS^2\n *       + c[7] aI aO + c[8] aI aS + c[9] aO aS\n"
-                       " * with a the specific force along input, output and spin axis, g.\n";
+    std::string text;
+    if (campaign.head.simulated) text = std::string("/* ") + kSimulatedRig + " */\n";
+    text += "/* Gyro error coefficients of campaign " + name + ", " +
+            report::utc_text(campaign.head.utc_ns) +
+            ".\n * deg/h, deg/h/g, deg/h/g^2. Drift about the input axis of a gyro:\n"
+            " *   D = c[0] + c[1] aI + c[2] aO + c[3] aS + c[4] aI^2 + c[5] aO^2 + c[6] "
+            "aS^2\n *       + c[7] aI aO + c[8] aI aS + c[9] aO aS\n"
+            " * with a the specific force along input, output and spin axis, g.\n";
     for (const auto& line : comments) text += " * " + line + "\n";
     text += " */\n#ifndef VIBRIG_COEFFICIENTS_H\n#define VIBRIG_COEFFICIENTS_H\n\n";
     for (const bool sigma : {false, true}) {
@@ -267,8 +272,10 @@ int compensate(CompensateArguments arguments) {
     report::Coefficients coefficients;
     estimator::Settings settings = report_settings(campaign, arguments.config);
     const auto replayed = record::replay(campaign, settings, {});
-    coefficients = report::combined(estimator::uncertainty::assess(settings, replayed.result),
-                                    report::final_coefficients(campaign.path, replayed.dwells));
+    coefficients =
+        report::combined(estimator::uncertainty::assess(
+                             dwells::Anew::settings_of(settings, replayed.found), replayed.result),
+                         report::final_coefficients(campaign.path, replayed));
     check_finite(campaign.path, coefficients);
     if (arguments.table_g) level *= settings.transmission;
     const double kappa = 1 + level * level / 2;
@@ -281,14 +288,18 @@ int compensate(CompensateArguments arguments) {
             campaign.path +
             ": found coefficients that are not determined, expected all 30 for "
             "a C header");
-    const auto comments = comment_lines(settings, predicted, arguments, kappa);
+    auto comments = comment_lines(settings, predicted, arguments, kappa);
+    const bool simulated = campaign.head.simulated;
+    // In the header it has a comment of its own.
+    if (simulated && arguments.format == "csv") comments.insert(comments.begin(), kSimulatedRig);
     const std::string text =
         arguments.format == "json"  ? coefficients_json(campaign, coefficients, settings,
                                                         prediction_json(predicted, arguments, kappa))
         : arguments.format == "csv" ? coefficients_csv(coefficients, comments)
         : arguments.format == "c"
             ? coefficients_header(campaign, coefficients, comments)
-            : coefficients_text(coefficients, axes_line(settings), predicted, arguments, kappa);
+            : simulated_line(simulated) +
+                  coefficients_text(coefficients, axes_line(settings), predicted, arguments, kappa);
     if (arguments.output.empty()) {
         std::cout << text << std::flush;
     } else {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/tool/allan_analysis.hpp"
 #include "daemon/tool/progress.hpp"
 #include "daemon/tool/reproduce.hpp"
 #include "estimator/allan/deviation.hpp"
@@ -15,8 +16,6 @@
 namespace vibrig::tool {
 
 namespace {
-
-namespace allan = estimator::allan;
 
 constexpr std::size_t kSeeds = 40;
 constexpr std::size_t kRecord = 36000;  // 10 h at 1 Hz
@@ -92,6 +91,7 @@ allan::DynamicSummary windows(const std::vector<double>& rate, allan::MeanMode m
     allan::DynamicSettings settings;
     settings.window = kWindow;
     settings.mode = mode;
+    settings.fits = false;  // the mean of the windows is fitted
     allan::DynamicAllan dynamic(settings);
     std::vector<allan::WindowRow> rows;
     for (const double y : rate) {
@@ -221,6 +221,39 @@ void add_synthetic(Reproduction& table, std::size_t seeds, Progress& progress) {
     }
 }
 
+/// A record whose noise changes: from half time on N is doubled and the rate rises as a gyro's does
+/// that warms. Surface, traces and the mean curve, as the paper's Figures 4, 5 and 7 show theirs.
+void add_charts(Reproduction& table) {
+    constexpr double kRise = 0.05;  // deg/h per hour
+    AllanAnalysis shown;
+    shown.request.file = "simulated gyro, N doubled and warming from 5 h on";
+    shown.request.tau0 = 1;
+    shown.request.window_s = kWindow;
+    std::vector<double> rate =
+        allan::synthetic_rate({0.1, 0.001, 0.002, 0, 0}, kRecord, 1.0, kFirstSeed);
+    const std::vector<double> later =
+        allan::synthetic_rate({0.1, 0.002, 0.002, 0, 0}, kRecord, 1.0, kFirstSeed);
+    for (std::size_t i = kRecord / 2; i < kRecord; ++i) {
+        rate[i] = later[i] + kRise * static_cast<double>(i - kRecord / 2) / 3600;
+    }
+    allan::DynamicSettings settings;
+    settings.window = kWindow;
+    allan::DynamicAllan dynamic(settings);
+    allan::StationarityMonitor monitor({}, dynamic);
+    for (const double y : rate) {
+        if (!dynamic.add(y)) continue;
+        const allan::WindowRow row = dynamic.row();
+        shown.windows.push_back({row, monitor.check(row)});
+    }
+    shown.factors = dynamic.factors();
+    shown.points = allan::deviations(allan::Series::from_rate(rate, 1.0), oadev,
+                                     allan::log_factors(kRecord / 2, 30));
+    shown.fit = whole_record(rate);
+    table.charts = {{"surface", surface_chart(shown)},
+                    {"coefficients", traces_chart(shown)},
+                    {"deviation", deviation_chart(shown)}};
+}
+
 }  // namespace
 
 Reproduction reproduce_allan(const ReproduceOptions& options) {
@@ -233,6 +266,7 @@ Reproduction reproduce_allan(const ReproduceOptions& options) {
     add_multipliers(table);
     add_gauss_markov(table, seeds, progress);
     add_synthetic(table, seeds, progress);
+    if (!options.plot.empty()) add_charts(table);
     table.notes.push_back(text(
         "Monte-Carlo rows: %zu runs, seeds from %d; 10 h at 1 Hz, windows of 3600 s; Q 0.1 arcsec, "
         "N 0.001 deg/rt-h, and s = 0.02 deg/h, tm = 1.5 h or B 0.01, K 0.02, R 0.02",

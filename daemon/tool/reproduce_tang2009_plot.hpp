@@ -6,7 +6,7 @@
 
 namespace vibrig::tool::tang2009 {
 
-/// Charts like the paper's Figure 3, one for each gyro and route of a study. Throws
+/// Charts like the paper's Figure 3, one for each trial, gyro and route of a study. Throws
 /// std::runtime_error naming the path.
 void plot_convergence(const Study& study, const std::string& folder);
 

@@ -27,13 +27,15 @@ constexpr std::size_t kSamplesBetweenNotes = 400;  ///< 10 s
 struct Plan {
     Method method;
     std::array<bool, 4> uses;  ///< of kTable_g
+    bool all_at_once = false;
 };
 constexpr std::array<Plan, kRoutes> kPlans{{{Method::two_step, {true, true, false, false}},
                                             {Method::joint, {true, true, false, false}},
                                             {Method::two_step, {false, false, true, true}},
                                             {Method::joint, {false, false, true, true}},
-                                            {Method::joint, {true, false, false, false}},
-                                            {Method::joint, {true, false, true, false}}}};
+                                            {Method::two_step, {true, false, false, false}, true},
+                                            {Method::joint, {true, false, true, false}},
+                                            {Method::joint, {true, false, false, false}}}};
 
 estimator::Covariance correlation_of(const estimator::Result& result) {
     const Eigen::Map<const Eigen::Matrix<double, kParameters, 1>> sigma(result.sigma.data());
@@ -56,17 +58,27 @@ struct Follower {
     Identification identification;
     Plan plan;
     std::size_t run = 0, position = 0;
+    std::size_t samples = 0;
 
     explicit Follower(const Plan& of)
         : identification([&of] {
               estimator::Settings settings;
               settings.method = of.method;
+              settings.all_at_once = of.all_at_once;
               return settings;
           }()),
           plan(of) {}
 
+    /// Where it goes, every 10 s.
+    void note(Convergence& convergence) const {
+        estimator::Estimate estimate;
+        identification.estimate(estimate);
+        convergence.minutes.push_back(static_cast<double>(samples) * kPeriod_s / 60);
+        convergence.value.push_back(estimate.value);
+    }
+
     void take(const plant::PlannedSample& sample, const estimator::Measurement& measurement,
-              double table_g) {
+              double table_g, Convergence* convergence) {
         if (!plan.uses[sample.run - 1]) return;
         if (sample.run != run || sample.position != position) {
             run = sample.run;
@@ -75,6 +87,7 @@ struct Follower {
                 {static_cast<int>(run), static_cast<int>(position), table_g});
         }
         static_cast<void>(identification.add(measurement));
+        if (++samples % kSamplesBetweenNotes == 0 && convergence != nullptr) note(*convergence);
     }
 
     Outcome end() {
@@ -92,7 +105,8 @@ struct Follower {
     }
 };
 
-std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Convergence* convergence,
+std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed,
+                                      std::array<Convergence, kRoutes>* convergence,
                                       const std::function<void()>& dwell_done) {
     plant::Truth rig;
     rig.seed = seed;
@@ -104,16 +118,6 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Converge
     std::vector<Follower> followers;
     for (const Plan& of : kPlans) followers.emplace_back(of);
 
-    std::size_t samples = 0;  // of trial 1
-    const auto note = [&] {
-        if (convergence == nullptr) return;
-        estimator::Estimate joint, two_step;
-        followers[kJoint1].identification.estimate(joint);
-        followers[kTwoStep1].identification.estimate(two_step);
-        convergence->minutes.push_back(static_cast<double>(samples) * kPeriod_s / 60);
-        convergence->joint.push_back(joint.value);
-        convergence->two_step.push_back(two_step.value);
-    };
     plant::simulate(
         rig, plan,
         [&](const plant::PlannedSample& sample) {
@@ -123,15 +127,17 @@ std::array<Outcome, kRoutes> run_seed(double scale, std::uint64_t seed, Converge
                 m.angle_rad[k] = sample.readings.encoder_deg[k] * (std::numbers::pi / 180);
                 m.force_g[k] = sample.readings.raw_g[k];
             }
-            for (Follower& follower : followers) {
-                follower.take(sample, m, plan.table_g[sample.run - 1]);
+            for (std::size_t r = 0; r < kRoutes; ++r) {
+                followers[r].take(sample, m, plan.table_g[sample.run - 1],
+                                  convergence != nullptr ? &(*convergence)[r] : nullptr);
             }
-            if (sample.run <= 2 && ++samples % kSamplesBetweenNotes == 0) note();
         },
         [&](std::size_t, std::size_t) { dwell_done(); });
     std::array<Outcome, kRoutes> outcomes;
-    for (std::size_t r = 0; r < kRoutes; ++r) outcomes[r] = followers[r].end();
-    note();
+    for (std::size_t r = 0; r < kRoutes; ++r) {
+        outcomes[r] = followers[r].end();
+        if (convergence != nullptr) followers[r].note((*convergence)[r]);
+    }
     return outcomes;
 }
 

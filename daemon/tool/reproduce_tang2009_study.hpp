@@ -17,8 +17,9 @@ enum Route : std::size_t {
     kJoint1,
     kTwoStep2,  ///< trial 2: 0 and 2 g
     kJoint2,
-    kOneLevel3,  ///< trial 3: 9 g alone, all 30 coefficients at once
-    kJointRest,  ///< 9 and 0 g
+    kOneLevel3,   ///< trial 3: 9 g alone, all 30 coefficients at once, amplitude by eq. 13
+    kJointRest,   ///< 9 and 0 g
+    kJointLevel,  ///< 9 g alone, the joint filter
     kRoutes
 };
 
@@ -30,10 +31,10 @@ struct Outcome {
     double correlation_square = 0;
 };
 
-/// Estimates of trial 1 every 10 s of its dwells, one seed.
+/// Estimates of a route every 10 s of its dwells, one seed.
 struct Convergence {
     std::vector<double> minutes;
-    std::vector<Coefficients> joint, two_step;
+    std::vector<Coefficients> value;
 };
 
 /// All routes over simulated rigs at `scale` times the paper's levels (9, 7, 0 and 2 g at the
@@ -41,8 +42,8 @@ struct Convergence {
 struct Study {
     double scale = 1;
     std::vector<std::array<Outcome, kRoutes>> seeds;
-    Convergence convergence;                ///< of the first seed
-    Coefficients bound{}, bound_trial_2{};  ///< Cramer-Rao, 1 sigma
+    std::array<Convergence, kRoutes> convergence;  ///< of the first seed
+    Coefficients bound{}, bound_trial_2{};         ///< Cramer-Rao, 1 sigma
 
     [[nodiscard]] double platform_g(double table_g) const { return scale * table_g * 2.0 / 3.0; }
 };

@@ -83,10 +83,35 @@ Json combinations(const estimator::Result& result) {
     return list;
 }
 
+/// With what noise, and what was shown before.
+Json identified_anew(const dwells::Live& live) {
+    Json list = Json::array();
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const bool observable = live.result.observable[i];
+        const uncertainty::Coefficient& of = live.assessed.coefficients[i];
+        const double value = live.assessed.done ? of.value : live.result.value[i];
+        list.push_back({{"name", estimator::parameter_names()[i]},
+                        {"value", number_if(observable, value)},
+                        {"sigma", number_if(observable, live.result.sigma[i])},
+                        {"u", number_if(observable, of.u)}});
+    }
+    const estimator::NoiseLevels& levels = live.found.levels;
+    return {{"noise",
+             {{"angle_arcsec", levels.angle_arcsec},
+              {"gyro_random_walk_deg_per_rt_h", levels.gyro_random_walk_deg_per_rt_h},
+              {"dof", number_or_null(live.found.dof)}}},
+            {"live",
+             {{"parameters", std::move(list)},
+              {"nis", number_or_null(live.result.nis_per_dof)},
+              {"verdict", uncertainty::word_of(live.assessed.verdict.level)},
+              {"sentence", live.assessed.verdict.sentence}}}};
+}
+
 }  // namespace
 
 std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed,
-                        const uncertainty::MonteCarlo* drawn) {
+                        bool simulated, const uncertainty::MonteCarlo* drawn,
+                        const dwells::Live* live) {
     Json root;
     root["parameters"] = parameters(result, assessed, drawn);
     root["covariance"] = covariance(result);
@@ -106,8 +131,10 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
                               : Json(nullptr);
     if (!assessed.verdict.sentence.empty()) root.update(assessment_json(assessed));
     if (drawn != nullptr) root["monte_carlo"] = monte_carlo_json(*drawn);
+    if (live != nullptr) root["identified_anew"] = identified_anew(*live);
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
+    root["simulated"] = simulated;
     // A warning may carry bytes of a file; a broken sequence must not cost the result.
     return root.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "daemon/dwells/anew.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
 
@@ -10,10 +11,13 @@ namespace vibrig::tool {
 /// The JSON form of a result, as `vibrig identify --json` prints it and vibrigd writes it to
 /// result.json: one line, keys in fixed order, numbers that read back exactly. What is not
 /// observable or does not exist is null, never NaN. Without an assessment there is no verdict, no
-/// budget, and `value` is that of a constant bias. `drawn`: the Monte Carlo, if there was one.
+/// budget, and `value` is that of a constant bias. `simulated`: the rig was a program. `drawn`: the
+/// Monte Carlo, if there was one. `live`: what the result replaced, if it was identified anew.
 [[nodiscard]] std::string result_json(const estimator::Result& result,
                                       const estimator::uncertainty::Assessment& assessed = {},
-                                      const estimator::uncertainty::MonteCarlo* drawn = nullptr);
+                                      bool simulated = false,
+                                      const estimator::uncertainty::MonteCarlo* drawn = nullptr,
+                                      const dwells::Live* live = nullptr);
 
 /// True if all 30 coefficients are determined one by one.
 [[nodiscard]] bool all_observable(const estimator::Result& result);

@@ -32,11 +32,13 @@ int main(int argc, char** argv) {
     vibrig::tool::add_level(app, exit_code);
     vibrig::tool::add_zero(app, exit_code);
     vibrig::tool::add_reproduce(app, exit_code);
+    vibrig::tool::add_study(app, exit_code);
     vibrig::tool::add_replay(app, exit_code);
     vibrig::tool::add_recordings(app, exit_code);
     vibrig::tool::add_reports(app, exit_code);
     vibrig::tool::add_certificate(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
+    vibrig::tool::add_commission(app, exit_code);
     vibrig::tool::add_journal(app, exit_code);
     vibrig::tool::add_pki(app, exit_code);
     if (vibrig::proto::asks_for_command_tree(argc, argv)) {

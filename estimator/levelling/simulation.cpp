@@ -2,9 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 
 namespace vibrig::estimator::levelling {
+
+namespace {
+
+Pair acceleration_at(const Scenario& scenario, double time_s) noexcept {
+    Pair sum{};
+    for (const Manoeuvre& m : scenario.motion) {
+        if (time_s < m.from_s || time_s >= m.until_s) continue;
+        for (std::size_t i = 0; i < 2; ++i) sum[i] += m.acceleration_mps2[i];
+    }
+    return sum;
+}
+
+}  // namespace
 
 double SimulatedStart::last_above(double fraction) const noexcept {
     if (trace.empty()) {
@@ -35,12 +49,14 @@ SimulatedStart simulate(const Scenario& scenario) {
     const double t = loop.period_s;
     std::mt19937_64 generator(scenario.seed);
     std::normal_distribution<double> normal;
-    Leveller leveller(loop);
+    std::optional<Leveller> leveller;
+    if (scenario.network != Network::bare) leveller.emplace(loop);
     std::array<ConventionalNetwork, 2> conventional{ConventionalNetwork(loop.earth),
                                                     ConventionalNetwork(loop.earth)};
-    std::array<FastNetwork, 2> undamped{FastNetwork(loop.earth), FastNetwork(loop.earth)};
+    std::array<FastNetwork, 2> plain{FastNetwork(loop.earth), FastNetwork(loop.earth)};
     SimulatedStart result;
     Pair tilt = scenario.tilt;
+    Pair velocity{};
     const auto steps = static_cast<std::size_t>(std::llround(scenario.duration_s / t));
     if (!scenario.until_settled) {
         result.trace.reserve(steps);
@@ -53,46 +69,53 @@ SimulatedStart simulate(const Scenario& scenario) {
             for (std::size_t i = 0; i < 2; ++i) tilt[i] += scenario.step[i];
         }
         LevelInput input;
+        const Pair acceleration = acceleration_at(scenario, now);
         for (std::size_t i = 0; i < 2; ++i) {
-            input.force[i] = loop.earth.gravity_mps2 * tilt[i] + scenario.zero[i] +
-                             loop.noise.accelerometer_mps2 * normal(generator);
-            input.reference[i] =
+            // The reference is read at the end of the interval whose specific force comes with it.
+            velocity[i] += t * acceleration[i];
+            input.force[i] = acceleration[i] + loop.earth.gravity_mps2 * tilt[i] +
+                             scenario.zero[i] + loop.noise.accelerometer_mps2 * normal(generator);
+            const double error =
                 (now >= scenario.reference_error_s ? scenario.reference_error[i] : 0) +
                 loop.noise.reference_mps * normal(generator);
+            input.reference[i] = scenario.internal ? 0 : velocity[i] + error;
         }
         for (std::size_t i = 0; k == 0 && i < 2; ++i) {
             conventional[i].start(input.reference[i]);
-            undamped[i].start(input.reference[i]);
+            plain[i].start(input.reference[i]);
         }
         Pair rate{};
         if (scenario.network == Network::fast) {
-            rate = leveller.step(input).rate;
+            rate = leveller->step(input).rate;
         } else {
             for (std::size_t i = 0; i < 2; ++i) {
+                const Gains gains = scenario.network == Network::bare ? loop.fast : Gains{};
                 rate[i] = scenario.network == Network::conventional
                               ? conventional[i].step(input.force[i], input.reference[i], t)
-                              : undamped[i].step(input.force[i], input.reference[i], {}, t);
+                              : plain[i].step(input.force[i], input.reference[i], gains, t);
             }
         }
         if (!scenario.until_settled) {
             result.trace.push_back({now, tilt, rate});
         }
-        if (leveller.settled_s() && result.settled_s < 0) {
-            result.settled_s = *leveller.settled_s();
+        if (leveller && leveller->settled_s() && result.settled_s < 0) {
+            result.settled_s = *leveller->settled_s();
             result.tilt_when_settled = tilt;
             if (scenario.until_settled) {
                 break;
             }
         }
         for (std::size_t i = 0; i < 2; ++i) {
-            tilt[i] += t * (scenario.drift[i] - rate[i]) +
+            // The vertical of the carrier's place turns with its way.
+            tilt[i] += t * (scenario.drift[i] - rate[i] + velocity[i] / loop.earth.radius_m) +
                        loop.noise.gyro_random_walk * std::sqrt(t) * normal(generator);
         }
     }
-    result.verdict = leveller.verdict();
-    result.drift = leveller.drift();
-    result.observables = leveller.observables();
-    result.message = leveller.message();
+    if (!leveller) return result;
+    result.verdict = leveller->verdict();
+    result.drift = leveller->drift();
+    result.observables = leveller->observables();
+    result.message = leveller->message();
     return result;
 }
 

@@ -8,12 +8,22 @@
 
 namespace vibrig::estimator::levelling {
 
-enum class Network : std::uint8_t { undamped, conventional, fast };
+/// `bare`: the fast gains as they are, also with k3 = 0 (eq. 8), without the loop's checks.
+enum class Network : std::uint8_t { undamped, conventional, fast, bare };
 
-/// A simulated start: two channels at rest with what is wrong with them.
+/// The carrier speeds up, or slows down.
+struct Manoeuvre {
+    double from_s = 0, until_s = 0;
+    Pair acceleration_mps2{};
+};
+
+/// A simulated start: two channels with what is wrong with them, at rest or on a carrier.
 struct Scenario {
     LevellerSettings loop;
     Network network = Network::fast;
+    std::vector<Manoeuvre> motion;  ///< from rest
+    /// Internal damping (eq. 1): the network has no reference velocity, and so 0 for one.
+    bool internal = false;
     Pair tilt{};                   ///< at the start, rad
     Pair drift{};                  ///< rad/s
     Pair zero{};                   ///< of the accelerometers, m/s^2

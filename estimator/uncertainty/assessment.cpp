@@ -103,12 +103,11 @@ struct TypeB {
     VectorXd local_g;      ///< per relative change of g
 };
 
-TypeB propagate(const Settings& settings, const Together& all,
-                const std::vector<InputSignature>& inputs, const MatrixXd& u, double sync_bound) {
+TypeB propagate(const Settings& settings, const Together& all, const MatrixXd& rates,
+                const MatrixXd& u, double sync_bound) {
     TypeB b;
-    b.sensitivity.resize(kAll, index(inputs.size()));
-    for (std::size_t i = 0; i < inputs.size(); ++i)
-        b.sensitivity.col(index(i)) = all.gain * inputs[i].rates;
+    b.sensitivity.resize(kAll, rates.cols());
+    for (Index i = 0; i < rates.cols(); ++i) b.sensitivity.col(i) = all.gain * rates.col(i);
     b.local_g = VectorXd::Zero(kAll);
     for (std::size_t g = kDi; g < kGroups; ++g) {
         for (std::size_t j = 0; j < kGyros; ++j) {
@@ -277,7 +276,6 @@ const char* word_of(Level level) noexcept {
 Assessment assess(const Settings& settings, const Result& result) {
     Assessment out;
     const DwellTable table = dwell_table(result.rows);
-    MatrixXd gain0;
     if (table.dwells() >= 2 && settings.method == Method::joint) {
         out.done = true;
         out.model = settings.drift.model;
@@ -292,13 +290,11 @@ Assessment assess(const Settings& settings, const Result& result) {
                 coefficients[internal_index(g, j)] = out.drift[j].value[index(g)];
         }
         const ForwardModel model(settings, coefficients);
-        out.inputs = input_signatures(settings.uncertainty, table, model);
+        InputSignatures inputs = input_signatures(settings.uncertainty, table, model);
+        out.inputs = std::move(inputs.list);
         const MatrixXd u = input_covariance(settings.uncertainty, out.inputs);
-        MatrixXd declared(3 * table.dwells(), index(out.inputs.size()));
-        for (std::size_t i = 0; i < out.inputs.size(); ++i)
-            declared.col(index(i)) = out.inputs[i].rates;
         const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
-        const MatrixXd scaled = declared * MatrixXd(root.matrixL());
+        const MatrixXd scaled = inputs.rates * MatrixXd(root.matrixL());
         for (Index k = 0; k < scaled.rows(); ++k) {
             MatrixXd& of_gyro = gyros[static_cast<std::size_t>(k % 3)].declared;
             if (k < 3) of_gyro.resize(table.dwells(), scaled.cols());
@@ -323,11 +319,11 @@ Assessment assess(const Settings& settings, const Result& result) {
         out.worst_step = worst_step(gyros);
         tell_rates(table, fit.residual(all.value), fit.residual_variance(), out);
         if (out.degrees >= 9) out.evidence = weigh_patterns(table, fit, out.ramps, model, gyros);
-        const TypeB b = propagate(settings, all, out.inputs, u, out.sync_bound);
+        const TypeB b = propagate(settings, all, inputs.rates, u, out.sync_bound);
+        out.sensitivity = b.sensitivity;
         tell_coefficients(settings, result, table, fit, all, b, out);
-        gain0 = fit.gain();
     }
-    out.verdict = judge(settings, result, out, gain0);
+    out.verdict = judge(settings, result, out);
     return out;
 }
 

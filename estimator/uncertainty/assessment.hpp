@@ -87,8 +87,9 @@ struct Assessment {
     double sync_arcsec = 0, sync_bound = 0;  ///< deg/h/g^2
     std::vector<DwellRate> rates;
     bool times_assumed = false;
-    /// For the Monte Carlo: gain of the estimator and the inputs it acts on, filter order.
-    Eigen::MatrixXd gain, covariance_type_a;
+    /// For the Monte Carlo: gain of the estimator (30 x 3 n), the inputs, and what one unit of each
+    /// does to the coefficients (30 x m), filter order.
+    Eigen::MatrixXd gain, covariance_type_a, sensitivity;
     std::vector<InputSignature> inputs;
 };
 

@@ -75,9 +75,14 @@ void each_input(const Inputs& in, const Each& each) {
             [k](Disturbance& d, double x) { (k == 0 ? d.cross_north : d.cross_east) = x; });
 }
 
+void append(InputSignatures& to, InputSignature input, const VectorXd& rates) {
+    to.list.push_back(std::move(input));
+    to.rates.conservativeResize(rates.size(), to.rates.cols() + 1);
+    to.rates.rightCols<1>() = rates;
+}
+
 /// A step of the bias of each gyro at each change of run, about its mean.
-void add_run_steps(const Inputs& inputs, const DwellTable& table,
-                   std::vector<InputSignature>& list) {
+void add_run_steps(const Inputs& inputs, const DwellTable& table, InputSignatures& to) {
     if (!(inputs.bias_step_between_runs.u > 0)) return;
     for (Index k = 1; k < table.dwells(); ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -88,12 +93,13 @@ void add_run_steps(const Inputs& inputs, const DwellTable& table,
         for (std::size_t j = 0; j < 3; ++j) {
             VectorXd rates = VectorXd::Zero(3 * table.dwells());
             for (Index r = 0; r < table.dwells(); ++r) rates[3 * r + static_cast<Index>(j)] = z[r];
-            list.push_back({"bias_step_between_runs",
-                            std::string("after dwell ") + std::to_string(k) + ", " + kAxis[j],
-                            inputs.bias_step_between_runs,
-                            std::move(rates),
-                            false,
-                            {}});
+            append(to,
+                   {"bias_step_between_runs",
+                    std::string("after dwell ") + std::to_string(k) + ", " + kAxis[j],
+                    inputs.bias_step_between_runs,
+                    false,
+                    {}},
+                   rates);
         }
     }
 }
@@ -106,18 +112,19 @@ std::string joined(const std::string& input, const std::string& element) {
 
 std::string InputSignature::name() const { return joined(input, element); }
 
-std::vector<InputSignature> input_signatures(const Inputs& inputs, const DwellTable& table,
-                                             const ForwardModel& model) {
-    std::vector<InputSignature> list;
+InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
+                                 const ForwardModel& model) {
+    InputSignatures out{{}, MatrixXd(3 * table.dwells(), 0)};
     each_input(inputs, [&](const char* key, std::string element, const Declared& declared,
                            double unit, double step, const Set& set, bool with_next) {
         if (!(declared.u > 0)) return;
-        list.push_back({key, std::move(element), declared,
-                        unit * signature(table, model, set, step), with_next,
-                        [set, unit](Disturbance& d, double x) { set(d, unit * x); }});
+        append(out,
+               {key, std::move(element), declared, with_next,
+                [set, unit](Disturbance& d, double x) { set(d, unit * x); }},
+               unit * signature(table, model, set, step));
     });
-    add_run_steps(inputs, table, list);
-    return list;
+    add_run_steps(inputs, table, out);
+    return out;
 }
 
 MatrixXd input_covariance(const Inputs& inputs, const std::vector<InputSignature>& list) {

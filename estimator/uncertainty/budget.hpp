@@ -10,11 +10,10 @@
 
 namespace vibrig::estimator::uncertainty {
 
-/// One declared input on this campaign: how it moves the rates.
+/// One declared input that moves the rates.
 struct InputSignature {
     std::string input, element;  ///< key, and which of several
     Declared declared;           ///< in the unit of the key
-    Eigen::VectorXd rates;       ///< per unit, 3 n
     /// Cosine and sine of one amplitude are drawn together.
     bool with_next = false;
     /// Gives it a size, in the unit of the key; none: it is linear.
@@ -24,9 +23,12 @@ struct InputSignature {
     [[nodiscard]] std::string name() const;
 };
 
-[[nodiscard]] std::vector<InputSignature> input_signatures(const Inputs& inputs,
-                                                           const DwellTable& table,
-                                                           const ForwardModel& model);
+struct InputSignatures {
+    std::vector<InputSignature> list;
+    Eigen::MatrixXd rates;  ///< of each per unit, 3 n x m
+};
+[[nodiscard]] InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
+                                               const ForwardModel& model);
 
 /// Covariance of the inputs; throws SettingsError when correlations name no input, or two that
 /// cannot be correlated so.

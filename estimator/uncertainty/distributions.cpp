@@ -11,10 +11,16 @@ namespace {
 constexpr double kTiny = 1e-300;
 constexpr double kPrecision = 1e-15;
 
+/// std::lgamma writes the sign to a variable that all threads share.
+double log_gamma(double a) {
+    int sign = 0;
+    return ::lgamma_r(a, &sign);
+}
+
 /// Regularised upper incomplete gamma function: series below a + 1, else Lentz's fraction.
 double gamma_upper(double a, double x) {
     if (x <= 0) return 1;
-    const double scale = std::exp(-x + a * std::log(x) - std::lgamma(a));
+    const double scale = std::exp(-x + a * std::log(x) - log_gamma(a));
     if (x < a + 1) {
         double term = 1 / a, sum = term;
         for (double n = a + 1; term > kPrecision * sum; ++n) sum += term *= x / n;
@@ -58,7 +64,7 @@ double beta_fraction(double a, double b, double x) {
 double beta_lower(double a, double b, double x) {
     if (x <= 0) return 0;
     if (x >= 1) return 1;
-    const double scale = std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) +
+    const double scale = std::exp(log_gamma(a + b) - log_gamma(a) - log_gamma(b) +
                                   a * std::log(x) + b * std::log1p(-x));
     if (x < (a + 1) / (a + b + 2)) return scale * beta_fraction(a, b, x) / a;
     return 1 - scale * beta_fraction(b, a, 1 - x) / b;

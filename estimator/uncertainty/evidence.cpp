@@ -44,7 +44,8 @@ std::vector<double> log_odds(const NullFit::Projection& of) {
     return logs;
 }
 
-void take_size(Evidence& out, const Signatures& of, const NullFit::Projection& projection) {
+void take_size(Evidence& out, const Signatures& of, const NullFit& fit,
+               const NullFit::Projection& projection) {
     MatrixXd information = projection.f;
     information.diagonal().array() += 1 / (kLargestSize * kLargestSize);
     const MatrixXd covariance =
@@ -52,7 +53,7 @@ void take_size(Evidence& out, const Signatures& of, const NullFit::Projection& p
     const VectorXd p = covariance * projection.s;
     out.elements = of.elements;
     out.unit = of.unit;
-    out.rates = of.z * p;
+    out.change = fit.change(of.z * p);
     out.size.clear();
     out.sigma.clear();
     for (Index i = 0; i < p.size(); ++i) {
@@ -68,7 +69,7 @@ Evidence weigh(Pattern pattern, const Signatures& of, const NullFit& fit) {
     out.pattern = pattern;
     const auto projection = fit.project(of.z);
     out.log_odds = log_mean(log_odds(projection));
-    take_size(out, of, projection);
+    take_size(out, of, fit, projection);
     return out;
 }
 
@@ -89,7 +90,7 @@ Evidence weigh_steps(Pattern pattern, Misfit misfit, int first, const DwellTable
         if (const double mean = log_mean(here); mean > best) {
             best = mean;
             out.after_dwell = static_cast<int>(k);
-            take_size(out, of, projection);
+            take_size(out, of, fit, projection);
         }
     }
     out.log_odds = logs.empty() ? 0 : log_mean(logs);
@@ -120,6 +121,15 @@ Evidence of_state(Pattern pattern, double odds, const char* unit) {
     out.log_odds = odds;
     out.unit = unit;
     return out;
+}
+
+/// By the chi-square alone; of a mean of squares the relative error is sqrt(2 / nu).
+void take_scatter(Evidence& out, const NullFit& fit, double s0) {
+    const double nu = std::max(1, fit.degrees()), mean = fit.chi_square() / nu;
+    const double size = s0 * std::sqrt(std::max(mean - 1, 0.5 * std::sqrt(2 / nu)));
+    out.elements = {""};
+    out.size = {mean > 1 ? size : 0};
+    out.sigma = {s0 * s0 * mean * std::sqrt(2 / nu) / (2 * size)};
 }
 
 }  // namespace
@@ -173,12 +183,14 @@ std::vector<Evidence> weigh_patterns(const DwellTable& table, const NullFit& fit
     all.push_back(weigh_steps(Pattern::step, Misfit::step, 2, table, fit, model, s0));
     all.push_back(
         weigh_steps(Pattern::unbalance_step, Misfit::unbalance_step, 3, table, fit, model, s0));
-    all.push_back(of_state(Pattern::scatter,
-                           log_odds_of(gyros, {0.5, 1, 2, 4, 8},
-                                       [](const DriftLikelihood& of, double size) {
-                                           return of.ratio_of_scatter(size);
-                                       }),
-                           "deg/h"));
+    Evidence scatter = of_state(Pattern::scatter,
+                                log_odds_of(gyros, {0.5, 1, 2, 4, 8},
+                                            [](const DriftLikelihood& of, double size) {
+                                                return of.ratio_of_scatter(size);
+                                            }),
+                                "deg/h");
+    take_scatter(scatter, fit, s0);
+    all.push_back(std::move(scatter));
     all.push_back(of_state(
         Pattern::walk,
         log_odds_of(gyros, {2, 4, 8, 16, 32},

@@ -80,13 +80,8 @@ NullFit::Projection NullFit::project(const MatrixXd& z) const {
     return {white.transpose() * y_left_, white.transpose() * left(white)};
 }
 
-MatrixXd NullFit::gain() const {
-    MatrixXd back = white_.leftCols(kCoefficients);
-    for (Index k = 0; k < table_.dwells(); ++k) {
-        const Eigen::LLT<Eigen::Matrix3d> factor(table_.rows[static_cast<std::size_t>(k)].variance);
-        factor.matrixU().solveInPlace(back.middleRows<3>(3 * k));
-    }
-    return covariance_ * back.transpose();
+VectorXd NullFit::change(const VectorXd& rates) const {
+    return covariance_ * (white_.leftCols(kCoefficients).transpose() * whitened(rates));
 }
 
 VectorXd NullFit::residual(const VectorXd& coefficients) const {

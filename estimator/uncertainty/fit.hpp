@@ -25,8 +25,8 @@ class NullFit {
     /// Coefficients of constant bias, filter order, and their covariance.
     [[nodiscard]] const Eigen::VectorXd& value() const { return value_; }
     [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
-    /// Gain of that estimator, 30 x 3 n.
-    [[nodiscard]] Eigen::MatrixXd gain() const;
+    /// What rates that are so much larger do to them.
+    [[nodiscard]] Eigen::VectorXd change(const Eigen::VectorXd& rates) const;
     /// y - H D and its variance, 3 n.
     [[nodiscard]] Eigen::VectorXd residual(const Eigen::VectorXd& coefficients) const;
     [[nodiscard]] Eigen::VectorXd residual_variance() const;
@@ -98,7 +98,7 @@ struct Evidence {
     std::vector<std::string> elements;
     std::vector<double> size, sigma;  ///< in `unit`
     const char* unit = "";
-    Eigen::VectorXd rates;     ///< what it does to them, 3 n
+    Eigen::VectorXd change;    ///< of the coefficients of constant bias, filter order
     double smallest_seen = 0;  ///< of its best seen unknown, with 90 %
 
     /// Odds enough to be named.

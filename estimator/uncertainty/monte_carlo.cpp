@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <random>
 #include <vector>
 
@@ -93,9 +95,7 @@ struct DrawModel {
 
 DrawModel model_of(const Settings& settings, const Assessment& assessed) {
     DrawModel m;
-    m.sensitivity.resize(kTogether, static_cast<Index>(assessed.inputs.size()));
-    for (std::size_t i = 0; i < assessed.inputs.size(); ++i)
-        m.sensitivity.col(static_cast<Index>(i)) = assessed.gain * assessed.inputs[i].rates;
+    m.sensitivity = assessed.sensitivity;
     m.type_a = root_of(assessed.covariance_type_a);
     m.value = VectorXd::Zero(kTogether);
     for (Index g = 0; g < static_cast<Index>(kGroups); ++g) {
@@ -113,8 +113,7 @@ DrawModel model_of(const Settings& settings, const Assessment& assessed) {
 /// Mean, standard deviation and the ends of the symmetric interval, 30 each.
 using Block = Eigen::Matrix<double, Eigen::Dynamic, 4>;
 
-Block one_block(const DrawModel& model, InputDraws& inputs, int count, double coverage,
-                std::mt19937_64& random) {
+MatrixXd draws_of(const DrawModel& model, InputDraws& inputs, int count, std::mt19937_64& random) {
     std::normal_distribution<double> normal;
     std::uniform_real_distribution<double> uniform(-1, 1);
     MatrixXd x(count, kTogether);
@@ -128,6 +127,12 @@ Block one_block(const DrawModel& model, InputDraws& inputs, int count, double co
         }
         x.row(i) = here.transpose();
     }
+    return x;
+}
+
+Block one_block(const DrawModel& model, InputDraws& inputs, int count, double coverage,
+                std::mt19937_64& random) {
+    MatrixXd x = draws_of(model, inputs, count, random);
     Block out(kTogether, 4);
     const auto place = static_cast<std::ptrdiff_t>(0.5 * (1 - coverage) * count);
     for (Index k = 0; k < kTogether; ++k) {
@@ -144,9 +149,21 @@ Block one_block(const DrawModel& model, InputDraws& inputs, int count, double co
     return out;
 }
 
-/// Half a unit of the last of so many digits of u.
-double tolerance(double u, int digits) {
-    return 0.5 * std::pow(10.0, std::floor(std::log10(u)) + 1 - digits);
+/// Of sorted values.
+DrawnBlock::Coefficient intervals_of(const double* sorted, int count, double coverage) {
+    DrawnBlock::Coefficient out;
+    const auto place = static_cast<std::ptrdiff_t>(0.5 * (1 - coverage) * count);
+    out.low = sorted[place];
+    out.high = sorted[count - 1 - place];
+    const auto within = static_cast<std::ptrdiff_t>(std::lround(coverage * count));
+    double shortest = std::numeric_limits<double>::infinity();
+    for (std::ptrdiff_t i = 0; i + within < count; ++i) {
+        if (sorted[i + within] - sorted[i] >= shortest) continue;
+        shortest = sorted[i + within] - sorted[i];
+        out.shortest_low = sorted[i];
+        out.shortest_high = sorted[i + within];
+    }
+    return out;
 }
 
 /// Relative rms of what the inputs do together over what the linear model says.
@@ -200,7 +217,53 @@ bool settled(const std::vector<Block>& blocks, const Block& sum, const VectorXd&
     return true;
 }
 
+/// With all that it draws from.
+class BlockDrawer {
+  public:
+    BlockDrawer(const Settings& settings, const Assessment& of)
+        : assessed_(of),
+          coverage_(settings.uncertainty.coverage),
+          inputs_(settings, assessed_),
+          model_(model_of(settings, assessed_)) {}
+
+    DrawnBlock draw(std::uint64_t seed, int count) {
+        std::mt19937_64 random(seed);
+        MatrixXd x = draws_of(model_, inputs_, count, random);
+        DrawnBlock out;
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            if (!(assessed_.coefficients[i].u > 0)) continue;
+            auto column = x.col(static_cast<Index>(internal_of(i)));
+            const double mean = column.mean();
+            const double square = (column.array() - mean).square().sum() / (count - 1);
+            std::sort(column.data(), column.data() + count);
+            out.coefficients[i] = intervals_of(column.data(), count, coverage_);
+            out.coefficients[i].mean = mean;
+            out.coefficients[i].u = std::sqrt(square);
+        }
+        return out;
+    }
+
+  private:
+    Assessment assessed_;
+    double coverage_;
+    InputDraws inputs_;
+    DrawModel model_;
+};
+
 }  // namespace
+
+double numerical_tolerance(double u, int digits) {
+    return 0.5 * std::pow(10.0, std::floor(std::log10(u)) + 1 - digits);
+}
+
+BlockDrawing block_drawing(const Settings& settings, const Assessment& assessed) {
+    if (!assessed.done)
+        throw SettingsError(
+            "found nothing to draw from, expected two dwells at least and estimator.method = "
+            "\"joint\"");
+    const auto drawer = std::make_shared<BlockDrawer>(settings, assessed);
+    return [drawer](std::uint64_t seed, int count) { return drawer->draw(seed, count); };
+}
 
 MonteCarlo propagate_distributions(const Settings& settings, const Result& result,
                                    const Assessment& assessed, const MonteCarloSettings& how,
@@ -215,7 +278,7 @@ MonteCarlo propagate_distributions(const Settings& settings, const Result& resul
     VectorXd delta = VectorXd::Zero(kTogether);
     for (std::size_t i = 0; i < kParameters; ++i) {
         const double u = assessed.coefficients[i].u;
-        if (u > 0) delta[static_cast<Index>(internal_of(i))] = tolerance(u, how.digits);
+        if (u > 0) delta[static_cast<Index>(internal_of(i))] = numerical_tolerance(u, how.digits);
     }
     MonteCarlo out;
     out.digits = how.digits;

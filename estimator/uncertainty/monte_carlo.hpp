@@ -39,4 +39,23 @@ struct MonteCarlo {
                                                  const MonteCarloSettings& how = {},
                                                  const std::function<void(int)>& progress = {});
 
+/// One block of draws by itself, for those who share the blocks out; the coefficients less their
+/// estimates, in the order of parameter_names().
+struct DrawnBlock {
+    struct Coefficient {
+        double mean = kNone, u = kNone;
+        double low = kNone, high = kNone;                    ///< symmetric interval
+        double shortest_low = kNone, shortest_high = kNone;  ///< JCGM 101, 7.7
+    };
+    std::array<Coefficient, kParameters> coefficients;
+};
+
+/// Draws `count` of a seed, as propagate_distributions() does. One thread at a time.
+using BlockDrawing = std::function<DrawnBlock(std::uint64_t seed, int count)>;
+/// Throws SettingsError when there is nothing assessed.
+[[nodiscard]] BlockDrawing block_drawing(const Settings& settings, const Assessment& assessed);
+
+/// Half a unit of the last of so many digits of u: what a result is to hold to, JCGM 101, 7.9.2.
+[[nodiscard]] double numerical_tolerance(double u, int digits);
+
 }  // namespace vibrig::estimator::uncertainty

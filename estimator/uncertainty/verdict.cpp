@@ -11,7 +11,6 @@ namespace vibrig::estimator::uncertainty {
 namespace {
 
 using Eigen::Index;
-using Eigen::VectorXd;
 
 constexpr int kFewestDegrees = 9;
 constexpr double kUnlikely = 1e-3;
@@ -106,7 +105,9 @@ std::string words_of_state(const Assessment& a, const Evidence& e) {
         case Pattern::walk:
             return "the bias walks from dwell to dwell" + taken;
         case Pattern::scatter:
-            return text("dwells scatter by %.2f times what the noise explains", a.birge) + taken;
+            return text("dwells scatter by %.3f +- %.3f deg/h more than the noise explains",
+                        e.size[0], e.sigma[0]) +
+                   taken;
         case Pattern::unbalance_trend:
         case Pattern::unbalance_step: {
             const std::size_t i = strongest(e);
@@ -135,8 +136,7 @@ struct Effect {
 };
 
 /// What a pattern of the rates does to a constant-bias estimate, in u.
-Effect effect_of(const Assessment& a, const Eigen::MatrixXd& gain0, const VectorXd& rates) {
-    const VectorXd change = gain0 * rates;
+Effect effect_of(const Assessment& a, const Eigen::VectorXd& change) {
     Effect worst;
     for (std::size_t i = 0; i < kParameters; ++i) {
         const double in_u =
@@ -172,8 +172,7 @@ std::string contradiction(const Settings& settings, const Evidence& e) {
     }
 }
 
-void add_patterns(const Settings& settings, const Assessment& a, const Eigen::MatrixXd& gain0,
-                  std::vector<Reason>& list) {
+void add_patterns(const Settings& settings, const Assessment& a, std::vector<Reason>& list) {
     std::vector<const Evidence*> structural;
     for (const Evidence& e : a.evidence) {
         if (!e.named() || e.log_odds < a.evidence.front().log_odds - kNearBest) continue;
@@ -195,7 +194,7 @@ void add_patterns(const Settings& settings, const Assessment& a, const Eigen::Ma
     Effect worst;
     for (std::size_t i = 0; i < structural.size(); ++i) {
         reason.text += (i > 0 ? ", or " : "") + words_of(*structural[i]);
-        const Effect effect = effect_of(a, gain0, structural[i]->rates);
+        const Effect effect = effect_of(a, structural[i]->change);
         if (effect.in_u > worst.in_u) worst = effect;
     }
     take_size(*structural.front(), reason);
@@ -333,14 +332,13 @@ std::string sentence_of(const Assessment& a, const Verdict& verdict) {
 
 }  // namespace
 
-Verdict judge(const Settings& settings, const Result& result, const Assessment& a,
-              const Eigen::MatrixXd& gain0) {
+Verdict judge(const Settings& settings, const Result& result, const Assessment& a) {
     Verdict verdict;
     std::vector<Reason>& list = verdict.reasons;
     add_result(result, list);
     add_dwells(result, list);
     if (a.done) {
-        add_patterns(settings, a, gain0, list);
+        add_patterns(settings, a, list);
         add_chi_square(a, list);
         add_sync(settings, a, list);
         add_order(settings, a, list);

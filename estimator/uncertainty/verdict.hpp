@@ -4,9 +4,8 @@
 
 namespace vibrig::estimator::uncertainty {
 
-/// What the rules say of an assessment that is complete but for its verdict. `fit`: the null fit;
-/// `gain0`: 30 x 3 n of a constant bias, filter order.
+/// What the rules say of an assessment that is complete but for its verdict.
 [[nodiscard]] Verdict judge(const Settings& settings, const Result& result,
-                            const Assessment& assessed, const Eigen::MatrixXd& gain0);
+                            const Assessment& assessed);
 
 }  // namespace vibrig::estimator::uncertainty

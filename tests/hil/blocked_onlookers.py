@@ -116,7 +116,7 @@ def only_degrades(checks, programs):
             checks.check(shaking, "the table shakes", found + rig.logs())
             missed = slow_recorder(checks, rig)
             slow_server(checks, rig)
-            m.check_balances(checks, rig, "after both")
+            r.check_balance(checks, rig, "after both")
             rig.command("abort")
             rig.wait_for(lambda t: not t["recorder"].get("recording"), 30)
             checks.equal(rig.daemon.end(timeout=30), 0, "vibrigd ends cleanly")

@@ -5,6 +5,7 @@ seqpacket bus, against a controller that lies.
 usage: disobeyed_stop.py PROGRAMS
 """
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,8 @@ import tempfile
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import guard_campaign as g  # noqa: E402
+import modbus_proxy  # noqa: E402
 import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "liar", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0], "dwell_s": 600.0,
@@ -26,16 +29,20 @@ class Liar(r.Rig):
 
     def __init__(self, programs, folder):
         super().__init__(programs, "seqpacket", "real", folder, poll_s=0.1)
-        self.fifo = os.path.join(folder, "control")
-        os.mkfifo(self.fifo)
-        self.start_plant("--seed", "5", "--warm-up", "1", "--start-temperature", "45", "--control", self.fifo)
-        self.control = open(self.fifo, "w", encoding="ascii")
-        self.configure(CAMPAIGN, **LATE)
+        self.start_plant("--seed", "5", "--warm-up", "1", "--start-temperature", "45")
+        self.coils = g.Coils()
+        self.write_configuration()
         self.start_daemon()
         self.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("rest") == "at rest", 30)
 
-    def order(self, line):
-        print(line, file=self.control, flush=True)
+    def write_configuration(self):
+        self.configure(CAMPAIGN, **LATE)
+        with open(self.configuration, "a", encoding="utf-8") as file:
+            file.write(f'[annunciator.modbus]\nhost = "127.0.0.1"\nport = {self.coils.port}\nhorn_coil = 0\nlamp_coil = 1\n')
+
+    def stop(self):
+        super().stop()
+        self.coils.end()
 
     def shake(self, checks):
         said = [self.tool(command, "--by", "Ada") for command in ("arm", "start")]
@@ -74,6 +81,10 @@ def acknowledged_without_stop(checks, programs, folder):
                      f"after {DEADLINE_S} s it is a stop that was not obeyed", f"{status['shaker']}\n{rig.logs()}")
         status = rig.wait_for(lambda s: s["campaign"]["state"] == "tripped", BUSY_S)
         checks.equal(status["interlock"]["tripped"], "stop_disobeyed", "which latches as a trip")
+        time.sleep(2)
+        horn = [value for coil, value in list(rig.coils.writes) if coil == 0]
+        checks.check(g.wait_until(lambda: rig.coils.on(0) and rig.coils.on(1)) and horn[-1:] == [1],
+                     "the horn sounds without a pause, the lamp is on", rig.coils.writes)
         events = rig.events()
         checks.check("stop not obeyed" in events and "press the emergency stop" in events and "aborted by Ada" in events,
                      "the event says so, whose stop it was, and what to do", events[-2000:])
@@ -123,6 +134,36 @@ def stuck_contactor(checks, programs, folder):
         rig.stop()
 
 
+def blind(checks, programs, folder):
+    """Killed at 5 g, and the next life sees neither bus nor controller: nobody knows, and that is no rest."""
+    rig = Liar(programs, folder)
+    try:
+        rig.daemon.end()
+        own, proxy = rig.modbus_port, modbus_proxy.Proxy(rig.modbus_port)
+        rig.modbus_port = proxy.port
+        rig.write_configuration()
+        rig.modbus_port = own
+        rig.start_daemon()
+        rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("rest") == "at rest", 30)
+        rig.shake(checks)
+        rig.order("fault timeout-ignored")
+        rig.daemon.process.kill()
+        rig.daemon.process.wait()
+        rig.order("fault bus-silent=100000")
+        proxy.break_with("refuse")
+        rig.start_daemon()
+        checks.check(g.wait_until(lambda: rig.coils.on(1) and rig.coils.on(0)), "the next life's lamp and horn tell of the trip it has found",
+                     rig.coils.writes)
+        status = rig.wait_for(disobeyed, DEADLINE_S + RING_DOWN_S + BUSY_S)
+        checks.check(disobeyed(status), "blind, it says that its first stop is not obeyed", f"{status['shaker']}\n{rig.logs()}")
+        checks.equal(rig.daemon.end(signal.SIGTERM, timeout=60), 1, "blind, it ends with status 1")
+        checks.check("stopped cleanly" not in rig.daemon.text().rsplit("not acknowledged", 1)[-1], "and not \"cleanly\"", rig.logs())
+        moves = float(re.search(r"table ([\d.]+) g", rig.order("status"))[1])
+        checks.check(moves > 4.9, "for the table does 5 g all the time", moves)
+    finally:
+        rig.stop()
+
+
 def obeyed(checks, programs, folder):
     """A controller that obeys; its watchdog's timeout; a second daemon."""
     rig = Liar(programs, folder)
@@ -164,7 +205,7 @@ def obeyed(checks, programs, folder):
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (acknowledged_without_stop, stuck_contactor, obeyed):
+    for part in (acknowledged_without_stop, stuck_contactor, blind, obeyed):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

@@ -296,7 +296,7 @@ class Liar:
 
     def __init__(self, rig):
         self.link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self.link.connect(rig.meeting)
+        wait_until(lambda: self.link.connect_ex(rig.meeting) == 0)   # the socket is there a moment before anybody listens
         self.flags, self.level_g, self.sequence, self.heard = 0, 0.0, 0, None
         self.quit = threading.Event()
         self.thread = threading.Thread(target=self.talk, daemon=True)

@@ -89,6 +89,7 @@ def named_and_acknowledged(checks, rig, journal, what, says, within_s):
 def while_it_runs(checks, rig, journal):
     os.remove(journal.path)
     named_and_acknowledged(checks, rig, journal, "deleted", "was deleted while the daemon ran", PERIOD_S)
+    checks.check(rig.paged("was deleted while the daemon ran"), "deleted: somebody is paged, as for each alarm")
     kept = len(glob.glob(journal.path + ".aside.*.head"))
     journal.by_hand("UPDATE event SET text = 'all good' WHERE id = 2")
     named_and_acknowledged(checks, rig, journal, "UPDATE by hand", "event 2 (entry", PERIOD_S)

@@ -133,8 +133,7 @@ class Kill:
 
     def begins(self):
         self.rig.start_daemon()
-        status = self.rig.wait_for(lambda s: stages.measuring(s) and any(
-            c["quality"] == "good" for c in s["sample"]["channels"]) and s["shaker"].get("state") in (0, 4), 60)
+        status = self.rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("state") in (0, 4), 60)
         # The controller's watchdog has tripped; a stop that came before the table was at rest did not clear that.
         end = time.monotonic() + 30
         while status is not None and status["shaker"].get("state") == 4 and time.monotonic() < end:

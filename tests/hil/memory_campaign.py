@@ -13,12 +13,12 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
-# The aim is 100, and it is missed: 140 were measured with the status asked for twice a second (a status has every dwell, so
-# that the room in which it is written grows with them), and 620 with the verdict after each dwell, whose matrices grow with
-# the dwells, too. The limit keeps it from becoming more.
-LIMIT_KB_PER_H = 900
+# The aim is 100; of each dwell the filter, the result and the status keep some 2 kB, and the disk's library some more: 82 to 104
+# were measured. What the system gives comes in pieces of up to 300 kB, which is 15 of such a rate: four of those are let pass.
+LIMIT_KB_PER_H = 160
 DWELLS_PER_H = 3600 / 110   # of 100 s, with ramps, settling and slews
 WARM = 140                  # dwells until caches and buffers have their size
+TOGETHER = 80               # dwells of which the least is taken: what a verdict has while it is made is not kept
 
 
 def resident_kb(rig):
@@ -26,10 +26,14 @@ def resident_kb(rig):
         return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
 
 
+def least(looks):
+    return min(looks, key=lambda look: look[1])
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("programs")
-    options.add_argument("--dwells", type=int, default=320)
+    options.add_argument("--dwells", type=int, default=840)
     given = options.parse_args()
     checks = r.Checks()
     campaign = {"name": "many", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 2]] * (given.dwells // 4),
@@ -44,7 +48,7 @@ def main():
             rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"].get("rest") == "at rest" and
                          s["platform"].get("ready"), 60)
             said = [rig.tool(command, "--by", "tester").stderr for command in ("arm", "start")]
-            end, status = time.monotonic() + 300, None
+            end, status = time.monotonic() + 500, None
             while time.monotonic() < end:
                 status = rig.status()
                 if status is None or status["campaign"]["state"] in ("finished", "aborted", "tripped", "idle"):
@@ -56,7 +60,8 @@ def main():
             rig.stop()
     warm = [look for look in looks if look[0] >= WARM]
     if checks.check(len(warm) >= 10, "it was looked at meanwhile", looks):
-        (first, before), (last, after) = warm[0], warm[-1]
+        first, before = least(look for look in warm if look[0] < warm[0][0] + TOGETHER)
+        last, after = least(look for look in warm if look[0] > warm[-1][0] - TOGETHER)
         growth = (after - before) / (last - first) * DWELLS_PER_H
         checks.note(f"{before} kB after {first} dwells, {after} kB after {last}: {growth:.0f} kB per hour of the rig")
         checks.check(growth <= LIMIT_KB_PER_H, f"resident memory grows by {LIMIT_KB_PER_H} kB per hour at most",

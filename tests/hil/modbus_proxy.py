@@ -7,11 +7,13 @@ import time
 
 RUN = 5   # register: 1 run, 0 stop
 WATCHDOG = 6
+INPUTS = 5   # state, fault, emergency stop, measured amplitude: read in one request
 
 
 class Proxy:
     """`spoil` is one of None, "refuse", "hang", "freeze" (as a server that is stopped), "reset", "trickle", "transaction",
-    "unit", "function", "length", "short", ("exception", N), ("late", seconds); `times` replies are spoilt, then it is None
+    "unit", "function", "length", "short", ("exception", N), ("late", seconds), ("measured", factor) of the measured amplitude, ("contact", 1) of the
+    emergency stop, which reads open; `times` replies are spoilt, then it is None
     again (None: until told)."""
 
     def __init__(self, target):
@@ -124,6 +126,11 @@ class Proxy:
             length += 7
         elif kind == "short":
             length, body = 3, body[:1]
+        elif kind == "measured" and function == 4 and len(body) == 1 + 2 * INPUTS:
+            measured = struct.unpack(">I", body[-4:])[0]
+            body = body[:-4] + struct.pack(">I", round(measured * value))
+        elif kind == "contact" and function == 4 and len(body) == 1 + 2 * INPUTS:
+            body = body[:5] + struct.pack(">H", value) + body[7:]
         elif kind == "exception":
             function, body, length = function | 0x80, bytes([value]), 3
         reply = struct.pack(">HHHBB", transaction, protocol, length, unit, function) + body

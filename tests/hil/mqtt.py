@@ -194,7 +194,7 @@ def check_deaths(checks, host, rig):
     rig.start_daemon()
     birth = host.more("NBIRTH", births)
     checks.check(birth is not None, "a restarted one has a birth", rig.logs())
-    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", PATIENCE_S)
+    rig.wait_for(r.measuring, PATIENCE_S)
     checks.equal(rig.daemon.end(), 0, "it ends in order")
     death = host.more("NDEATH", deaths + 1)
     checks.check(death is not None and value_of(named(death)["bdSeq"]) == value_of(named(birth)["bdSeq"]),
@@ -241,7 +241,7 @@ def check_refusals(checks, rig, broker, folder, settings, campaign):
     checks.equal(rig.daemon.end(), 0, "it ends in order")
     broker.process.send_signal(signal.SIGSTOP)
     rig.start_daemon()
-    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", PATIENCE_S)
+    rig.wait_for(r.measuring, PATIENCE_S)
     checks.equal(rig.daemon.end(), 0, "also in the middle of connecting to a broker that hangs")
     broker.process.send_signal(signal.SIGCONT)
     strangers = {"certificate": os.path.join(other, "eve.crt"), "key": os.path.join(other, "eve.key")}
@@ -287,7 +287,7 @@ def main():
                         "backoff_max_s": 1.0}
             rig.configure(campaign, mqtt=settings, server={"page": "127.0.0.1:0"})
             rig.start_daemon()
-            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", PATIENCE_S)
+            rig.wait_for(r.measuring, PATIENCE_S)
             birth = check_birth(checks, host, rig)
             if birth is not None:
                 check_data(checks, host, rig, birth)

@@ -157,8 +157,8 @@ def starts(checks, rig):
     succeeds(checks, "systemctl enable --now", "systemctl", "enable", "--now", UNIT)
     checks.equal((prop("Type"), prop("ActiveState"), prop("SubState")), ("notify", "active", "running"),
                  "started as it has said READY")
-    status = rig.wait_for(stages.measuring, 30)
-    checks.check(status is not None and stages.measuring(status), "status answers; it measures", journal()[-1500:])
+    status = rig.wait_for(r.measuring, 30)
+    checks.check(status is not None and r.measuring(status), "status answers; it measures", journal()[-1500:])
     # "ready, measuring" and the like: what it tells the service manager
     checks.check(wait_until(lambda: prop("StatusText") != "", 10), f"systemctl status shows: {prop('StatusText')}")
 
@@ -250,7 +250,7 @@ def shakes(checks, rig, what):
     status = rig.wait_for(lambda s: s["shaker"].get("state") in (0, 4) and not s["shaker"].get("running", True), 30)
     if status is not None and status["shaker"].get("state") == 4:
         rig.tool("abort", "--by", "tester")
-    status = rig.wait_for(lambda s: stages.measuring(s) and s["shaker"].get("state") == 0 and
+    status = rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("state") == 0 and
                           not s["shaker"].get("running", True), 30)
     if status["campaign"]["state"] == "tripped":
         rig.tool("ack", "trip", "--by", "tester")
@@ -269,8 +269,8 @@ def comes_back(checks, rig, what, restarts, pid, begun):
                  prop("NRestarts") == str(restarts), f"{what}: systemd starts it again",
                  f"{prop('NRestarts')} restarts; {journal()[-800:]}")
     ready = time.monotonic()
-    status = rig.wait_for(stages.measuring, 30)
-    checks.check(status is not None and stages.measuring(status), f"{what}: it measures again")
+    status = rig.wait_for(r.measuring, 30)
+    checks.check(status is not None and r.measuring(status), f"{what}: it measures again")
     checks.note(f"{what}: READY after {ready - begun:.1f} s, measures and answers after {time.monotonic() - begun:.1f} s")
     checks.check(at_rest(rig), f"{what}: the shaker stops", f"state {stages.shaker_state(rig)}")
     checks.check(status is not None and status["campaign"]["state"] in ("idle", "tripped"), f"{what}: disarmed",
@@ -323,10 +323,10 @@ def upgrades(checks, rig, package):
             os.path.join(DATA, "**", "campaign.h5"))
     rig.campaign = {**SHORT, "dwell_s": 300.0}   # longer than dpkg takes
     configure(rig)
-    rig.wait_for(lambda s: stages.measuring(s) and s["shaker"].get("rest") == "at rest", 30)
+    rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("rest") == "at rest", 30)
     output("systemctl", "restart", UNIT)
     before, pid = digest(*kept), int(prop("MainPID"))
-    rig.wait_for(lambda s: stages.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted", "tripped"), 30)
+    rig.wait_for(lambda s: r.measuring(s) and s["campaign"]["state"] in ("idle", "finished", "aborted", "tripped"), 30)
     rig.tool("ack", "trip", "--by", "tester")   # what was killed and hung has latched
     rig.wait_for(lambda s: s["campaign"]["state"] != "tripped" and not s["shaker"].get("stop_pending"), 30)
     armed, end = rig.tool("arm", "--by", "tester"), time.monotonic() + 60
@@ -355,7 +355,7 @@ def upgrades(checks, rig, package):
     after = digest(*kept)
     lost = [path for path in before if after.get(path) != before[path]]   # the new campaign's are there beside them
     checks.check(len(before) > 3 and not lost, "configuration and recordings are kept", str(lost))
-    at_rest = lambda s: stages.measuring(s) and s["shaker"].get("rest") == "at rest"  # noqa: E731
+    at_rest = lambda s: r.measuring(s) and s["shaker"].get("rest") == "at rest"  # noqa: E731
     status = rig.wait_for(at_rest, 30)
     checks.check(status is not None and at_rest(status), "it measures, the table at rest")
 
@@ -453,7 +453,7 @@ def main():
         return inside(programs, sys.argv[at + 1], sys.argv[at + 2], soak)
     checks = r.Checks()
     build = os.path.dirname(programs)
-    with tempfile.TemporaryDirectory(dir=build) as folder:   # a booting system empties /tmp
+    with tempfile.TemporaryDirectory(dir=build) as folder:
         installs_below_a_prefix(checks, build, folder)
         packages = [package(checks, build, folder, version) for version in VERSIONS]
         is_complete(checks, packages[0])

@@ -25,7 +25,7 @@ class Run:
             rig.start_plant("--seed", "2", *(["--truth", rig.truth_file(truth)] if truth else []))
             rig.configure({"name": "planned", **campaign}, **tables)
             rig.start_daemon()
-            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            rig.wait_for(r.measuring, 30)
             self.plan = json.loads(subprocess.run(
                 ["curl", "-s", "--unix-socket", rig.socket, "http://localhost/api/v1/plan"], capture_output=True, text=True,
                 timeout=30).stdout or "{}")
@@ -82,12 +82,11 @@ def restarted(checks, programs, folder):
     campaign = {"name": "planned", "table_g": [9.0, 0.0], "adaptive": True, "dwell_s": 40.0, "time_limit_s": 1000.0}
     targets = {"bias": 1e-4, "linear": 1e-4, "quadratic": 1e-5}   # out of reach: the time limit ends it
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
-    connected = lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running"
     try:
         rig.start_plant("--seed", "2", "--speed", "60")
         rig.configure(campaign, **{"campaign.targets": targets})
         rig.start_daemon()
-        rig.wait_for(connected, 30)
+        rig.wait_for(r.measuring, 30)
         for command in ("arm", "start"):
             rig.tool(command, "--by", "tester")
         rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 3 and s["campaign"]["state"] == "slewing", 120)
@@ -95,11 +94,11 @@ def restarted(checks, programs, folder):
         rig.daemon.process.wait()
         done = rig.positions_done()   # the journal is written behind
         rig.start_daemon()
-        status = rig.wait_for(lambda s: connected(s) and s["campaign"].get("resume_offer"), 60)
+        status = rig.wait_for(lambda s: r.measuring(s) and s["campaign"].get("resume_offer"), 60)
         if not checks.check(status and status["campaign"]["resume_offer"].startswith(f"{done} positions done"),
                             "a killed adaptive campaign offers to go on after its last dwell", rig.logs()):
             return
-        rig.wait_for(lambda s: s["shaker"].get("state") == 0 and any(c["quality"] == "good" for c in s["sample"]["channels"]), 30)
+        rig.wait_for(lambda s: s["shaker"].get("state") == 0 and r.measuring(s), 30)
         rig.tool("ack", "trip", "--by", "tester")
         commands = [rig.tool(command, "--by", "tester") for command in ("arm", "resume")]
         last = rig.wait_for_state(("finished", "aborted", "tripped"), 150)

@@ -61,6 +61,7 @@ class Shaker:
         self.holding = Holding()
         self.inputs = ModbusSequentialDataBlock(0, [0] * 16)
         self.state, self.fault, self.level, self.last_feed, self.fed_at = IDLE, 0, 0.0, 0, time.monotonic()
+        self.heard = b""   # of a line that is not whole yet
         self.feeds, self.lies, self.held, self.told_to_run = 0, dict(lies), 0.0, False
 
     def word(self, address):
@@ -153,18 +154,21 @@ def line():
 
 
 def listen(shaker):
-    """One line of standard input."""
-    text = sys.stdin.readline()
-    if not text:
-        asyncio.get_running_loop().remove_reader(sys.stdin)
-    word, _, rest = text.strip().partition(" ")
-    if word == "honest":
-        shaker.lies.clear()
-    elif word == "lie":
-        try:
-            shaker.lies.update([lie(rest)])
-        except (argparse.ArgumentTypeError, ValueError) as error:
-            print(error, file=sys.stderr, flush=True)
+    """Whole lines of standard input, however many have come."""
+    data = os.read(0, 4096)
+    if not data:
+        asyncio.get_running_loop().remove_reader(0)
+    shaker.heard += data
+    *lines, shaker.heard = shaker.heard.split(b"\n")
+    for text in lines:
+        word, _, rest = text.decode().strip().partition(" ")
+        if word == "honest":
+            shaker.lies.clear()
+        elif word == "lie":
+            try:
+                shaker.lies.update([lie(rest)])
+            except (argparse.ArgumentTypeError, ValueError) as error:
+                print(error, file=sys.stderr, flush=True)
 
 
 async def main():
@@ -185,7 +189,7 @@ async def main():
     else:
         server = ModbusTcpServer(context, address=("127.0.0.1", int(arguments.where)), allow_reuse_address=True)
     if not sys.stdin.closed and not os.path.samestat(os.fstat(0), os.stat("/dev/null")):
-        asyncio.get_running_loop().add_reader(sys.stdin, listen, shaker)
+        asyncio.get_running_loop().add_reader(0, listen, shaker)
     playing = asyncio.ensure_future(play(shaker, fifo))
     await server.serve_forever()
     playing.cancel()

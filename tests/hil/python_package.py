@@ -13,6 +13,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import time
 import xml.etree.ElementTree
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -46,7 +47,10 @@ def look_live(checks, rig, where, client):
     checks.equal(status["campaign"]["name"], "python", f"{where}: status")
     checks.check("site.latitude_deg" in client.configuration() and len(client.plan()["stops"]) == 28, f"{where}: configuration, plan")
     checks.check("vibrig_uptime_seconds" in client.metrics(), f"{where}: metrics")
-    curves = client.history("temperature_c", "measured_g")
+    curves, end = client.history("temperature_c", "measured_g"), time.monotonic() + 20
+    while not len(curves["time_s"]) and time.monotonic() < end:   # its first row comes after a second of the rig
+        time.sleep(0.1)
+        curves = client.history("temperature_c", "measured_g")
     checks.check(len(curves["time_s"]) == len(curves["temperature_c_max"]) > 0, f"{where}: history", str(curves)[:300])
     events = client.events()
     later = client.events(after=int(events[0]["id"]))
@@ -267,7 +271,7 @@ def main():
                           server={"page": "127.0.0.1:0", "remote": f"127.0.0.1:{port}", "certificate": os.path.join(keys, "server.crt"),
                                   "key": os.path.join(keys, "server.key"), "clients_ca": os.path.join(keys, "authority.crt")})
             rig.start_daemon()
-            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            rig.wait_for(r.measuring, 30)
             for command in ("arm", "start"):
                 rig.tool(command, "--by", "A. Person")
             check_live(checks, rig, keys, port)

@@ -57,8 +57,7 @@ def offline(rig, *arguments, timeout=120):
 
 def begin(checks, rig):
     rig.start_daemon()
-    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running" and
-                 any(c["quality"] == "good" for c in s["sample"]["channels"]), 60)
+    rig.wait_for(r.measuring, 60)
     armed, started = rig.tool("arm", "--by", "test"), rig.tool("start", "--by", "test")
     checks.check(armed.returncode == 0 and started.returncode == 0, "a campaign starts",
                  armed.stderr + started.stderr + rig.logs())
@@ -107,7 +106,7 @@ def resumed(checks, rig):
     rig.daemon.process.wait()
     rig.start_daemon()
     rig.wait_for(lambda s: s["campaign"].get("resume_offer") and s["shaker"].get("running") is False and
-                 s["shaker"].get("state") == 0 and any(c["quality"] == "good" for c in s["sample"]["channels"]), 60)
+                 s["shaker"].get("state") == 0 and r.measuring(s), 60)
     if rig.status()["campaign"]["state"] == "tripped":   # the shaker was left running
         rig.tool("ack", "trip", "--by", "test")
     runs = [rig.tool(command, "--by", "test") for command in ("arm", "resume")]
@@ -125,6 +124,15 @@ def resumed(checks, rig):
     names = sorted(os.path.basename(name) for name in glob.glob(folder + "/*.h5"))
     checks.equal(names, ["campaign-2.h5", "campaign.h5"], "resumed: in a second part")
     result = rig.result()[1].decode().strip()
+    # The truth is 5 arcsec and the steps of 20 bit; what is found is the mean of three fits, each with a sigma of its own (of some
+    # 11 % here): four sigma of that mean, which leave the configured 10 arcsec far outside.
+    anew = json.loads(result).get("identified_anew", {})
+    truth = math.hypot(5.0, 360.0 * 3600 / 2**20 / math.sqrt(12.0))
+    sigma = math.hypot(*(gyro.get("fit", {}).get("Q", {}).get("sigma", math.inf) for gyro in status["noise"]["gyros"])) / 3
+    checks.check(sigma < 0.1 * truth and abs(anew.get("noise", {}).get("angle_arcsec", 0) - truth) < 4 * sigma and
+                 len(anew.get("live", {}).get("parameters", [])) == 30 and json.loads(result)["cross_check"]["agrees"],
+                 "resumed: at the end identified anew with the noise found, the live result beside it",
+                 f"sigma {sigma}: {anew}"[:300])
     environment = {**os.environ, "VIBRIG_RECORDINGS": rig.results}
     for how, arguments in (("replayed by its name", ("replay", "recorded")), ("identified", ("identify", folder)),
                            ("from frames alone", ("replay", *r.raw_logs(folder)))):
@@ -251,11 +259,38 @@ def complete(checks, rig):
         file.write("[noise]\nresolver_arcsec = 10.0\n")
     anew = offline(rig, "replay", path, "--config", other, "--json")
     checks.check(json.loads(anew.stdout)["nis"] < json.loads(result)["nis"], "other settings give another result")
+    studied(checks, rig, folder, json.loads(anew.stdout))
     changed(checks, rig, path)
     exports(checks, rig, folder, path)
+    marked(checks, rig, folder, path, result)
     wrong_input(checks, rig, path)
     kept(checks, rig, folder)
     report(checks, rig, folder)
+
+
+def studied(checks, rig, folder, anew):
+    """The same identified anew in a study, with the settings of `anew`; and a proof of its budget."""
+    def study(name, text):
+        with open(os.path.join(rig.folder, name + ".toml"), "w", encoding="utf-8") as file:
+            file.write(f'[study]\nname = "{name}"\n{text}')
+        offline(rig, "study", "plan", name + ".toml", "-o", name, "--instruction-set", "auto")
+        offline(rig, "study", "run", name)
+        run = offline(rig, "study", "merge", name, "-o", name + ".json", "--csv", name + ".csv", "--hdf5", name + ".h5",
+                      "--plot", name + "-charts")
+        charts = [open(chart, encoding="utf-8").read() for chart in glob.glob(os.path.join(rig.folder, name + "-charts", "*.svg"))]
+        checks.check(len(charts) >= 2 and all("<svg" in chart and not re.search(r"\bnan\b", chart) for chart in charts), f"and drawn: {len(charts)} charts")
+        checks.equal((run.returncode, run.stderr), (0, ""), f"a study of kind {name} is merged")
+        with open(os.path.join(rig.folder, name + ".json"), encoding="utf-8") as file:
+            return json.load(file), run.stdout
+    again, table = study("recordings", f'kind = "recordings"\nfolders = ["{folder}"]\n[identify]\nnoise.resolver_arcsec = 10.0\n')
+    checks.equal(again["recordings"][0]["new"]["value"], [p["value"] for p in anew["parameters"]],
+                 "a study of recordings gives what replay gives, to the last bit")
+    checks.check("with noise.resolver_arcsec = 10.0" in table and again["recordings"][0]["old"] is not None,
+                 "and says with what, and what the recording said", table)
+    proof, table = study("uncertainty", f'kind = "uncertainty"\nrecording = "{folder}"\n')
+    checks.check(proof["stable"] and f"the budget is {proof['verdict']}" in table, "a budget is proved or not", table)
+    with h5py().File(os.path.join(rig.folder, "recordings.h5")) as first, h5py().File(os.path.join(rig.folder, "uncertainty.h5")) as second:
+        checks.equal((first["new"].shape, second["coefficients"].shape), ((1, 30), (30, 12)), "both as tables, too")
 
 
 def changed(checks, rig, path):
@@ -329,6 +364,28 @@ def exports(checks, rig, folder, path):
     ascii_log = subprocess.run(["log2asc", "-I", log, "vcan0"], capture_output=True, text=True)
     frames = sum(" vcan0 " not in line and " d " in line for line in ascii_log.stdout.splitlines())
     checks.equal(frames, len(lines), "can-utils read every line of it")
+
+
+def marked(checks, rig, folder, path, result):
+    """SIMULATED on whatever is made of a simulated rig's campaign."""
+    with h5py().File(path, "r") as file:
+        attribute, events = file.attrs["simulated"], " ".join(str(text) for text in file["events/text"][:])
+    checks.check(attribute == 1 and "SIMULATED" in events, "the HDF5 file says SIMULATED", str(attribute))
+    checks.check(json.loads(result)["simulated"] is True, "result.json says so")
+    for kind in ("text", "csv", "json"):
+        made = offline(rig, "compensate", folder, "--to", kind).stdout
+        first = made.splitlines()[0 if kind != "json" else 1]
+        checks.check("simulated" in first.lower() and (kind == "json") == ('"simulated": true' in first),
+                     f"the compensation as {kind} begins with it", made[:200])
+    checks.check(offline(rig, "identify", path).stdout.startswith("SIMULATED: "), "identify begins with it")
+    with open(os.path.join(rig.folder, "x.csv"), encoding="ascii") as file:
+        lines = file.read().splitlines()
+    checks.check(lines[0].endswith(",simulated") and all(line.endswith(",1") for line in lines[1:]),
+                 "the exported CSV says so in each row", lines[0])
+    checks.check(json.loads(offline(rig, "identify", "x.csv", "--json").stdout)["simulated"] is True,
+                 "and what is identified from it says so")
+    import scipy.io
+    checks.equal(scipy.io.loadmat(os.path.join(rig.folder, "x.mat"))["simulated"].item(), 1, "the MATLAB file says so")
 
 
 def kept(checks, rig, folder):

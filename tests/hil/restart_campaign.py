@@ -24,11 +24,6 @@ CAMPAIGN = {"name": "restarted", "identify": "what-it-can",
 POSITIONS = 6
 
 
-def measuring(status):
-    return status["can"]["link"] == "running" and status["shaker"]["link"] == "running" and \
-        any(c["quality"] == "good" for c in status["sample"]["channels"])
-
-
 def journal(rig):
     return os.path.join(rig.results, "journal.sqlite3")
 
@@ -45,8 +40,8 @@ def events(rig):
 def restart(checks, rig, what):
     begun = time.monotonic()
     rig.start_daemon()
-    status = rig.wait_for(measuring, 60)
-    checks.check(status is not None and measuring(status), f"{what}: the daemon measures again", rig.logs())
+    status = rig.wait_for(r.measuring, 60)
+    checks.check(status is not None and r.measuring(status), f"{what}: the daemon measures again", rig.logs())
     checks.note(f"{what}: measures {time.monotonic() - begun:.1f} s after its start")
     return status
 
@@ -82,7 +77,7 @@ def killed_and_resumed(checks, programs, folder):
         rig.start_plant("--seed", "3", "--speed", "20")
         rig.configure(CAMPAIGN)
         rig.start_daemon()
-        rig.wait_for(measuring, 60)
+        rig.wait_for(r.measuring, 60)
         for command in ("arm", "start"):
             rig.tool(command, "--by", "Ada")
         for kills in (1, 3):
@@ -155,7 +150,7 @@ def noise_goes_on(checks, programs, folder):
         rig.start_plant("--seed", "4", "--speed", "60", "--fault", "gyro-noise=8@0")
         rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 15 * k] for k in range(8)], "dwell_s": 30.0})
         rig.start_daemon()
-        rig.wait_for(measuring, 60)
+        rig.wait_for(r.measuring, 60)
         configured = noise_in_force(rig.status())
         for command in ("arm", "start"):
             rig.tool(command, "--by", "Ada")
@@ -208,7 +203,7 @@ def not_used(checks, programs, folder):
         rig.start_plant("--seed", "3", "--speed", "20")
         rig.configure({**CAMPAIGN, "dwell_s": 10.0})
         rig.start_daemon()
-        rig.wait_for(measuring, 60)
+        rig.wait_for(r.measuring, 60)
         for command in ("arm", "start"):
             rig.tool(command, "--by", "Ada")
         rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)

@@ -146,6 +146,7 @@ class Rig:
         self.socket = os.path.join(folder, "vibrigd.sock")
         self.results = os.path.join(folder, "results")
         self.configuration = os.path.join(folder, "vibrigd.toml")
+        self.control = os.path.join(folder, "control")
         self.plant = self.daemon = None
         os.makedirs(self.results, exist_ok=True)
 
@@ -182,13 +183,30 @@ class Rig:
         bus = "seqpacket:" + self.path if self.bus == "seqpacket" else self.bus
         ready = os.path.join(self.folder, "plant.json")
         self.plant = Child("plant", [self.program("vibrig-plant"), "run", "--can", bus, "--modbus", "tcp:127.0.0.1:0",
-                                     "--clock", self.clock, "--ready-file", ready, *more], self.folder)
+                                     "--clock", self.clock, "--control", self.control, "--ready-file", ready, *more], self.folder)
         while self.plant.running() and not os.path.exists(ready):
             time.sleep(0.05)
         if not self.plant.running():
             raise RuntimeError("vibrig-plant did not start: " + self.plant.text())
         with open(ready, encoding="utf-8") as file:
             self.modbus_port = json.load(file)["modbus_port"]
+
+    def order(self, line, timeout_s=10):
+        """Given to the plant, and done when this returns: its answer."""
+        known = len(self.plant.text())
+        with open(self.control, "w", encoding="ascii") as control:
+            print(line, file=control)
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end and self.plant.running():
+            # Whole lines; another process may have given an order, too.
+            answers = self.plant.text()[known:].split("\n")[:-1]
+            for answer in answers:
+                if answer == f"ok {line}" or (line == "status" and answer.startswith("ok time ")):
+                    return answer
+            if any(answer.startswith("error: ") for answer in answers):
+                break
+            time.sleep(0.005)
+        raise RuntimeError(f"vibrig-plant, told to {line}: {self.plant.text()[known:]}")
 
     def be_punctual(self):
         """In real time a rig comes first, whatever else the machine does: a late frame would be taken for a fault of the
@@ -271,6 +289,14 @@ def number(value):
     return int(value)
 
 
+def measuring(status):
+    """Both links are up and the rate of the samples is known, which an arming asks for: good channels alone come before that."""
+    return status["can"]["link"] == "running" and status["shaker"]["link"] == "running" and status["sample"].get("rate_hz", 0) > 0
+
+
+IMBALANCE = "received is not handled"   # of the daemon's alarm
+
+
 def balances(status):
     """Every stage with its loss balance: name, received, accounted for."""
     can, assembler, ring = status["can"], status["assembler"], status["estimator_ring"]
@@ -290,8 +316,8 @@ def balances(status):
     return rows
 
 
-def check_balances(checks, rig):
-    """A stage may hold something for the moment: each balance has to close within a few looks."""
+def settled_balances(rig):
+    """The balances once each closes, or those of the last of some looks: a stage may hold something for the moment."""
     status, rows = None, []
     for _ in range(20):
         status = rig.status()
@@ -299,10 +325,24 @@ def check_balances(checks, rig):
         if rows and all(left == right for _, left, right in rows):
             break
         time.sleep(0.1)
+    return status, rows
+
+
+def check_balances(checks, rig):
+    status, rows = settled_balances(rig)
     checks.check(rows, "status answers")
     for name, left, right in rows:
         checks.check(left == right, f"loss balance closes: {name}", f"received {left}, accounted for {right}")
+    # It looks at its stages every second, the lines of the log among them.
+    checks.check(IMBALANCE not in rig.daemon.text(), "the daemon itself has found no stage that does not balance", rig.logs())
     return status
+
+
+def check_balance(checks, rig, what):
+    """All of them as one check."""
+    _, rows = settled_balances(rig)
+    checks.check(rows and all(left == right for _, left, right in rows) and IMBALANCE not in rig.daemon.text(),
+                 f"{what}: the loss balance closes", f"{rows}\n{rig.logs()}")
 
 
 SANITIZER = re.compile(r"(AddressSanitizer|LeakSanitizer|ThreadSanitizer|UndefinedBehaviorSanitizer|runtime error:)")

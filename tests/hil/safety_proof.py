@@ -14,6 +14,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import modbus_proxy  # noqa: E402
 import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "proved", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [5.0], "dwell_s": 10.0}
@@ -40,18 +41,18 @@ def ready(status):
 class Proof:
     """A rig with a truth of its own, and a daemon that measures."""
 
-    def __init__(self, checks, programs, folder, shaker=None, **tables):
+    def __init__(self, checks, programs, folder, shaker=None, proxied=False, **tables):
         self.rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1)
-        self.fifo = os.path.join(folder, "control")
-        self.rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45", "--speed", "40", "--control", self.fifo,
+        self.rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45", "--speed", "40",
                              "--truth", self.rig.truth_file({"shaker": shaker or {}}))
-        self.control = open(self.fifo, "w", encoding="ascii")
+        own = self.rig.modbus_port
+        if proxied:
+            self.proxy = modbus_proxy.Proxy(own)
+            self.rig.modbus_port = self.proxy.port
         self.rig.configure(CAMPAIGN, **{"commission": {"enforce": True}, **tables})
+        self.rig.modbus_port = own
         self.rig.start_daemon()
         checks.check(ready(self.rig.wait_for(ready, 60) or {"can": {"link": ""}}), "the rig is ready", self.rig.logs())
-
-    def do(self, line):
-        print(line, file=self.control, flush=True)
 
     def make(self, *more):
         return self.rig.tool("selftest", "--by", "Ada", *more, timeout=120)
@@ -60,7 +61,6 @@ class Proof:
         return (self.rig.status() or {}).get("proof", {})
 
     def end(self):
-        self.control.close()
         self.rig.stop()
 
 
@@ -101,6 +101,18 @@ def row(proof, name):
     return next((x["value"] for x in proof.get("rows", []) if x["name"] == name), None)
 
 
+def signed(checks, p, said):
+    """The line that a person files with the proof: the journal goes through it, and through no other."""
+    lines = [line.removeprefix("signed record: ") for line in said.splitlines() if line.startswith("signed record: ")]
+    journal = os.path.join(p.rig.results, "journal.sqlite3")
+    ends = []
+    for line in [*lines, *(line.replace(line[40:44], "0000") for line in lines)]:
+        ends.append(subprocess.run([p.rig.program("vibrig"), "journal", "verify", journal, "--anchor", line],
+                                   stdin=subprocess.DEVNULL, capture_output=True, text=True))
+    checks.check(len(lines) == 1 and ends[0].returncode == 0 and ends[1].returncode != 0,
+                 "its signed record is one of the journal's, a changed one is not", said[-800:] + "".join(e.stdout + e.stderr for e in ends))
+
+
 def honest(checks, programs, folder):
     p = Proof(checks, programs, folder)
     try:
@@ -114,11 +126,13 @@ def honest(checks, programs, folder):
                      0 < row(proof, "stop, platform") <= DEADLINE_S + RING_DOWN_S, "the times of the stop are kept", proof)
         checks.check(TIMEOUT_S / 2 <= row(proof, "watchdog, rest") <= TIMEOUT_S + DEADLINE_S,
                      "the starved watchdog stops the table within its time", proof)
+        checks.check(0 < row(proof, "noise at rest, platform") < 0.02 / 6, "the noise at rest is a sixth of what is called rest at most", proof)
         checks.check(all(row(proof, name) == 1 for name in ("arming is refused while it moves", "a slew is refused while it moves",
                                                             "another frequency is refused while it moves",
                                                             "watchdog, fault acknowledged")),
                      "what must not be done while the table moves is refused", proof)
         checks.check("emergency stop has never" in proof.get("advice", ""), "the emergency stop is asked for", proof)
+        signed(checks, p, made.stdout)
         armed = p.rig.tool("arm", "--by", "Ada")
         checks.equal(armed.returncode, 0, "then a campaign is armed")
         recorded(checks, p, proof)
@@ -158,12 +172,17 @@ def pressed(checks, programs, folder):
                         folder)
         asked = rig.wait_for(lambda s: s.get("proof", {}).get("asks"), 60)
         checks.check(asked and "press" in asked["proof"].get("asks", ""), "a person is asked for the emergency stop", child.text())
-        p.do("estop open")
+        p.rig.order("estop open")
+        asked = rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
+        checks.check(asked and "close" in asked["proof"].get("asks", ""), "then to close its chain again", child.text())
+        p.rig.order("estop close")
         status = rig.wait_for(lambda s: s.get("proof", {}).get("by"), 60)
         child.end()
-        checks.check(status and status["proof"].get("passed") and row(status["proof"], "emergency stop, latched") == 1,
-                     "pressed, it stops the table and latches", (status or {}).get("proof"))
-        p.do("estop close")
+        proof = (status or {}).get("proof", {})
+        checks.check(proof.get("passed") and row(proof, "emergency stop, latched") == 1 and
+                     0 <= row(proof, "emergency stop, seen") <= 0.5 and row(proof, "closing the chain starts nothing") == 1 and
+                     row(proof, "emergency stop, the controller says fault") == 1,
+                     "pressed, it stops the table, is seen within 0.5 s and latches; closing it starts nothing", proof)
         later = rig.wait_for(lambda s: not s["shaker"].get("emergency_stop_open"), 30)
         checks.check(later["campaign"]["state"] == "tripped" and later["shaker"].get("measured_g", 0) == 0,
                      "closing the chain alone starts nothing", r.state_of(later))
@@ -191,10 +210,30 @@ def lies(checks, programs, folder):
                 p.end()
 
 
+def contact_alone(checks, programs, folder):
+    """The button's contact is seen, and nothing is cut: the table stands because the daemon's own stop goes there."""
+    p = Proof(checks, programs, folder, proxied=True)
+    try:
+        rig = p.rig
+        child = r.Child("selftest", [rig.program("vibrig"), "selftest", "--by", "Ada", "--emergency-stop", "--socket", rig.socket],
+                        folder)
+        rig.wait_for(lambda s: "press" in s.get("proof", {}).get("asks", ""), 60)
+        p.proxy.break_with(("contact", 1))
+        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
+        p.proxy.break_with(None)
+        status = rig.wait_for(lambda s: s.get("proof", {}).get("by"), 60)
+        child.end()
+        proof = (status or {}).get("proof", {})
+        checks.check(proof.get("passed") is False and row(proof, "emergency stop, the controller says fault") == 0,
+                     "an emergency stop that is a contact alone does not pass", f"{proof}\n{rig.logs()}")
+    finally:
+        p.end()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (honest, pressed, lies):
+    for part in (honest, pressed, contact_alone, lies):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

@@ -57,7 +57,7 @@ def start(rig, **other):
     rig.start_plant("--seed", "3")
     rig.configure({**SHORT, **other})
     rig.start_daemon()
-    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+    rig.wait_for(r.measuring, 30)
     return [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
 
 

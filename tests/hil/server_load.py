@@ -128,7 +128,7 @@ def main():
             rig.configure({"name": "load", "identify": "what-it-can"}, server={"page": "127.0.0.1:0"})
             rig.start_daemon()
             where = urllib.parse.urlparse(live_page.page_address(rig))
-            rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+            rig.wait_for(r.measuring, 30)
             control = Control(rig.socket)
             server = Thread(rig.daemon.process, "server")
             first = control.status()

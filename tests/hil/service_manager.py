@@ -91,15 +91,11 @@ def block(tid):
     os.waitpid(tid, WALL)
 
 
-def measuring(status):
-    return status["can"]["link"] == "running" and status["shaker"]["link"] == "running"
-
-
 def blocked(checks, rig, manager, stage):
     start_daemon(rig, manager)
     heard = manager.listen(20, "READY=1")
     checks.check("READY=1" in heard, f"{stage}: the daemon says that it is ready", rig.logs())
-    rig.wait_for(measuring, 20)
+    rig.wait_for(r.measuring, 20)
     if rig.status()["campaign"]["state"] == "tripped":
         rig.tool("ack", "trip", "--by", "tester")
     rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
@@ -126,8 +122,8 @@ def blocked(checks, rig, manager, stage):
     os.waitpid(thread, WALL)    # the tracer's; only then the process can be
     rig.daemon.process.wait()
     start_daemon(rig, manager)
-    status = rig.wait_for(measuring, 20)
-    checks.check(status is not None and measuring(status), f"{stage} blocked: restarted, it measures", rig.logs())
+    status = rig.wait_for(r.measuring, 20)
+    checks.check(status is not None and r.measuring(status), f"{stage} blocked: restarted, it measures", rig.logs())
     checks.check(status is not None and status["campaign"]["state"] in ("idle", "tripped") and
                  shaker_state(rig) in (0, 4), f"{stage} blocked: restarted, it moves nothing", r.state_of(status))
     checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, f"{stage} blocked: restarted, it ends cleanly")
@@ -136,7 +132,7 @@ def blocked(checks, rig, manager, stage):
 def talks(checks, rig, manager):
     start_daemon(rig, manager)
     checks.check("READY=1" in manager.listen(20, "READY=1"), "it says READY")
-    rig.wait_for(measuring, 20)
+    rig.wait_for(r.measuring, 20)
     heard = manager.listen(3)
     checks.check("WATCHDOG=1" in heard, "it feeds the watchdog", str(heard))
     rig.daemon.process.send_signal(signal.SIGHUP)
@@ -152,7 +148,7 @@ def restarts_at_rest(checks, rig, manager):
     """An upgrade leaves a file in the service's folder."""
     request = os.path.join(rig.folder, "restart-when-at-rest")
     start_daemon(rig, manager, RUNTIME_DIRECTORY=rig.folder)
-    rig.wait_for(lambda s: measuring(s) and s["shaker"].get("state") == 0, 20)
+    rig.wait_for(lambda s: r.measuring(s) and s["shaker"].get("state") == 0, 20)
     if rig.status()["campaign"]["state"] == "tripped":
         rig.tool("ack", "trip", "--by", "tester")
     rig.wait_for(lambda s: s["shaker"].get("state") == 0 and not s["shaker"].get("running", True), 20)
@@ -174,7 +170,7 @@ def restarts_at_rest(checks, rig, manager):
     with open(request, "w", encoding="ascii"):
         pass
     start_daemon(rig, manager, RUNTIME_DIRECTORY=rig.folder)
-    checks.check(rig.wait_for(measuring, 20) is not None and not os.path.exists(request),
+    checks.check(rig.wait_for(r.measuring, 20) is not None and not os.path.exists(request),
                  "upgrade: what was asked of the one before does not restart this one", rig.logs())
     checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "upgrade: it ends cleanly")
 

@@ -48,7 +48,7 @@ def command(rig, kind):
 
 
 def shake(checks, rig, what):
-    rig.wait_for(lambda t: s.measuring(t) and t["shaker"].get("state") == 0 and not t["shaker"].get("running", True), 30)
+    rig.wait_for(lambda t: r.measuring(t) and t["shaker"].get("state") == 0 and not t["shaker"].get("running", True), 30)
     said = []
     end = time.monotonic() + 30
     while command(rig, "arm")[0] != 200 and time.monotonic() < end:   # rest has to be measured first
@@ -78,7 +78,7 @@ def stops(checks, rig, what):
 def start(rig, environment=None):
     rig.start_daemon() if environment is None else setattr(
         rig, "daemon", r.Child("vibrigd", [rig.program("vibrigd"), "--config", rig.configuration], rig.folder, environment))
-    rig.wait_for(s.measuring, 30)
+    rig.wait_for(r.measuring, 30)
 
 
 def told(rig, words):
@@ -98,7 +98,7 @@ def nobody_reads_the_log(checks, rig):
                                stdout=subprocess.DEVNULL, stderr=writer, preexec_fn=r.die_with_parent)
     os.close(writer)
     try:
-        rig.wait_for(s.measuring, 30)
+        rig.wait_for(r.measuring, 30)
         shake(checks, rig, "log blocked")
         status = rig.wait_for(lambda t: t["log"]["blocked"], 10)
         log = {key: r.number(value) for key, value in status["log"].items()}

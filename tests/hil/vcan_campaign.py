@@ -70,7 +70,7 @@ def campaign(checks, rig, folder):
     log = os.path.join(folder, "candump.log")
     with open(log, "wb") as file:
         candump = subprocess.Popen(["candump", "-L", BUS], stdin=subprocess.DEVNULL, stdout=file)
-    first = rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running" and
+    first = rig.wait_for(lambda s: r.measuring(s) and
                          r.number(s["assembler"]["samples"]) > 20, 20)
     checks.check(first is not None and first["can"]["link"] == "running", "vibrigd hears the rig on vcan0",
                  r.state_of(first))
@@ -198,7 +198,7 @@ def stops_on_sigterm(checks, rig):
 
 def dies_safely(checks, rig):
     rig.start_daemon()
-    rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 20)
+    rig.wait_for(r.measuring, 20)
     checks.equal(r.state_of(rig.status()), "idle", "after a restart the shaker is disarmed")
     if not run_up(checks, rig, "after a restart, armed anew, the shaker runs"):
         return
@@ -220,15 +220,13 @@ def with_pymodbus(checks, programs, folder):
     rig.modbus_port = 1502
     rig.configure(SHORT, **r.PATIENT)
     platform = r.Rig(programs, BUS, "real", folder)
-    fifo = os.path.join(folder, "control")
-    os.mkfifo(fifo)
     played = None
     try:
-        platform.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45", "--control", fifo)
+        platform.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
         played = r.Child("shaker", [os.path.join(os.path.dirname(os.path.abspath(__file__)), "pymodbus_shaker.py"),
-                                    str(rig.modbus_port), "--table", fifo], folder)
+                                    str(rig.modbus_port), "--table", platform.control], folder)
         rig.start_daemon()
-        rig.wait_for(lambda s: s["can"]["link"] == "running" and s["shaker"]["link"] == "running", 30)
+        rig.wait_for(r.measuring, 30)
         run_up(checks, rig, "pymodbus plays the shaker: it reaches its level")
         rig.tool("abort", "--by", "tester")
         stopped = rig.wait_for(lambda s: s["campaign"]["state"] in ("aborted", "tripped") and

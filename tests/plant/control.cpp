@@ -55,14 +55,17 @@ std::string Control::execute(std::string_view line) {
         const std::scoped_lock lock(rig_.mutex);
         if (word == "fault") {
             rig_.faults.add(parse_fault(rest, rig_.now_s()));
+            rig_.apply_faults();
             return "ok fault " + std::string(rest);
         }
         if (word == "clear") {
             rig_.faults.clear(rest);
-            return "ok clear";
+            rig_.apply_faults();
+            return "ok " + std::string(text);
         }
         if (word == "estop" && (rest == "open" || rest == "close")) {
             rig_.emergency_stop_by_hand = rest == "open";
+            rig_.apply_faults();
             return "ok estop " + std::string(rest);
         }
         if (word == "table") {

@@ -24,6 +24,20 @@ double natural_omega(double transmission, double frequency_hz, double damping) {
     return kTwoPi * frequency_hz / std::sqrt(x);
 }
 
+using Complex = std::complex<double>;
+
+// The library's product looks for infinities.
+Complex times(const Complex& a, const Complex& b) noexcept {
+    return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+
+/// One Newton step keeps the length at 1 for ever.
+Complex turned(const Complex& phasor, const Complex& turn) noexcept {
+    const Complex next = times(phasor, turn);
+    const double norm = 1.5 - 0.5 * (next.real() * next.real() + next.imag() * next.imag());
+    return {next.real() * norm, next.imag() * norm};
+}
+
 }  // namespace
 
 Isolator::Isolator(double transmission, double frequency_hz, double damping, double step_s)
@@ -47,14 +61,19 @@ std::complex<double> Isolator::transfer(double frequency_hz) const noexcept {
 }
 
 void Isolator::set_drive(double frequency_hz, const Harmonics& harmonics) noexcept {
+    used_ = 1;
     for (std::size_t n = 0; n < harmonics_.size(); ++n) {
         harmonics_[n].relative = n == 0 ? 1 : harmonics[n - 1];
         harmonics_[n].phasor = {1, 0};
+        if (harmonics_[n].relative != 0) used_ = n + 1;
     }
     retune(frequency_hz);
+    steady_ = true;
+    leap_.ahead.clear();
 }
 
 void Isolator::retune(double frequency_hz) noexcept {
+    steady_ = false;
     for (std::size_t n = 0; n < harmonics_.size(); ++n) {
         Harmonic& h = harmonics_[n];
         const Complex s{0, kTwoPi * frequency_hz * static_cast<double>(n + 1)};
@@ -67,37 +86,116 @@ void Isolator::retune(double frequency_hz) noexcept {
     }
 }
 
-void Isolator::advance(double amplitude_g) noexcept {
+void Isolator::step(double amplitude_g) noexcept {
     const auto& t = transition_;
-    std::array<double, 2> sine{t[0][0] * state_[0] + t[0][1] * state_[1],
-                               t[1][0] * state_[0] + t[1][1] * state_[1]};
-    std::array<double, 2> cosine{t[0][0] * ahead_[0] + t[0][1] * ahead_[1],
-                                 t[1][0] * ahead_[0] + t[1][1] * ahead_[1]};
-    for (Harmonic& h : harmonics_) {
+    const auto moved = [&t](const std::array<double, 2>& m) {
+        return std::array<double, 2>{t[0][0] * m[0] + t[0][1] * m[1],
+                                     t[1][0] * m[0] + t[1][1] * m[1]};
+    };
+    motion_ = {moved(motion_.sine), moved(motion_.cosine)};
+    for (Harmonic& h : std::span(harmonics_).first(used_)) {
         if (h.relative == 0) continue;
         const double g = amplitude_g * h.relative;
-        const double re = h.phasor.real();
-        const double im = h.phasor.imag();
         for (std::size_t i = 0; i < 2; ++i) {
-            sine[i] += g * (re * h.input[i].imag() + im * h.input[i].real());
-            cosine[i] += g * (re * h.input[i].real() - im * h.input[i].imag());
+            const Complex push = times(h.phasor, h.input[i]);
+            motion_.sine[i] += g * push.imag();
+            motion_.cosine[i] += g * push.real();
         }
-        const double next_re = re * h.turn.real() - im * h.turn.imag();
-        const double next_im = re * h.turn.imag() + im * h.turn.real();
-        // One Newton step keeps the length at 1 for ever.
-        const double norm = 1.5 - 0.5 * (next_re * next_re + next_im * next_im);
-        h.phasor = {next_re * norm, next_im * norm};
+        h.phasor = turned(h.phasor, h.turn);
     }
-    state_ = sine;
-    ahead_ = cosine;
 }
 
-void Isolator::kick(double g) noexcept { state_[0] += g / (omega0_ * omega0_); }
+void Isolator::advance(double amplitude_g) noexcept { step(amplitude_g); }
+
+void Isolator::advance(double begin_g, double slope_g, std::span<Shake> after) {
+    if (after.empty()) return;
+    // A frequency that drifts is another drive with each call.
+    if (steady_ && used_ == 1) {
+        if (leap_.ahead.size() != after.size()) prepare_leap(after.size());
+        leap(begin_g, slope_g, after);
+        return;
+    }
+    for (std::size_t i = 0; i < after.size(); ++i) {
+        step(begin_g + slope_g * (static_cast<double>(i + 1) - 0.5));
+        after[i] = shake();
+    }
+}
+
+void Isolator::prepare_leap(std::size_t steps) {
+    const double stiff = omega0_ * omega0_, damp = 2 * damping_ * omega0_;
+    const Harmonic& line = harmonics_[0];
+    const auto& t = transition_;
+    const auto moved = [&t](std::array<Complex, 2>& m) {
+        m = {t[0][0] * m[0] + t[0][1] * m[1], t[1][0] * m[0] + t[1][1] * m[1]};
+    };
+    const auto both = [](double x) { return Pair{x, x}; };
+    const auto felt = [&](const std::array<Complex, 2>& m) {
+        const Complex g = stiff * m[0] + damp * m[1];
+        return std::array<Pair, 2>{both(g.real()), both(g.imag())};
+    };
+    Leap& all = leap_;
+    all = {};
+    all.transition = {{{1, 0}, {0, 1}}};
+    for (std::size_t i = 0; i < steps; ++i) {
+        moved(all.amplitude);
+        moved(all.slope);
+        for (std::size_t k = 0; k < 2; ++k) {
+            const Complex push = times(all.turn, line.input[k]);
+            all.amplitude[k] += push;
+            all.slope[k] += (static_cast<double>(i) + 0.5) * push;
+        }
+        all.turn = turned(all.turn, line.turn);
+        const Transition before = all.transition;
+        for (std::size_t r = 0; r < 2; ++r) {
+            for (std::size_t c = 0; c < 2; ++c)
+                all.transition[r][c] = t[r][0] * before[0][c] + t[r][1] * before[1][c];
+        }
+        const auto of_motion = [&](std::size_t c) {
+            return both(stiff * all.transition[0][c] + damp * all.transition[1][c]);
+        };
+        all.ahead.push_back({{of_motion(0), of_motion(1)}, felt(all.amplitude), felt(all.slope)});
+    }
+}
+
+void Isolator::leap(double begin_g, double slope_g, std::span<Shake> after) noexcept {
+    const Pair m0{motion_.sine[0], motion_.cosine[0]}, m1{motion_.sine[1], motion_.cosine[1]};
+    // Imaginary and real part of the phasor times what it meets.
+    Complex& phasor = harmonics_[0].phasor;
+    const Pair by_real{phasor.imag(), phasor.real()}, by_imag{phasor.real(), -phasor.imag()};
+    const Pair g0 = begin_g * by_real, g1 = begin_g * by_imag;
+    const auto store = [&after](std::size_t i, Pair felt) { after[i] = {felt[0], felt[1]}; };
+    if (slope_g == 0) {
+        for (std::size_t i = 0; i < after.size(); ++i) {
+            const Ahead& a = leap_.ahead[i];
+            store(i, (a.motion[0] * m0 + a.motion[1] * m1) +
+                         (a.amplitude[0] * g0 + a.amplitude[1] * g1));
+        }
+    } else {
+        const Pair s0 = slope_g * by_real, s1 = slope_g * by_imag;
+        for (std::size_t i = 0; i < after.size(); ++i) {
+            const Ahead& a = leap_.ahead[i];
+            store(i, (a.motion[0] * m0 + a.motion[1] * m1) +
+                         (a.amplitude[0] * g0 + a.amplitude[1] * g1) +
+                         (a.slope[0] * s0 + a.slope[1] * s1));
+        }
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+        const Complex push = times(phasor, begin_g * leap_.amplitude[k] + slope_g * leap_.slope[k]);
+        const Pair next = leap_.transition[k][0] * m0 + leap_.transition[k][1] * m1 +
+                          Pair{push.imag(), push.real()};
+        motion_.sine[k] = next[0];
+        motion_.cosine[k] = next[1];
+    }
+    phasor = turned(phasor, leap_.turn);
+}
+
+void Isolator::kick(double g) noexcept { motion_.sine[0] += g / (omega0_ * omega0_); }
 
 Shake Isolator::shake() const noexcept {
     const double stiff = omega0_ * omega0_;
     const double damp = 2 * damping_ * omega0_;
-    return {stiff * state_[0] + damp * state_[1], stiff * ahead_[0] + damp * ahead_[1]};
+    return {stiff * motion_.sine[0] + damp * motion_.sine[1],
+            stiff * motion_.cosine[0] + damp * motion_.cosine[1]};
 }
 
 double Isolator::table_g(double amplitude_g) const noexcept {
@@ -110,7 +208,7 @@ bool Isolator::at_rest() const noexcept {
     const auto small = [this](const std::array<double, 2>& s) {
         return std::abs(s[0]) * omega0_ * omega0_ < 1e-9 && std::abs(s[1]) * omega0_ < 1e-9;
     };
-    return small(state_) && small(ahead_);
+    return small(motion_.sine) && small(motion_.cosine);
 }
 
 }  // namespace vibrig::plant

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <complex>
+#include <span>
+#include <vector>
 
 namespace vibrig::plant {
 
@@ -34,6 +36,10 @@ class Isolator {
     void retune(double frequency_hz) noexcept;
     /// One step under a table acceleration of this amplitude (g), constant over the step.
     void advance(double amplitude_g) noexcept;
+    /// A step for each of `after`, under an amplitude that grows by `slope_g` with each. The motion
+    /// is linear in what it is before, so that for a drive of one line each step follows from
+    /// numbers found once for a drive and not from the step before it.
+    void advance(double begin_g, double slope_g, std::span<Shake> after);
     /// The platform gets a push: its acceleration jumps by this much and then rings down.
     void kick(double g) noexcept;
 
@@ -51,13 +57,40 @@ class Isolator {
         std::array<Complex, 2> input{};  ///< of one step
     };
 
+    using Transition = std::array<std::array<double, 2>, 2>;
+    /// Driven by the sines and by the cosines; acceleration = omega0^2 s0 + 2 zeta omega0 s1.
+    struct Motion {
+        std::array<double, 2> sine{}, cosine{};
+    };
+    void step(double amplitude_g) noexcept;
+
+    /// Sine and cosine side by side.
+    typedef double Pair __attribute__((vector_size(16)));
+    /// What the acceleration after so many steps has of the motion, the amplitude and the slope
+    /// before them; the same in both lanes.
+    struct Ahead {
+        std::array<Pair, 2> motion;
+        std::array<Pair, 2> amplitude, slope;  ///< real and imaginary part
+    };
+    /// Many steps at once, for a drive of one line; empty: step by step.
+    struct Leap {
+        std::vector<Ahead> ahead;
+        Transition transition{};
+        std::array<Complex, 2> amplitude{}, slope{};  ///< in the motion
+        Complex turn{1, 0};
+    };
+    void prepare_leap(std::size_t steps);
+    void leap(double begin_g, double slope_g, std::span<Shake> after) noexcept;
+
     double omega0_;
     double damping_;
     double step_s_;
-    std::array<std::array<double, 2>, 2> transition_{};
-    /// Driven by the sines and by the cosines; acceleration = omega0^2 s0 + 2 zeta omega0 s1.
-    std::array<double, 2> state_{}, ahead_{};
+    Transition transition_{};
+    Motion motion_;
     std::array<Harmonic, 5> harmonics_{};
+    std::size_t used_ = harmonics_.size();  ///< those behind are not there
+    bool steady_ = false;                   ///< the drive is as set_drive() left it
+    Leap leap_;
 };
 
 }  // namespace vibrig::plant

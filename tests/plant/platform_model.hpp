@@ -19,13 +19,27 @@ class PlatformModel {
     /// Angles of the gimbals: alpha, beta, gamma in rad; they are not wrapped while the platform
     /// drifts.
     [[nodiscard]] const Vec3& angles() const noexcept { return angles_; }
-    void set_angles(const Vec3& rad) noexcept { angles_ = rad; }
+    void set_angles(const Vec3& rad) noexcept {
+        angles_ = rad;
+        here_ = Turn(rad);
+    }
+
+    /// Cosines and sines of the three gimbal angles: they are what most of a tick's time went into.
+    struct Turn {
+        double ca, sa, cb, sb, cg, sg;
+        explicit Turn(const Vec3& angles) noexcept;
+        /// At angles that are further by so much, by the addition theorems.
+        [[nodiscard]] Turn further(const Vec3& by) const noexcept;
+    };
 
     /// A vector of the reference frame seen in platform axes, through gimbals that are square.
     [[nodiscard]] static Vec3 to_platform(const Vec3& angles, const Vec3& reference) noexcept;
     /// The same through the gimbals of this platform.
-    [[nodiscard]] Vec3 seen(const Vec3& angles, const Vec3& reference) const noexcept;
-    [[nodiscard]] Vec3 up_in_platform() const noexcept { return up_at(angles_); }
+    [[nodiscard]] Vec3 seen(const Vec3& angles, const Vec3& reference) const noexcept {
+        return seen(Turn(angles), reference);
+    }
+    [[nodiscard]] Vec3 seen(const Turn& turn, const Vec3& reference) const noexcept;
+    [[nodiscard]] Vec3 up_in_platform() const noexcept { return seen(here_, up_); }
     [[nodiscard]] Vec3 up_at(const Vec3& angles) const noexcept { return seen(angles, up_); }
     /// Rate of the Earth in platform axes, deg/h.
     [[nodiscard]] Vec3 earth_rate_in_platform(const Vec3& angles) const noexcept {
@@ -56,7 +70,7 @@ class PlatformModel {
     /// torquing).
     [[nodiscard]] Vec3 angle_rates(const Vec3& angles, double a1,
                                    const Vec3& extra) const noexcept {
-        return rates_of(angles, drift_sign_ * gyro_drift(up_at(angles), a1) + extra);
+        return rates_of(Turn(angles), drift_sign_ * gyro_drift(up_at(angles), a1) + extra);
     }
 
     /// Goes on by dt. `shakes` is the vibration at equal steps from beginning to end of it, an odd
@@ -80,15 +94,25 @@ class PlatformModel {
         }
     };
     [[nodiscard]] Vec3 drift_under(const Moments& force) const noexcept;
+    /// Mean powers of the vibration: x, y; xx, xy, yy; xxx, xxy, xyy, yyy.
+    struct Powers {
+        double p = 0, q = 0, pp = 0, pq = 0, qq = 0, ppp = 0, ppq = 0, pqq = 0, qqq = 0;
+    };
+    template <bool kThird>
+    [[nodiscard]] static Powers powers(std::span<const Shake> shakes) noexcept;
+    /// Of up + x a + y b over the vibration x, y.
+    [[nodiscard]] static Moments swept(const Vec3& up, const Vec3& a, const Vec3& b,
+                                       const Powers& powers) noexcept;
     /// Change of the gimbal angles when the platform turns against its base, both small or rates.
-    [[nodiscard]] Vec3 gimbal_turn(const Vec3& angles, const Vec3& turn) const noexcept;
+    [[nodiscard]] Vec3 gimbal_turn(const Turn& at, const Vec3& turn) const noexcept;
     /// d angles / dt, rad/s, for a rate of the platform in inertial space, deg/h.
-    [[nodiscard]] Vec3 rates_of(const Vec3& angles, const Vec3& rate) const noexcept;
-    [[nodiscard]] Vec3 mean_rate(const Vec3& angles, double dt_s,
+    [[nodiscard]] Vec3 rates_of(const Turn& at, const Vec3& rate) const noexcept;
+    [[nodiscard]] Vec3 mean_rate(const Turn& at, double dt_s,
                                  std::span<const Shake> shakes) const noexcept;
 
     Vec3 angles_{};
-    Vec3 rate_{};  ///< of the last step, due to drift and rocking, deg/h
+    Turn here_{Vec3{}};  ///< of the angles
+    Vec3 rate_{};        ///< of the last step, due to drift and rocking, deg/h
     VibrationShape shape_;
     Vec3 up_{};     ///< against gravity, in the reference frame
     Vec3 earth_{};  ///< in the reference frame, deg/h

@@ -114,10 +114,7 @@ void Rig::vibrate() {
     }
     shakes_[0] = isolator_.shake();
     const double slope = (end - begin) / static_cast<double>(steps_);
-    for (std::size_t i = 1; i < shakes_.size(); ++i) {
-        isolator_.advance(begin + slope * (static_cast<double>(i) - 0.5));
-        shakes_[i] = isolator_.shake();
-    }
+    isolator_.advance(begin, slope, std::span(shakes_).subspan(1));
 }
 
 Shake Rig::shake_before(double seconds) const noexcept {

@@ -1,15 +1,16 @@
 #include "tests/plant/sensors.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 namespace vibrig::plant {
 
 double quantise_angle(double deg, int bits) noexcept {
-    const double count = std::ldexp(1.0, bits);
-    double step = std::fmod(std::floor(deg / 360 * count + 0.5), count);
-    if (step < 0) step += count;
-    return step * 360 / count;
+    const std::int64_t count = std::int64_t{1} << bits;
+    const auto whole = static_cast<double>(count);
+    const auto step = static_cast<std::int64_t>(std::floor(deg / 360 * whole + 0.5)) & (count - 1);
+    return static_cast<double>(step) * 360 / whole;
 }
 
 Sensors::Sensors(const Truth& truth, std::uint64_t seed)

@@ -45,6 +45,28 @@ const Draw = (() => {
     }
   }
 
+  // A column for each dwell; below its alarm gyros x, y, z, each with its averaging times: what is above the expected is red.
+  function surface(curves, expected) {
+    const canvas = byId('surface'), taus = [...new Set(curves.flatMap(c => c.tau_s))].sort((a, b) => a - b);
+    canvas.width = Math.max(1, curves.length);
+    canvas.height = 3 * taus.length + 3;
+    const g = canvas.getContext('2d');
+    const cell = (x, y, name, alpha) => { g.globalAlpha = alpha; g.fillStyle = css(name); g.fillRect(x, y, 1, 1); };
+    curves.forEach((curve, column) => {
+      if (curve.alarm) cell(column, 0, '--bad', 1);
+      ['x', 'y', 'z'].forEach((gyro, j) => curve.tau_s.forEach((tau, i) => {
+        const doublings = Math.log2(curve[gyro + '_deg_h'][i] / expected(j, tau));
+        if (Number.isFinite(doublings)) cell(column, 1 + j * (taus.length + 1) + taus.indexOf(tau), doublings > 0 ? '--bad' : '--c0', Math.min(1, Math.abs(doublings)));
+      }));
+    });
+    const alarms = curves.filter(c => c.alarm).map(c => `run ${c.run} position ${c.position}`);
+    const words = `Dwells one by one: ${curves.length || 'none yet'}; gyros x, y, z, averaging time downwards, red above and blue below what the noise lets expect; `
+      + (alarms.length ? 'alarms in ' + alarms.join(', ') : 'no alarm');
+    canvas.setAttribute('aria-label', words);
+    canvas.title = words;
+    canvas.dataset.dwells = curves.length;
+  }
+
   function again() {
     for (const plot of charts.values()) plot.destroy();
     charts.clear();
@@ -138,5 +160,5 @@ const Draw = (() => {
     });
   }
 
-  return {chart, again, resize, up, gimbals, coefficients, digits, byId};
+  return {surface, chart, again, resize, up, gimbals, coefficients, digits, byId};
 })();

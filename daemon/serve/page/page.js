@@ -175,6 +175,12 @@
       show();
     } catch { /* the stream tells when the link is lost */ }
   }
+  let seenDwells = null;
+  async function getSurface(expected) {
+    try {
+      Draw.surface((await (await fetch('/api/v1/surface')).json()).curves || [], expected);
+    } catch { seenDwells = null; }   // asked again with the next status
+  }
   const column = k => history.rows.map(r => r[k]);
   function charts(s) {
     if (history.t.length === 0) return;
@@ -205,6 +211,11 @@
     const lines = gyros.map((g, i) => taus.map(tau => (measured.length ? at(points[i], tau, 'expected_deg_h')
       : g.in_force_deg_per_rt_h ? g.in_force_deg_per_rt_h / Math.sqrt(2 * tau / 3600) : null)));
     Draw.chart('allan', [taus, ...lines, ...points.map(m => taus.map(tau => at(m, tau, 'deviation_deg_h')))]);
+    const dwells = `${instance} ${noise.dwells} ${noise.dwells_left_out}`;
+    if (seenDwells !== dwells) {
+      seenDwells = dwells;
+      getSurface((j, tau) => at(points[j], tau, 'expected_deg_h'));
+    }
     const words = gyros.map(g => {
       const n = g.fit && g.fit.N;
       return `${g.gyro} ${n && n.value !== undefined ? n.value.toExponential(1) : 'N as configured'}`;

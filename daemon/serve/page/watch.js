@@ -152,5 +152,5 @@ const Watch = (() => {
   });
   const alarmed = event => { if (event.severity === 'alarm' && !playing) sound('alarm'); };
 
-  return {person, clock, strip, locks, next, sirens, alarmed, show(s) { strip(s); proof(s); locks(s); next(s); sirens(s); byId('utc').textContent = clock(s.utc) + ' UTC'; }};
+  return {person, clock, strip, locks, next, sirens, alarmed, show(s) { strip(s); proof(s); locks(s); next(s); sirens(s); byId('simulated').hidden = s.simulated !== true; byId('utc').textContent = clock(s.utc) + ' UTC'; }};
 })();

@@ -125,7 +125,7 @@ std::string Axis::text_of(double tick) const {
             digits,
             2 + static_cast<int>(std::log10(std::max(std::abs(low), std::abs(high)) / step())));
     std::snprintf(text.data(), text.size(), "%.*g", std::min(digits, 15),
-                  std::abs(tick) < 1e-12 * (high - low) ? 0 : tick);
+                  !log && std::abs(tick) < 1e-12 * (high - low) ? 0 : tick);
     return text.data();
 }
 

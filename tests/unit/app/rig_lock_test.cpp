@@ -101,10 +101,17 @@ TEST(RigLock, KnowsOneSpellingOfAnAddress) {
     Configuration c;
     c.can.kind = drivers::CanPortSettings::Kind::socketcan;
     c.can.interface = "can0";
+    for (const char* host : {"LocalHost", "127.1", "0:0::1"}) {
+        c.shaker.host = host;
+        const auto all = RigLock::resources(c);
+        ASSERT_EQ(all.size(), 3U) << host;
+        EXPECT_EQ(all[1], "modbus:127.0.0.1:502") << host;
+    }
     c.shaker.host = "LocalHost";
+    EXPECT_THAT(RigLock::resources(c),
+                ElementsAre("can:can0", "modbus:127.0.0.1:502", "modbus:localhost:502"));
+    c.shaker.host = "127.0.0.1";
     EXPECT_THAT(RigLock::resources(c), ElementsAre("can:can0", "modbus:127.0.0.1:502"));
-    c.shaker.host = "0:0::1";
-    EXPECT_THAT(RigLock::resources(c), ElementsAre("can:can0", "modbus:::1:502"));
     c.shaker.transport = drivers::ShakerSettings::Transport::rtu;
     c.shaker.device = "/dev/../dev/null";
     EXPECT_THAT(RigLock::resources(c), ElementsAre("can:can0", "modbus:/dev/null"));

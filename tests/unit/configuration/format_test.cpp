@@ -20,6 +20,22 @@ const EffectiveValue& value_of(const Loaded& loaded, const std::string& key) {
     return *found;
 }
 
+TEST(Format, CorrelationsThatExcludeOneAnotherAreRefusedForRecordingsToo) {
+    for (const bool daemon : {false, true}) {
+        try {
+            static_cast<void>(parse(as_simulated("[uncertainty]\ncorrelation = [[\"latitude\", "
+                                                 "\"azimuth\", 0.9], [\"azimuth\", \"time_base\", "
+                                                 "0.9], [\"latitude\", \"time_base\", -0.9]]\n",
+                                                 daemon),
+                                    "f", daemon));
+            ADD_FAILURE() << "accepted, daemon " << daemon;
+        } catch (const ConfigurationError& error) {
+            EXPECT_NE(std::string(error.what()).find("exclude one another"), std::string::npos)
+                << error.what();
+        }
+    }
+}
+
 TEST(Effective, EveryValueHasItsOrigin) {
     const Loaded loaded =
         parse(as_simulated("[site]\nlatitude_deg = 50\n\n[noise]\n\nresolver_bits = 18\n", true),

@@ -145,5 +145,27 @@ TEST(Positions, BeyondTheTravelAreRefused) {
     EXPECT_THAT(complaint("site.elevation_deg = 2.1"), HasSubstr("site.elevation_deg: found 2.1"));
 }
 
+TEST(OpeningCheck, IsOfRigsThatAreArmedByTheRecord) {
+    const auto of = [](const std::string& text) {
+        return parse(text, "rig.toml", true).configuration.campaign.opening;
+    };
+    EXPECT_TRUE(of("[commission]\nsimulated = true\n").empty());
+    EXPECT_EQ(of(kMap).size(), 5U);
+    EXPECT_TRUE(of("commission.opening_check = false\n" + kMap).empty());
+    // AND it looks where the travel allows it: as the encoders count, this way up or that
+    const auto stops =
+        of("gimbal.travel_deg = [[-130, 80], [-30, 30], [-160, 175]]\n"
+           "platform.encoder_zero_deg = [0, 0, 10]\n"
+           "campaign = { positions_deg = [[0, 0, 0]], identify = \"what-it-can\" }\n" +
+           kMap);
+    ASSERT_EQ(stops.size(), 4U) << "190 deg are not reached";
+    EXPECT_EQ(stops[0].position_deg, (std::array{-90.0, 0.0, 10.0}));
+    EXPECT_EQ(stops[1].position_deg, (std::array{-90.0, 0.0, 100.0}));
+    EXPECT_EQ(stops[2].position_deg, (std::array{-90.0, 0.0, -80.0}));
+    EXPECT_TRUE(stops[2].drifts);
+    EXPECT_EQ(stops[3].position_deg, (std::array{60.0, 15.0, 100.0}));
+    EXPECT_FALSE(stops[3].drifts);
+}
+
 }  // namespace
 }  // namespace vibrig::configuration

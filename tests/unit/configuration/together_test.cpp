@@ -1,6 +1,10 @@
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 
+#include "daemon/configuration/cross_checks.hpp"
 #include "tests/unit/configuration/support.hpp"
+#include "tests/unit/plant/temporary_folder.hpp"
 
 namespace vibrig::configuration {
 namespace {
@@ -21,12 +25,54 @@ TEST(Together, ADaemonWithoutAWatchdogRegisterIsRefused) {
     EXPECT_EQ(complaint("shaker.registers.watchdog = true", true), "");
 }
 
+TEST(Together, AnotherDbcUnderTheSameNameIsNotWhatWasProved) {
+    const std::string path = ::testing::TempDir() + "proved.dbc";
+    const auto keys_with = [&](const std::string& contents) {
+        std::ofstream(path) << contents;
+        return accepted("can.dbc = \"" + path + "\"\n").campaign.proof.keys;
+    };
+    const std::string proved = keys_with("SG_ accel_x : 0|16@1- (0.001,0)");
+    EXPECT_THAT(proved, HasSubstr("contents of can.dbc="));
+    EXPECT_EQ(keys_with("SG_ accel_x : 0|16@1- (0.001,0)"), proved);
+    EXPECT_NE(keys_with("SG_ accel_x : 0|16@1- (0.002,0)"), proved);
+    std::filesystem::remove(path);
+    EXPECT_THAT(accepted("can.dbc = \"" + path + "\"\n").campaign.proof.keys,
+                HasSubstr("contents of can.dbc=unknown"));
+    EXPECT_THAT(accepted("can.dbc = \"/\"\n").campaign.proof.keys,
+                HasSubstr("contents of can.dbc=unknown"));
+}
+
 TEST(Together, AWatchdogThatWaitsLongerThanThreeSecondsIsRefused) {
     EXPECT_EQ(complaint("shaker.watchdog_period_ms = 1000\n", true), "");
     EXPECT_THAT(complaint("shaker.watchdog_period_ms = 1001\n", true),
                 AllOf(StartsWith("rig.toml:1:29: shaker.watchdog_period_ms: found 1001 ms"),
                       HasSubstr("3.003 s after a daemon that died"), HasSubstr("1000 ms at most")));
     EXPECT_EQ(complaint("shaker.watchdog_period_ms = 20000\n", false), "");
+}
+
+TEST(Together, ReadBacksThatComeTooSeldomToSeeAnEmergencyStopAreRefused) {
+    EXPECT_EQ(complaint("shaker.poll_period_ms = 500\n", true), "");
+    EXPECT_THAT(complaint("shaker.poll_period_ms = 501\n", true),
+                AllOf(StartsWith("rig.toml:1:25: shaker.poll_period_ms: found 501 ms"),
+                      HasSubstr("expected 500 ms at most")));
+    EXPECT_EQ(complaint("shaker.poll_period_ms = 60000\n", false), "");
+}
+
+TEST(Together, MotionCannotBeCalledRest) {
+    EXPECT_EQ(complaint("shaker.rest_g = 0.05\n", true), "");
+    EXPECT_THAT(complaint("shaker.rest_g = 0.9\n", true), HasSubstr("shaker.rest_g: found 0.9"));
+    EXPECT_THAT(complaint("selftest.transmission_tolerance = 0.5\n", true),
+                HasSubstr("selftest.transmission_tolerance: found 0.5"));
+}
+
+TEST(Together, AnInterfaceWithADeviceIsHardware) {
+    const plant::TemporaryFolder folder;
+    std::filesystem::create_directories(folder.file("can0/device"));
+    std::filesystem::create_directories(folder.file("vcan0"));
+    EXPECT_TRUE(is_hardware("can0", folder.file(".")));
+    EXPECT_FALSE(is_hardware("vcan0", folder.file(".")));
+    EXPECT_FALSE(is_hardware("none", folder.file(".")));
+    EXPECT_FALSE(is_hardware("lo"));
 }
 
 TEST(Together, AWatchdogTimeoutThatCannotBeReadBackIsRefused) {

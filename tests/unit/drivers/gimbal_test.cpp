@@ -238,6 +238,17 @@ TEST_F(GimbalTest, GoesByTheMiddleOfATravelThatCablesLimit) {
     EXPECT_NEAR(sent(5, "Azimuth"), 0, 1e-9);
 }
 
+TEST_F(GimbalTest, ItStaysWhereItIsKnownToStandThoughCablesLimitIt) {
+    settings_.travel_deg = {{{-130, 130}, {-360, 360}, {-175, 175}}};
+    Gimbal gimbal{rig_dbc(), settings_, port_};
+    // GIVEN readings that say where it stands WHEN it is commanded there THEN by no detour
+    gimbal.stands_at({120, 10, -160});
+    gimbal.slew_to({120, 10, -160}, kStart);
+    ASSERT_EQ(port_.sent.size(), 1u);
+    EXPECT_NEAR(sent(0, "Outer"), 120, 1e-9);
+    EXPECT_NEAR(sent(0, "Azimuth"), -160, 1e-9);
+}
+
 TEST_F(GimbalTest, NeverSendsWhatTheTravelDoesNotReach) {
     settings_.travel_deg[0] = {-130, 130};
     Gimbal gimbal(rig_dbc(), settings_, port_);

@@ -216,7 +216,7 @@ TEST(GrowingHann, IsExactForAnyLength) {
         }
         EXPECT_NEAR(growing.means().mean, static_cast<double>(s / w), 1e-7) << n;
         EXPECT_NEAR(growing.means().mean_square, static_cast<double>(q / w), 1e-7) << n;
-        const HannMeans direct = hann_means(values.data(), n, 0, n);
+        const HannMeans direct = HannWindow(n).means(values.data(), n, 0, n);
         EXPECT_NEAR(direct.mean, static_cast<double>(s / w), 1e-10) << n;
     }
 }

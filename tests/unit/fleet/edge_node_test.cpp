@@ -30,13 +30,16 @@ TEST(EdgeNode, ABirthNamesEverythingOnceAndDataWhatChanged) {
     std::set<std::string> names;
     std::set<std::uint64_t> aliases;
     std::uint64_t state = 0, sigma = 0;
+    bool simulated = false;
     for (const auto& metric : birth.metrics()) {
+        if (metric.name() == "Properties/SIMULATED") simulated = metric.boolean_value();
         EXPECT_TRUE(names.insert(metric.name()).second) << metric.name();
         const bool fresh = !metric.has_alias() || aliases.insert(metric.alias()).second;
         EXPECT_TRUE(fresh) << metric.name();
         if (metric.name() == "Campaign/State") state = metric.alias();
         if (metric.name() == "Coefficients/D_Fx/Sigma") sigma = metric.alias();
     }
+    EXPECT_TRUE(simulated);
     EXPECT_EQ(aliases.size() + 2, names.size());
     EXPECT_TRUE(node.data(status).empty()) << "nothing has changed";
     status.state = CampaignState::tripped;

@@ -7,7 +7,6 @@
 namespace vibrig::guard {
 namespace {
 
-using drivers::HornPattern;
 using proto::GuardCause;
 
 constexpr std::uint64_t kFirst = 1000;
@@ -90,7 +89,7 @@ TEST(Judge, FindsNothingInAWholeCampaign) {
     EXPECT_EQ(world.pass(2), -1);
     world.shake(0);
     EXPECT_EQ(world.pass(30), -1);
-    EXPECT_EQ(world.judge.pattern(), HornPattern::none);
+    EXPECT_EQ(world.judge.tune(), Tune::none);
     EXPECT_FALSE(world.judge.stop_wanted());
 }
 
@@ -103,7 +102,7 @@ TEST(Judge, ADaemonThatFallsSilentWhileTheTableMovesIsFoundWithinItsDeadline) {
     EXPECT_NEAR(world.pass(2), safety::kHeartbeatDeadline_s, 2 * kLook_s);
     EXPECT_EQ(world.judge.cause(), GuardCause::daemon_silent);
     EXPECT_TRUE(world.judge.stop_wanted());
-    EXPECT_EQ(world.judge.pattern(), HornPattern::abort);
+    EXPECT_EQ(world.judge.tune(), Tune::stop);
 }
 
 TEST(Judge, ADaemonThatFallsSilentAtRestIsNoDanger) {
@@ -222,11 +221,11 @@ TEST(Judge, AStopThatIsNotObeyedSoundsTheHornAfterItsDeadline) {
     // THEN
     EXPECT_EQ(world.judge.cause(), GuardCause::stop_disobeyed);
     EXPECT_TRUE(world.judge.disobeyed());
-    EXPECT_EQ(world.judge.pattern(), HornPattern::disobeyed);
+    EXPECT_EQ(world.judge.tune(), Tune::disobeyed);
     // AND when somebody has pressed the emergency stop the horn changes its tune, and stays on
     world.shake(0);
     world.pass(1);
-    EXPECT_EQ(world.judge.pattern(), HornPattern::abort);
+    EXPECT_EQ(world.judge.tune(), Tune::stop);
     EXPECT_TRUE(world.judge.disobeyed());
     EXPECT_FALSE(world.judge.stop_wanted());
 }
@@ -345,7 +344,7 @@ TEST(Judge, AFindingStaysUntilAPersonHasSeenItAtRest) {
     world.e.word->acknowledged = kFirst;
     world.pass(1);
     EXPECT_EQ(world.judge.cause(), GuardCause::none);
-    EXPECT_EQ(world.judge.pattern(), HornPattern::none);
+    EXPECT_EQ(world.judge.tune(), Tune::none);
     // THEN the next has a number of its own, which that acknowledgement does not cover
     world.shake(5);
     ASSERT_GT(world.pass(5), 0);

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <map>
 #include <sstream>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/schema.hpp"
+#include "daemon/guard/known_keys.hpp"
 
 namespace vibrig::guard {
 namespace {
@@ -128,8 +131,9 @@ TEST(GuardSettings, NeverWritesItsOwnMapToAForeignController) {
         << said;
     const std::string half = "[shaker.registers]\nrun = { address = 30, type = \"u16\" }\n";
     EXPECT_NE(refusal(real + half).find("measured_amplitude.address"), std::string::npos);
-    EXPECT_EQ(refusal(real + half + "measured_amplitude = { address = 40, type = \"u16\" }\n"),
-              "taken");
+    const std::string more = half + "measured_amplitude = { address = 40, type = \"u16\" }\n";
+    EXPECT_NE(refusal(real + more).find("ramp_time.address"), std::string::npos);
+    EXPECT_EQ(refusal(real + more + "ramp_time = { address = 31, type = \"u16\" }\n"), "taken");
 }
 
 TEST(GuardSettings, ASerialLineIsRefusedWithTheReason) {
@@ -167,6 +171,57 @@ modbus = { horn_coil = 1, lamp_coil = 1 }
           "rig.toml:14:11: annunciator.command: found \"page-me\", expected an absolute path",
           "annunciator.modbus.lamp_coil: found 1, expected another coil than the horn's"})
         EXPECT_NE(said.find(part), std::string::npos) << part << "\n" << said;
+}
+
+TEST(GuardSettings, AKeyThatNeitherProgramKnowsIsRefusedWithItsPlace) {
+    const auto said = refusal(kGuard + R"(anunciator.command = "/bin/page-me"
+[annunciator]
+comand = "/bin/page-me"
+modbus = { host = "horn", horn_coils = 1 }
+[can.signal]
+accel_x = ""
+[can.signals]
+table_acel = ""
+"accel_x.valid" = ""
+[shaker.registers]
+runs = { address = 3 }
+run = { adress = 3 }
+[shaker]
+limits = 5
+"h st\n" = 1
+)");
+    for (const char* part :
+         {"rig.toml:3:1: anunciator: found an unknown table, expected one of accelerometer, "
+          "annunciator, campaign, can, ",
+          "rig.toml:5:1: annunciator.comand: found an unknown key, expected one of command, "
+          "command_limit_s, modbus\n",
+          "rig.toml:6:27: annunciator.modbus.horn_coils: found an unknown key, expected one of "
+          "horn_coil, host, lamp_coil, port, unit\n",
+          "rig.toml:7:6: can.signal: found an unknown table, expected one of dbc, fd, ",
+          "rig.toml:10:1: can.signals.table_acel: found an unknown key, expected one of accel_x, ",
+          "rig.toml:11:1: can.signals.\"accel_x.valid\": found an unknown key",
+          "rig.toml:13:1: shaker.registers.runs: found an unknown table, expected one of amplitude",
+          "rig.toml:14:9: shaker.registers.run.adress: found an unknown key, expected one of "
+          "access, address, mask, scale, table, type, word_order\n",
+          "rig.toml:16:10: shaker.limits: found 5, expected a table\n",
+          "rig.toml:17:1: shaker.\"h st\\n\": found an unknown key, expected one of "})
+        EXPECT_NE(said.find(part), std::string::npos) << part << "\n" << said;
+    EXPECT_EQ(
+        refusal("[guard]\nsokket = \"@g\"\nsocket = \"@g\"\n[commission]\nsimulated = true\n"),
+        "rig.toml:2:1: guard.sokket: found an unknown key, expected socket\n");
+}
+
+TEST(GuardSettings, EveryKeyOfTheDaemonsMayBeThereAndNoneThatItDoesNotKnow) {
+    const auto& keys = configuration::schema();
+    for (const auto& key : keys)
+        EXPECT_EQ(refusal(key.name + " = 0\n").find("unknown"), std::string::npos) << key.name;
+    const auto daemon_knows = [&keys](const std::string& name) {
+        return std::any_of(keys.begin(), keys.end(), [&name](const auto& key) {
+            return key.name == name || key.name.starts_with(name + ".");
+        });
+    };
+    for (const auto& name : keys_of_the_daemon()) EXPECT_TRUE(daemon_knows(name)) << name;
+    for (const auto& name : tables_of_the_daemon()) EXPECT_TRUE(daemon_knows(name)) << name;
 }
 
 TEST(GuardSettings, WhatIsNoTomlIsToldWithItsPlace) {

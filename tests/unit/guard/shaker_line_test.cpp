@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "test_server.hpp"
@@ -14,11 +15,12 @@ using drivers::test::Answer;
 using drivers::test::Request;
 using drivers::test::TestServer;
 
-constexpr int kRun = 5, kWatchdog = 6;
+constexpr int kRamp = 4, kRun = 5, kWatchdog = 6;
 
 ShakerLineSettings settings_of(const TestServer& server) {
     const proto::ShakerRegisters registers;
-    return {"127.0.0.1", server.port(), 1, registers.run, registers.measured_amplitude};
+    return {"127.0.0.1",         server.port(), 1,
+            registers.ramp_time, registers.run, registers.measured_amplitude};
 }
 
 TEST(ShakerLine, ReadsAndWritesNothingWhileNoStopIsWanted) {
@@ -39,16 +41,115 @@ TEST(ShakerLine, ReadsAndWritesNothingWhileNoStopIsWanted) {
 TEST(ShakerLine, StopsAtOnceAndUntilItIsToldThatItMayEnd) {
     TestServer server;
     server.set_holding(kRun, 1);
+    server.set_holding(kRamp, 6000);
     ShakerLine line(settings_of(server));
     line.step(0, false);
     // WHEN a stop is wanted between two polls
     line.step(kSecond / 20, true);
     EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_EQ(server.holding(kRamp), 0) << "not as slowly as comfort wants";
+    ASSERT_EQ(server.writes().size(), 1U) << "in one request";
     EXPECT_FALSE(line.word(kSecond / 20).runs);
     // THEN it is ordered again five times a second, and nothing else is written
     for (int i = 2; i < 21; ++i) line.step(i * kSecond / 20, true);
     EXPECT_NEAR(static_cast<double>(line.stops_written()), 5, 1);
     for (const Request& write : server.writes()) EXPECT_TRUE(write.writes(kRun, 0));
+}
+
+TEST(ShakerLine, TriesTheRampOnceWhereItCannotGoWithTheStop) {
+    TestServer server;
+    server.set_holding(kRun, 1);
+    auto settings = settings_of(server);
+    settings.ramp_time.address = 40;
+    // Never answered: the stop follows on another connection.
+    server.script([](const Request& request) {
+        return Answer{request.writes(40) ? Answer::Kind::hang : Answer::Kind::normal, 0, {}};
+    });
+    ShakerLine line(settings);
+    line.step(0, true);
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_EQ(server.writes().back().connection, 2) << "no late answer is taken for its own";
+    for (int i = 1; i < 21; ++i) line.step(i * kSecond / 20, true);
+    int ramps = 0;
+    for (const Request& write : server.writes()) ramps += write.writes(40);
+    EXPECT_EQ(ramps, 1);
+}
+
+TEST(ShakerLine, ADeviceThatTakesOneRegisterAtATimeIsStoppedAllTheSame) {
+    TestServer server;
+    server.set_holding(kRun, 1);
+    server.set_holding(kRamp, 6000);
+    server.script([](const Request& request) {
+        constexpr int kIllegalAddress = 2;
+        if (request.function == 16 && request.count > 1)
+            return Answer{Answer::Kind::exception, kIllegalAddress, {}};
+        return Answer{};
+    });
+    ShakerLine line(settings_of(server));
+    line.step(0, true);
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_EQ(server.holding(kRamp), 0);
+}
+
+bool is_joint(const Request& request) { return request.writes_run() && request.count > 1; }
+
+TEST(ShakerLine, AfterOneJointWriteThatCameToNothingRunZeroGoesAlone) {
+    for (const auto joint :
+         {Answer::Kind::swallow, Answer::Kind::ignore_write, Answer::Kind::close}) {
+        TestServer server;
+        server.set_holding(kRun, 1);
+        server.set_holding(kRamp, 6000);
+        server.script([joint](const Request& request) {
+            return Answer{is_joint(request) ? joint : Answer::Kind::normal, 0, {}};
+        });
+        ShakerLine line(settings_of(server));
+        // WHEN it looks twice, 50 ms apart
+        line.step(0, true);
+        line.step(kSecond / 20, true);
+        // THEN they have gone out as if they lay apart, run 0 alone
+        const auto writes = server.writes();
+        ASSERT_GE(writes.size(), 3U) << static_cast<int>(joint);
+        EXPECT_TRUE(is_joint(writes[0]));
+        EXPECT_TRUE(writes[1].writes(kRamp, 0));
+        EXPECT_TRUE(writes[2].writes(kRun, 0));
+        EXPECT_EQ(server.holding(kRun), 0);
+        EXPECT_EQ(server.holding(kRamp), 0);
+        EXPECT_FALSE(line.word(kSecond / 20).runs);
+        // AND so it goes on until this stop is done
+        for (int i = 2; i < 21; ++i) line.step(i * kSecond / 20, true);
+        const auto all = server.writes();
+        EXPECT_EQ(std::count_if(all.begin(), all.end(), is_joint), 1);
+        EXPECT_GE(all.size(), writes.size() + 3);
+        // AND the next begins as every one
+        line.step(2 * kSecond, false);
+        server.script({});
+        server.forget();
+        line.step(3 * kSecond, true);
+        EXPECT_TRUE(is_joint(server.writes().front()));
+    }
+}
+
+TEST(ShakerLine, AJointWriteThatCameToNothingIsNotTriedAgainOverReconnections) {
+    for (const auto joint :
+         {Answer::Kind::swallow, Answer::Kind::ignore_write, Answer::Kind::exception}) {
+        int alone = 0;  // before the server, whose thread asks it to the end
+        TestServer server;
+        server.set_holding(kRun, 1);
+        server.set_holding(kRamp, 6000);
+        server.script([&alone, joint](const Request& request) {
+            if (is_joint(request)) return Answer{joint, 1, {}};
+            const bool ends = request.writes_run() && ++alone <= 3;
+            return Answer{ends ? Answer::Kind::close : Answer::Kind::normal, 0, {}};
+        });
+        ShakerLine line(settings_of(server));
+        for (int i = 0; i < 40; ++i) line.step(i * kSecond / 20, true);
+        const auto writes = server.writes();
+        EXPECT_EQ(std::count_if(writes.begin(), writes.end(), is_joint), 1)
+            << static_cast<int>(joint);
+        EXPECT_GE(writes.back().connection, 4);
+        EXPECT_EQ(server.holding(kRun), 0);
+        EXPECT_EQ(server.holding(kRamp), 0);
+    }
 }
 
 TEST(ShakerLine, NeverFeedsTheWatchdog) {
@@ -64,6 +165,7 @@ TEST(ShakerLine, LeavesForeignBitsOfTheRunRegisterAlone) {
     auto settings = settings_of(server);
     settings.run.type = proto::RegisterType::bits;
     settings.run.mask = 0x0008;
+    server.set_holding(kRamp, 6000);
     ShakerLine line(settings);
     line.step(0, true);
     EXPECT_EQ(server.holding(kRun), 0x0f07);
@@ -97,9 +199,21 @@ TEST(ShakerLine, WhatWasReadTwoSecondsAgoIsNotKnownAnyMore) {
 }
 
 TEST(ShakerLine, AHostThatCannotBeResolvedIsToldAtTheStart) {
-    ShakerLineSettings settings;
-    settings.host = "256.256.256.256";
-    EXPECT_THROW(ShakerLine{settings}, std::runtime_error);
+    const auto settings = parse_settings(
+        "guard.socket = \"@g\"\ncommission.simulated = true\n[shaker]\nhost = "
+        "\"256.256.256.256\"\n",
+        "rig.toml");
+    try {
+        const ShakerLine line(settings.shaker);
+        FAIL() << "resolved";
+    } catch (const SettingsError&) {
+        FAIL() << "it may be over with a later start";
+    } catch (const std::runtime_error& error) {
+        const std::string said = error.what();
+        EXPECT_EQ(said.rfind("rig.toml:4:8: shaker.host: found \"256.256.256.256\" (", 0), 0U)
+            << said;
+        EXPECT_NE(said.find("), expected a host that can be resolved"), std::string::npos) << said;
+    }
 }
 
 }  // namespace

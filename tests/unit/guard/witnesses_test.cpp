@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <numbers>
 
 namespace vibrig::guard {
@@ -124,6 +125,56 @@ TEST(Witnesses, WithoutAnyTheGuardRefusesToStart) {
                   std::string::npos)
             << error.what();
     }
+}
+
+/// What the guard says of a file that is well written.
+std::string refusal_of(const std::string& text) {
+    const auto settings = parse_settings("guard.socket = \"@g\"\n" + text, "rig.toml");
+    try {
+        const Witnesses witnesses(settings.witness);
+    } catch (const SettingsError& error) {
+        return error.what();
+    }
+    return "taken";
+}
+
+TEST(Witnesses, WhatTheDbcDoesNotHaveIsToldWithThePlaceOfItsKey) {
+    const std::string simulated = "commission.simulated = true\n";
+    EXPECT_EQ(refusal_of(simulated + R"([can.signals]
+accel_x = "AccelerometersXY.Q"
+accel_y_valid = "AccelerometersXY"
+accel_z = ""
+table_accel = "Nobody.Axial"
+)"),
+              "rig.toml:4:11: can.signals.accel_x: found \"AccelerometersXY.Q\", expected a signal "
+              "of the DBC, as \"Message.Signal\"\n"
+              "rig.toml:5:17: can.signals.accel_y_valid: found \"AccelerometersXY\", expected a "
+              "signal of the DBC, as \"Message.Signal\"\n"
+              "rig.toml:7:15: can.signals.table_accel: found \"Nobody.Axial\", expected a signal "
+              "of the DBC, as \"Message.Signal\"\n");
+    EXPECT_EQ(refusal_of(simulated + "can.signals = { accel_x = \"\", table_accel = \"\" }\n"),
+              "rig.toml:3:45: can.signals.table_accel: found \"\" and not three accelerometers on "
+              "the platform, expected one of both at least: the guard would see nothing\n");
+}
+
+TEST(Witnesses, ADbcThatDoesNotFitIsToldWithThePlaceOfItsKey) {
+    const std::string simulated = "commission.simulated = true\n";
+    EXPECT_EQ(
+        refusal_of(simulated + "[can]\ndbc = \"/nowhere/bus.dbc\"\n"),
+        "rig.toml:4:7: can.dbc: found \"/nowhere/bus.dbc\" (cannot be opened: No such file or "
+        "directory), expected a DBC file that can be read\n");
+    // GIVEN one of another rig, and [can.signals] left out
+    const std::string path = testing::TempDir() + "another_rig.dbc";
+    std::ofstream(path)
+        << "VERSION \"\"\nBU_: A\nBO_ 1 M: 8 A\n SG_ S : 0|8@1+ (1,0) [0|0] \"\" A\n";
+    const auto said = refusal_of("clock.source = \"rig\"\n[can]\ndbc = \"" + path + "\"\n");
+    for (const char* part :
+         {"rig.toml:4:7: can.signals.accel_x: found \"AccelerometersXY.X\" (default), expected a "
+          "signal of the DBC",
+          "rig.toml:4:7: can.signals.table_accel: found \"TableAccelerometer.Axial\" (default), ",
+          "rig.toml:2:16: clock.source: found \"rig\" and no RigTime.TimeUs in the DBC, expected "
+          "the simulated rig's message\n"})
+        EXPECT_NE(said.find(part), std::string::npos) << part << "\n" << said;
 }
 
 TEST(Witnesses, GoByTheRigsTimeWhereItOwnsTheTime) {

@@ -168,6 +168,35 @@ TEST_F(NoiseMonitorTest, AnAlarmFlagsTheDwellAndTeachesNothing) {
     EXPECT_NE(events_.back().second.find("position 11"), std::string::npos);
 }
 
+TEST_F(NoiseMonitorTest, TheSurfaceHasTheNewestDwellsThoseWithAnAlarmToo) {
+    std::mt19937_64 generator(7011);
+    for (int d = 0; d < 6; ++d) static_cast<void>(dwell({}, generator));
+    const auto early = monitor_.status().surface;
+    EXPECT_EQ(early->size(), 6U);
+    EXPECT_TRUE(dwell({15, 1e-3, 98}, generator));
+    const auto& newest = monitor_.status().surface->back();
+    EXPECT_EQ(newest.position, 7);
+    EXPECT_TRUE(newest.alarm);
+    EXPECT_FALSE(early->back().alarm);
+    ASSERT_EQ(newest.tau_s.size(), early->back().tau_s.size());
+    for (std::size_t j = 0; j < 3; ++j) {
+        ASSERT_EQ(newest.deviation_deg_h[j].size(), newest.tau_s.size());
+        // Three times the noise of the angle, at the same angles: 96 second differences are 49
+        // degrees of freedom, the ratio is known to 14 %; four of those.
+        EXPECT_NEAR(newest.deviation_deg_h[j][0] / (*early)[3].deviation_deg_h[j][0], 3, 1.7);
+    }
+    // WHEN there are more than are kept, THEN the oldest go, and who has them keeps what it has
+    while (position_ < static_cast<int>(NoiseStatus::kMostCurves) + 9)
+        static_cast<void>(dwell({5.013, 1e-3, 20}, generator));
+    const auto& curves = *monitor_.status().surface;
+    ASSERT_EQ(curves.size(), NoiseStatus::kMostCurves);
+    EXPECT_EQ(curves.back().position, position_);
+    EXPECT_EQ(curves.front().position, position_ + 1 - static_cast<int>(NoiseStatus::kMostCurves));
+    EXPECT_EQ(early->size(), 6U);
+    monitor_.reset();
+    EXPECT_TRUE(monitor_.status().surface->empty());
+}
+
 TEST_F(NoiseMonitorTest, AStepOfTheMeanBetweenDwellsRaisesAnAlarm) {
     std::mt19937_64 generator(7005);
     // GIVEN dwells of one kind; the very first is compared with the prior, which says nothing

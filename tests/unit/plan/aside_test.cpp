@@ -33,6 +33,20 @@ TEST(Aside, GivesItsResultOnceAndTellsThatItIsThere) {
     EXPECT_EQ(told.load(), 1);
 }
 
+TEST(Aside, WhoMayWaitHasTheResultAtOnceAndNobodyIsTold) {
+    std::atomic<int> told{0};
+    Aside<int> aside([&] { ++told; });
+    for (int n = 0; n < 100; ++n) EXPECT_EQ(aside.compute([n] { return n; }), n);
+    EXPECT_FALSE(aside.asked());
+    EXPECT_FALSE(aside.take());
+    EXPECT_EQ(told.load(), 0);
+    // and whoever may not wait is told again
+    aside.ask([] { return 7; });
+    EXPECT_EQ(result_of(aside), 7);
+    for (int n = 0; n < 60'000 && told.load() == 0; ++n) std::this_thread::sleep_for(1ms);
+    EXPECT_EQ(told.load(), 1);
+}
+
 TEST(Aside, NobodyWaitsForAComputationThatIsAbandoned) {
     // GIVEN a computation that ends only when this thread lets it, later
     std::promise<void> let_go;

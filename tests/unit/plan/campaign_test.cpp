@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <random>
 
 #include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/forecast.hpp"
@@ -12,6 +13,7 @@
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/positions.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/uncertainty/theory_rows.hpp"
 
 namespace vibrig::plan {
 namespace {
@@ -190,6 +192,61 @@ TEST(AdaptivePlan, SaysWhetherTargetsOrTimeEndIt) {
     adaptive.table_g = {9, 0};
     adaptive.target = {};
     EXPECT_THROW(AdaptivePlan(settings, adaptive), std::runtime_error);
+}
+
+TEST(AdaptivePlan, MeetsItsTargetsByWhatTheDwellsScatterAndNotByNoiseAlone) {
+    const std::uint64_t seed = 5;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const estimator::Settings settings;
+    std::vector<double> covariance(kParameters * kParameters, 0.0);
+    for (std::size_t i = 0; i < kParameters; ++i) covariance[i * kParameters + i] = 4;
+    covariance[1] = covariance[kParameters] = 1;
+    // GIVEN dwells with their noise, and dwells that scatter by four times that
+    const auto rows_of = [&](double scatter) {
+        std::mt19937_64 random(seed);
+        auto rows = estimator::testing::theory_rows(settings, estimator::testing::balanced(6, 5));
+        estimator::testing::add_noise(rows, random);
+        std::normal_distribution<double> normal;
+        for (auto& row : rows) {
+            for (double& rate : row.rate) rate += scatter * normal(random);
+        }
+        return rows;
+    };
+    const double noise = std::sqrt(estimator::testing::kRateVariance);
+    const auto quiet = widened(covariance, settings, estimator::testing::result_of(rows_of(0)));
+    const auto scattered =
+        widened(covariance, settings, estimator::testing::result_of(rows_of(4 * noise)));
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t k = i * kParameters + i;
+        EXPECT_GE(quiet[k], covariance[k]);
+        EXPECT_LE(std::sqrt(quiet[k] / covariance[k]), 1.3);
+        EXPECT_NEAR(std::sqrt(scattered[k] / covariance[k]), std::sqrt(17.0), 1.5);
+    }
+    EXPECT_NEAR(scattered[1] / covariance[1],
+                std::sqrt(scattered[0] * scattered[kParameters + 1]) / 4, 1e-9);
+    // AND of a few dwells nothing of the kind is known
+    auto few = rows_of(4 * noise);
+    few.resize(kFewestDwells - 1);
+    EXPECT_EQ(widened(covariance, settings, estimator::testing::result_of(few)), covariance);
+}
+
+TEST(AdaptivePlan, GoesOnToFourteenDwellsAlsoWhereEveryTargetIsMet) {
+    const estimator::Settings settings;
+    AdaptiveSettings adaptive;
+    adaptive.period_s = kPeriod_s;
+    adaptive.table_g = {9, 0};
+    adaptive.target = {10, 10, 1};
+    const AdaptivePlan plan(settings, adaptive);
+    std::vector<double> covariance(kParameters * kParameters, 0.0);
+    for (std::size_t i = 0; i < kParameters; ++i) covariance[i * kParameters + i] = 1e-4;
+    for (const std::size_t dwells : {std::size_t{0}, std::size_t{11}, kFewestDwells - 1}) {
+        const auto next = plan.next(covariance, {}, 0, dwells);
+        EXPECT_EQ(next.verdict, AdaptivePlan::Verdict::go_on) << dwells;
+        EXPECT_EQ(next.left, kFewestDwells - dwells);
+        EXPECT_NE(next.words.find("fewer than 14 dwells"), std::string::npos) << next.words;
+    }
+    EXPECT_EQ(plan.next(covariance, {}, 0, kFewestDwells).verdict,
+              AdaptivePlan::Verdict::targets_met);
 }
 
 TEST(AdaptivePlan, EndsBeforeItsTimeLimitWithLevellingAndWhatComesAfterTheLastDwell) {

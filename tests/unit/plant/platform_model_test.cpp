@@ -161,5 +161,28 @@ TEST(PlatformModel, GyroAxesPickInputOutputAndSpin) {
                 1e-12);
 }
 
+TEST(PlatformModel, ATurnThatGoesOnIsThatOfTheSum) {
+    // GIVEN angles all round WHEN they go on by little and by much THEN cosines and sines are those
+    // of the sums
+    for (int i = 0; i < 100; ++i) {
+        const double x = 0.37 * i;
+        const Vec3 angles{x, -2 * x, 5 * x};
+        for (const double by : {0.0, 1e-12, 2e-6, 0.99e-4, 1.01e-4, 0.1, 2.0}) {
+            const Vec3 step{by, -by, 0.5 * by};
+            const auto further = PlatformModel::Turn(angles).further(step);
+            const PlatformModel::Turn direct(angles + step);
+            SCOPED_TRACE(by);
+            // Rounding, and that of an angle of up to 200 rad.
+            constexpr double kRounding = 5e-14;
+            EXPECT_NEAR(further.ca, direct.ca, kRounding);
+            EXPECT_NEAR(further.sa, direct.sa, kRounding);
+            EXPECT_NEAR(further.cb, direct.cb, kRounding);
+            EXPECT_NEAR(further.sb, direct.sb, kRounding);
+            EXPECT_NEAR(further.cg, direct.cg, kRounding);
+            EXPECT_NEAR(further.sg, direct.sg, kRounding);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace vibrig::plant

@@ -93,6 +93,12 @@ TEST_F(Recording, IsGivenBackExactlyAfterWriting) {
     }
     // WHEN they are written and read
     write_recording(path(), rows);
+    EXPECT_FALSE(says_simulated(path()));
+    const auto plain = read_recording(path());
+    ASSERT_EQ(plain.size(), rows.size());
+    // WHEN they are a simulated rig's, which each row says
+    write_recording(path(), rows, true);
+    EXPECT_TRUE(says_simulated(path()));
     const auto back = read_recording(path());
     // THEN no bit has changed
     ASSERT_EQ(back.size(), rows.size());

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -8,8 +9,10 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/digest.hpp"
+#include "daemon/record/hdf5.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/replay.hpp"
+#include "estimator/parameters.hpp"
 
 namespace vibrig::record {
 namespace {
@@ -19,6 +22,24 @@ using drivers::kSecond;
 using drivers::Time;
 
 constexpr Time kStep = 25 * drivers::kMillisecond;
+
+/// Every number another one.
+estimator::DwellRow row_of(int position) {
+    estimator::DwellRow row;
+    row.run = 1;
+    row.position = position;
+    row.middle_s = 100.0 * position;
+    for (Eigen::Index j = 0; j < 3; ++j) {
+        row.rate[j] = 1.0 + static_cast<double>(j);
+        row.ramp_variance(j, j) = 4.0 + static_cast<double>(j);
+        for (Eigen::Index k = 0; k < 3; ++k)
+            row.variance(j, k) = 10.0 + static_cast<double>(3 * j + k);
+        for (Eigen::Index t = 0; t < 10; ++t)
+            row.regressors(j, t) = 100.0 + static_cast<double>(10 * j + t);
+    }
+    row.vibration.gamma = {0.1, 1, 0.2, 0.3, 0.4, 0.5};
+    return row;
+}
 
 /// Campaigns in recordings/test-1: files with samples, and dwells of 100 samples.
 class Parts : public ::testing::Test {
@@ -76,6 +97,7 @@ class Parts : public ::testing::Test {
             dwell.summary.run = 1;
             dwell.summary.position = orders[i];
             dwell.summary.samples = 100;
+            if (i > 0) dwell.row = row_of(orders[i]);
             writer.dwell(dwell);
         }
         writer.end({state, "", "", "{}", head.utc_ns + kSecond});
@@ -91,6 +113,35 @@ class Parts : public ::testing::Test {
 
     fs::path recordings_, folder_;
 };
+
+TEST_F(Parts, HaveTheRowsOfTheirDwellsInTheOrderOfTheCoefficients) {
+    write(head(1), 10 * kSecond, {1, 2}, 2);
+    const hdf5::File file =
+        hdf5::File::open((folder_ / "campaign.h5").string(), hdf5::File::Mode::read);
+    const auto rate = file.doubles("/dwells/rate"),
+               regressors = file.doubles("/dwells/rate_regressors"),
+               covariance = file.doubles("/dwells/rate_covariance"),
+               ramp_sigma = file.doubles("/dwells/ramp_sigma"),
+               gamma = file.doubles("/dwells/gamma"), middle = file.doubles("/dwells/middle_s");
+    // the first was left out
+    EXPECT_TRUE(std::isnan(middle.values.at(0)));
+    EXPECT_TRUE(std::isnan(rate.values.at(2)));
+    EXPECT_EQ(middle.values.at(1), 200);
+    ASSERT_EQ(regressors.values.size(), 60U);
+    const estimator::DwellRow row = row_of(2);
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto g = static_cast<Eigen::Index>(j);
+        EXPECT_EQ(rate.values.at(3 + j), row.rate[g]);
+        EXPECT_EQ(covariance.values.at(9 + 3 * j + (j + 1) % 3), row.variance(g, (g + 1) % 3));
+        EXPECT_EQ(ramp_sigma.values.at(3 + j), std::sqrt(row.ramp_variance(g, g)));
+        for (std::size_t t = 0; t < 10; ++t) {
+            const auto group =
+                static_cast<Eigen::Index>(estimator::internal_of(10 * j + t) / estimator::kGyros);
+            EXPECT_EQ(regressors.values.at(30 + 10 * j + t), row.regressors(g, group));
+        }
+    }
+    EXPECT_EQ(gamma.values.at(6 + 3), row.vibration.gamma[3]);
+}
 
 TEST_F(Parts, OfARestartTakeThePlaceOfWhatWasNotFinished) {
     // GIVEN a campaign that died in its third dwell, the second of them not in the journal either

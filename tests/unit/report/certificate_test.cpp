@@ -79,12 +79,10 @@ TEST_F(Certificate, OfADoubtfulResultOrASimulatedRigSaysSoAcrossThePage) {
     const std::string doubtful = certificate_page(made());
     EXPECT_THAT(doubtful, HasSubstr("<span>DOUBTFUL</span>"));
     EXPECT_THAT(doubtful, HasSubstr("biases walk"));
-    campaign_.head.clock = "rig";
+    campaign_.head.simulated = true;
     const std::string both = certificate_page(made());
     EXPECT_THAT(both, HasSubstr("<span>SIMULATED</span>"));
     EXPECT_THAT(both, HasSubstr("The result is DOUBTFUL"));
-    campaign_.head.clock = "real";
-    campaign_.head.configuration += "commission.simulated = true   # 1 file\n";
     EXPECT_TRUE(made()["simulated"]);
 }
 

@@ -116,6 +116,7 @@ constexpr std::uint32_t kNotAtAll = 1'000'000'000;
 const Case kCases[] = {
     // 100 ms and 500 ms are the ages that are still good
     {"stale_channel", Trip::stale_channel, 0, rare("AccelerometerZ", 5, kNotAtAll)},
+    {"stale_table_accelerometer", Trip::stale_channel, 0, rare("TableAccelerometer", 5, kNotAtAll)},
     {"stale_platform", Trip::stale_platform, 0, rare("PlatformStatus", 21, kNotAtAll),
      // longer than it takes until the next one
      Guard::excitation, Guard::armed, 1},

@@ -97,6 +97,17 @@ TEST_F(InterlockTest, WatchesEmergencyStopFaultsAndBusFromTheArmingOn) {
     EXPECT_EQ(interlock.tripped(), Trip::can_lost);
 }
 
+TEST_F(InterlockTest, MotionThatNobodyCommandedWaitsForNoRowsDwell) {
+    auto rules = default_interlock();
+    for (Rule& rule : rules)
+        if (rule.condition == Trip::uncommanded) rule.dwell_s = 1;
+    Interlock slow{shaker, *control, {12.0, drivers::kSecond, rules}};
+    slow.uncommanded();
+    EXPECT_EQ(slow.tripped(), Trip::uncommanded);
+    EXPECT_EQ(slow.name_of(slow.latched()), "uncommanded");
+    EXPECT_EQ(shaker.stops_asked, 1U);
+}
+
 TEST_F(InterlockTest, StopsAShakerThatNobodyCommanded) {
     // GIVEN a disarmed daemon and a shaker that runs, left over or started at its panel
     drivers::ShakerReading reading;

@@ -41,6 +41,8 @@ TEST(MeanMotion, TakesTheVibrationOutOfASecondThatIsNoWholeNumberOfPeriods) {
             EXPECT_NEAR(meter.mean().force[0], 0, 1e-9) << hz;
             EXPECT_NEAR(meter.mean().force[1], 0.6, 1e-9) << hz;
             EXPECT_NEAR(meter.mean().force[2], 0.8, 1e-9) << hz;
+            EXPECT_NEAR(std::hypot(meter.mean().cosine[0], meter.mean().sine[0]), 1.2, 1e-9) << hz;
+            EXPECT_NEAR(std::hypot(meter.mean().cosine[2], meter.mean().sine[2]), 4.8, 1e-9) << hz;
             EXPECT_NEAR(std::remainder(meter.mean().angle[0], 2 * std::numbers::pi), 0, 1e-9);
             EXPECT_GE(meter.mean().to - meter.mean().from, kSecond);
         }

@@ -83,7 +83,9 @@ TEST(Render, ShowsWhatCountsOnAWideTerminal) {
 }
 
 TEST(Render, KeepsTheCoefficientsOfOneKindInARow) {
-    const Lines lines = render_coefficients(message_of(full_status()), 80);
+    StatusData data = full_status();
+    data.simulated = false;
+    const Lines lines = render_coefficients(message_of(data), 80);
     ASSERT_EQ(lines.size(), 10u);
     EXPECT_TRUE(has(lines[0], "D_Fx") && has(lines[0], "D_Fy") && has(lines[0], "D_Fz"));
     EXPECT_TRUE(has(lines[9], "D_OSx") && has(lines[9], "D_OSy") && has(lines[9], "D_OSz"));
@@ -111,6 +113,24 @@ TEST(Render, IsNeverWiderThanTheTerminalAndShowsAllCoefficients) {
             EXPECT_TRUE(has(text, parameter.name() + ' ')) << parameter.name() << " at " << width;
         }
     }
+}
+
+TEST(Render, OfASimulatedRigEveryLineSaysSo) {
+    StatusData data = full_status();
+    data.simulated = true;
+    data.reason = std::string(300, 'r');
+    const v1::Status status = message_of(data);
+    for (const int width : {1, 40, 80, 132}) {
+        for (const std::string& line : render_table(status, {}, width)) {
+            if (line.empty()) continue;  // between summary and coefficients
+            EXPECT_TRUE(line.ends_with("  SIMULATED")) << line;
+            EXPECT_LE(columns_of(line), std::max(width, 20)) << line;
+        }
+    }
+    EXPECT_TRUE(render_line(status).ends_with("  SIMULATED")) << render_line(status);
+    data.simulated = false;
+    EXPECT_FALSE(has(joined(render_table(message_of(data), {}, 80)), "SIMULATED"));
+    EXPECT_FALSE(has(render_line(message_of(data)), "SIMULATED"));
 }
 
 TEST(Render, NamesEveryCampaignState) {

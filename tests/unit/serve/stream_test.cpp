@@ -347,6 +347,7 @@ TEST(OpenApi, RequiresWhatIsAlwaysThere) {
     EXPECT_EQ(judge("Parameters", parameters_json(full_result())), "");
     EXPECT_EQ(judge("Events", events_json("", {EventRecord{}})), "");
     EXPECT_EQ(judge("Plan", plan_json({})), "");
+    EXPECT_EQ(judge("Surface", surface_json({})), "");
     EXPECT_EQ(judge("CommandReply", reply_json({})), "");
     EXPECT_EQ(judge("Configuration", configuration_json("")), "");
     EXPECT_EQ(judge("Problem", problem_json(400, "", "")), "");

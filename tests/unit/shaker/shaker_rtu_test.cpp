@@ -30,13 +30,13 @@ void PrintTo(const RtuFault& fault, std::ostream* out) { *out << fault.name; }
 class ShakerRtuWire : public testing::TestWithParam<RtuFault> {};
 
 TEST_P(ShakerRtuWire, OpensTheLineAgain) {
+    std::atomic<bool> spoiled = false;  // before the server, whose thread asks it to the end
     TestServer server(TestServer::Line::rtu);
     ShakerSettings settings = settings_for(server);
     const bool times_out = GetParam().kind == Kind::hang;
     if (times_out) settings.response_timeout = 300 * kMillisecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.reaches(LinkState::running));
-    std::atomic<bool> spoiled = false;
     server.script([&](const Request& request) {
         return request.function == 3 && !spoiled.exchange(true) ? Answer{GetParam().kind, 0, {}}
                                                                 : Answer{};
@@ -60,12 +60,12 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ShakerRtu, SendsAStopAsSoonAsTheLineIsFree) {
     // GIVEN a device that does not answer one request
+    std::atomic<bool> hung = false;  // before the server, whose thread asks it to the end
     TestServer server(TestServer::Line::rtu);
     ShakerSettings settings = settings_for(server);
     settings.response_timeout = kSecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.apply({15.0, 3.5, 4.0}));
-    std::atomic<bool> hung = false;
     server.script([&](const Request& request) {
         return !request.is_write() && !hung.exchange(true) ? Answer{Kind::hang, 0, {}} : Answer{};
     });

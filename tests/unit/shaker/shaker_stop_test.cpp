@@ -26,12 +26,12 @@ TEST(ShakerStop, StopsARunningShaker) {
 
 TEST(ShakerStop, CutsOffAHangingRequestAndIsTheNextWrite) {
     // GIVEN a response timeout far beyond this test's patience, and a server that stops answering
+    std::atomic<bool> hung = false;  // before the server, whose thread asks it to the end
     TestServer server;
     ShakerSettings settings = settings_for(server);
     settings.response_timeout = 60 * kSecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.apply(kRunning));
-    std::atomic<bool> hung = false;
     server.script([&](const Request& request) {
         if (hung.exchange(true) || !is_poll(request)) {
             return hung.load() && request.connection == 1 ? Answer{Kind::hang, 0, {}} : Answer{};
@@ -60,7 +60,7 @@ TEST(ShakerStop, LeavesNoSetPointBehind) {
     settings.response_timeout = 60 * kSecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.reaches(LinkState::running));
-    server.script([&](const Request& request) {
+    server.script([](const Request& request) {
         return request.writes(kRampTime) ? Answer{Kind::hang, 0, {}} : Answer{};
     });
     ASSERT_TRUE(bench.request(kRunning));
@@ -107,7 +107,7 @@ TEST(ShakerStop, DiscardsASetPointWhenTheLinkIsLost) {
     Bench bench(settings_for(server));
     ASSERT_TRUE(bench.reaches(LinkState::running));
     // GIVEN a set-point that waits while the connection ends
-    server.script([&](const Request& request) {
+    server.script([](const Request& request) {
         return request.connection == 1 && request.writes(kRampTime) ? Answer{Kind::close, 0, {}}
                                                                     : Answer{};
     });
@@ -149,10 +149,10 @@ TEST(ShakerStop, IsRepeatedUntilItIsReadBackAndTheWatchdogStarves) {
 }
 
 TEST(ShakerStop, IsRepeatedWhenTheDeviceRefusesIt) {
+    std::atomic<int> refused = 0;  // before the server, whose thread asks it to the end
     TestServer server;
     Bench bench(settings_for(server));
     ASSERT_TRUE(bench.apply(kRunning));
-    std::atomic<int> refused = 0;
     server.script([&](const Request& request) {
         return request.writes(kRun, 0) && ++refused <= 3 ? Answer{Kind::exception, 6, {}}
                                                          : Answer{};

@@ -149,7 +149,7 @@ TEST(Shaker, StaysDegradedAfterAMismatchUntilAStopIsReadBack) {
     Bench bench(settings_for(server));
     ASSERT_TRUE(bench.apply({15.0, 3.5, 4.0}));
     // THEN the shaker does not run, and says why
-    EXPECT_EQ(bench.shaker->state(), LinkState::degraded);
+    ASSERT_TRUE(bench.reaches(LinkState::degraded));
     EXPECT_EQ(bench.shaker->counters().read_back_mismatches, 1U);
     EXPECT_EQ(addresses_written(server), (std::vector{kFrequency, kRampTime, kAmplitude}));
     EXPECT_NE(bench.said().back().second.find("amplitude reads back as 0.000000, expected 3.5"),
@@ -161,6 +161,44 @@ TEST(Shaker, StaysDegradedAfterAMismatchUntilAStopIsReadBack) {
     EXPECT_TRUE(bench.reaches(LinkState::running));
 }
 
+// What another master writes while the table moves shows in the next look at the registers.
+TEST(Shaker, NoticesWhatAnotherMasterChangesWhileItRuns) {
+    struct Change {
+        int address;
+        const char* role;
+    };
+    for (const Change& change :
+         {Change{kFrequency + 1, "frequency"}, Change{kAmplitude + 1, "amplitude"},
+          Change{kRampTime, "ramp time"}, Change{kRun, "run"}}) {
+        SCOPED_TRACE(change.role);
+        TestServer server;
+        Bench bench(settings_for(server));
+        ASSERT_TRUE(bench.apply({15, 0.5, 1}));
+        EXPECT_EQ(bench.shaker->counters().read_back_mismatches, 0U);
+        const std::uint16_t own = server.holding(change.address);
+        server.set_holding(change.address, own ^ 1U);
+        ASSERT_TRUE(bench.reaches(LinkState::degraded));
+        EXPECT_EQ(bench.shaker->counters().read_back_mismatches, 1U);
+        EXPECT_NE(
+            bench.said().back().second.find(std::string(change.role) + " was changed by another"),
+            std::string::npos)
+            << bench.said().back().second;
+        bench.shaker->stop_now();
+        EXPECT_TRUE(bench.reaches(LinkState::running));
+    }
+}
+
+TEST(Shaker, LeavesADeviceThatStoppedByItselfToItsFault) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply({15, 0.5, 1}));
+    server.set_input(1, 1);
+    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->reading().fault != 0; }));
+    server.set_holding(kRun, 0);
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->reading().running; }));
+    EXPECT_EQ(bench.shaker->counters().read_back_mismatches, 0U);
+}
+
 TEST(Shaker, CountsAnExceptionAndKeepsTheLink) {
     TestServer server;
     for (int code = 1; code <= 6; ++code) {
@@ -170,7 +208,7 @@ TEST(Shaker, CountsAnExceptionAndKeepsTheLink) {
         });
         Bench bench(settings_for(server));
         ASSERT_TRUE(bench.apply({10.0 + code, 3.5, 4.0}));
-        EXPECT_EQ(bench.shaker->state(), LinkState::degraded);
+        ASSERT_TRUE(bench.reaches(LinkState::degraded));
         EXPECT_EQ(bench.shaker->counters().exceptions, 1U);
         EXPECT_EQ(bench.shaker->counters().reconnects, 0U);
         EXPECT_EQ(server.holding(kRun), 0);

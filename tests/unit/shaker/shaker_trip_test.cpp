@@ -72,6 +72,101 @@ TEST(ShakerTrip, ADeviceThatTakesOneRegisterAtATimeGetsThemOneByOne) {
     EXPECT_TRUE(bench.reaches(LinkState::running)) << "what was refused on the way is no fault";
 }
 
+[[nodiscard]] bool is_joint(const Request& request) {
+    return request.writes_run() && request.count > 1;
+}
+
+/// Of a stop: one request for both, then run 0 alone at once, and the ramp.
+void expect_run_zero_alone_after_one_joint_write(const TestServer& server) {
+    std::vector<Request> writes = server.writes();
+    std::erase_if(writes, [](const Request& write) {
+        return write.address == kWatchdog || write.address == kWatchdogTimeout;
+    });
+    ASSERT_GE(writes.size(), 3U);
+    EXPECT_TRUE(is_joint(writes[0]));
+    EXPECT_EQ(std::ranges::count_if(writes, is_joint), 1);
+    EXPECT_TRUE(writes[1].writes(kRampTime, 0));
+    EXPECT_TRUE(writes[2].writes(kRun, 0));
+    EXPECT_EQ(server.holding(kRun), 0);
+    EXPECT_EQ(server.holding(kRampTime), 0);
+}
+
+TEST(ShakerTrip, AJointWriteThatIsSwallowedIsFollowedByRunZeroAlone) {
+    TestServer server;
+    ShakerSettings settings = settings_for(server);
+    settings.response_timeout = kSecond;
+    settings.backoff_min = 60 * kSecond;  // which the stop does not wait for
+    settings.backoff_max = 60 * kSecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.apply(kSlow));
+    server.script([](const Request& request) {
+        return is_joint(request) ? Answer{Kind::swallow, 0, {}} : Answer{};
+    });
+    server.forget();
+    stop_of(bench);
+    expect_run_zero_alone_after_one_joint_write(server);
+    EXPECT_TRUE(bench.reaches(LinkState::running));
+}
+
+TEST(ShakerTrip, AJointWriteThatIsAcknowledgedAndIgnoredIsFollowedByRunZeroAlone) {
+    TestServer server;
+    ShakerSettings settings = settings_for(server);
+    settings.backoff_min = 60 * kSecond;
+    settings.backoff_max = 60 * kSecond;
+    Bench bench(settings);
+    ASSERT_TRUE(bench.apply(kSlow));
+    server.script([](const Request& request) {
+        return is_joint(request) ? Answer{Kind::ignore_write, 0, {}} : Answer{};
+    });
+    server.forget();
+    stop_of(bench);
+    expect_run_zero_alone_after_one_joint_write(server);
+    EXPECT_TRUE(bench.reaches(LinkState::running));
+    // AND the stop after it is as quick as it can be again
+    server.script({});
+    ASSERT_TRUE(bench.apply(kSlow));
+    server.forget();
+    stop_of(bench);
+    EXPECT_TRUE(is_joint(server.writes().front()));
+}
+
+TEST(ShakerTrip, AJointWriteThatCameToNothingIsNotTriedAgainOverReconnections) {
+    for (const Kind joint : {Kind::swallow, Kind::ignore_write, Kind::exception, Kind::close}) {
+        std::atomic<int> alone = 0;  // before the server, whose thread asks it to the end
+        TestServer server;
+        ShakerSettings settings = settings_for(server);
+        settings.response_timeout = kSecond;
+        Bench bench(settings);
+        ASSERT_TRUE(bench.apply(kSlow));
+        // GIVEN a device that does nothing of it, and ends the connection three times at run alone
+        server.script([&, joint](const Request& request) {
+            if (is_joint(request)) return Answer{joint, 1, {}};
+            return request.writes_run() && ++alone <= 3 ? Answer{Kind::close, 0, {}} : Answer{};
+        });
+        server.forget();
+        stop_of(bench);
+        const auto writes = server.writes();
+        EXPECT_EQ(std::ranges::count_if(writes, is_joint), 1) << static_cast<int>(joint);
+        EXPECT_GE(bench.shaker->counters().reconnects, 3U);
+        EXPECT_EQ(server.holding(kRun), 0);
+        EXPECT_EQ(server.holding(kRampTime), 0);
+    }
+}
+
+TEST(ShakerTrip, ARampThatIsSwallowedAfterAJointWriteIsNotTriedAgain) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply(kSlow));
+    server.script([](const Request& request) {
+        if (is_joint(request)) return Answer{Kind::ignore_write, 0, {}};
+        return request.writes(kRampTime) ? Answer{Kind::swallow, 0, {}} : Answer{};
+    });
+    server.forget();
+    stop_of(bench);
+    EXPECT_EQ(std::ranges::count(addresses_written(server), kRampTime), 1);
+    EXPECT_EQ(server.holding(kRun), 0);
+}
+
 TEST(ShakerTrip, RunZeroGoesOutWhateverBecomesOfTheRamp) {
     for (const Answer answer : {Answer{Kind::exception, 3, {}}, Answer{Kind::ignore_write, 0, {}},
                                 Answer{Kind::close, 0, {}}, Answer{Kind::wrong_unit, 0, {}}}) {
@@ -105,10 +200,10 @@ TEST(ShakerTrip, ARampThatIsNotAnsweredHoldsRunZeroUpFor100MillisecondsAtMost) {
 
 TEST(ShakerTrip, WaitsTheFullResponseTimeoutForEverythingElse) {
     // GIVEN a ramp that was not answered in its 100 ms
+    std::atomic<bool> first = true;  // before the server, whose thread asks it to the end
     TestServer server;
     Bench bench(apart(server));
     ASSERT_TRUE(bench.apply(kSlow));
-    std::atomic<bool> first = true;
     server.script([&](const Request& request) {
         if (request.writes(kElsewhere) && first.exchange(false)) return Answer{Kind::hang, 0, {}};
         // WHEN run is answered late THEN it is waited for

@@ -30,13 +30,13 @@ class ShakerWire : public testing::TestWithParam<WireFault> {};
 
 TEST_P(ShakerWire, GivesTheLinkUpAndConnectsAgain) {
     // GIVEN a running link and a device that spoils one reply to a read
+    std::atomic<bool> spoiled = false;  // before the server, whose thread asks it to the end
     TestServer server;
     ShakerSettings settings = settings_for(server);
     const bool times_out = GetParam().kind == Kind::hang || GetParam().kind == Kind::late;
     if (times_out) settings.response_timeout = 200 * kMillisecond;
     Bench bench(settings);
     ASSERT_TRUE(bench.reaches(LinkState::running));
-    std::atomic<bool> spoiled = false;
     server.script([&](const Request& request) {
         if (request.function != 3 || spoiled.exchange(true)) return Answer{};
         return Answer{GetParam().kind, 0, std::chrono::milliseconds(300)};

@@ -60,8 +60,13 @@ class Bench {
         }
         return true;
     }
+    /// True when the shaker is in `state` and has said so: what it says follows the state.
     [[nodiscard]] bool reaches(LinkState state) {
-        return eventually([&] { return shaker->state() == state; });
+        return eventually([&] {
+            if (shaker->state() != state) return false;
+            const auto lines = said();
+            return !lines.empty() && lines.back().first == state;
+        });
     }
     /// Asks for a set-point under whatever stops there were.
     [[nodiscard]] bool request(const ShakerSetPoint& set_point) {

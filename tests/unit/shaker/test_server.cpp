@@ -249,7 +249,7 @@ void TestServer::serve(int client) {
         std::array<std::uint16_t, 16> before{};
         std::copy_n(mapping_->tab_registers, before.size(), before.begin());
         bytes = reply_to(query, answer);
-        if (answer.kind == Answer::Kind::ignore_write) {
+        if (answer.kind == Answer::Kind::ignore_write || answer.kind == Answer::Kind::swallow) {
             std::ranges::copy(before, mapping_->tab_registers);
         } else if (answer.kind != Answer::Kind::exception) {
             if (answer.kind == Answer::Kind::trip) mapping_->tab_registers[5] = 0;
@@ -261,6 +261,7 @@ void TestServer::serve(int client) {
     const auto header = static_cast<std::size_t>(modbus_get_header_length(context_));
     switch (answer.kind) {
         case Answer::Kind::hang:
+        case Answer::Kind::swallow:
             return;
         case Answer::Kind::close:
             return drop(client);

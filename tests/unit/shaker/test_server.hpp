@@ -48,6 +48,7 @@ struct Answer {
         hang,          ///< carried out, never answered
         exception,     ///< `code`; not carried out
         ignore_write,  ///< acknowledged, not carried out
+        swallow,       ///< neither carried out nor answered
         trip,          ///< carried out, and the run register drops to 0
         late,          ///< answered after `delay`
         twice,         ///< answered, and then again

@@ -32,6 +32,14 @@ TEST(Axis, LabelsTellOneTickFromTheNext) {
     EXPECT_EQ(plain.text_of(plain.ticks().back()), "0.7");
 }
 
+TEST(Axis, OfManyDecadesHasNoZero) {
+    Axis axis("det M", true);
+    axis.include(1e10);
+    axis.include(1e42);
+    axis.settle();
+    for (const double tick : axis.ticks()) EXPECT_NE(axis.text_of(tick), "0") << tick;
+}
+
 TEST(Axis, OfLessThanADecadeHasLabels) {
     // GIVEN data that span a half, two thirds, a little less and more than a decade, anywhere
     for (const double span : {1.01, 2.0, 4.6, 9.9, 10.0, 30.0}) {

@@ -49,7 +49,9 @@ TEST(ResultJson, HasTheKeysOfTheContractInOrder) {
     const Json root = Json::parse(result_json(complete()));
     EXPECT_THAT(keys_of(root), ElementsAre("parameters", "covariance", "amplitudes", "combinations",
                                            "nis", "samples", "rejected", "warnings", "cross_check",
-                                           "instruction_set", "compiler"));
+                                           "instruction_set", "compiler", "simulated"));
+    EXPECT_FALSE(root["simulated"].get<bool>());
+    EXPECT_TRUE(Json::parse(result_json(complete(), {}, true))["simulated"].get<bool>());
     ASSERT_EQ(root["parameters"].size(), 30U);
     EXPECT_THAT(keys_of(root["parameters"][0]),
                 ElementsAre("name", "value", "sigma", "unit", "observable"));

@@ -183,6 +183,66 @@ TEST_F(Acceptance, AGainAtTheFrequencyIsSeenByNobodyAndCoveredWhenDeclared) {
         "gain 0.99 at f", [](plant::Truth& t) { t.vibration_gain = 0.99; }, "V", 1.6, 1.6);
 }
 
+/// All declared inputs at their declared uncertainty, and motion across the vertical of 5 % rms.
+class RandomRig {
+  public:
+    explicit RandomRig(std::uint64_t seed) : random_(seed) {}
+
+    void operator()(plant::Truth& t) {
+        constexpr double kArcsec = 1.0 / 3600;
+        t.latitude_deg += 10 * kArcsec * gauss();
+        t.azimuth_deg += 20 * kArcsec * gauss();
+        for (double& zero : t.encoder_zero_deg) zero = 10 * kArcsec * gauss();
+        for (double& skew : t.non_orthogonality_arcsec) skew = 5 * gauss();
+        t.harmonic_1_arcsec = t.harmonic_2_arcsec = {5, 5, 5};
+        t.harmonic_16_arcsec = {3, 3, 3};
+        for (auto* phase :
+             {&t.harmonic_1_phase_deg, &t.harmonic_2_phase_deg, &t.harmonic_16_phase_deg}) {
+            for (double& one : *phase) one = 180 * even();
+        }
+        t.time_base = 1e-5 * std::sqrt(3.0) * even();
+        t.vibration_gain = 1 + 0.005 * std::sqrt(3.0) * even();
+        for (double& zero : t.zero_g) zero = 1e-4 * gauss();
+        for (std::size_t i = 0; i < 3; ++i) {
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (i != k) t.matrix[i][k] = 2.4e-4 * gauss();
+            }
+        }
+        for (double& share : t.cross_axis) share = 0.05 * gauss();
+    }
+
+  private:
+    double gauss() { return std::normal_distribution<double>()(random_); }
+    double even() { return std::uniform_real_distribution<double>(-1, 1)(random_); }
+    std::mt19937_64 random_;
+};
+
+TEST_F(Acceptance, SoakOfRigsAtRandomWhoseErrorsAreWhatUSays) {
+    constexpr int kRigs = 40;
+    double rms = 0, within = 0, noise_only = 0;
+    int not_valid = 0;
+    for (int seed = 1; seed <= kRigs; ++seed) {
+        const Quiet rig = simulated({}, RandomRig(static_cast<std::uint64_t>(seed)));
+        ASSERT_EQ(rig.rows.size(), 28U) << "seed " << seed;
+        const Assessment a = assessed({}, rig, seed);
+        not_valid += a.verdict.level == Level::not_valid ? 1 : 0;
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            const auto& c = a.coefficients[i];
+            const double error = c.value - rig.truth[i];
+            rms += error * error / (c.u * c.u) / (kRigs * kParameters);
+            noise_only += error * error / (c.sigma * c.sigma) / (kRigs * kParameters);
+            within += std::abs(error) <= 2 * c.u ? 1.0 / (kRigs * kParameters) : 0;
+        }
+    }
+    std::cout << "40 rigs at random, seeds 1 to 40: rms of error/u " << std::sqrt(rms)
+              << ", within 2 u " << within << ", rms of error/sigma " << std::sqrt(noise_only)
+              << ", not valid " << not_valid << '\n';
+    EXPECT_GE(std::sqrt(rms), 0.85);
+    EXPECT_LE(std::sqrt(rms), 1.1);
+    EXPECT_GE(within, 0.94);
+    EXPECT_LE(not_valid, 2);
+}
+
 // The long table. Directions and phases are this test's own where the table leaves them open.
 TEST_F(Acceptance, SoakOfTheSystematicRows) {
     const auto vec = [](double x) { return plant::Vec3{x, x, x}; };
@@ -259,6 +319,65 @@ TEST_F(Acceptance, SoakOfTheSystematicRows) {
         "azimuth 6 arcmin", [](plant::Truth& t) { t.azimuth_deg = 0.1; }, "N", 4.6, kAll);
     expect(
         "latitude 0.6 arcmin", [](plant::Truth& t) { t.latitude_deg += 0.01; }, "V", 0.9);
+    expect(
+        "azimuth 1 arcmin", [](plant::Truth& t) { t.azimuth_deg = 1.0 / 60; }, "V", 0.8);
+    expect(
+        "resolver 16 per turn 10 arcsec", [&](plant::Truth& t) { t.harmonic_16_arcsec = vec(10); },
+        "V", 3.0, 1.5);
+    expect(
+        "accelerometer 1e-3, 200 arcsec, 1 mg",
+        [](plant::Truth& t) {
+            for (std::size_t i = 0; i < 3; ++i) {
+                for (std::size_t k = 0; k < 3; ++k)
+                    t.matrix[i][k] = i == k ? 1.001 : (i < k ? 1e-3 : -1e-3);
+                t.zero_g[i] = 1e-3;
+            }
+        },
+        "V", 0.5);
+    expect(
+        "accelerometer zero 5 mg", [&](plant::Truth& t) { t.zero_g = vec(5e-3); }, "V", 2.4, 1.5);
+    expect(
+        "amplitude drift 5 %", [](plant::Truth& t) { t.amplitude_drift_per_h = 0.05; }, "V", 0.2);
+    for (const double size : {0.01, 0.03}) {
+        expect(("bias step " + std::to_string(size) + " at half").c_str(),
+               [&](plant::Truth& t) {
+                   t.bias_step_deg_h = vec(size);
+                   t.step_after_dwell = 14;
+               },
+               "D", size > 0.02 ? 0.9 : 0.6);
+    }
+    expect(
+        "night ramp 0.01", [&](plant::Truth& t) { t.bias_ramp_deg_h_h = vec(0.01); }, "VD", 0.4);
+    expect(
+        "ramp in dwell 0.01", [&](plant::Truth& t) { t.bias_ramp_in_dwell_deg_h = vec(0.01); },
+        "VD", 0.1);
+    expect(
+        "unbalance step 0.01",
+        [](plant::Truth& t) {
+            for (auto& row : t.unbalance_step_deg_h_g) row[0] = 0.01;
+            t.step_after_dwell = 14;
+        },
+        "D", 0.7);
+    expect(
+        "unbalance ramp 0.01 per h",
+        [](plant::Truth& t) {
+            for (auto& row : t.unbalance_ramp_deg_h_g_h) row[0] = 0.01;
+        },
+        "VD", 0.5);
+    expect(
+        "platform moves 2 arcsec",
+        [](plant::Truth& t) {
+            t.platform_rocking_arcsec_g = {2 / 6.0, 0, 0};
+            t.platform_rocking_quadrature_arcsec_g = {0, 0, 2 / 6.0};
+        },
+        "V", 0.3);
+    expect(
+        "platform moves 5 arcsec",
+        [](plant::Truth& t) {
+            t.platform_rocking_arcsec_g = {5 / 6.0, 0, 0};
+            t.platform_rocking_quadrature_arcsec_g = {0, 0, 5 / 6.0};
+        },
+        "D", 0.8);
     expect(
         "clock 1e-4", [](plant::Truth& t) { t.time_base = 1e-4; }, "V", 0.5);
     expect(

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/noise/noise_monitor.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+
+namespace vibrig::dwells {
+
+/// A campaign identified once more from its recorded dwells, all of them with the noise that the
+/// whole of it was found to have. Live, resumed and replayed it is fed alike, to the last bit.
+class Anew {
+  public:
+    Anew(const estimator::Settings& settings, const noise::Found& found, std::size_t dwells);
+
+    [[nodiscard]] estimator::Identification& identification() noexcept { return identification_; }
+    [[nodiscard]] const estimator::Identification& identification() const noexcept {
+        return identification_;
+    }
+    /// With a warning that says what was done.
+    [[nodiscard]] estimator::Result result() const;
+    /// What can be believed of it: the noise is known no better than it was found.
+    [[nodiscard]] static estimator::Settings settings_of(estimator::Settings settings,
+                                                         const std::optional<noise::Found>& found);
+
+  private:
+    estimator::Identification identification_;
+    std::string words_;
+};
+
+/// What was shown before a campaign was identified anew.
+struct Live {
+    noise::Found found;
+    estimator::Result result;
+    estimator::uncertainty::Assessment assessed;
+};
+
+/// As a result's JSON has it.
+[[nodiscard]] std::string noise_in_json(const noise::Found& found);
+/// With what noise a result's JSON says that it was identified anew; nothing: it was not.
+[[nodiscard]] std::optional<noise::Found> noise_found_in(const std::string& result_json);
+
+}  // namespace vibrig::dwells
