@@ -1,5 +1,8 @@
 #include "daemon/serve/client.hpp"
 
+#include <sys/socket.h>
+#include <sys/time.h>
+
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -11,6 +14,8 @@
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket.hpp>
+#include <cerrno>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -83,6 +88,26 @@ struct Client::Impl {
         return asio::error::timed_out;
     }
 
+    /// A Unix socket whose queue is full takes no connection at once, and Asio would take that for
+    /// one under way. The system waits for a place itself, in the order of who came.
+    error_code enter(const Protocol::endpoint& endpoint) {
+        AnyStream::Socket& socket = stream->socket();
+        error_code error;
+        socket.open(endpoint.protocol(), error);
+        if (error) return error;
+        const auto limit = std::chrono::duration_cast<std::chrono::microseconds>(timeout).count();
+        constexpr std::int64_t kMicro = 1'000'000;
+        const timeval longest{limit / kMicro, limit % kMicro};
+        const int descriptor = socket.native_handle();
+        ::setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &longest, sizeof longest);
+        int failed = 0;
+        do {
+            failed =
+                ::connect(descriptor, endpoint.data(), static_cast<socklen_t>(endpoint.size()));
+        } while (failed != 0 && errno == EINTR);
+        return failed == 0 ? error_code() : error_code(errno, asio::error::get_system_category());
+    }
+
     void connect() {
         stream.reset();
         buffer.clear();
@@ -94,11 +119,12 @@ struct Client::Impl {
             throw ClientError("socket: found '" + address.socket + "', expected at most 107 bytes");
         }
         stream.emplace(AnyStream::Socket(io));
-        const error_code error = run([&](auto done) {
-            stream->socket().async_connect(endpoint, [done](error_code code) { done(code); });
-        });
+        const error_code error = enter(endpoint);
         if (!error) return;
         stream.reset();
+        if (error == asio::error::try_again)
+            throw ClientError("cannot connect to " + where + ": its queue is full, nobody took " +
+                              "this connection within " + std::to_string(timeout.count()) + " ms");
         if (error == boost::system::errc::no_such_file_or_directory ||
             error == asio::error::connection_refused) {
             throw NotRunning("no vibrigd answers at " + where +

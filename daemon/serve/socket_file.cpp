@@ -18,7 +18,7 @@ namespace vibrig::serve {
 namespace {
 
 constexpr mode_t kMode = 0660;
-constexpr int kBacklog = 128;
+constexpr int kBacklog = 4096;  // or what the system allows: a crowd must not keep a stop out
 
 std::string text_of(int error) { return std::generic_category().message(error); }
 

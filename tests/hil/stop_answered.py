@@ -10,6 +10,7 @@ import os
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -25,14 +26,17 @@ CAMPAIGN = {"name": "stops", "identify": "what-it-can", "positions_deg": [[0, 0,
 WITHIN_S = 0.2
 TRIES = 5           # of a busy machine's: what is held up is held up each time
 CLIENTS = 300       # more than the control socket has places
+LONGEST = struct.pack("ll", 30, 0)
 
 
 def ask(path, method, target, body=""):
     """On a connection of its own; the status, the answer, and how long it took."""
     begun = time.monotonic()
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
-        link.settimeout(30)
+        # With a timeout Python does not wait where the queue of the door is full, it fails: the system waits, and that counts.
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, LONGEST)
         link.connect(path)
+        link.settimeout(30)
         link.sendall(f"{method} {target} HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n"
                      f"Content-Length: {len(body)}\r\n\r\n{body}".encode())
         answer = b""
@@ -172,8 +176,9 @@ def crowd(checks, rig):
         status, text, _ = ask(rig.socket, "GET", "/api/v1/status")
         checks.equal(status, 503, "crowd: who looks is told that there is no place")
         first = command(rig, "abort")
-        checks.check(first[0] == 200 and first[2] < WITHIN_S or min(command(rig, "abort")[2] for _ in range(TRIES)) < WITHIN_S,
-                     f"crowd: an abort is answered within {WITHIN_S} s ({first[2] * 1e3:.0f} ms)", first)
+        took = [first[2]] + [command(rig, "abort")[2] for _ in range(TRIES - 1)]
+        checks.check(first[0] == 200 and min(took) < WITHIN_S, f"crowd: an abort is answered within {WITHIN_S} s ({min(took) * 1e3:.0f} ms)",
+                     [first, took])
     finally:
         for one in held:
             one.close()

@@ -10,11 +10,16 @@
 #include "daemon/serve/event_log.hpp"
 #include "daemon/status.hpp"
 
+namespace vibrig::v1 {
+class Status;
+}
+
 namespace vibrig::serve {
 
 /// A status in which no field has its default value, so that a forgotten one shows.
 [[nodiscard]] StatusData full_status();
 [[nodiscard]] estimator::Result full_result();
+[[nodiscard]] v1::Status message_of(const StatusData& data);
 
 /// A daemon without devices.
 class FakeSource : public StatusSource {

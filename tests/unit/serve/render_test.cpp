@@ -5,18 +5,11 @@
 #include <algorithm>
 #include <limits>
 
-#include "daemon/serve/status_message.hpp"
 #include "proto/vibrig.pb.h"
 #include "tests/unit/serve/fake_source.hpp"
 
 namespace vibrig::serve {
 namespace {
-
-v1::Status message_of(const StatusData& data) {
-    v1::Status status;
-    fill(status, data);
-    return status;
-}
 
 std::string joined(const Lines& lines) {
     std::string text;

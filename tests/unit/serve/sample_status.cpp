@@ -1,6 +1,14 @@
+#include "daemon/serve/status_message.hpp"
+#include "proto/vibrig.pb.h"
 #include "tests/unit/serve/fake_source.hpp"
 
 namespace vibrig::serve {
+
+v1::Status message_of(const StatusData& data) {
+    v1::Status status;
+    fill(status, data);
+    return status;
+}
 
 StatusData full_status() {
     StatusData s;

@@ -9,6 +9,7 @@
 #include "daemon/serve/status_json.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/serve/stream_feed.hpp"
+#include "proto/vibrig.pb.h"
 #include "tests/unit/serve/fake_source.hpp"
 #include "tests/unit/serve/raw_connection.hpp"
 
