@@ -110,6 +110,8 @@ std::string joined(const std::vector<std::string>& words) {
 }
 
 std::string read_text(const std::string& path) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return {};  // nobody waits at a pipe
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
 }

@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include "daemon/journal/signing_key.hpp"
 
@@ -96,7 +95,8 @@ std::vector<SignedHead> heads_in(std::string_view text) {
 std::string write_head(const std::string& path, const SignedHead& head) {
     const std::string text = head.line() + "\n";
     const std::string unfinished = path + ".new";
-    const int fd = ::open(unfinished.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    ::unlink(unfinished.c_str());  // of a life that was killed, or something that is no file
+    const int fd = ::open(unfinished.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     if (fd < 0) return unfinished + ": " + std::strerror(errno);
     const bool written =
         ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
@@ -108,11 +108,13 @@ std::string write_head(const std::string& path, const SignedHead& head) {
 }
 
 FoundHead read_head(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) return {};
+    // Where a pipe lies in its place, nobody is waited for.
+    const int fd = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) return {};
     std::string line(kLargestHead, '\0');
-    file.read(line.data(), static_cast<std::streamsize>(line.size()));
-    line.resize(static_cast<std::size_t>(file.gcount()));
+    const ssize_t size = ::read(fd, line.data(), line.size());
+    ::close(fd);
+    line.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
     auto head = parse_head(line);
     if (!head || line != head->line() + "\n") return {{}, path + ": is no journal's head"};
     if (!head->holds()) return {{}, path + ": its signature does not hold"};

@@ -38,11 +38,13 @@ unsigned char* bytes_of(std::string& text) { return reinterpret_cast<unsigned ch
 void SigningKey::Free::operator()(evp_pkey_st* key) const noexcept { EVP_PKEY_free(key); }
 
 SigningKey::SigningKey(const std::string& path) : path_(path) {
-    int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    // Where a pipe lies in its place, nobody is waited for.
+    int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (fd >= 0) {
         const File file(::fdopen(fd, "r"), std::fclose);
         struct stat found {};
         if (::fstat(fd, &found) != 0) fail(path, std::strerror(errno));
+        if (!S_ISREG(found.st_mode)) fail(path, "is no file, expected the journal's key");
         if ((found.st_mode & (S_IRWXG | S_IRWXO)) != 0)
             fail(path,
                  fmt::format("found mode {:04o}, expected 0600: others than the daemon can read "

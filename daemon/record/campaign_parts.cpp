@@ -29,6 +29,7 @@ std::map<int, std::string> part_files(const std::string& folder) {
     std::map<int, std::string> parts;
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(folder, error)) {
+        if (!entry.is_regular_file(error)) continue;  // whoever opens a pipe waits
         const std::string name = entry.path().filename().string();
         int part = 0;
         if (name == part_name(1)) {

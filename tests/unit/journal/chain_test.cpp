@@ -87,6 +87,10 @@ struct ChainTest : testing::Test {
         stream.put(static_cast<char>(byte ^ (1 << bit)));
     }
     static void cut(const std::string& file) { fs::resize_file(file, fs::file_size(file) / 2); }
+    static void pipe_for(const std::string& file) {
+        fs::remove(file);
+        ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+    }
     void by_hand(const char* sql) const { Database(path).execute(sql); }
     /// As a backup would, or somebody who had kept one.
     void copy_to(const fs::path& to) const {
@@ -283,6 +287,9 @@ TEST_F(ChainTest, NoticesFilesThatAreGoneCutOrOthers) {
         {"head gone", false, [&] { fs::remove(path + kHeadSuffix); }, "signed head is gone"},
         {"head cut", false, [&] { cut(path + kHeadSuffix); }, "is no journal's head"},
         {"key gone", false, [&] { fs::remove(path + kKeySuffix); }, "key is gone"},
+        {"a pipe for its head", false, [&] { pipe_for(path + kHeadSuffix); },
+         "is no journal's head"},
+        {"a pipe for its key", false, [&] { pipe_for(path + kKeySuffix); }, "is no file"},
         {"key of others", false, [&] { ::chmod((path + kKeySuffix).c_str(), 0640); },
          "found mode 0640, expected 0600"},
         {"key cut", false, [&] { cut(path + kKeySuffix); }, "is no Ed25519 key"},
