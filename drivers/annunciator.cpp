@@ -15,6 +15,7 @@ constexpr std::size_t kMostWaiting = 16;
 // Two looks in a row: between write and read-back another master may have had its turn.
 constexpr int kLooksToBelieve = 2;
 constexpr auto kLookAtRuns = std::chrono::milliseconds(50);
+constexpr auto kLookAtCommand = std::chrono::seconds(2);
 
 [[nodiscard]] Time steady_now() noexcept {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -129,7 +130,23 @@ void Annunciator::sound(Time now) {
                                  : "horn or lamp do not confirm: " + horn_->note());
 }
 
+/// Whether it is there has to be known before it is needed.
+void Annunciator::look_at_command(Time now) {
+    if (now < look_due_) return;
+    look_due_ = now + std::chrono::nanoseconds(kLookAtCommand).count();
+    const std::string trouble = command_->trouble();
+    if (trouble == trouble_) return;
+    trouble_ = trouble;
+    {
+        const std::lock_guard lock(mutex_);
+        status_.command_note = trouble;
+    }
+    if (said_) said_(trouble.empty(), trouble.empty() ? "the command can be run again" : trouble);
+}
+
 void Annunciator::page(Time now) {
+    look_at_command(now);
+    const std::uint64_t done = command_->counters().done;
     std::string wrong = command_->attend(now);
     while (command_->has_room()) {
         std::string text;
@@ -147,7 +164,7 @@ void Annunciator::page(Time now) {
         status_.started = counters.started;
         status_.failed = counters.failed;
         status_.timed_out = counters.timed_out;
-        if (!wrong.empty()) status_.command_note = wrong;
+        if (!wrong.empty() || counters.done > done) status_.command_note = wrong;
     }
     if (!wrong.empty() && said_) said_(false, wrong);
 }
@@ -168,13 +185,13 @@ void Annunciator::run() {
         };
         if (command_ && !command_->idle()) {
             changed_.wait_for(lock, kLookAtRuns, woken);
-        } else if (horn_) {
+        } else if (!horn_) {
+            changed_.wait_for(lock, kLookAtCommand, woken);
+        } else {
             changed_.wait_for(
                 lock,
                 std::chrono::nanoseconds(std::max<Time>(horn_due - steady_now(), kMillisecond)),
                 woken);
-        } else {
-            changed_.wait(lock, woken);
         }
         if (quit_) break;
         if (pattern_ != shown_) horn_due = 0;

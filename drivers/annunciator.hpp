@@ -29,7 +29,7 @@ struct AnnunciatorStatus {
     bool command = false;                                  ///< there is one
     std::uint64_t started = 0, failed = 0, timed_out = 0;  ///< runs of it
     std::uint64_t left_out = 0;                            ///< not run: too many waited
-    std::string command_note;                              ///< what went wrong with the newest
+    std::string command_note;  ///< what went wrong with the newest, or why it cannot be run
 };
 
 /// Horn, lamp and pager, on a thread of its own and in wall time. show() and announce() may be
@@ -54,6 +54,7 @@ class Annunciator {
     void run();
     void sound(Time now);
     void page(Time now);
+    void look_at_command(Time now);
     [[nodiscard]] std::string to_json(HornPattern kind, const std::string& text) const;
 
     const AnnunciatorSettings settings_;
@@ -62,6 +63,8 @@ class Annunciator {
     std::unique_ptr<PageCommand> command_;
     HornPattern shown_ = HornPattern::none;
     int bad_looks_ = 0;
+    std::string trouble_;  ///< of the command, as last looked at
+    Time look_due_ = 0;
 
     mutable std::mutex mutex_;  ///< guards what follows; never held while horn or command are busy
     std::condition_variable changed_;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -120,10 +121,21 @@ std::optional<std::string> PageCommand::conclude(Run& run, Time now) {
         ++counters_.timed_out;
         return path_ + ": killed after " + std::to_string(limit_ / kSecond) + " s";
     }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return std::string();
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+        ++counters_.done;
+        return std::string();
+    }
     ++counters_.failed;
     return path_ + (WIFEXITED(status) ? ": ended with status " + std::to_string(WEXITSTATUS(status))
                                       : ": ended by signal " + std::to_string(WTERMSIG(status)));
+}
+
+std::string PageCommand::trouble() const {
+    struct stat found {};
+    if (::stat(path_.c_str(), &found) != 0) return path_ + ": " + words_of(errno);
+    if (!S_ISREG(found.st_mode)) return path_ + ": is no program";
+    if (::access(path_.c_str(), X_OK) != 0) return path_ + ": cannot be run: " + words_of(errno);
+    return {};
 }
 
 std::string PageCommand::attend(Time now) {

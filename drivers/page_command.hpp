@@ -22,6 +22,7 @@ class PageCommand {
 
     struct Counters {
         std::uint64_t started = 0;
+        std::uint64_t done = 0;       ///< ended with status 0
         std::uint64_t failed = 0;     ///< not started, or ended with another status than 0
         std::uint64_t timed_out = 0;  ///< killed
     };
@@ -37,6 +38,8 @@ class PageCommand {
     [[nodiscard]] std::string start(const std::string& text, Time now);
     /// Looks after what runs, without waiting. What went wrong with one that is over, in words.
     [[nodiscard]] std::string attend(Time now);
+    /// Why it cannot be run as it lies there now, before anybody needs it; empty: it can.
+    [[nodiscard]] std::string trouble() const;
     [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
   private:

@@ -205,6 +205,14 @@ void CrossCheck::onlookers() {
         refuse({"annunciator.modbus.unit"}, std::to_string(horn.unit),
                "1 to 247, or 255 (Modbus/TCP)");
     }
+    // Whoever names a coil believes that there is a horn.
+    for (const char* key : {"annunciator.modbus.port", "annunciator.modbus.unit",
+                            "annunciator.modbus.horn_coil", "annunciator.modbus.lamp_coil"}) {
+        if (!horn.host.empty() || !places_.contains(key)) continue;
+        refuse({key}, "it without annunciator.modbus.host",
+               "the device's host as well: without it there is neither horn nor lamp");
+        break;
+    }
     if (sound({"annunciator.modbus.horn_coil", "annunciator.modbus.lamp_coil"}) &&
         horn.horn_coil == horn.lamp_coil) {
         refuse({"annunciator.modbus.lamp_coil", "annunciator.modbus.horn_coil"},

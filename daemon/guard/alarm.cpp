@@ -201,6 +201,9 @@ Alarm::Alarm(const AlarmSettings& settings) {
     if (!settings.command.empty()) {
         stop_pager_ = std::make_unique<Pager>(settings.command, settings.command_limit);
         disobeyed_pager_ = std::make_unique<Pager>(settings.command, settings.command_limit);
+        // As this user, and before it is needed.
+        if (::access(settings.command.c_str(), X_OK) != 0)
+            say("warning", settings.command + ": cannot be run: " + words_of(errno));
     }
     if (!coils_ && !stop_pager_) return;
     thread_ = std::thread([this] { run(); });

@@ -126,8 +126,12 @@ Readiness readiness(const StatusData& status) {
             : !guard.sees           ? "sees no accelerometer"
             : !guard.reaches_shaker ? "does not reach the shaker"
                                     : "watches");
-    if (const auto& horn = status.annunciator; horn.horn)
-        add("annunciator", horn.confirms, horn.confirms ? "confirms" : horn.horn_note);
+    if (const auto& outside = status.annunciator; outside.horn || outside.command)
+        add("annunciator", outside.confirms && outside.command_note.empty(),
+            !outside.confirms               ? outside.horn_note
+            : !outside.command_note.empty() ? "pager: " + outside.command_note
+            : outside.horn                  ? "confirms"
+                                            : "pager can be run");
     found.checks.push_back(journal_check(status));
     std::string shut;
     for (const auto& door : status.server.doors)

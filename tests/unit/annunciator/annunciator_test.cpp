@@ -82,6 +82,29 @@ TEST(Annunciator, AFailureOfTheCommandIsSaidAndCounted) {
     EXPECT_NE(annunciator.status().command_note.find("status 3"), std::string::npos);
 }
 
+TEST(Annunciator, ACommandThatCannotBeRunIsToldBeforeItIsNeeded) {
+    const Script script("exit 0", false);
+    Said said;
+    Annunciator annunciator(with_command(script), said.taker());
+    EXPECT_TRUE(eventually([&] { return said.has("bad: ") && said.has("Permission denied"); }));
+    EXPECT_NE(annunciator.status().command_note.find("cannot be run"), std::string::npos);
+    ASSERT_EQ(::chmod(script.path().c_str(), 0700), 0);
+    EXPECT_TRUE(eventually([&] { return said.has("good: the command can be run again"); }));
+    EXPECT_EQ(annunciator.status().command_note, "");
+    EXPECT_EQ(annunciator.status().failed, 0u) << "and it was never run for that";
+}
+
+TEST(Annunciator, OfACommandThatWorksAgainNothingIsHeldAgainstIt) {
+    const Script script("[ -e well ]");
+    Annunciator annunciator(with_command(script), {});
+    annunciator.announce(HornPattern::alarm, "x");
+    EXPECT_TRUE(eventually([&] { return !annunciator.status().command_note.empty(); }));
+    script.make("well");
+    annunciator.announce(HornPattern::alarm, "x");
+    EXPECT_TRUE(eventually([&] { return annunciator.status().command_note.empty(); }));
+    EXPECT_EQ(annunciator.status().failed, 1u);
+}
+
 class AnnunciatorOnTheWire : public testing::Test {
   protected:
     void SetUp() override {

@@ -29,6 +29,8 @@ class Script {
         text << file.rdbuf();
         return text.str();
     }
+    /// An empty file beside it.
+    void make(const std::string& name) const { std::ofstream(folder_.file(name)); }
     /// The process whose number the script has written into the file.
     [[nodiscard]] pid_t process_of(const std::string& name) const {
         const auto text = text_of(name);

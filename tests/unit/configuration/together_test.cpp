@@ -58,6 +58,14 @@ TEST(Together, ReadBacksThatComeTooSeldomToSeeAnEmergencyStopAreRefused) {
     EXPECT_EQ(complaint("shaker.poll_period_ms = 60000\n", false), "");
 }
 
+TEST(Together, AHornWithoutItsDeviceIsRefused) {
+    EXPECT_THAT(complaint("annunciator.modbus = { port = 502, horn_coil = 3 }\n", true),
+                AllOf(StartsWith("rig.toml:1:31: annunciator.modbus.port: found it without"),
+                      HasSubstr("expected the device's host as well")));
+    EXPECT_EQ(complaint("annunciator.modbus = { host = \"127.0.0.1\", horn_coil = 3 }\n", true),
+              "");
+}
+
 TEST(Together, MotionCannotBeCalledRest) {
     EXPECT_EQ(complaint("shaker.rest_g = 0.05\n", true), "");
     EXPECT_THAT(complaint("shaker.rest_g = 0.9\n", true), HasSubstr("shaker.rest_g: found 0.9"));

@@ -194,6 +194,11 @@ TEST(Readiness, NamesWhatIsNotWell) {
                  [](StatusData& s) {
                      s.rest = {"stop not obeyed", {}, true, ""};
                  }},
+             Row{"annunciator: pager: /p: Permission denied",
+                 [](StatusData& s) {
+                     s.annunciator.command = true;
+                     s.annunciator.command_note = "/p: Permission denied";
+                 }},
              Row{"watchdog: timeout reads 60.0 s, not what was written",
                  [](StatusData& s) {
                      s.shaker.watchdog = drivers::WatchdogTimeout::changed;
