@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <condition_variable>
 #include <cstddef>
 #include <exception>
@@ -14,16 +13,17 @@
 
 namespace vibrig::record {
 
-/// What `make(0)`, `make(1)` ... give, one after the other, but made ahead in threads of its own:
-/// by one thread in this order, by several at the same time. As many are kept as there are threads,
-/// and one more, so that memory does not grow with their number.
-template <typename T>
+/// What is made of a source, one after the other, but ahead in threads of its own: `take` is called
+/// by one of them at a time, `make` of what it gave by all at the same time. As many are kept as
+/// there are threads, and one more, so that memory does not grow with their number.
+template <typename Raw, typename T = Raw>
 class InOrder {
   public:
-    /// Nothing: it was the last one before.
-    using Make = std::function<std::optional<T>(std::size_t)>;
+    using Take = std::function<std::optional<Raw>()>;  ///< nothing: it was the last one before
+    using Make = std::function<T(Raw)>;
 
-    InOrder(Make make, unsigned threads) : make_(std::move(make)), most_(threads + 1) {
+    InOrder(Take take, Make make, unsigned threads)
+        : take_(std::move(take)), make_(std::move(make)), most_(threads + 1) {
         try {
             while (threads_.size() < threads) threads_.emplace_back([this] { work(); });
         } catch (...) {
@@ -35,18 +35,17 @@ class InOrder {
     InOrder(const InOrder&) = delete;
     InOrder& operator=(const InOrder&) = delete;
 
-    /// The next one; nothing: there is none. What `make` threw is thrown in its place.
+    /// The next one; nothing: there is none. What was thrown for it is thrown here.
     [[nodiscard]] std::optional<T> next() {
         std::unique_lock lock(mutex_);
-        changed_.wait(lock, [&] { return made_.contains(taken_); });
-        Made made = std::move(made_.at(taken_));
-        if (!made.value) {  // that it is over stays
-            if (made.why) std::rethrow_exception(made.why);
-            return std::nullopt;
-        }
-        made_.erase(taken_++);
+        changed_.wait(lock, [&] { return made_.contains(given_); });
+        Made& made = made_.at(given_);
+        if (made.why) std::rethrow_exception(made.why);
+        if (!made.value) return std::nullopt;
+        std::optional<T> value = std::move(made.value);
+        made_.erase(given_++);
         changed_.notify_all();
-        return std::move(made.value);
+        return value;
     }
 
   private:
@@ -55,23 +54,34 @@ class InOrder {
         std::exception_ptr why = nullptr;
     };
 
-    void work() {
-        std::unique_lock lock(mutex_);
-        for (;;) {
-            changed_.wait(lock, [&] { return over_ || begun_ < taken_ + most_; });
-            if (over_) return;
-            const std::size_t number = begun_++;
-            lock.unlock();
-            Made made;
-            try {
-                made.value = make_(number);
-            } catch (...) {
-                made.why = std::current_exception();
+    /// False: it was the last.
+    bool one() {
+        std::unique_lock turn(turn_);
+        std::size_t number = 0;
+        {
+            std::unique_lock lock(mutex_);
+            changed_.wait(lock, [&] { return over_ || taken_ < given_ + most_; });
+            if (over_) return false;
+            number = taken_++;
+        }
+        Made made;
+        try {
+            if (std::optional<Raw> raw = take_()) {
+                turn.unlock();
+                made.value = make_(std::move(*raw));
             }
-            lock.lock();
-            over_ = over_ || !made.value;
-            made_.insert_or_assign(number, std::move(made));
-            changed_.notify_all();
+        } catch (...) {
+            made.why = std::current_exception();
+        }
+        const bool more = made.value.has_value();
+        const std::scoped_lock lock(mutex_);
+        over_ = over_ || !more;
+        made_.emplace(number, std::move(made));
+        changed_.notify_all();
+        return more;
+    }
+    void work() {
+        while (one()) {
         }
     }
     void end() {
@@ -83,12 +93,14 @@ class InOrder {
         for (std::thread& thread : threads_) thread.join();
     }
 
+    const Take take_;
     const Make make_;
     const std::size_t most_;
+    std::mutex turn_;  ///< of those that take
     std::mutex mutex_;
     std::condition_variable changed_;
     std::map<std::size_t, Made> made_;
-    std::size_t begun_ = 0, taken_ = 0;
+    std::size_t taken_ = 0, given_ = 0;
     bool over_ = false;  ///< no more are begun
     std::vector<std::thread> threads_;
 };

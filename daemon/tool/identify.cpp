@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <numbers>
@@ -115,7 +116,7 @@ Found identify(proto::RecordingReader& file, std::uint64_t size,
     };
     constexpr std::size_t kBlock = 4096;
     record::InOrder<Block> blocks(
-        [&file](std::size_t) -> std::optional<Block> {
+        [&file]() -> std::optional<Block> {
             Block block;
             block.rows.resize(kBlock);
             std::size_t count = 0;
@@ -124,7 +125,7 @@ Found identify(proto::RecordingReader& file, std::uint64_t size,
             block.bytes = file.bytes();
             return count > 0 ? std::optional(std::move(block)) : std::nullopt;
         },
-        1);
+        std::identity(), 1);
     RowsIdentified identified(settings);
     Progress progress("identifying");
     while (const auto block = blocks.next()) {
