@@ -14,7 +14,7 @@
 
 namespace vibrig::record {
 
-namespace {
+namespace raw {
 
 constexpr std::size_t kText = 1 << 18, kLongestLine = 4096;
 constexpr unsigned kMostThreads = 8;
@@ -76,7 +76,8 @@ class Texts {
     std::string rest_;
 };
 
-std::optional<drivers::ReceivedFrame> received(std::string_view text, std::int64_t utc_offset_ns) {
+inline std::optional<drivers::ReceivedFrame> received(std::string_view text,
+                                                      std::int64_t utc_offset_ns) {
     const proto::LoggedFrame logged = proto::parse_candump_line(text);
     if (text.ends_with(" T") || logged.error) return std::nullopt;
     drivers::ReceivedFrame frame;
@@ -89,7 +90,7 @@ std::optional<drivers::ReceivedFrame> received(std::string_view text, std::int64
     return frame;
 }
 
-Frames frames_of(const Text& text, std::int64_t utc_offset_ns) {
+inline Frames frames_of(const Text& text, std::int64_t utc_offset_ns) {
     Frames out;
     std::string_view rest = text.bytes;
     for (std::size_t line = text.lines_before + 1; !rest.empty(); ++line) {
@@ -109,22 +110,22 @@ Frames frames_of(const Text& text, std::int64_t utc_offset_ns) {
     return out;
 }
 
-}  // namespace
+}  // namespace raw
 
 struct RawFrames::Ahead {
     Ahead(const std::vector<std::string>& logs, std::int64_t utc_offset_ns)
         : texts(logs),
           frames([this] { return texts.take(); },
-                 [utc_offset_ns](const Text& text) {
-                     return std::pair(text.log, frames_of(text, utc_offset_ns));
+                 [utc_offset_ns](const raw::Text& text) {
+                     return std::pair(text.log, raw::frames_of(text, utc_offset_ns));
                  },
                  // The reader of the frames has work of its own.
-                 std::clamp(std::thread::hardware_concurrency(), 2U, kMostThreads + 1) - 1) {}
+                 std::clamp(std::thread::hardware_concurrency(), 2U, raw::kMostThreads + 1) - 1) {}
 
-    Texts texts;
-    std::pair<std::size_t, Frames> now;
+    raw::Texts texts;
+    std::pair<std::size_t, raw::Frames> now;
     std::size_t at = 0;
-    InOrder<Text, std::pair<std::size_t, Frames>> frames;
+    InOrder<raw::Text, std::pair<std::size_t, raw::Frames>> frames;
 };
 
 RawFrames::RawFrames(std::vector<std::string> logs, std::int64_t utc_offset_ns)

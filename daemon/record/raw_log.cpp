@@ -227,7 +227,7 @@ std::string compress(const std::string& path, const std::function<void()>& on_pr
 }
 
 struct RawReader::Input {
-    StdFile file;
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{nullptr, std::fclose};
     bool packed = false;
     std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context{ZSTD_createDCtx(), ZSTD_freeDCtx};
     std::vector<char> from = std::vector<char>(ZSTD_DStreamInSize());

@@ -102,7 +102,7 @@ std::string log_of(int from, int to) {
 
 TEST_F(RawLogs, GiveTheirFramesInOrderWhateverIsReadAhead) {
     // GIVEN logs longer than what is read at once, packed and not, with words and a torn end
-    constexpr int kEach = 40'000;
+    constexpr int kEach = 42'000;
     const std::vector<std::string> logs{
         write("raw-0001.log", log_of(0, kEach), true),
         write("raw-0002.log", "# words\n" + log_of(kEach, 2 * kEach), false),
