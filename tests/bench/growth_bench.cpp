@@ -3,7 +3,7 @@
 //   growth_bench open-journal FOLDER             the start of a daemon on it
 //   growth_bench make-index FOLDER CAMPAIGNS     an index of so many campaigns
 //   growth_bench open-index FOLDER               opened, and one campaign looked up
-//   growth_bench make-campaign FOLDER POSITIONS  a recorded campaign, 5 s each
+//   growth_bench make-campaign FOLDER POSITIONS DWELL_S    a recorded campaign
 //   growth_bench verdict DWELLS                  what follows a dwell
 //   growth_bench chart FILE.json FILE.svg
 #include <cstdio>
@@ -88,10 +88,9 @@ void open_index(const std::string& folder) {
     if (!found.ends_with("platform-17-1000000")) throw std::runtime_error("found " + found);
 }
 
-void make_campaign(const std::string& folder, std::size_t positions) {
-    constexpr double kDwell_s = 5;
+void make_campaign(const std::string& folder, std::size_t positions, double dwell_s) {
     plant::CampaignPlan plan;
-    plan.dwell_s = kDwell_s;
+    plan.dwell_s = dwell_s;
     std::mt19937 random(1);
     std::uniform_real_distribution<double> angle(-180, 180);
     plan.positions_deg.clear();
@@ -115,7 +114,7 @@ void make_campaign(const std::string& folder, std::size_t positions) {
         const std::size_t now = (from.run - 1) * plan.positions_deg.size() + from.position;
         if (now != dwell)
             campaign.orders.push_back({sample.time, sample.time,
-                                       sample.time + drivers::from_seconds(kDwell_s),
+                                       sample.time + drivers::from_seconds(dwell_s),
                                        static_cast<int>(from.run), static_cast<int>(from.position),
                                        plan.table_g[from.run - 1]});
         dwell = now;
@@ -174,8 +173,8 @@ int main(int argc, char** argv) {
             make_index(words[1], std::stoi(words[2]));
         } else if (is("open-index", 1)) {
             open_index(words[1]);
-        } else if (is("make-campaign", 2)) {
-            make_campaign(words[1], std::stoul(words[2]));
+        } else if (is("make-campaign", 3)) {
+            make_campaign(words[1], std::stoul(words[2]), std::stod(words[3]));
         } else if (is("verdict", 1)) {
             verdict(std::stoul(words[1]));
         } else if (is("chart", 2)) {
