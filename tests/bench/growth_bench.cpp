@@ -152,6 +152,8 @@ void chart(const std::string& from, const std::string& to) {
         curve.name = one.at("name");
         curve.x = one.at("x").get<std::vector<double>>();
         curve.y = one.at("y").get<std::vector<double>>();
+        // More than there are colours.
+        if (chart.curves.size() >= 8) curve.look = tool::plot::Look::dashed;
         chart.curves.push_back(curve);
     }
     tool::plot::write_file(to, chart.svg());
