@@ -50,10 +50,14 @@ Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
                 s.accelerometer_matrix[r][c];
         }
     }
-    dwells.reserve(max_dwells);
-    rows.reserve(s.method == Method::joint ? max_dwells : 0);
-    paper_starts_.reserve(max_dwells);
+    reserve(max_dwells);
     solve(solution);
+}
+
+void Identification::Impl::reserve(std::size_t max_dwells) {
+    dwells.reserve(max_dwells);
+    rows.reserve(settings.method == Method::joint ? max_dwells : 0);
+    paper_starts_.reserve(max_dwells);
 }
 
 Reading Identification::Impl::prepare(const Measurement& m) const noexcept {
@@ -409,6 +413,7 @@ void Identification::Impl::estimate(Estimate& out) const noexcept {
 
 Identification::Identification(const Settings& settings, std::size_t max_dwells)
     : impl_(std::make_unique<Impl>(settings, max_dwells)) {}
+void Identification::reserve(std::size_t max_dwells) { impl_->reserve(max_dwells); }
 Identification::~Identification() = default;
 Identification::Identification(Identification&&) noexcept = default;
 Identification& Identification::operator=(Identification&&) noexcept = default;

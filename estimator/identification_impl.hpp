@@ -43,6 +43,7 @@ struct Solution {
 struct Identification::Impl {
     Impl(const Settings& s, std::size_t max_dwells);
 
+    void reserve(std::size_t max_dwells);
     void begin_dwell(const DwellInfo& dwell) noexcept;
     StepResult add(const Measurement& measurement) noexcept;
     DwellSummary end_dwell() noexcept;

@@ -34,12 +34,13 @@ bool is_size(const LoggedFrame& frame) noexcept {
     return frame.fd && std::find(kLong.begin(), kLong.end(), frame.size) != kLong.end();
 }
 
+bool is_blank(char c) noexcept { return c == ' ' || c == '\t'; }
+
 std::string_view next_word(std::string_view& text) noexcept {
-    const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
-    text.remove_prefix(begin);
-    const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
-    const std::string_view word = text.substr(0, end);
-    text.remove_prefix(end);
+    const auto begin = std::find_if_not(text.begin(), text.end(), is_blank);
+    const auto end = std::find_if(begin, text.end(), is_blank);
+    const std::string_view word(begin, end);
+    text = {end, text.end()};
     return word;
 }
 

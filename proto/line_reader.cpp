@@ -21,6 +21,7 @@ bool LineReader::fill() {
         throw std::runtime_error(std::string("cannot be read: ") + std::strerror(errno));
     }
     end_ += got;
+    bytes_ += got;
     return got > 0;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -20,6 +21,7 @@ class LineReader {
     [[nodiscard]] std::optional<std::string_view> next();
     /// Number of the line that next() returned or failed at, from 1.
     [[nodiscard]] std::size_t line() const noexcept { return line_; }
+    [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }  ///< read of the file
 
   private:
     struct Close {
@@ -34,6 +36,7 @@ class LineReader {
     std::size_t begin_ = 0;
     std::size_t end_ = 0;
     std::size_t line_ = 0;
+    std::uint64_t bytes_ = 0;
 };
 
 }  // namespace vibrig::proto

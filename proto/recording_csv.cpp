@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "proto/line_reader.hpp"
 #include "proto/text.hpp"
@@ -66,30 +67,32 @@ std::string text_of(double value) {
     return {text.data(), error == std::errc() ? end : text.data()};
 }
 
-class RecordingReader {
+}  // namespace
+
+class RecordingReader::Rows {
   public:
-    explicit RecordingReader(const std::string& path) try : path_(path), lines_(path) {
+    explicit Rows(const std::string& path) try : path_(path), lines_(path) {
+        read_header();
+        simulated_ =
+            std::ranges::any_of(fields_, [](auto name) { return same("simulated", name); });
+    } catch (const RecordingError&) {
+        throw;
     } catch (const std::runtime_error& error) {
         throw RecordingError(path, 0, "", error.what());
     }
 
-    std::vector<RecordingRow> run() {
-        read_header();
-        std::vector<RecordingRow> rows;
+    bool next(RecordingRow& to) {
         while (const auto line = next_line()) {
-            if (!trim(*line).empty()) rows.push_back(row(*line));
+            if (trim(*line).empty()) continue;
+            to = row(*line);
+            return true;
         }
-        if (rows.empty()) {
+        if (!last_time_)
             throw RecordingError(path_, 0, "", "found no row after the header, expected samples");
-        }
-        return rows;
+        return false;
     }
-
-    /// Of the header alone.
-    bool has(std::string_view column) {
-        read_header();
-        return std::ranges::any_of(fields_, [&](auto name) { return same(column, name); });
-    }
+    [[nodiscard]] bool simulated() const { return simulated_; }
+    [[nodiscard]] std::uint64_t bytes() const { return lines_.bytes(); }
 
   private:
     [[noreturn]] void fail(std::string_view column, const std::string& what) const {
@@ -285,8 +288,9 @@ class RecordingReader {
         dwell_ = pair;
     }
 
-    const std::string& path_;
+    std::string path_;
     LineReader lines_;
+    bool simulated_ = false;
     char separator_ = ',';
     std::vector<std::string_view> fields_;
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
@@ -294,16 +298,14 @@ class RecordingReader {
     std::optional<double> last_time_;  ///< of the dwell in force
 };
 
-}  // namespace
-
 RecordingError::RecordingError(const std::string& file, std::size_t line, const std::string& column,
                                const std::string& what)
     : std::runtime_error(locate(file, line, column, what)), line_(line), column_(column) {}
 
-std::vector<RecordingRow> read_recording(const std::string& path) {
-    return RecordingReader(path).run();
-}
-
-bool says_simulated(const std::string& path) { return RecordingReader(path).has("simulated"); }
+RecordingReader::RecordingReader(const std::string& path) : rows_(std::make_unique<Rows>(path)) {}
+RecordingReader::~RecordingReader() = default;
+bool RecordingReader::next(RecordingRow& row) { return rows_->next(row); }
+bool RecordingReader::simulated() const { return rows_->simulated(); }
+std::uint64_t RecordingReader::bytes() const { return rows_->bytes(); }
 
 }  // namespace vibrig::proto

@@ -2,10 +2,11 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 namespace vibrig::proto {
 
@@ -34,17 +35,32 @@ class RecordingError : public std::runtime_error {
 };
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
-/// ax_g, ay_g, az_g in any order and any case; others are ignored. Fields are separated by commas,
-/// or by semicolons or tabs as the header says; then numbers may have decimal commas. Lines of
-/// comment (#) may come before the header. A (run, position) pair that comes back after another one
-/// begins a new dwell. Throws RecordingError.
-[[nodiscard]] std::vector<RecordingRow> read_recording(const std::string& path);
+/// ax_g, ay_g, az_g in any order and any case, row by row in bounded memory; other columns are
+/// ignored. Fields are separated by commas, or by semicolons or tabs as the header says; then
+/// numbers may have decimal commas. Lines of comment (#) may come before the header. A (run,
+/// position) pair that comes back after another one begins a new dwell. Throws RecordingError.
+class RecordingReader {
+  public:
+    /// Reads the header.
+    explicit RecordingReader(const std::string& path);
+    ~RecordingReader();
+    RecordingReader(const RecordingReader&) = delete;
+    RecordingReader& operator=(const RecordingReader&) = delete;
 
-/// Writes what read_recording() reads, every number with the digits that give it back exactly. Of a
+    /// False at the end; no row at all is an error.
+    bool next(RecordingRow& row);
+    /// The header names the column `simulated`.
+    [[nodiscard]] bool simulated() const;
+    [[nodiscard]] std::uint64_t bytes() const;  ///< read so far
+
+  private:
+    class Rows;
+    std::unique_ptr<Rows> rows_;
+};
+
+/// Writes what RecordingReader reads, every number with the digits that give it back exactly. Of a
 /// simulated rig each row says so, in a last column `simulated`. Throws RecordingError.
 void write_recording(const std::string& path, std::span<const RecordingRow> rows,
                      bool simulated = false);
-/// True where the header names the column `simulated`. Throws RecordingError.
-[[nodiscard]] bool says_simulated(const std::string& path);
 
 }  // namespace vibrig::proto

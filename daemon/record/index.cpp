@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "daemon/journal/database.hpp"
@@ -28,7 +29,9 @@ CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, name TEXT NOT NULL, s
     started_utc_ns INTEGER NOT NULL, state TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS file (campaign TEXT NOT NULL, name TEXT NOT NULL, part INTEGER NOT NULL,
     closed INTEGER NOT NULL, from_utc_ns INTEGER NOT NULL, to_utc_ns INTEGER NOT NULL, rows INTEGER NOT NULL,
-    bytes INTEGER NOT NULL, sha256 TEXT NOT NULL, PRIMARY KEY (campaign, name)))";
+    bytes INTEGER NOT NULL, sha256 TEXT NOT NULL, PRIMARY KEY (campaign, name));
+CREATE INDEX IF NOT EXISTS campaign_by_name ON campaign (name);
+CREATE INDEX IF NOT EXISTS campaign_by_begin ON campaign (started_utc_ns))";
 
 std::string base_name(const fs::path& path) {
     return (path.has_filename() ? path : path.parent_path()).filename().string();
@@ -80,18 +83,33 @@ IndexedFile look_at_raw(const std::string& path) {
 
 std::string Index::path_in(const std::string& folder) { return folder + "/recordings.sqlite3"; }
 
-Index::Index(std::string folder, const Tell& tell) : folder_(std::move(folder)) {
+Index::Index(std::string folder, const Tell& tell) : folder_(std::move(folder)), tell_(tell) {
     try {
         open();
-        static_cast<void>(campaigns());
     } catch (const DatabaseError& error) {
         if (!error.damaged()) throw;
-        database_.reset();
-        for (const char* end : {"", "-wal", "-shm"}) fs::remove(path_in(folder_) + end);
-        open();
-        const std::size_t count = rebuild();
-        tell(fmt::format("{}: made anew from the files of {} campaigns", error.what(), count));
+        make_anew(error.what());
     }
+    static_cast<void>(ask("SELECT name FROM file LIMIT 1"));
+}
+
+void Index::make_anew(const std::string& why) {
+    database_.reset();
+    for (const char* end : {"", "-wal", "-shm"}) fs::remove(path_in(folder_) + end);
+    open();
+    const std::size_t count = rebuild();
+    tell_(fmt::format("{}: made anew from the files of {} campaigns", why, count));
+}
+
+std::vector<journal::Row> Index::ask(const char* sql, const std::vector<std::string>& texts) {
+    const std::vector<journal::Value> values(texts.begin(), texts.end());
+    try {
+        return database_->ask(sql, values);
+    } catch (const DatabaseError& error) {
+        if (!error.damaged()) throw;
+        make_anew(error.what());
+    }
+    return database_->ask(sql, values);
 }
 
 Index::~Index() = default;
@@ -110,7 +128,7 @@ void Index::put(const std::string& key, const IndexedFile& file) {
                     file.bytes, std::string_view(file.sha256)});
 }
 
-void Index::note_file(const std::string& path) {
+void Index::look(const std::string& path) {
     const std::string folder = folder_of(path);
     const std::string key = base_name(folder);
     IndexedFile file;
@@ -137,9 +155,27 @@ void Index::note_file(const std::string& path) {
     put(key, file);
 }
 
+void Index::note_file(const std::string& path) {
+    try {
+        look(path);
+    } catch (const DatabaseError& error) {
+        if (!error.damaged()) throw;
+        make_anew(error.what());  // with this file
+    }
+}
+
+void Index::look_at_folder(const std::string& campaign_folder) {
+    for (const auto& [number, path] : part_files(campaign_folder)) look(path);
+    for (const auto& path : raw_files(campaign_folder)) look(path);
+}
+
 void Index::note(const std::string& campaign_folder) {
-    for (const auto& [number, path] : part_files(campaign_folder)) note_file(path);
-    for (const auto& path : raw_files(campaign_folder)) note_file(path);
+    try {
+        look_at_folder(campaign_folder);
+    } catch (const DatabaseError& error) {
+        if (!error.damaged()) throw;
+        make_anew(error.what());
+    }
 }
 
 std::size_t Index::rebuild() {
@@ -149,7 +185,7 @@ std::size_t Index::rebuild() {
     for (const auto& entry : fs::directory_iterator(folder_)) {
         if (!entry.is_directory() || part_files(entry.path().string()).empty()) continue;
         try {
-            note(entry.path().string());
+            look_at_folder(entry.path().string());
             ++count;
         } catch (const DatabaseError&) {
             throw;
@@ -160,46 +196,96 @@ std::size_t Index::rebuild() {
     return count;
 }
 
-std::vector<IndexedCampaign> Index::campaigns() const {
+namespace {
+
+IndexedFile file_of(const journal::Row& row) {
+    return {row.texts[1],        static_cast<int>(row.numbers[2]),
+            row.numbers[3] != 0, row.numbers[4],
+            row.numbers[5],      row.numbers[6],
+            row.numbers[7],      row.texts[8]};
+}
+
+}  // namespace
+
+std::vector<IndexedCampaign> Index::campaigns() {
     std::vector<IndexedCampaign> all;
-    for (const auto& row :
-         database_->ask("SELECT key, name, started_by, state, started_utc_ns FROM "
-                        "campaign ORDER BY started_utc_ns"))
+    std::map<std::string, std::size_t> at;
+    for (const auto& row : ask("SELECT key, name, started_by, state, started_utc_ns FROM "
+                               "campaign ORDER BY started_utc_ns")) {
+        at.emplace(row.texts[0], all.size());
         all.push_back({row.texts[0], row.texts[1], row.texts[2], row.texts[3], row.numbers[4], {}});
-    for (auto& campaign : all) {
-        for (const auto& row : database_->ask(
-                 "SELECT name, part, closed, from_utc_ns, to_utc_ns, rows, bytes, sha256 "
-                 "FROM file WHERE campaign = ? ORDER BY name",
-                 {std::string_view(campaign.key)}))
-            campaign.files.push_back({row.texts[0], static_cast<int>(row.numbers[1]),
-                                      row.numbers[2] != 0, row.numbers[3], row.numbers[4],
-                                      row.numbers[5], row.numbers[6], row.texts[7]});
+    }
+    for (const auto& row : ask("SELECT * FROM file ORDER BY campaign, name")) {
+        if (const auto of = at.find(row.texts[0]); of != at.end())
+            all[of->second].files.push_back(file_of(row));
     }
     return all;
 }
 
+Index::Named Index::look_up(const std::string& key_or_name) {
+    Named found;
+    found.is_key = !ask("SELECT key FROM campaign WHERE key = ?", {key_or_name}).empty();
+    for (const auto& row :
+         ask("SELECT key FROM campaign WHERE name = ? ORDER BY started_utc_ns", {key_or_name}))
+        found.keys.push_back(row.texts[0]);
+    return found;
+}
+
+std::vector<IndexedFile> Index::files_of(const std::string& key) {
+    std::vector<IndexedFile> files;
+    for (const auto& row : ask("SELECT * FROM file WHERE campaign = ? ORDER BY name", {key}))
+        files.push_back(file_of(row));
+    return files;
+}
+
+std::pair<std::vector<std::string>, std::size_t> Index::some_keys(std::size_t most) {
+    std::vector<std::string> keys;
+    const std::string some =
+        fmt::format("SELECT key FROM campaign ORDER BY started_utc_ns LIMIT {}", most);
+    for (const auto& row : ask(some.c_str())) keys.push_back(row.texts[0]);
+    const auto count = ask("SELECT count(*) FROM campaign").at(0).numbers.at(0);
+    return {keys, static_cast<std::size_t>(count)};
+}
+
 namespace {
 
-/// As the index has them; where it cannot be opened, by a look at the folders.
-std::vector<IndexedCampaign> known_in(const std::string& folder, const Index::Tell& tell) {
-    try {
-        return Index(folder, tell).campaigns();
-    } catch (const std::exception&) {
-    }
-    std::vector<IndexedCampaign> found;
+/// What a folder of campaigns has of a name.
+struct Known {
+    Index::Named named;
+    std::vector<std::string> keys;  ///< some, if none is meant
+    std::size_t count = 0;
+};
+
+/// Of a folder whose index cannot be opened, by a look at its folders.
+Known seen_in(const std::string& folder, const std::string& argument) {
+    Known known;
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(folder, error)) {
         const auto parts = part_files(entry.path().string());
         if (parts.empty()) continue;
         try {
-            const Head head = read_part_head(parts.begin()->second).head;
-            found.push_back(
-                {base_name(entry.path()), head.name, head.started_by, "", head.utc_ns, {}});
+            const std::string key = base_name(entry.path());
+            const std::string name = read_part_head(parts.begin()->second).head.name;
+            known.named.is_key = known.named.is_key || key == argument;
+            if (name == argument) known.named.keys.push_back(key);
+            if (++known.count <= kMostNamed) known.keys.push_back(key);
         } catch (const std::exception&) {
             continue;
         }
     }
-    return found;
+    return known;
+}
+
+Known known_in(const std::string& folder, const std::string& argument, const Index::Tell& tell) {
+    try {
+        Index index(folder, tell);
+        Known known{index.look_up(argument), {}, 0};
+        if (!known.named.is_key && known.named.keys.empty())
+            std::tie(known.keys, known.count) = index.some_keys(kMostNamed);
+        return known;
+    } catch (const std::exception&) {
+        return seen_in(folder, argument);
+    }
 }
 
 }  // namespace
@@ -210,14 +296,16 @@ std::string find_campaign(const std::string& argument, const std::vector<std::st
     if (fs::exists(argument, error) || argument.find('/') != std::string::npos) return argument;
     std::vector<std::string> found;
     std::string known;
-    std::size_t count = 0;
+    std::size_t count = 0, named = 0;
     for (const auto& folder : folders) {
         if (!fs::exists(Index::path_in(folder), error)) continue;
-        for (const auto& campaign : known_in(folder, tell)) {
-            if (campaign.key == argument) return folder + "/" + campaign.key;
-            if (campaign.name == argument) found.push_back(folder + "/" + campaign.key);
-            if (++count <= kMostNamed) known += " " + campaign.key;
+        const Known here = known_in(folder, argument, tell);
+        if (here.named.is_key) return folder + "/" + argument;
+        for (const auto& key : here.named.keys) found.push_back(folder + "/" + key);
+        for (const auto& key : here.keys) {
+            if (named++ < kMostNamed) known += " " + key;
         }
+        count += here.count;
     }
     if (found.size() == 1) return found.front();
     if (!found.empty())
@@ -240,9 +328,7 @@ std::vector<IndexedFile> indexed_files(const std::string& campaign_folder,
     const std::string beside = folder.parent_path().string();
     if (error || !fs::exists(Index::path_in(beside), error)) return {};
     try {
-        for (auto& campaign : Index(beside, tell).campaigns()) {
-            if (campaign.key == base_name(folder)) return std::move(campaign.files);
-        }
+        return Index(beside, tell).files_of(base_name(folder));
     } catch (const std::exception&) {
         // Of somebody else: nothing to compare with.
     }

@@ -4,11 +4,13 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace vibrig::journal {
 class Database;
-}
+struct Row;
+}  // namespace vibrig::journal
 
 namespace vibrig::record {
 
@@ -46,15 +48,32 @@ class Index {
     /// Forgets all and looks at every folder; the number of campaigns.
     std::size_t rebuild();
 
-    [[nodiscard]] std::vector<IndexedCampaign> campaigns() const;
+    /// All of them, by their begin.
+    [[nodiscard]] std::vector<IndexedCampaign> campaigns();
+    /// What one looks for by a folder's name or a campaign's: does not grow with the index.
+    struct Named {
+        bool is_key = false;
+        std::vector<std::string> keys;  ///< of campaigns of that name, by their begin
+    };
+    [[nodiscard]] Named look_up(const std::string& key_or_name);
+    [[nodiscard]] std::vector<IndexedFile> files_of(const std::string& key);
+    /// So many keys at most, by their begin, and how many there are.
+    [[nodiscard]] std::pair<std::vector<std::string>, std::size_t> some_keys(std::size_t most);
 
     [[nodiscard]] static std::string path_in(const std::string& folder);
 
   private:
     void open();
+    void look(const std::string& path);
+    void look_at_folder(const std::string& campaign_folder);
+    void make_anew(const std::string& why);
+    /// Where it is found damaged only now, it is made anew.
+    [[nodiscard]] std::vector<journal::Row> ask(const char* sql,
+                                                const std::vector<std::string>& texts = {});
     void put(const std::string& key, const IndexedFile& file);
 
     std::string folder_;
+    Tell tell_;
     std::unique_ptr<journal::Database> database_;
 };
 

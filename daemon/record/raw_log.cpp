@@ -226,32 +226,52 @@ std::string compress(const std::string& path, const std::function<void()>& on_pr
     return {};
 }
 
-void read_raw(const std::string& path, const std::function<bool(std::string_view)>& take) {
-    const StdFile in(std::fopen(path.c_str(), "rb"));
-    if (!in) throw std::runtime_error(path + ": " + std::strerror(errno));
-    std::vector<char> from(ZSTD_DStreamInSize());
-    const bool packed = path.ends_with(".zst");
-    const std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
-                                                                     ZSTD_freeDCtx);
-    std::vector<char> to(ZSTD_DStreamOutSize());
-    std::size_t left = 0;
-    while (const std::size_t n = std::fread(from.data(), 1, from.size(), in.get())) {
-        if (!packed) {
-            if (!take({from.data(), n})) return;
-            continue;
+struct RawReader::Input {
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{nullptr, std::fclose};
+    bool packed = false;
+    std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> context{ZSTD_createDCtx(), ZSTD_freeDCtx};
+    std::vector<char> from = std::vector<char>(ZSTD_DStreamInSize());
+    std::vector<char> to = std::vector<char>(ZSTD_DStreamOutSize());
+    ZSTD_inBuffer there{nullptr, 0, 0};
+    std::size_t left = 0;  ///< of a frame of zstd
+};
+
+RawReader::RawReader(std::string path) : path_(std::move(path)), input_(std::make_unique<Input>()) {
+    input_->file.reset(std::fopen(path_.c_str(), "rb"));
+    if (!input_->file) throw std::runtime_error(path_ + ": " + std::strerror(errno));
+    input_->packed = path_.ends_with(".zst");
+}
+RawReader::~RawReader() = default;
+
+bool RawReader::next(std::string_view& piece) {
+    Input& in = *input_;
+    for (;;) {
+        while (in.packed && in.there.pos < in.there.size) {
+            ZSTD_outBuffer output{in.to.data(), in.to.size(), 0};
+            in.left = ZSTD_decompressStream(in.context.get(), &output, &in.there);
+            if (ZSTD_isError(in.left) != 0)
+                throw std::runtime_error(path_ + ": " + ZSTD_getErrorName(in.left));
+            piece = {in.to.data(), output.pos};
+            if (output.pos > 0) return true;
         }
-        ZSTD_inBuffer input{from.data(), n, 0};
-        while (input.pos < input.size) {
-            ZSTD_outBuffer output{to.data(), to.size(), 0};
-            left = ZSTD_decompressStream(context.get(), &output, &input);
-            if (ZSTD_isError(left) != 0)
-                throw std::runtime_error(path + ": " + ZSTD_getErrorName(left));
-            if (output.pos > 0 && !take({to.data(), output.pos})) return;
-        }
+        const std::size_t n = std::fread(in.from.data(), 1, in.from.size(), in.file.get());
+        if (std::ferror(in.file.get()) != 0)
+            throw std::runtime_error(path_ + ": " + std::strerror(errno));
+        if (n == 0 && in.packed && in.left != 0)
+            throw std::runtime_error(path_ +
+                                     ": found the end of the file, expected more of its frame");
+        if (n == 0) return false;
+        in.there = {in.from.data(), n, 0};
+        piece = {in.from.data(), n};
+        if (!in.packed) return true;
     }
-    if (std::ferror(in.get()) != 0) throw std::runtime_error(path + ": " + std::strerror(errno));
-    if (packed && left != 0)
-        throw std::runtime_error(path + ": found the end of the file, expected more of its frame");
+}
+
+void read_raw(const std::string& path, const std::function<bool(std::string_view)>& take) {
+    RawReader reader(path);
+    for (std::string_view piece; reader.next(piece);) {
+        if (!take(piece)) return;
+    }
 }
 
 }  // namespace vibrig::record

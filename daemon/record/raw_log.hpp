@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -76,8 +77,24 @@ class RawLog {
 /// `on_progress` is called now and then.
 [[nodiscard]] std::string compress(const std::string& path,
                                    const std::function<void()>& on_progress = {});
-/// Calls `take` with the pieces of a file, decompressed if it ends in .zst. Throws
-/// std::runtime_error. False of `take` ends it.
+
+/// A file of a raw log piece by piece, decompressed if it ends in .zst. Throws std::runtime_error.
+class RawReader {
+  public:
+    explicit RawReader(std::string path);
+    ~RawReader();
+    RawReader(const RawReader&) = delete;
+    RawReader& operator=(const RawReader&) = delete;
+
+    /// Valid until the next call; false at the end.
+    [[nodiscard]] bool next(std::string_view& piece);
+
+  private:
+    struct Input;
+    std::string path_;
+    std::unique_ptr<Input> input_;
+};
+/// Calls `take` with the pieces of a file; false of it ends it. Throws std::runtime_error.
 void read_raw(const std::string& path, const std::function<bool(std::string_view)>& take);
 
 }  // namespace vibrig::record

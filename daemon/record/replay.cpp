@@ -16,7 +16,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/dwells/player.hpp"
-#include "daemon/record/raw_log.hpp"
+#include "daemon/record/raw_frames.hpp"
 #include "drivers/assembler.hpp"
 #include "proto/candump.hpp"
 #include "proto/text.hpp"
@@ -132,25 +132,26 @@ class FrameReader {
         }
     }
 
-    void read(const std::string& path) {
-        std::string rest;
-        std::size_t number = 0;
-        first_ = true;
-        read_raw(path, [&](std::string_view piece) {
-            rest += piece;
-            std::size_t begin = 0;
-            for (std::size_t end = rest.find('\n'); end != std::string::npos;
-                 begin = end + 1, end = rest.find('\n', begin)) {
-                ++number;
-                line(std::string_view(rest).substr(begin, end - begin), path, number);
+    void read(const std::vector<std::string>& logs) {
+        RawFrames frames(logs, utc_offset_ns_);
+        std::optional<std::size_t> log;
+        while (const RawFrame* one = frames.next()) {
+            if (one->start) {
+                begin();
+                last_ = 0;  // UTC may have been set back meanwhile
+                continue;
             }
-            rest.erase(0, begin);
-            if (rest.size() > 4096)
-                throw std::runtime_error(
-                    fmt::format("{}:{}: found no end of the line, expected one", path, number + 1));
-            return true;
-        });
-        // A line without an end was cut off with its writer.
+            const Time time = one->frame.time;
+            // Behind one another; a second for time stamps that are not quite in order.
+            if (log != one->log && last_ > 0 && time + drivers::kSecond < last_)
+                throw std::runtime_error(fmt::format(
+                    "{}:{}: found a time {:.6f} s before the end of the log before it, "
+                    "expected logs in their order",
+                    frames.path_of(*one), one->line, drivers::to_seconds(last_ - time)));
+            log = one->log;
+            last_ = std::max(last_, time);
+            take(one->frame);
+        }
     }
     void finish() { assembler_->advance(std::numeric_limits<Time>::max() / 2); }
     [[nodiscard]] Time until() const { return until_; }
@@ -162,35 +163,7 @@ class FrameReader {
         assembler_.emplace(dbc_, settings_,
                            [this](const drivers::Sample& sample) { to_.push_back(sample); });
     }
-    void line(std::string_view text, const std::string& path, std::size_t number) {
-        if (text == kStartLine) {
-            begin();
-            last_ = 0;  // UTC may have been set back meanwhile
-        }
-        if (text.empty() || text.front() == '#') return;
-        proto::LoggedFrame logged;
-        try {
-            logged = proto::parse_candump_line(text);
-        } catch (const proto::CandumpError& error) {
-            throw std::runtime_error(fmt::format("{}:{}: {}", path, number, error.what()));
-        }
-        if (text.ends_with(" T")) return;  // what the daemon sent it does not receive
-        drivers::ReceivedFrame frame;
-        frame.time = logged.time_ns - utc_offset_ns_;
-        frame.frame.can_id = logged.id | (logged.extended ? CAN_EFF_FLAG : 0U) |
-                             (logged.remote ? CAN_RTR_FLAG : 0U) |
-                             (logged.error ? CAN_ERR_FLAG : 0U);
-        frame.frame.len = logged.size;
-        frame.fd = logged.fd;
-        std::copy_n(logged.data.begin(), logged.size, frame.frame.data);
-        if (logged.error) return;
-        // Behind one another; a second for time stamps that are not quite in order.
-        if (std::exchange(first_, false) && last_ > 0 && frame.time + drivers::kSecond < last_)
-            throw std::runtime_error(
-                fmt::format("{}:{}: found a time {:.6f} s before the end of the log before it, "
-                            "expected logs in their order",
-                            path, number, drivers::to_seconds(last_ - frame.time)));
-        last_ = std::max(last_, frame.time);
+    void take(const drivers::ReceivedFrame& frame) {
         until_ = std::max(until_, frame.time);
         ++frames_;
         if (rig_time_ != nullptr && frame.frame.can_id == rig_time_->id) {
@@ -211,8 +184,7 @@ class FrameReader {
     const proto::Message* rig_time_ = nullptr;
     const proto::Signal* tick_end_ = nullptr;
     bool rig_ = false;
-    bool first_ = true;  ///< frame of a log
-    Time last_ = 0;      ///< since the daemon was started
+    Time last_ = 0;  ///< since the daemon was started
     Time until_ = 0;
     std::uint64_t frames_ = 0;
 };
@@ -449,7 +421,7 @@ std::vector<drivers::Sample> samples_from_raw(const Campaign& campaign, Time& un
     std::vector<drivers::Sample> samples;
     FrameReader reader(campaign.head.dbc, campaign.head.configuration, campaign.head.utc_offset_ns,
                        samples);
-    for (const auto& path : raw_files(campaign.folder)) reader.read(path);
+    reader.read(raw_files(campaign.folder));
     reader.finish();
     until = reader.until();
     return samples;
@@ -463,7 +435,7 @@ Campaign campaign_from_candump(const std::vector<std::string>& logs, const std::
     campaign.head.simulated = of_simulated_rig(configuration);
     read_dwells(dwells, campaign);
     FrameReader reader(dbc, configuration, campaign.head.utc_offset_ns, campaign.samples);
-    for (const auto& path : in_order(logs)) reader.read(path);
+    reader.read(in_order(logs));
     reader.finish();
     if (campaign.samples.empty())
         throw std::runtime_error(

@@ -2,10 +2,10 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <numbers>
@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/record/in_order.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/tool/campaign_argument.hpp"
@@ -25,14 +26,10 @@
 #include "daemon/tool/result_json.hpp"
 #include "daemon/tool/result_table.hpp"
 #include "daemon/tool/rig_doubts.hpp"
+#include "daemon/tool/seen_plan.hpp"
 #include "daemon/tool/simulated.hpp"
-#include "estimator/hann.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
-#include "estimator/kinematics.hpp"
-#include "estimator/plan/positions.hpp"
-#include "estimator/plan_report.hpp"
-#include "estimator/vibration_level.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -40,33 +37,6 @@ namespace vibrig::tool {
 namespace {
 
 using proto::RecordingRow;
-
-struct Dwell {
-    int run = 0;
-    int position = 0;
-    std::vector<const RecordingRow*> rows;
-};
-
-/// One dwell for each stretch of rows with the same run and position: a pair that comes back
-/// begins another.
-std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
-    std::vector<Dwell> dwells;
-    for (const RecordingRow& row : rows) {
-        if (dwells.empty() || dwells.back().run != row.run ||
-            dwells.back().position != row.position)
-            dwells.push_back({row.run, row.position, {}});
-        dwells.back().rows.push_back(&row);
-    }
-    return dwells;
-}
-
-/// The times of the file go on from dwell to dwell.
-bool has_common_clock(const std::vector<Dwell>& dwells) {
-    for (std::size_t d = 1; d < dwells.size(); ++d) {
-        if (!(dwells[d].rows.front()->time_s > dwells[d - 1].rows.back()->time_s)) return false;
-    }
-    return true;
-}
 
 estimator::Measurement measurement_of(const RecordingRow& row) {
     estimator::Measurement measurement;
@@ -76,94 +46,6 @@ estimator::Measurement measurement_of(const RecordingRow& row) {
         measurement.force_g[i] = row.force_g[i];
     }
     return measurement;
-}
-
-/// A dwell as a plan would have it: where it begins, and its level by its own accelerometers.
-class SeenDwell {
-  public:
-    explicit SeenDwell(const estimator::Settings& settings) : settings_(settings) {}
-
-    void add(const estimator::Measurement& measurement) {
-        if (!begin_s_) begin_s_ = measurement.time_s;
-        end_s_ = measurement.time_s;
-        if (times_s_.size() < kTimesEnough) times_s_.push_back(end_s_);
-        std::array<double, 3> angle_deg{};
-        double all = 0;
-        for (std::size_t i = 0; i < 3; ++i) {
-            angle_deg[i] = measurement.angle_rad[i] * (180 / std::numbers::pi);
-            all += angle_deg[i] + measurement.force_g[i];
-        }
-        const bool good = measurement.angles_good && measurement.force_good;
-        if (!good || !std::isfinite(all)) return;
-        if (!up_) {
-            angles_deg_ = estimator::gimbal_deg(settings_, angle_deg);
-            up_ = estimator::plan::up_at(settings_, angle_deg);
-        }
-        double along = 0;
-        for (std::size_t i = 0; i < 3; ++i) {
-            for (std::size_t j = 0; j < 3; ++j) {
-                along += (*up_)[i] * settings_.accelerometer_matrix[i][j] *
-                         (measurement.force_g[j] - settings_.accelerometer_zero_g[j]);
-            }
-        }
-        force_.add(along);
-    }
-
-    /// Nothing without a good sample.
-    [[nodiscard]] std::optional<estimator::PlannedDwell> planned() const {
-        if (!up_) return std::nullopt;
-        const auto means = force_.means();
-        double kappa = means.mean_square / (means.mean * means.mean) -
-                       settings_.accelerometer_g * settings_.accelerometer_g;
-        if (kappa - 1 < 1e-4) kappa = 1;  // at rest
-        const double duration_s = end_s_ - *begin_s_;
-        if (!(duration_s > 0) || !std::isfinite(kappa)) return std::nullopt;
-        return estimator::PlannedDwell{angles_deg_, kappa, duration_s, 1};
-    }
-
-    /// Between its samples, s; 0: not known. Once.
-    [[nodiscard]] double period_s() { return estimator::median_interval(times_s_); }
-
-  private:
-    static constexpr std::size_t kTimesEnough = 1001;
-
-    const estimator::Settings& settings_;
-    std::vector<double> times_s_;
-    std::optional<double> begin_s_;
-    double end_s_ = 0;
-    std::array<double, 3> angles_deg_{};
-    std::optional<std::array<double, 3>> up_;
-    estimator::GrowingHann force_;
-};
-
-int run_of(const Dwell& dwell) { return dwell.run; }
-int run_of(const record::RecordedDwell& dwell) { return dwell.order->run; }
-
-/// Says what these dwells cannot determine, before they are gone through. `show(dwell, seen)` adds
-/// all measurements of a dwell to `seen`.
-template <typename Dwells, typename Show>
-void tell_before(const Dwells& dwells, const estimator::Settings& settings, const Show& show) {
-    std::vector<estimator::PlannedDwell> plan;
-    double period_s = 0;
-    for (const auto& dwell : dwells) {
-        SeenDwell seen(settings);
-        show(dwell, seen);
-        if (!(period_s > 0)) period_s = seen.period_s();
-        if (auto one = seen.planned()) {
-            one->run = run_of(dwell);
-            plan.push_back(*one);
-        }
-    }
-    if (plan.empty() || !(period_s > 0)) return;
-    for (const std::string& line :
-         estimator::plan_warnings(estimator::report_plan(settings, plan, period_s))) {
-        std::cerr << "before the run: " << line << '\n';
-    }
-    const bool vibrating =
-        std::any_of(plan.begin(), plan.end(), [](const auto& one) { return one.kappa > 1; });
-    const std::string alias = estimator::VibrationLevel::aliasing(settings.frequency_hz, period_s,
-                                                                  settings.level_window_s);
-    if (vibrating && !alias.empty()) std::cerr << "before the run: " << alias << '\n';
 }
 
 /// A result, and what of the recording contradicts the configuration.
@@ -178,43 +60,92 @@ Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
     return found;
 }
 
-Found identify(const std::vector<RecordingRow>& rows, const estimator::Settings& settings) {
-    const std::vector<Dwell> dwells = dwells_of(rows);
-    tell_before(dwells, settings, [](const Dwell& dwell, SeenDwell& seen) {
-        for (const RecordingRow* row : dwell.rows) seen.add(measurement_of(*row));
-    });
-    const bool common_clock = has_common_clock(dwells);
-    estimator::Identification identification(settings, dwells.size());
-    RigDoubts doubts(settings);
-    Progress progress("identifying");
-    std::size_t done = 0;
-    for (const Dwell& dwell : dwells) {
-        estimator::DwellInfo info{dwell.run, dwell.position};
-        if (common_clock) info.begin_s = 0;
-        identification.begin_dwell(info);
-        doubts.begin_dwell();
-        for (const RecordingRow* row : dwell.rows) {
-            const auto measurement = measurement_of(*row);
-            static_cast<void>(identification.add(measurement));
-            doubts.add(measurement);
-            // Asking a clock costs more than a filter step.
-            if (++done % 1024 == 0) {
-                progress.show(done, rows.size());
-            }
-        }
-        static_cast<void>(identification.end_dwell());
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
+class RowsIdentified {
+  public:
+    explicit RowsIdentified(const estimator::Settings& settings)
+        : identification_(settings, room_), doubts_(settings), plan_(settings) {}
+
+    void add(const RecordingRow& row) {
+        if (dwells_ == 0 || row.run != run_ || row.position != position_) begin_dwell(row);
+        last_s_ = row.time_s;
+        const auto measurement = measurement_of(row);
+        plan_.add(measurement);
+        static_cast<void>(identification_.add(measurement));
+        doubts_.add(measurement);
     }
-    return with_doubts(identification.result(), doubts);
+    Found found() {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        plan_.tell();
+        auto result = identification_.result();
+        for (auto& row : result.rows) row.common_clock = common_clock_;
+        return with_doubts(std::move(result), doubts_);
+    }
+
+  private:
+    void begin_dwell(const RecordingRow& row) {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        // The times of the file may go on from dwell to dwell; that they do is known at its end.
+        if (dwells_ > 0 && !(row.time_s > last_s_)) common_clock_ = false;
+        if (++dwells_ > room_) identification_.reserve(room_ *= 2);
+        run_ = row.run;
+        position_ = row.position;
+        estimator::DwellInfo info{run_, position_};
+        info.begin_s = 0;
+        identification_.begin_dwell(info);
+        doubts_.begin_dwell();
+        plan_.begin_dwell(run_);
+    }
+
+    std::size_t room_ = 1024, dwells_ = 0;
+    estimator::Identification identification_;
+    RigDoubts doubts_;
+    SeenPlan plan_;
+    bool common_clock_ = true;
+    int run_ = 0, position_ = 0;
+    double last_s_ = 0;
+};
+
+/// A file of any length, in memory that does not grow with it: another thread reads ahead.
+Found identify(proto::RecordingReader& file, std::uint64_t size,
+               const estimator::Settings& settings) {
+    struct Block {
+        std::vector<RecordingRow> rows;
+        std::uint64_t bytes = 0;  ///< of the file, up to its end
+    };
+    constexpr std::size_t kBlock = 4096;
+    record::InOrder<Block> blocks(
+        [&file]() -> std::optional<Block> {
+            Block block;
+            block.rows.resize(kBlock);
+            std::size_t count = 0;
+            while (count < kBlock && file.next(block.rows[count])) ++count;
+            block.rows.resize(count);
+            block.bytes = file.bytes();
+            return count > 0 ? std::optional(std::move(block)) : std::nullopt;
+        },
+        std::identity(), 1);
+    RowsIdentified identified(settings);
+    Progress progress("identifying");
+    while (const auto block = blocks.next()) {
+        for (const RecordingRow& row : block->rows) identified.add(row);
+        progress.show(block->bytes, std::max(size, block->bytes));
+    }
+    return identified.found();
 }
 
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
 Found identify(const record::Campaign& campaign, const estimator::Settings& settings) {
     const auto dwells = record::recorded_dwells(campaign);
-    tell_before(dwells, settings, [&](const record::RecordedDwell& dwell, SeenDwell& seen) {
+    SeenPlan plan(settings);
+    for (const auto& dwell : dwells) {
+        plan.begin_dwell(dwell.order->run);
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
-            seen.add(
+            plan.add(
                 rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
-    });
+    }
+    plan.tell();
     std::optional<dwells::Anew> anew;
     if (campaign.found) anew.emplace(settings, *campaign.found, dwells.size());
     estimator::Identification as_recorded(settings, dwells.size());
@@ -274,12 +205,6 @@ bool is_campaign(const std::string& argument) {
                : record::is_hdf5(argument);
 }
 
-std::vector<RecordingRow> read(const std::string& path) {
-    Progress progress("reading " + path);
-    progress.show(0, 1);
-    return proto::read_recording(path);
-}
-
 struct IdentifyOptions {
     std::string recording;
     std::string config;
@@ -318,8 +243,11 @@ Identified identify_recording(const std::string& file, const std::string& config
     } else {
         const auto loaded = configuration::load(config, false);
         identified.settings = loaded.configuration.estimator;
-        identified.simulated = loaded.configuration.simulated() || proto::says_simulated(file);
-        found = identify(read(file), identified.settings);
+        proto::RecordingReader reader(file);
+        identified.simulated = loaded.configuration.simulated() || reader.simulated();
+        std::error_code unknown;
+        const auto size = std::filesystem::file_size(file, unknown);
+        found = identify(reader, unknown ? 0 : size, identified.settings);
     }
     identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "daemon/study/reduce.hpp"
 #include "daemon/study/statistics.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/tool/study_output.hpp"
@@ -20,6 +21,10 @@ constexpr std::size_t kMostCompared = 100;  // recordings in a chart
 constexpr std::array<std::pair<const char*, const char*>, 3> kUnits{
     {{"bias", "deg/h"}, {"unbalance", "deg/h/g"}, {"compliance", "deg/h/g^2"}}};
 
+constexpr std::array<std::pair<const char*, const char*>, 2> kClaims{
+    {{"all", "all inputs"}, {"noise", "noise alone"}}};
+constexpr double kShift = 0.15;  // of two points at one place, to either side
+
 constexpr const char* kNothing = "nothing to draw, no chart was written";
 
 std::string first_of(std::size_t shown, std::size_t all, const std::string& what) {
@@ -31,6 +36,28 @@ plot::Curve curve_of(const std::string& name, plot::Look look) {
     curve.name = name;
     curve.look = look;
     return curve;
+}
+
+/// Places 1, 2 ... of what is counted, with room for points beside them.
+plot::Axis axis_of_places(const std::string& label, double first, double last) {
+    plot::Axis axis(label);
+    axis.low = first - 0.6;
+    axis.high = last + 0.6;
+    axis.exact = true;
+    return axis;
+}
+
+/// The 30, by name.
+plot::Axis axis_of_coefficients() {
+    plot::Axis axis = axis_of_places("coefficient", 1, estimator::kParameters);
+    for (const char* name : estimator::parameter_names())
+        axis.named.emplace_back(static_cast<double>(axis.named.size() + 1), name);
+    return axis;
+}
+
+plot::Axis axis_of_points(const Json& result) {
+    return axis_of_places("point of the grid", 0,
+                          result.at("points").back().at("point").get<double>());
 }
 
 plot::Curve level_line(const std::string& name, double first, double last, double y) {
@@ -52,21 +79,18 @@ plot::Chart coefficient_chart(const Json& point, const std::string& title, const
                               const std::vector<std::pair<const char*, const char*>>& curves) {
     plot::Chart chart;
     chart.title = title;
-    chart.x = plot::Axis("coefficient");
+    chart.x = axis_of_coefficients();
     chart.y = plot::Axis(y);
-    double at = 1;
-    for (const Json& c : point.at("coefficients"))
-        chart.x.named.emplace_back(at++, c.at("name").get<std::string>().substr(2));
-    double shift = -0.15;
+    double shift = -kShift;
     for (const auto& [name, pointer] : curves) {
         plot::Curve curve = curve_of(name, plot::Look::dots);
-        at = 1;
+        double at = 1;
         for (const Json& c : point.at("coefficients")) {
             const Json::json_pointer where(pointer);
             if (c.contains(where)) add_interval(curve, at + shift, c.at(where));
             at += 1;
         }
-        shift += 0.3;
+        shift += 2 * kShift;
         chart.curves.push_back(std::move(curve));
     }
     chart.notes = {grid_text(point) + "; bars: 95 %"};
@@ -76,25 +100,24 @@ plot::Chart coefficient_chart(const Json& point, const std::string& title, const
 plot::Chart nees_chart(const Json& point) {
     plot::Chart chart;
     chart.title = "NEES in 20 bins that are equally likely under chi-square 30";
-    chart.x = plot::Axis("bin");
+    chart.x = axis_of_places("bin", 1, study::kNeesBins);
     chart.y = plot::Axis("campaigns");
-    double total = 0;
-    for (const char* claim : {"noise", "all"}) {
+    chart.y.include(0);
+    double total = 0, shift = -kShift;
+    for (const auto& [claim, name] : kClaims) {
         const Json& nees = point.at("nees").at(claim);
         if (!nees.contains("histogram")) continue;
-        plot::Curve curve = curve_of(claim, plot::Look::dots);
+        plot::Curve curve = curve_of(name, plot::Look::dots);
         double at = 1;
         for (const Json& count : nees.at("histogram")) {
-            const auto n = count.get<double>();
-            curve.x.push_back(at++);
-            curve.y.push_back(n);
-            curve.low.push_back(std::max(0.0, n - 2 * std::sqrt(n)));
-            curve.high.push_back(n + 2 * std::sqrt(n));
+            curve.x.push_back(at++ + shift);
+            curve.y.push_back(count.get<double>());
         }
+        shift += 2 * kShift;
         total = nees.at("n").get<double>();
         std::array<char, 120> text{};
         std::snprintf(text.data(), text.size(),
-                      "%s: NEES %.2f of %.0f, %.2f to %.2f expected (95 %%)", claim,
+                      "%s: NEES %.2f of %.0f, %.2f to %.2f expected (95 %%)", name,
                       number_at(nees, "/mean"), number_at(nees, "/expected"),
                       number_at(nees, "/low"), number_at(nees, "/high"));
         chart.notes.emplace_back(text.data());
@@ -102,9 +125,14 @@ plot::Chart nees_chart(const Json& point) {
     }
     if (chart.curves.empty())
         chart.notes.emplace_back("no campaign determines all 30 coefficients: there is no NEES");
-    chart.curves.push_back(level_line("theory", 1, 20, total / 20));
+    const double share = 1.0 / study::kNeesBins, expected = share * total;
+    const double half = 2 * std::sqrt(expected * (1 - share));
+    plot::Curve theory = level_line("theory", chart.x.low, chart.x.high, expected);
+    theory.low.assign(2, std::max(0.0, expected - half));
+    theory.high.assign(2, expected + half);
+    chart.curves.push_back(std::move(theory));
     chart.notes.insert(chart.notes.begin(),
-                       grid_text(point) + "; bars: two standard deviations of a count");
+                       grid_text(point) + "; band: two standard deviations of a bin's count");
     return chart;
 }
 
@@ -112,23 +140,25 @@ plot::Chart nees_chart(const Json& point) {
 plot::Chart grid_chart(const Json& result) {
     plot::Chart chart;
     chart.title = "rms z over the grid, of 30 coefficients together";
-    chart.x = plot::Axis("point of the grid");
+    chart.x = axis_of_points(result);
     chart.y = plot::Axis("sqrt(NEES / 30)");
-    for (const char* claim : {"noise", "all"}) {
-        plot::Curve curve = curve_of(claim, plot::Look::dots);
+    double shift = -kShift;
+    for (const auto& [claim, name] : kClaims) {
+        plot::Curve curve = curve_of(name, plot::Look::dots);
         for (const Json& point : result.at("points")) {
             const Json& nees = point.at("nees").at(claim);
             if (nees.at("n") == 0) continue;
             const double mean = number_at(nees, "/mean"), expected = number_at(nees, "/expected");
-            curve.x.push_back(point.at("point").get<double>());
+            curve.x.push_back(point.at("point").get<double>() + shift);
             curve.y.push_back(std::sqrt(mean / expected));
             curve.low.push_back(std::sqrt(mean / number_at(nees, "/high")));
             curve.high.push_back(std::sqrt(mean / number_at(nees, "/low")));
         }
+        shift += 2 * kShift;
         chart.curves.push_back(std::move(curve));
     }
-    const double last = result.at("points").back().at("point").get<double>();
-    chart.curves.push_back(level_line("theory", 0, std::max(1.0, last), 1));
+    chart.curves.push_back(level_line("theory", chart.x.low, chart.x.high, 1));
+    chart.notes = {"bars: 95 %"};
     return chart;
 }
 
@@ -136,7 +166,7 @@ plot::Chart grid_chart(const Json& result) {
 plot::Chart error_chart(const Json& result, const std::string& unit) {
     plot::Chart chart;
     chart.title = "rms error over the grid";
-    chart.x = plot::Axis("point of the grid");
+    chart.x = axis_of_points(result);
     chart.y = plot::Axis("rms error, " + unit);
     plot::Curve errors = curve_of("error", plot::Look::dots);
     plot::Curve claimed = curve_of("claimed u, all inputs", plot::Look::dashed);
@@ -218,7 +248,6 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
     plot::make_folder(folder);
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const double at = static_cast<double>(i + 1);
-        z.x.named.emplace_back(at, std::string(estimator::parameter_names()[i]).substr(2));
         double squares = 0;
         std::uint64_t count = 0, good = 0;
         for (const Json* one : compared) {
@@ -240,8 +269,7 @@ std::string write_recordings_charts(const Json& result, const std::string& folde
     }
     const std::string note = std::to_string(compared.size()) + " recordings; bars: 95 %";
     z.title = "new less old result over both standard uncertainties";
-    z.x.label = coverage.x.label = "coefficient";
-    coverage.x.named = z.x.named;
+    z.x = coverage.x = axis_of_coefficients();
     z.y = plot::Axis("rms z");
     z.curves = {std::move(rms), level_line("independent results", 1, 30, 1)};
     z.notes = {note, "both rest on the same data: less than 1 is to be expected"};
@@ -281,7 +309,6 @@ std::string write_propagation_charts(const Json& result, const std::string& fold
     double at = 0;
     for (const Json& c : result.at("coefficients")) {
         at += 1;
-        u.x.named.emplace_back(at, c.at("name").get<std::string>().substr(2));
         if (!c.contains("value")) continue;
         const auto add = [](plot::Curve& curve, double x, double y, double half) {
             curve.x.push_back(x);
@@ -291,10 +318,10 @@ std::string write_propagation_charts(const Json& result, const std::string& fold
         };
         const double budget = number_at(c, "/gum/u"), tolerance = number_at(c, "/tolerance");
         add(ratio, at, number_at(c, "/u") / budget, 2 * number_at(c, "/standard_error/u") / budget);
-        add(off[0], at - 0.15,
+        add(off[0], at - kShift,
             (number_at(c, "/symmetric/0") - number_at(c, "/gum/low")) / tolerance,
             2 * number_at(c, "/standard_error/low") / tolerance);
-        add(off[1], at + 0.15,
+        add(off[1], at + kShift,
             (number_at(c, "/symmetric/1") - number_at(c, "/gum/high")) / tolerance,
             2 * number_at(c, "/standard_error/high") / tolerance);
     }
@@ -304,9 +331,8 @@ std::string write_propagation_charts(const Json& result, const std::string& fold
                              " trials; bars: two standard errors; the budget is " +
                              result.at("verdict").get<std::string>();
     u.title = "rms z of the draws: u drawn over u of the budget";
-    u.x.label = ends.x.label = "coefficient";
+    u.x = ends.x = axis_of_coefficients();
     u.y = plot::Axis("rms z");
-    ends.x.named = u.x.named;
     u.curves = {std::move(ratio), level_line("budget", 1, 30, 1)};
     ends.title = "ends of the 95 % intervals, drawn less budget";
     ends.y = plot::Axis("of the numerical tolerance");

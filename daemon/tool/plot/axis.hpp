@@ -18,7 +18,7 @@ class Axis {
     double low = 0;
     double high = 0;
     bool exact = false;  ///< keeps its range; else it is rounded to ticks
-    /// Ticks with words instead of numbers, from left to right; empty: numbers.
+    /// Ticks with words, upright, instead of numbers, from left to right; empty: numbers.
     std::vector<std::pair<double, std::string>> named;
 
     void include(double value);                       ///< widens the range; log: only if > 0

@@ -22,6 +22,7 @@ constexpr double kTop = 44;
 constexpr double kPlotHeight = 420;
 constexpr double kRight = 190;  // legend or colour scale
 constexpr double kNoteHeight = 16;
+constexpr double kNameHeight = 30;  // of a tick's name, upright, beyond a number's
 constexpr std::size_t kColours = 8;
 
 struct Palette {
@@ -123,7 +124,11 @@ class Drawing {
         }
         for (const double t : x_.ticks()) {
             line("grid", px(t), kTop, px(t), bottom());
-            text(px(t), bottom() + 18, x_.text_of(t), "middle");
+            if (x_.named.empty()) {
+                text(px(t), bottom() + 18, x_.text_of(t), "middle");
+            } else {
+                upright(px(t) + 4, bottom() + 8, x_.text_of(t));
+            }
         }
         for (const double t : y_.ticks()) {
             line("grid", kLeft, py(t), right(), py(t));
@@ -136,7 +141,7 @@ class Drawing {
                 "\" width=\"" + number(right() - kLeft) + "\" height=\"" + number(kPlotHeight) +
                 "\"/>\n";
         text(kLeft, kTop - 16, title, "start", " class=\"title\"");
-        text((kLeft + right()) / 2, bottom() + 38, x_.label, "middle");
+        text((kLeft + right()) / 2, bottom() + below() - 18, x_.label, "middle");
         const double middle = kTop + kPlotHeight / 2;
         text(22, middle, y_.label, "middle",
              " transform=\"rotate(-90 22 " + number(middle) + ")\"");
@@ -204,6 +209,8 @@ class Drawing {
     }
 
     [[nodiscard]] static double bottom() { return kTop + kPlotHeight; }
+    /// Height of the ticks' texts and the label.
+    [[nodiscard]] double below() const { return x_.named.empty() ? 56 : 56 + kNameHeight; }
     [[nodiscard]] const std::string& out() const { return out_; }
 
   private:
@@ -223,6 +230,10 @@ class Drawing {
     void line(const char* style, double x1, double y1, double x2, double y2) {
         out_ += std::string("<line class=\"") + style + "\" x1=\"" + number(x1) + "\" y1=\"" +
                 number(y1) + "\" x2=\"" + number(x2) + "\" y2=\"" + number(y2) + "\"/>\n";
+    }
+    /// Names side by side would run into each other.
+    void upright(double x, double y, const std::string& words) {
+        text(x, y, words, "end", " transform=\"rotate(-90 " + number(x) + " " + number(y) + ")\"");
     }
     void dot(double x, double y) {
         out_ += "<circle class=\"dot\" cx=\"" + number(x) + "\" cy=\"" + number(y) + "\" r=\"3\"/>";
@@ -279,7 +290,8 @@ class Drawing {
 
 std::string Chart::svg() const {
     Drawing drawing(*this);
-    const double height = Drawing::bottom() + 56 + kNoteHeight * static_cast<double>(notes.size());
+    const double foot = Drawing::bottom() + drawing.below();
+    const double height = foot + kNoteHeight * static_cast<double>(notes.size());
     if (maps.empty()) {
         drawing.grid();
     } else {
@@ -291,8 +303,8 @@ std::string Chart::svg() const {
     }
     drawing.frame(title);
     for (std::size_t i = 0; i < notes.size(); ++i) {
-        drawing.text(kLeft, Drawing::bottom() + 58 + kNoteHeight * static_cast<double>(i), notes[i],
-                     "start", " class=\"note\"");
+        drawing.text(kLeft, foot + 2 + kNoteHeight * static_cast<double>(i), notes[i], "start",
+                     " class=\"note\"");
     }
     return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + number(kWidth) + "\" height=\"" +
            number(height) + "\" viewBox=\"0 0 " + number(kWidth) + " " + number(height) +

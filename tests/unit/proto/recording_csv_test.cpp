@@ -14,6 +14,14 @@ namespace {
 
 constexpr const char* kHeader = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
 
+std::vector<RecordingRow> read_recording(const std::string& path) {
+    RecordingReader reader(path);
+    std::vector<RecordingRow> rows;
+    for (RecordingRow row; reader.next(row);) rows.push_back(row);
+    EXPECT_EQ(reader.bytes(), std::filesystem::file_size(path));
+    return rows;
+}
+
 class Recording : public testing::Test {
   protected:
     Recording() {
@@ -93,12 +101,12 @@ TEST_F(Recording, IsGivenBackExactlyAfterWriting) {
     }
     // WHEN they are written and read
     write_recording(path(), rows);
-    EXPECT_FALSE(says_simulated(path()));
+    EXPECT_FALSE(RecordingReader(path()).simulated());
     const auto plain = read_recording(path());
     ASSERT_EQ(plain.size(), rows.size());
     // WHEN they are a simulated rig's, which each row says
     write_recording(path(), rows, true);
-    EXPECT_TRUE(says_simulated(path()));
+    EXPECT_TRUE(RecordingReader(path()).simulated());
     const auto back = read_recording(path());
     // THEN no bit has changed
     ASSERT_EQ(back.size(), rows.size());

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "daemon/journal/database.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/digest.hpp"
@@ -225,6 +226,48 @@ TEST_F(Parts, AreRefusedByNameWhenOneIsMissing) {
     fs::rename(folder_ / "campaign-2.h5", folder_ / "other.h5");
     EXPECT_THROW(static_cast<void>(read_campaign((folder_ / "other.h5").string())),
                  std::runtime_error);
+}
+
+TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
+    // GIVEN one campaign that is there, and many more in the index
+    write(head(1), 10 * kSecond, {1}, 1, "finished");
+    std::vector<std::string> told;
+    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    Index(recordings_.string(), tell).note(folder_.string());
+    const std::string path = Index::path_in(recordings_.string());
+    {
+        journal::Database database(path);
+        database.execute("BEGIN");
+        for (int i = 0; i < 20'000; ++i) {
+            const std::string key = "other-" + std::to_string(i);
+            database.run("INSERT INTO campaign VALUES (?, 'other', 'A. Person', ?, 'finished')",
+                         {std::string_view(key), std::int64_t{i}});
+        }
+        database.execute("COMMIT");
+    }
+    // THEN it is found by key and by name, and what is not is told with some that are
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    EXPECT_EQ(find_campaign("other-19999", {recordings_.string()}, tell),
+              (recordings_ / "other-19999").string());
+    try {
+        static_cast<void>(find_campaign("tset", {recordings_.string()}, tell));
+        FAIL() << "found";
+    } catch (const std::runtime_error& error) {
+        EXPECT_NE(std::string(error.what()).find("other-11 ..."), std::string::npos)
+            << error.what();
+    }
+    EXPECT_TRUE(told.empty());
+    // WHEN pages that opening does not read are overwritten
+    {
+        std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+        file.seekp(16 * 4096);
+        file << std::string(fs::file_size(path) - 16 * 4096, 'x');
+    }
+    // THEN it is made anew from the files, and told
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
+        << told[0];
 }
 
 TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {

@@ -1,7 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -142,6 +146,61 @@ TEST_F(Identify, FromTwoRowsIsHonest) {
         EXPECT_TRUE(parameter["value"].is_null()) << parameter;
     }
     EXPECT_EQ(vibrig("identify rec.csv").exit_code, 1);
+}
+
+TEST_F(Identify, TakesNoMoreMemoryForALongerRecording) {
+    // GIVEN recordings of 56 000 and 560 000 rows
+    const auto memory_mb = [this](const std::string& dwell_s) {
+        record("--dwell " + dwell_s);
+        const std::string path = folder_ / "rec.csv";
+        const pid_t child = ::fork();
+        if (child == 0) {
+            static_cast<void>(::freopen("/dev/null", "w", stdout));
+            ::execl(VIBRIG, VIBRIG, "identify", path.c_str(), "--json", nullptr);
+            ::_exit(127);
+        }
+        int status = 0;
+        rusage used{};
+        EXPECT_EQ(::wait4(child, &status, 0, &used), child);
+        EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) <= 1) << status;
+        return static_cast<double>(used.ru_maxrss) / 1024;
+    };
+    const double small = memory_mb("50"), large = memory_mb("500");
+    // THEN the larger one needs 2 MB more at most, where a row alone has 88 bytes: 44 MB in all
+    EXPECT_LT(large, small + 2) << small << " MB of the small one";
+    EXPECT_LT(large, 100);
+}
+
+TEST_F(Identify, KnowsAClockThatGoesOnFromOneThatBeginsAnewInEachDwell) {
+    // GIVEN a rig whose bias walks, which shows over the campaign
+    record("--dwell 1 --write-truth truth.json");
+    Json truth = Json::parse(content_of(folder_ / "truth.json"));
+    truth["drift"]["bias_walk_deg_h_rt_h"] = 0.3;
+    write("truth.json", truth.dump());
+    record("--dwell 20 --truth truth.json");
+    const Json together = Json::parse(vibrig("identify rec.csv --json").out);
+    // WHEN the times of the same rows begin at 0 in each dwell
+    std::istringstream rows(content_of(folder_ / "rec.csv"));
+    std::string line, pair, text;
+    std::getline(rows, line);
+    text = line + "\n";
+    double begin_s = 0;
+    while (std::getline(rows, line)) {
+        const auto comma = line.find(',');
+        const std::string now =
+            line.substr(comma, line.find(',', line.find(',', comma + 1) + 1) - comma);
+        if (now != pair) begin_s = std::stod(line);
+        pair = now;
+        text += std::to_string(std::stod(line) - begin_s) + line.substr(comma) + "\n";
+    }
+    write("rec.csv", text);
+    const Json apart = Json::parse(vibrig("identify rec.csv --json").out);
+    // THEN the coefficients of a constant bias are the same, and those of one that walks are not
+    const auto first = [](const Json& result, const char* key) {
+        return result["parameters"][0][key].get<double>();
+    };
+    EXPECT_NEAR(first(together, "value_constant"), first(apart, "value_constant"), 1e-6);
+    EXPECT_GT(std::abs(first(together, "value") - first(apart, "value")), 1e-3);
 }
 
 TEST_F(Identify, UsesTheConfiguration) {
