@@ -86,15 +86,6 @@ void Procedure::look() {
 
 void Procedure::looked() {
     start_ = mean_.angle;
-    // First differences: what is wanted is the noise, not the drift of a free platform.
-    for (std::size_t c = 0; c < 3; ++c) {
-        double sum = 0;
-        for (std::size_t i = 1; i < samples_.size(); ++i)
-            sum +=
-                std::pow(std::remainder(samples_[i].angle[c] - samples_[i - 1].angle[c], 360.0), 2);
-        noise_[c] = std::sqrt(sum / 2 / std::max<double>(1, double(samples_.size()) - 1));
-        noise_[c] = std::max(noise_[c], 1e-9);
-    }
     const double size = norm(mean_.force);
     if (const auto unit = unit_of_force(size); !unit.empty())
         return conclude(Verdict::refused,
