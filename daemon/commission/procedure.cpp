@@ -92,13 +92,13 @@ void Procedure::ask(Question question, std::function<void(const std::string&)> t
 }
 
 void Procedure::ask_yes(const std::string& id, const std::string& text, const std::string& no,
-                        Then then) {
+                        Then then, const std::string& usual) {
     const auto yes_or_no = [](std::string& value) {
         if (value == "y") value = "yes";
         if (value == "n") value = "no";
         return value == "yes" || value == "no" ? "" : "yes or no";
     };
-    ask({id, text, "yes or no", "", yes_or_no},
+    ask({id, text, "yes or no", usual, yes_or_no},
         [this, no, then = std::move(then)](const std::string& value) {
             if (value == "yes") return then();
             conclude(Verdict::undecided, no);

@@ -101,7 +101,8 @@ class Procedure {
     // procedure.cpp: what asking, moving and averaging are
     [[nodiscard]] std::string open(const std::string& by, bool by_hand, drivers::Time now);
     void ask(Question question, std::function<void(const std::string&)> then);
-    void ask_yes(const std::string& id, const std::string& text, const std::string& no, Then then);
+    void ask_yes(const std::string& id, const std::string& text, const std::string& no, Then then,
+                 const std::string& usual = {});
     void move(const Vec3& travel_deg, Then then);
     void next_leg();
     void average(double seconds, Then then);
@@ -146,8 +147,12 @@ class Procedure {
     void small_move(std::size_t index);
     void small_moved();
     void confirm_name();
+    void name_gimbal(std::size_t gimbal);
     void next_gimbal();
     void hand_moved();
+    /// Which command moves a gimbal, as a person says; and a travel by gimbal as one by command.
+    [[nodiscard]] std::size_t slot_said(std::size_t gimbal) const;
+    [[nodiscard]] Vec3 by_slot(const Vec3& by_gimbal) const;
     void plan_sweeps();
     void next_stop();
 
@@ -235,7 +240,7 @@ class Procedure {
     Vec3 ratio_{};                         ///< reading per commanded deg, by channel; 0: not known
     std::array<int, 3> said_{-1, -1, -1};  ///< gimbal that a command moves, as a person says
     Vec3 respond_{};                       ///< gravity's turn over the gimbal's, of the first moves
-    Vec3 from_{};                          ///< where inner and azimuth are swept
+    double outer_deg_ = 0;                 ///< where inner and azimuth are swept
     struct Planned {
         Vec3 travel{};
         int slot = -1;  ///< swept

@@ -48,7 +48,7 @@ class Commissioned : public ::testing::Test {
     void slew(const Vec3& command) {
         ++slews;
         drifting_since = 0;
-        if (!based) base = command;
+        for (std::size_t i = 0; !based && i < 3; ++i) base[i] = command[i] - travel[i] / gain;
         based = true;
         double farthest = 0;
         for (std::size_t i = 0; i < 3; ++i) {
