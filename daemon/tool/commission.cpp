@@ -435,7 +435,7 @@ int state_gyros(const CommissionOptions& options) {
 }
 
 int commission(const CommissionOptions& options) {
-    constexpr std::array<std::string_view, 5> kShaker{"registers", "watchdog", "stop", "units",
+    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units",
                                                       "excitation"};
     constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
                                                         "earth"};
@@ -549,6 +549,7 @@ void add_commission(CLI::App& app, int& exit_code) {
     run_as(accepting, exit_code, accepted, accept_commission);
 
     add_commission_bus(commissioning, exit_code);
+    add_commission_registers(commissioning, exit_code);
 
     commissioning.callback([&commissioning, &exit_code, options] {
         if (!commissioning.get_subcommands().empty()) return;  // it has done its own

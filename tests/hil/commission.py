@@ -392,7 +392,7 @@ def dialogue(checks, programs, folder):
                 line.sendall(f"POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode())
                 checks.check(line.recv(4096).startswith(b"HTTP/1.1 "), f"{what} is answered")
         checks.check(u.rig.daemon.running(), "what makes no sense harms nobody", u.rig.logs())
-        other = subprocess.run([u.rig.program("vibrig"), "commission", "registers", "--by", "Ada", "--socket", u.rig.socket],
+        other = subprocess.run([u.rig.program("vibrig"), "commission", "units", "--by", "Ada", "--socket", u.rig.socket],
                                capture_output=True, text=True, check=False)
         checks.check(other.returncode == 2 and "safe-state proof" in other.stderr, "what is not there is said", other.stderr)
     finally:

@@ -105,6 +105,11 @@ class Expected:
                 break
             self.matrix = product([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], self.matrix)
             self.zero[2] += 90 * self.sign[2]
+        # Accelerometers that are turned alike, by their misalignment, define the azimuth zero (10' each, 1 sigma): one quantity.
+        turn = product(found["accelerometer.matrix"], inverse(self.matrix))
+        self.turn = (turn[1][0] - turn[0][1]) / 2
+        self.matrix = product([[1, -self.turn, 0], [self.turn, 1, 0], [0, 0, 1]], self.matrix)
+        self.zero[2] -= math.degrees(self.turn) * self.sign[2]
 
     def flip(self, *signs):
         for k in signs:
@@ -155,6 +160,7 @@ def compare(checks, seed, truth, result, minutes):
         f"matrix off by {matrix}": max(map(abs, matrix)) < 5e-3,
         f"azimuth {found['site.azimuth_deg']}, is {expected.azimuth}": off([found["site.azimuth_deg"]], [expected.azimuth]) < 1,
         f"elevation {found['site.elevation_deg']}, is {expected.elevation}": abs(found["site.elevation_deg"] - expected.elevation) < 0.05,
+        f"accelerometers turned by {expected.turn:.4f}": abs(expected.turn) < 4 * 10 / math.sqrt(2) * ARCMIN,
         f"{minutes:.1f} minutes": minutes < 15,
     }
     wrong = [what for what, so in good.items() if not so]
