@@ -13,6 +13,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/commission/procedure.hpp"
+#include "daemon/commission/progress.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/dwells/anew.hpp"
 #include "daemon/fleet/publisher.hpp"
@@ -115,6 +116,9 @@ class Daemon final : public StatusSource {
                                              const commission::Json& what, drivers::Time now);
     [[nodiscard]] CommandReply enter_in_record(const CommandRequest& request,
                                                const commission::Json& what, drivers::Time now);
+    [[nodiscard]] CommandReply begin_commissioning(const CommandRequest& request,
+                                                   const commission::Json& what, drivers::Time now);
+    [[nodiscard]] commission::Progress progress() const;
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,
                                                     const configuration::Loaded& file);

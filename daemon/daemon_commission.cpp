@@ -18,6 +18,7 @@ using drivers::Time;
 
 namespace {
 
+constexpr const char* kNoScript = "answers: persons answer on a real rig";
 constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 commission::Vec3 in_degrees(const std::array<double, 3>& rad) {
@@ -76,12 +77,24 @@ std::unique_ptr<commission::Procedure> Daemon::make_procedure() {
     ports.event = [this](Severity severity, const std::string& text) {
         log(severity, "commissioning", text);
     };
+    ports.keep = [this](const Json& log) {
+        try {
+            progress().write(procedure_->by(), procedure_->by_hand(), log, utc_now());
+        } catch (const std::exception& error) {
+            this->log(Severity::warning, "commissioning",
+                      std::string("what is done is not kept: ") + error.what());
+        }
+    };
     return std::make_unique<commission::Procedure>(
         std::move(names),
         commission::Stated{configuration_.estimator.latitude_deg,
                            configuration_.commission.linear_sigma,
                            configuration_.simulated() && !real_wire(configuration_.can)},
         std::move(ports));
+}
+
+commission::Progress Daemon::progress() const {
+    return {configuration_.commission.folder, Json(book_.keys(Part::bus))};
 }
 
 Time Daemon::step_commissioning(Time now) {
@@ -125,27 +138,22 @@ CommandReply Daemon::do_commission(const CommandRequest& request, const Json& wh
     if (word == "accept" || word == "state") return enter_in_record(request, what, now);
     if (word == "begin") {
         if (active) return {false, "the rig is being commissioned by " + procedure_->by()};
-        if (const auto why = guard_refuses(request); !why.empty()) return {false, why};
-        auto fresh = make_procedure();
-        const bool by_hand = what.contains("by_hand") && what["by_hand"] == true;
-        if (const auto why = fresh->begin(request.by, by_hand, now); !why.empty())
-            return {false, why};
-        if (const auto why = campaign_.begin_commissioning(request.by, now); !why.empty())
-            return {false, why};
-        procedure_ = std::move(fresh);
-        procedure_->attend(request.by, rt::wall_clock());
-        log(Severity::info, "commissioning", "begun by " + request.by);
-        return {true, "begun"};
+        return begin_commissioning(request, what, now);
     }
-    if (word != "answer" && word != "stop" && word != "end")
+    if (word != "answer" && word != "answers" && word != "stop" && word != "end")
         return {false, "commission: do: found \"" + word +
-                           "\", expected begin, read, answer, stop, end, accept or state"};
+                           "\", expected begin, read, answer, answers, stop, end, accept or state"};
     if (!active) return {false, "the rig is not being commissioned"};
     procedure_->attend(request.by, rt::wall_clock());
     if (word == "answer") {
         const auto why = procedure_->answer(request.by, text("id"), text("value"));
         if (!procedure_->active()) campaign_.end_commissioning(now);
         return {why.empty(), why.empty() ? "answered" : why};
+    }
+    if (word == "answers") {
+        if (!configuration_.simulated()) return {false, kNoScript};
+        procedure_->answer_all(what.value("answers", Json::object()));
+        return {true, "answered as they are asked"};
     }
     if (word == "stop") {
         procedure_->stop("by " + commission::name_of_person(request.by), now);
@@ -154,6 +162,33 @@ CommandReply Daemon::do_commission(const CommandRequest& request, const Json& wh
         campaign_.end_commissioning(now);
     }
     return {true, word == "stop" ? "stopped" : "ended"};
+}
+
+CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Json& what,
+                                         Time now) {
+    if (auto why = guard_refuses(request); !why.empty()) return {false, why};
+    const auto flag = [&what](const char* key) { return what.contains(key) && what[key] == true; };
+    const bool by_hand = flag("by_hand");
+    commission::Kept kept;
+    if (flag("resume")) kept = progress().read(request.by, by_hand, utc_now());
+    if (what.contains("ask") && what["ask"].is_string()) kept.again = what["ask"];
+    if (!kept.again.empty() && !kept.why_not.empty())
+        return {false, kept.why_not + ": there is nothing to ask again"};
+    if (what.contains("answers") && !configuration_.simulated()) return {false, kNoScript};
+    auto fresh = make_procedure();
+    if (auto why = fresh->refusal(by_hand); !why.empty()) return {false, why};
+    if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty())
+        return {false, why};
+    procedure_ = std::move(fresh);
+    if (what.contains("answers")) procedure_->answer_all(what["answers"]);
+    procedure_->attend(request.by, rt::wall_clock());
+    auto why = flag("resume") ? procedure_->begin_again(request.by, by_hand, kept, now)
+                              : procedure_->begin(request.by, by_hand, now);
+    if (!procedure_->active()) campaign_.end_commissioning(now);
+    if (!why.empty()) return {false, why};
+    log(Severity::info, "commissioning",
+        fmt::format("{} by {}", flag("resume") ? "taken up" : "begun", request.by));
+    return {true, "begun"};
 }
 
 CommandReply Daemon::enter_in_record(const CommandRequest& request, const Json& what, Time now) {
@@ -204,7 +239,9 @@ CommandReply Daemon::accept_commissioning(const CommandRequest& request, const s
     if (const auto why = commission::not_as_found(finding, file); !why.empty()) return {false, why};
     if (const auto why = commission::not_as_running(parts, finding, book_, file); !why.empty())
         return {false, why + ": it was not measured with that: commission anew"};
-    return record_parts(request, second, parts, finding.evidence, file);
+    auto reply = record_parts(request, second, parts, finding.evidence, file);
+    if (reply.accepted) progress().remove();
+    return reply;
 }
 
 CommandReply Daemon::record_parts(const CommandRequest& request, const std::string& second,

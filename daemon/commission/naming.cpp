@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/commission/procedure.hpp"
 
@@ -217,7 +218,7 @@ void Procedure::watch_azimuth() {
                     "done or -", "done",
                     [](std::string& v) { return v == "done" || v == "-" ? "" : "done or -"; }},
                    [this](const std::string& value) {
-                       if (value == "-") return next_drift();
+                       if (value == "-") return after_sense();
                        average(3, [this] { azimuth_turned(); });
                    });
     ask({"watch", "Next the AZIMUTH gimbal turns by 40 deg. Watch it, " + seen + ". Ready?", "yes",
@@ -234,20 +235,37 @@ void Procedure::watch_azimuth() {
 void Procedure::azimuth_turned() {
     const auto c = static_cast<std::size_t>(named_.channel[2]);
     const bool grew = unwrapped(mean_.angle, sense_before_.angle)[c] > sense_before_.angle[c];
-    const auto keep = [this](bool with_anticlockwise) {
+    const auto take = [this](bool with_anticlockwise) {
         said_of_rig_.sense = room::Statements::Sense{sense_before_.angle, with_anticlockwise};
-        next_drift();
+        after_sense();
     };
-    if (by_hand_) return keep(grew);
+    if (by_hand_) return take(grew);
     ask({"anticlockwise", "Seen from the upper end of its axis: did it turn anticlockwise?",
          "yes, no or - (not known)", "-", yes_no_or_unknown},
-        [this, keep, grew](const std::string& value) {
-            if (value == "-") return next_drift();
-            keep((value == "yes") == grew);
+        [this, take, grew](const std::string& value) {
+            if (value == "-") return after_sense();
+            take((value == "yes") == grew);
         });
 }
 
 void Procedure::ask_people() {
+    if (again_ == "sense") return ask_sense_again();
+    ask_latitude();
+}
+
+void Procedure::ask_sense_again() {
+    again_.clear();
+    sense_again_ = true;
+    // Where the azimuth axis stands upright.
+    move(plan_.front().travel, [this] { average(1, [this] { watch_azimuth(); }); });
+}
+
+void Procedure::after_sense() {
+    if (std::exchange(sense_again_, false)) return ask_latitude();
+    next_drift();
+}
+
+void Procedure::ask_latitude() {
     const auto latitude = [](std::string& value) {
         double number = 0;
         return number_in(value, -90, 90, number) ? "" : "-90 to 90";

@@ -30,12 +30,40 @@ double turned_deg(const Vec3& a, const Vec3& b) {
     return 2 * 57.29577951 * std::asin(std::min(1.0, chord / 2));
 }
 
+/// First differences: what is wanted is the noise, not the drift of a free platform.
+Vec3 noise_of(const std::vector<Look>& samples) {
+    Vec3 noise{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        double sum = 0;
+        for (std::size_t i = 1; i < samples.size(); ++i)
+            sum +=
+                std::pow(std::remainder(samples[i].angle[c] - samples[i - 1].angle[c], 360.0), 2);
+        noise[c] = std::sqrt(sum / 2 / std::max<double>(1, double(samples.size()) - 1));
+        noise[c] = std::max(noise[c], 1e-9);
+    }
+    return noise;
+}
+
 }  // namespace
 
 std::string Procedure::begin(const std::string& by, bool by_hand, Time now) {
-    if (!stated_.simulated && !by_hand)
-        return "this version moves no gimbal of a real rig by command: vibrig commission --by-hand";
+    auto why = open(by, by_hand, now);
+    if (why.empty()) ports_.keep(log_);
+    return why;
+}
+
+std::string Procedure::refusal(bool by_hand) const {
+    if (stated_.simulated || by_hand) return {};
+    return "this version moves no gimbal of a real rig by command: vibrig commission --by-hand";
+}
+
+std::string Procedure::open(const std::string& by, bool by_hand, Time now) {
+    if (auto why = refusal(by_hand); !why.empty()) return why;
+    Json script = std::move(script_);
+    const Time attended = attended_;
     *this = Procedure(std::move(names_), stated_, std::move(ports_));
+    script_ = std::move(script);
+    attended_ = attended;
     by_ = by;
     by_hand_ = by_hand;
     now_ = now;
@@ -50,23 +78,27 @@ void Procedure::attend(const std::string& by, Time wall) {
 
 void Procedure::tell(const std::string& line) {
     lines_.push_back(line);
-    ports_.event(Severity::info, line);
+    if (!replaying_) ports_.event(Severity::info, line);
 }
 
 void Procedure::ask(Question question, std::function<void(const std::string&)> then) {
     question_ = std::move(question);
     answered_ = std::move(then);
     doing_ = Doing::asking;
+    if (!left_.contains(question_.id)) return;
+    const std::string value = left_[question_.id];
+    left_.erase(question_.id);
+    take_said(value);
 }
 
 void Procedure::ask_yes(const std::string& id, const std::string& text, const std::string& no,
-                        Then then) {
+                        Then then, const std::string& usual) {
     const auto yes_or_no = [](std::string& value) {
         if (value == "y") value = "yes";
         if (value == "n") value = "no";
         return value == "yes" || value == "no" ? "" : "yes or no";
     };
-    ask({id, text, "yes or no", "", yes_or_no},
+    ask({id, text, "yes or no", usual, yes_or_no},
         [this, no, then = std::move(then)](const std::string& value) {
             if (value == "yes") return then();
             conclude(Verdict::undecided, no);
@@ -87,11 +119,33 @@ std::string Procedure::answer(const std::string& by, const std::string& id, std:
         return fmt::format("found \"{}\", expected {}", given, expected);
     ports_.event(Severity::info,
                  fmt::format("commissioning: {} {}, says {}", question_.text, value, by));
-    auto then = std::move(answered_);
-    doing_ = Doing::averaging;  // whatever comes next says what it does
-    question_ = {};
-    then(value);
+    take_answer(value);
     return {};
+}
+
+void Procedure::answer_by_script() {
+    std::string value;
+    if (!script_.is_object()) return;
+    if (script_.contains(question_.id)) {
+        Json& said = script_[question_.id];
+        Json one = said;
+        if (said.is_array() && !said.empty()) {
+            one = said.front();
+            if (said.size() > 1) said.erase(said.begin());
+        }
+        value = one.is_string() ? one.get<std::string>() : one.dump();
+    } else if (question_.usual.empty()) {
+        return;  // the tool says which one is missing
+    }
+    take_said(value);
+}
+
+/// What was said before it was asked.
+void Procedure::take_said(const std::string& value) {
+    tell("? " + question_.text);
+    tell("> " + (value.empty() ? question_.usual : value));
+    if (const auto why = answer(by_, question_.id, value); !why.empty())
+        halt(question_.id + ": " + why, now_);
 }
 
 Vec3 Procedure::within_travel(Vec3 travel) const {
@@ -131,7 +185,7 @@ void Procedure::move(const Vec3& travel, Then then) {
             still);
     }
     legs_.clear();
-    if (released_) travel_ = read_travel(travel_);
+    if (released_ && !replaying_) travel_ = read_travel(travel_);
     Vec3 between = asked_;
     for (std::size_t k = 0; k < 3; ++k)
         if (std::abs(asked_[k] - travel_[k]) >= kOneWay_deg) between[k] = 0;
@@ -161,12 +215,12 @@ void Procedure::next_leg() {
 void Procedure::command_to(const Vec3& command) {
     commanded_ = true;
     released_ = false;
-    ports_.slew(command, now_);
+    if (!replaying_) ports_.slew(command, now_);
 }
 
 void Procedure::release() {
     released_ = true;
-    ports_.release(now_);
+    if (!replaying_) ports_.release(now_);
 }
 
 void Procedure::average(double seconds, Then then) {
@@ -259,6 +313,8 @@ void Procedure::take_second(Time now) {
             mean_.force[i] += one.force[i] / static_cast<double>(seconds_.size());
         }
     }
+    if (noise_ == Vec3{}) noise_ = noise_of(samples_);
+    keep_mean();
     auto then = std::move(then_);
     then();
 }
@@ -303,7 +359,7 @@ void Procedure::stop(const std::string& why, Time now) {
     if (!active() || doing_ == Doing::asking) return;
     const bool drifted = doing_ == Doing::averaging && released_;
     stand();
-    interrupted_ = Interrupted{doing_, std::move(then_), drifted};
+    interrupted_ = Interrupted{doing_, std::move(then_), drifted, unkept_};
     tell("stopped: " + why);
     ask_yes("go_on", "Stopped: " + why + ". Go on?", "stopped: " + why,
             [this] { go_on_after_stop(); });
@@ -313,13 +369,15 @@ void Procedure::go_on_after_stop() {
     Interrupted was = std::move(*interrupted_);
     interrupted_.reset();
     if (was.doing != Doing::averaging) return move(asked_, std::move(was.then));
-    auto measure = [this, wanted = wanted_s_, then = std::move(was.then)] {
+    auto measure = [this, wanted = wanted_s_, unkept = was.unkept, then = std::move(was.then)] {
+        unkept_ = unkept;
         average(wanted, then);
     };
     if (by_hand_ || !released_) return measure();
     if (!was.drifted) return move(asked_, std::move(measure));
     move(asked_, [this, measure = std::move(measure)] {
         release();
+        unkept_ = true;  // it is, once already
         average(kLetGo_s, measure);
     });
 }
@@ -346,6 +404,7 @@ void Procedure::conclude(Verdict verdict, const std::string& why) {
 Time Procedure::step(Time now, Time wall) {
     now_ = now;
     if (!active()) return drivers::kNever;
+    if (doing_ == Doing::asking && wall - attended_ <= kAbsent) answer_by_script();
     if (doing_ != Doing::asking && !by_hand_ && wall - attended_ > kAbsent)
         stop(fmt::format("nobody has been at the tool for {:.0f} s", to_seconds(kAbsent)), now);
     if (doing_ == Doing::moving) watch_move(now);

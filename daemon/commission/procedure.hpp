@@ -28,6 +28,15 @@ struct Ports {
     std::function<void(drivers::Time now)> release;
     std::function<drivers::GimbalState()> gimbal;
     std::function<void(Severity, const std::string&)> event;
+    /// What was answered and measured so far, on disk when this returns: begin_again() takes it.
+    std::function<void(const Json& log)> keep;
+};
+
+/// What an earlier daemon kept of a procedure.
+struct Kept {
+    Json log = Json::array();
+    std::string why_not;  ///< it does not count; empty: it does
+    std::string again;    ///< asked once more: "latitude", "compass", "drawing" or "sense"
 };
 
 /// Something that a person is asked.
@@ -46,9 +55,19 @@ class Procedure {
     Procedure(Names names, Stated stated, Ports ports)
         : names_(std::move(names)), stated_(stated), ports_(std::move(ports)) {}
 
+    /// Why it cannot be begun so; empty: it can.
+    [[nodiscard]] std::string refusal(bool by_hand) const;
     /// `by_hand`: a person moves the gimbals, and nothing is commanded. Why it is not begun; empty:
     /// it is.
     [[nodiscard]] std::string begin(const std::string& by, bool by_hand, drivers::Time now);
+    /// The same, from where another one was, without moving: what it kept is answered and measured
+    /// already. Nothing moves before a new permission, and the last position is measured anew
+    /// first: where it is another, all begins anew.
+    [[nodiscard]] std::string begin_again(const std::string& by, bool by_hand, const Kept& kept,
+                                          drivers::Time now);
+    /// Answers by question, a list for one that comes again: what is asked is answered at once, so
+    /// that a script's rig does not wait for a tool. Simulated rigs only.
+    void answer_all(Json answers) { script_ = std::move(answers); }
     /// Why it is not taken; empty: it is. The person who began it answers, nobody else.
     [[nodiscard]] std::string answer(const std::string& by, const std::string& id,
                                      std::string value);
@@ -64,6 +83,7 @@ class Procedure {
 
     [[nodiscard]] bool active() const noexcept { return doing_ != Doing::nothing; }
     [[nodiscard]] const std::string& by() const noexcept { return by_; }
+    [[nodiscard]] bool by_hand() const noexcept { return by_hand_; }
     [[nodiscard]] const Finding& finding() const noexcept { return finding_; }
     /// Question, lines from number `after` on, and what was found.
     [[nodiscard]] Json state(std::size_t after) const;
@@ -79,8 +99,10 @@ class Procedure {
     using Then = std::function<void()>;
 
     // procedure.cpp: what asking, moving and averaging are
+    [[nodiscard]] std::string open(const std::string& by, bool by_hand, drivers::Time now);
     void ask(Question question, std::function<void(const std::string&)> then);
-    void ask_yes(const std::string& id, const std::string& text, const std::string& no, Then then);
+    void ask_yes(const std::string& id, const std::string& text, const std::string& no, Then then,
+                 const std::string& usual = {});
     void move(const Vec3& travel_deg, Then then);
     void next_leg();
     void average(double seconds, Then then);
@@ -93,11 +115,24 @@ class Procedure {
     void release();
     void command_to(const Vec3& command);
     void go_on_after_stop();
+    void answer_by_script();
+    void take_said(const std::string& value);
     /// Where the gimbals whose readings are understood stand, as travel from the start.
     [[nodiscard]] Vec3 read_travel(const Vec3& near) const;
     [[nodiscard]] std::string contradiction(const Look& seen) const;
     [[nodiscard]] Vec3 within_travel(Vec3 travel_deg) const;
     [[nodiscard]] Vec3 unwrapped(const Vec3& angle, const Vec3& near) const;
+
+    // progress.cpp: what is kept, and gone on from
+    void take_answer(const std::string& value);
+    void keep(Json entry);
+    void keep_mean();
+    void replay(const Json& log);
+    [[nodiscard]] bool replay_mean(const Json& entry);
+    void leave_answers(const Json& log, std::size_t from);
+    void permit_again();
+    void measure_again();
+    [[nodiscard]] std::string moved_since() const;
 
     // steps.cpp: A to D
     void ask_travel();
@@ -112,8 +147,12 @@ class Procedure {
     void small_move(std::size_t index);
     void small_moved();
     void confirm_name();
+    void name_gimbal(std::size_t gimbal);
     void next_gimbal();
     void hand_moved();
+    /// Which command moves a gimbal, as a person says; and a travel by gimbal as one by command.
+    [[nodiscard]] std::size_t slot_said(std::size_t gimbal) const;
+    [[nodiscard]] Vec3 by_slot(const Vec3& by_gimbal) const;
     void plan_sweeps();
     void next_stop();
 
@@ -126,7 +165,10 @@ class Procedure {
     void drifted();
     void watch_azimuth();
     void azimuth_turned();
+    void after_sense();
     void ask_people();
+    void ask_sense_again();
+    void ask_latitude();
     void ask_drawing();
     void decide();
     /// Travel that brings a gimbal of the description to an angle, the shorter way.
@@ -148,8 +190,26 @@ class Procedure {
         Doing doing = Doing::nothing;
         Then then;
         bool drifted = false;  ///< it was let go for a measurement
+        bool unkept = false;
     };
-    std::optional<Interrupted> interrupted_;  ///< by a stop
+    std::optional<Interrupted> interrupted_;  ///< by a stop, or the end of a daemon
+
+    // what is kept
+    Json log_ = Json::array(), script_;
+    Json left_ = Json::object();  ///< answers that stand, behind one that is asked again
+    std::string again_;
+    bool replaying_ = false;  ///< nothing is commanded, nobody is told
+    bool unkept_ = false;     ///< the mean being taken is one of a kept position
+    struct Held {
+        Vec3 travel{};
+        Look mean;
+    };
+    Held held_;  ///< the last position that was measured while commanded
+    struct Waiting {
+        Question question;
+        std::function<void(const std::string&)> answered;
+    };
+    std::optional<Waiting> waiting_;  ///< asked when the daemon ended
 
     // moving
     std::vector<Vec3> legs_;                 ///< to come, travel from the start, deg
@@ -180,7 +240,7 @@ class Procedure {
     Vec3 ratio_{};                         ///< reading per commanded deg, by channel; 0: not known
     std::array<int, 3> said_{-1, -1, -1};  ///< gimbal that a command moves, as a person says
     Vec3 respond_{};                       ///< gravity's turn over the gimbal's, of the first moves
-    Vec3 from_{};                          ///< where inner and azimuth are swept
+    double outer_deg_ = 0;                 ///< where inner and azimuth are swept
     struct Planned {
         Vec3 travel{};
         int slot = -1;  ///< swept
@@ -194,6 +254,7 @@ class Procedure {
     estimator::commissioning::Description named_;
     estimator::commissioning::Statements said_of_rig_;
     Look sense_before_;
+    bool sense_again_ = false;  ///< asked when all was measured
     Finding finding_;
 };
 

@@ -86,15 +86,6 @@ void Procedure::look() {
 
 void Procedure::looked() {
     start_ = mean_.angle;
-    // First differences: what is wanted is the noise, not the drift of a free platform.
-    for (std::size_t c = 0; c < 3; ++c) {
-        double sum = 0;
-        for (std::size_t i = 1; i < samples_.size(); ++i)
-            sum +=
-                std::pow(std::remainder(samples_[i].angle[c] - samples_[i - 1].angle[c], 360.0), 2);
-        noise_[c] = std::sqrt(sum / 2 / std::max<double>(1, double(samples_.size()) - 1));
-        noise_[c] = std::max(noise_[c], 1e-9);
-    }
     const double size = norm(mean_.force);
     if (const auto unit = unit_of_force(size); !unit.empty())
         return conclude(Verdict::refused,
@@ -258,9 +249,33 @@ void Procedure::confirm_name() {
          "outer, inner or azimuth", kGimbalNames[slot_], wrong},
         [this](const std::string& value) {
             const auto* const at = std::ranges::find(kGimbalNames, value);
-            said_[slot_] = static_cast<int>(at - kGimbalNames.begin());
-            move({}, [this] { next_gimbal(); });
+            const auto gimbal = static_cast<std::size_t>(at - kGimbalNames.begin());
+            if (gimbal == slot_) return name_gimbal(gimbal);
+            const auto& [least, most] = limits_deg_[gimbal];
+            ask_yes(
+                std::string("sure.") + kGimbalNames[slot_],
+                fmt::format("The command named {} moves the {} gimbal, then, which may travel "
+                            "{:+g} to {:+g} deg. Sure?",
+                            kLoudNames[slot_], kLoudNames[gimbal], least, most),
+                "nobody is sure which gimbal turned", [this, gimbal] { name_gimbal(gimbal); },
+                "yes");
         });
+}
+
+void Procedure::name_gimbal(std::size_t gimbal) {
+    said_[slot_] = static_cast<int>(gimbal);
+    move({}, [this] { next_gimbal(); });
+}
+
+std::size_t Procedure::slot_said(std::size_t gimbal) const {
+    return static_cast<std::size_t>(std::ranges::find(said_, static_cast<int>(gimbal)) -
+                                    said_.begin());
+}
+
+Vec3 Procedure::by_slot(const Vec3& by_gimbal) const {
+    Vec3 out{};
+    for (std::size_t g = 0; g < 3; ++g) out[slot_said(g)] = by_gimbal[g];
+    return out;
 }
 
 void Procedure::next_gimbal() {
@@ -269,9 +284,27 @@ void Procedure::next_gimbal() {
     std::ranges::sort(sorted);
     if (sorted != std::array<std::size_t, 3>{0, 1, 2})
         return conclude(Verdict::undecided, "two gimbals move the same angle channel");
+    auto names = said_;
+    std::ranges::sort(names);
+    if (names != std::array<int, 3>{0, 1, 2})
+        return conclude(Verdict::undecided,
+                        fmt::format("the commands OUTER INNER AZIMUTH move the {} {} {} gimbal, "
+                                    "says {}: one is wrong",
+                                    kGimbalNames[static_cast<std::size_t>(said_[0])],
+                                    kGimbalNames[static_cast<std::size_t>(said_[1])],
+                                    kGimbalNames[static_cast<std::size_t>(said_[2])], by_));
+    // Cables are the gimbals', whatever their commands are called.
+    const auto limits = limits_deg_;
+    const auto free = free_;
+    for (std::size_t g = 0; g < 3; ++g) {
+        limits_deg_[slot_said(g)] = limits[g];
+        free_[slot_said(g)] = free[g];
+    }
     careful_ = false;
-    if (respond_[1] < kHardlyResponds || respond_[2] < kHardlyResponds)
-        from_[0] = std::clamp(40.0, limits_deg_[0][0], limits_deg_[0][1]);
+    if (respond_[slot_said(1)] < kHardlyResponds || respond_[slot_said(2)] < kHardlyResponds) {
+        const auto& [least, most] = limits_deg_[slot_said(0)];
+        outer_deg_ = std::clamp(40.0, least, most);
+    }
     plan_sweeps();
 }
 
@@ -280,20 +313,21 @@ void Procedure::plan_sweeps() {
         {{0, 31, 73, 118}, {-25, -9, 11, 25}, {0, 31, 73, 118}}};
     constexpr std::array<Vec3, 4> kTogether{
         {{-60, 25, 100}, {-100, -25, 160}, {80, 25, -130}, {100, -20, -60}}};
-    const auto scaled = [this](std::size_t k, double travel, double farthest) {
-        const double limit = travel >= 0 ? limits_deg_[k][1] : -limits_deg_[k][0];
-        return travel * std::min(1.0, limit / farthest);
+    const auto scaled = [this](std::size_t g, double travel, double farthest) {
+        const auto& [least, most] = limits_deg_[slot_said(g)];
+        return travel * std::min(1.0, (travel >= 0 ? most : -least) / farthest);
     };
     plan_.clear();
-    for (std::size_t k = 0; k < 3; ++k) {
-        for (const double travel : sweeps[k]) {
-            Vec3 to = k == 0 ? Vec3{} : from_;
-            to[k] = scaled(k, travel, k == 1 ? 25 : 118);
-            plan_.push_back({to, static_cast<int>(k)});
+    for (std::size_t g = 0; g < 3; ++g) {
+        for (const double travel : sweeps[g]) {
+            Vec3 to{g == 0 ? 0 : outer_deg_, 0, 0};
+            to[g] = scaled(g, travel, g == 1 ? 25 : 118);
+            plan_.push_back({by_slot(to), static_cast<int>(slot_said(g))});
         }
     }
     for (const Vec3& to : kTogether)
-        plan_.push_back({{scaled(0, to[0], 100), scaled(1, to[1], 25), scaled(2, to[2], 160)}, -1});
+        plan_.push_back(
+            {by_slot({scaled(0, to[0], 100), scaled(1, to[1], 25), scaled(2, to[2], 160)}), -1});
     at_ = 0;
     tell(fmt::format("C  {} positions: each gimbal alone, then all together", plan_.size()));
     next_stop();

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kLongestName = 100;  // bytes
 constexpr std::size_t kLongestArgument = 200;
+constexpr std::size_t kLongestScript = 4096;
 
 std::string to_json(const google::protobuf::Message& message) {
     google::protobuf::util::JsonPrintOptions options;
@@ -211,7 +212,9 @@ CommandRequest parse_command(const std::string& json) {
         throw std::invalid_argument("by: empty, expected the name of the person who commands");
     }
     check_line("by", request.by, kLongestName);
-    check_line("argument", request.argument, kLongestArgument);
+    // Of commissioning it is a script's answers, too.
+    const bool script = request.kind == CommandRequest::Kind::commission;
+    check_line("argument", request.argument, script ? kLongestScript : kLongestArgument);
     if (request.kind == CommandRequest::Kind::acknowledge && request.argument.empty()) {
         throw std::invalid_argument("argument: empty, expected what is acknowledged");
     }

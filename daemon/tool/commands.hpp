@@ -24,6 +24,7 @@ void add_remote(
     int& exit_code);  ///< status, selftest, watch, events, arm, start, pause, resume, abort, ack
 void add_commission(CLI::App& app, int& exit_code);  ///< commission, its status and accept
 void add_commission_bus(CLI::App& commissioning, int& exit_code);
+void add_commission_registers(CLI::App& commissioning, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_reports(CLI::App& app, int& exit_code);  ///< report, compensate
 void add_certificate(CLI::App& app, int& exit_code);

@@ -45,9 +45,9 @@ constexpr std::size_t kColumns = 79;
 
 struct CommissionOptions {
     serve::Address at;
-    std::string by, second, answers, configuration;
+    std::string by, second, answers, configuration, ask;
     std::vector<std::string> parts;
-    bool json = false, by_hand = false, yes = false;
+    bool json = false, by_hand = false, yes = false, resume = false;
 };
 
 class CommissionRefused : public std::runtime_error {
@@ -118,9 +118,15 @@ class Dialogue {
                 throw CommissionRefused("the rig is being commissioned by " + began +
                                         ", who answers; vibrig abort ends it");
             print_wrapped(out_, "Going on with what " + began + " began.");
+            if (answers_)
+                commission_command(client_, options_.by,
+                                   {{"do", "answers"}, {"answers", answers_->all()}});
         } else {
-            commission_command(client_, options_.by,
-                               {{"do", "begin"}, {"by_hand", options_.by_hand}});
+            CommissionJson begin{{"do", "begin"}, {"by_hand", options_.by_hand}};
+            if (options_.resume || !options_.ask.empty()) begin["resume"] = true;
+            if (!options_.ask.empty()) begin["ask"] = options_.ask;
+            if (answers_) begin["answers"] = answers_->all();
+            commission_command(client_, options_.by, begin);
             out_ << "While a gimbal moves any key stops it.\n";
         }
         for (;;) {
@@ -135,30 +141,41 @@ class Dialogue {
                 result["simulated"] = state["simulated"];
                 return result;
             }
-            if (!procedure["question"].is_null())
+            const bool asked = !procedure["question"].is_null();
+            if (asked && !answers_)
                 ask(procedure["question"]);
+            else if (asked)
+                expect_answer(procedure["question"]);
             else if (KeyByKey keys; keys.pressed(kCommissionPoll))
                 commission_command(client_, options_.by, {{"do", "stop"}});
         }
     }
 
   private:
+    /// The daemon gives it, unless there is none.
+    void expect_answer(const CommissionJson& question) {
+        try {
+            answers_->expect_one_to(question);
+        } catch (const std::runtime_error&) {
+            commission_command(client_, options_.by, {{"do", "end"}});
+            throw;
+        }
+        std::this_thread::sleep_for(kCommissionPoll / 2);  // 10 commands a second
+    }
+
     void ask(const CommissionJson& question) {
         const std::string usual = question["usual"];
         std::string text = question["text"].get<std::string>() + " [" +
                            question["expected"].get<std::string>() +
                            (usual.empty() ? "" : "; Enter: " + usual) + "]";
         print_wrapped(out_, "? " + text);
-        const std::string answer = answers_ ? answers_->to(question) : typed();
-        if (answers_) out_ << "> " << (answer.empty() ? usual : answer) << std::endl;
+        const std::string answer = typed();
         try {
             commission_command(client_, options_.by,
                                {{"do", "answer"}, {"id", question["id"]}, {"value", answer}});
         } catch (const CommissionRefused& refused) {
-            if (answers_) throw;
             print_wrapped(out_, std::string("  ") + refused.what());
         }
-        if (answers_) std::this_thread::sleep_for(kCommissionPoll / 2);  // 10 commands a second
     }
 
     /// A line; meanwhile the daemon is told that somebody is there.
@@ -418,7 +435,7 @@ int state_gyros(const CommissionOptions& options) {
 }
 
 int commission(const CommissionOptions& options) {
-    constexpr std::array<std::string_view, 5> kShaker{"registers", "watchdog", "stop", "units",
+    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units",
                                                       "excitation"};
     constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
                                                         "earth"};
@@ -491,6 +508,14 @@ void add_commission(CLI::App& app, int& exit_code) {
     commissioning.add_flag("--by-hand", options->by_hand,
                            "Nothing is commanded: a person turns the gimbals. The only way with "
                            "a rig that is not simulated");
+    commissioning.add_flag("--resume", options->resume,
+                           "Go on where the daemon ended, by a new permission; where there is "
+                           "nothing to go on with it begins anew");
+    commissioning
+        .add_option("--ask", options->ask,
+                    "Ask once more what was answered, or was not: latitude, compass, drawing or "
+                    "sense; nothing else is measured again")
+        ->check(CLI::IsMember({"latitude", "compass", "drawing", "sense"}));
     commissioning.add_flag("--yes", options->yes, "gyros: do not ask; simulated rigs only");
     commissioning.add_flag("--json", options->json,
                            "The finding as JSON; the dialogue goes to standard error");
@@ -524,6 +549,7 @@ void add_commission(CLI::App& app, int& exit_code) {
     run_as(accepting, exit_code, accepted, accept_commission);
 
     add_commission_bus(commissioning, exit_code);
+    add_commission_registers(commissioning, exit_code);
 
     commissioning.callback([&commissioning, &exit_code, options] {
         if (!commissioning.get_subcommands().empty()) return;  // it has done its own

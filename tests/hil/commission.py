@@ -2,7 +2,7 @@
 """Commissioning by script, on the seqpacket bus and the rig's clock: a simulated rig whose wiring is unknown is moved, named, recorded
 and armed; one that hides something ends undecided or refused, with the reason.
 
-usage: commission.py PROGRAMS
+usage: commission.py PROGRAMS [--soak]     killed at some steps; at all
 """
 import fcntl
 import hashlib
@@ -175,40 +175,51 @@ def whole(checks, programs, folder, seed):
         with open(u.rig.configuration, encoding="utf-8") as file:
             text = file.read()
         checks.check("# SIMULATED: ln LR" in text, "the configuration's comments say so, too", text)
-        signs = str(keys["platform.encoder_sign"])
-        wrong = str([1, -keys["platform.encoder_sign"][1], keys["platform.encoder_sign"][2]])
-        with open(u.rig.configuration, "w", encoding="utf-8") as file:
-            file.write(text.replace("encoder_sign = " + signs, "encoder_sign = " + wrong))
-        u.restart()
-        edited = tool("arm", "--by", "Ada")
-        checks.check(f"platform.encoder_sign is {wrong}, was proven as {signs} by Ada" in edited.stderr, "an edited key voids its part",
-                     edited.stderr)
-        with open(u.record, encoding="utf-8") as file:
-            recorded = file.read()
-        for key, old, new, suspect in (("platform.encoder_sign", signs, wrong, "platform.encoder_sign"),
-                                       ("site.latitude_deg", None, None, "site.latitude_deg")):
-            with open(u.rig.configuration, "w", encoding="utf-8") as file:
-                if old is None:
-                    old = re.search(r"latitude_deg = (-?[\d.]+)", text)[1]
-                    new = old[1:] if old.startswith("-") else "-" + old
-                name = key.partition(".")[2]
-                file.write(text.replace(f"{name} = {old}", f"{name} = {new}"))
-            with open(u.record, "w", encoding="utf-8") as file:
-                file.write(recorded)
-            u.restart()
-            forge(u, key)
-            u.restart()
-            if tool("arm", "--by", "Ada").returncode:
-                tool("selftest", "--by", "Ada", timeout=120)   # its proof stands on some of the keys
-                checks.equal(tool("arm", "--by", "Ada").returncode, 0, f"{key} is wrong and the record forged: it is armed")
-            tool("start", "--by", "Ada")
-            last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
-            reason = r.state_of(last)
-            suspects = reason.partition("suspects: ")[2].rstrip(")")
-            checks.check(reason.startswith("aborted (opening check") and any(s.startswith(suspect) for s in suspects.split("; ")[:3]) and
-                         not last["campaign"].get("dwells"), f"and {key} is caught before the table moves", reason)
+        each_key_is_caught_twice(checks, u, text)
     finally:
         u.rig.stop()
+
+
+def turned(value, by):
+    return round(remainder(value + by), 4)
+
+
+WRONG = (
+    ("platform.encoder_sign", lambda v: [1, -v[1], v[2]]),
+    ("platform.encoder_zero_deg", lambda v: [v[0], turned(v[1], 5), v[2]]),
+    ("accelerometer.matrix", lambda v: [[row[1], row[0], row[2]] for row in v]),   # two exchanged
+    ("accelerometer.matrix", lambda v: [[-x for x in row] for row in v]),
+    ("site.latitude_deg", lambda v: -v),
+    ("site.azimuth_deg", lambda v: turned(v, 90)),
+)
+
+
+def each_key_is_caught_twice(checks, u, text):
+    """By the record, and where that is forged by the opening check, before the table moves."""
+    with open(u.record, encoding="utf-8") as file:
+        recorded = file.read()
+    for key, change in WRONG:
+        name = key.partition(".")[2]
+        was = re.search(rf"^{name} = (.*?)(  #.*)?$", text, re.M)
+        wrong = json.dumps(change(json.loads(was[1])))
+        for path, content in ((u.rig.configuration, text[:was.start(1)] + wrong + text[was.end(1):]), (u.record, recorded)):
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(content)
+        u.restart()
+        edited = u.rig.tool("arm", "--by", "Ada")
+        checks.check(edited.returncode == 1 and f"{key} is " in edited.stderr and f"was proven as {was[1]} by Ada" in edited.stderr,
+                     f"an edited {key} voids its part: {wrong}", edited.stderr)
+        forge(u, key)
+        u.restart()
+        if u.rig.tool("arm", "--by", "Ada").returncode:
+            u.rig.tool("selftest", "--by", "Ada", timeout=120)   # its proof stands on some of the keys
+            checks.equal(u.rig.tool("arm", "--by", "Ada").returncode, 0, f"{key} is wrong and the record forged: it is armed")
+        u.rig.tool("start", "--by", "Ada")
+        last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
+        reason = r.state_of(last)
+        suspects = reason.partition("suspects: ")[2].rstrip(")")
+        checks.check(reason.startswith("aborted (opening check") and any(s.startswith(key) for s in suspects.split("; ")[:3]) and
+                     not last["campaign"].get("dwells"), f"and {key} is caught before the table moves", reason)
 
 
 def forge(unknown, key):
@@ -229,6 +240,56 @@ def forge(unknown, key):
     record["signature"] = signature
     with open(unknown.record, "w", encoding="utf-8") as file:
         json.dump(record, file)
+
+
+KILLS = (12, 60, 72, 76, 80)   # of what is kept on disk, by its number
+
+
+def killed(checks, programs, folder, kills):
+    """SIGKILL at any step: nothing moves before a new permission, and what is found is the same."""
+    u = Unknown(checks, programs, folder, drawn(5))
+    library, at = os.path.join(folder, "die_at.so"), os.path.join(folder, "die-at")
+    subprocess.run(["c++", "-shared", "-fPIC", "-O1", "-o", library, os.path.join(os.path.dirname(os.path.abspath(__file__)), "die_at.cpp")],
+                   check=True)
+    progress = os.path.join(os.path.dirname(u.record), "progress.json")
+    try:
+        _, whole_run = u.commission()
+        whole_keys = whole_run["found"]
+        with open(progress, encoding="utf-8") as file:
+            checks.check(len(json.load(file)["log"]) > KILLS[-2], "what is done is kept")
+        for kill in kills:
+            u.rig.daemon.end()
+            u.rig.daemon = r.Child("vibrigd", [u.rig.program("vibrigd"), "--config", u.rig.configuration], folder,
+                                   {"LD_PRELOAD": library, "DIE_AT": at})
+            u.rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("rest") == "at rest" and readings(s).get("outer") is not None, 60)
+            answers = u.answers(**{"permit.resume": "yes"})
+            with open(at, "w", encoding="ascii") as file:
+                file.write(f"{kill} rename")
+            first = u.rig.tool("commission", "--by", "Ada", "--json", "--answers", answers, timeout=300)
+            dead = not u.rig.daemon.running()
+            os.unlink(at)
+            if not dead:
+                checks.check(kill > KILLS[-2], f"killed at its {kill}th step", first.stderr + u.rig.logs())
+                continue
+            u.start()
+            before = readings(u.rig.status())
+            silent = os.path.join(folder, "silent.json")
+            with open(silent, "w", encoding="utf-8") as file:
+                json.dump({}, file)
+            asked = u.rig.tool("commission", "--by", "Ada", "--resume", "--answers", silent)
+            after = readings(u.rig.status())
+            checks.check(asked.returncode == 2 and ('"permit.resume"' in asked.stderr or '"power"' in asked.stderr) and
+                         all(abs(remainder(after[g] - before[g])) < 0.1 for g in ("outer", "inner", "azimuth")),
+                         f"killed at its {kill}th step: without a permission nothing moves", asked.stderr)
+            run = u.rig.tool("commission", "--by", "Ada", "--json", "--resume", "--answers", answers, timeout=300)
+            found = json.loads(run.stdout or "{}").get("found", {})
+            same = run.returncode == 0 and found.get("platform.encoder_sign") == whole_keys["platform.encoder_sign"] and all(
+                abs(remainder(a - b)) < 0.1 for a, b in zip(found["platform.encoder_zero_deg"], whole_keys["platform.encoder_zero_deg"])) and \
+                abs(remainder(found["site.azimuth_deg"] - whole_keys["site.azimuth_deg"])) < 1
+            checks.check(same, f"and the same is found: {[l for l in run.stderr.splitlines() if 'Going on' in l or 'anew' in l]}",
+                         run.stderr + u.rig.logs())
+    finally:
+        u.rig.stop()
 
 
 def hidden(checks, programs, folder, truth, others, outcome, word):
@@ -331,7 +392,7 @@ def dialogue(checks, programs, folder):
                 line.sendall(f"POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode())
                 checks.check(line.recv(4096).startswith(b"HTTP/1.1 "), f"{what} is answered")
         checks.check(u.rig.daemon.running(), "what makes no sense harms nobody", u.rig.logs())
-        other = subprocess.run([u.rig.program("vibrig"), "commission", "registers", "--by", "Ada", "--socket", u.rig.socket],
+        other = subprocess.run([u.rig.program("vibrig"), "commission", "units", "--by", "Ada", "--socket", u.rig.socket],
                                capture_output=True, text=True, check=False)
         checks.check(other.returncode == 2 and "safe-state proof" in other.stderr, "what is not there is said", other.stderr)
     finally:
@@ -386,6 +447,8 @@ def main():
     checks = r.Checks()
     with tempfile.TemporaryDirectory() as folder:
         whole(checks, programs, folder, 2)
+    with tempfile.TemporaryDirectory() as folder:
+        killed(checks, programs, folder, range(1, 88) if "--soak" in sys.argv else KILLS)
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)

@@ -185,6 +185,7 @@ def played(checks, programs, folder, line, part):
         part(checks, rig, "TCP")
         rig.rest()
         checks.equal(rig.daemon.end(timeout=SOON), 0, "vibrigd ends with status 0")
+        checks.check(not any("written beyond the map" in line for line in rig.said()), "only registers that were stated were written", rig.said())
     finally:
         rig.stop()
 

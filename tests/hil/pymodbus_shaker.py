@@ -51,6 +51,8 @@ class Holding(ModbusSequentialDataBlock):
     def setValues(self, address, values):
         super().setValues(address, values)
         count = len(values) if isinstance(values, list) else 1
+        if address + count > TIMEOUT + 1:
+            print(f"written beyond the map: {address}", flush=True)
         self.stopped = self.stopped or (address <= RUN < address + count and self.values[RUN] == 0)
 
 
@@ -195,5 +197,6 @@ async def main():
     playing.cancel()
 
 
-logging.disable()   # it calls the end of a connection an error
-asyncio.run(main())
+if __name__ == "__main__":
+    logging.disable()   # it calls the end of a connection an error
+    asyncio.run(main())

@@ -40,6 +40,7 @@ class Commissioned : public ::testing::Test {
             return now >= arrives ? drivers::GimbalState::in_position
                                   : drivers::GimbalState::slewing;
         };
+        p.keep = [this](const Json& log) { kept = log; };
         p.event = [this](Severity, const std::string& text) { events.push_back(text); };
         return p;
     }
@@ -47,7 +48,7 @@ class Commissioned : public ::testing::Test {
     void slew(const Vec3& command) {
         ++slews;
         drifting_since = 0;
-        if (!based) base = command;
+        for (std::size_t i = 0; !based && i < 3; ++i) base[i] = command[i] - travel[i] / gain;
         based = true;
         double farthest = 0;
         for (std::size_t i = 0; i < 3; ++i) {
@@ -175,6 +176,7 @@ class Commissioned : public ::testing::Test {
     Vec3 base{}, travel{}, most_travel{}, by_hand_deg{};
     estimator::commissioning::FreeDrift drift;
     int slews = 0, released = 0;
+    Json kept;  ///< what is on disk
 };
 
 }  // namespace vibrig::commission
