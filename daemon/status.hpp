@@ -185,6 +185,7 @@ struct NoiseStatus {
         bool alarm = false;
         std::vector<double> tau_s;
         std::array<std::vector<double>, 3> deviation_deg_h;  ///< by gyro
+        std::array<std::vector<double>, 3> classical_deg_h;  ///< about the dwell's own mean
     };
     static constexpr std::size_t kMostCurves = 128;
     std::array<Gyro, 3> gyros;

@@ -69,4 +69,9 @@ class Kinematics {
 [[nodiscard]] std::array<double, 3> encoder_deg(const Settings& settings,
                                                 const std::array<double, 3>& gimbal_deg) noexcept;
 
+/// Encoder angles within half a turn with the azimuth axis upright, platform z up or down, and this
+/// turn of the azimuth gimbal, deg. Throws SettingsError where the gimbals cannot do that.
+[[nodiscard]] std::array<double, 3> azimuth_upright_deg(const Settings& settings,
+                                                        double azimuth_deg, bool down);
+
 }  // namespace vibrig::estimator

@@ -55,24 +55,7 @@ double RigFrame::azimuth(const Vector& encoder_rad) const {
 }
 
 Vector RigFrame::azimuth_vertical_deg(double azimuth_deg, bool down) const {
-    // The outer gimbal turns about x: it takes y to z, never x.
-    if (settings_.up.axis == 0) {
-        throw estimator::SettingsError(
-            "platform.up: x, expected y or z for zeroing: the azimuth axis cannot be vertical "
-            "without the inner gimbal beyond 80 deg");
-    }
-    double outer = settings_.up.axis == 1 ? 90 * settings_.up.sign : 90 - 90 * settings_.up.sign;
-    if (down) outer += 180;
-    // Where the base leans along the north axis: x with up along y, y with up along z.
-    double inner = 0;
-    if (settings_.up.axis == 1) {
-        inner = down ? settings_.elevation_deg : -settings_.elevation_deg;
-    } else {
-        outer += settings_.up.sign * settings_.elevation_deg;
-    }
-    Vector encoder = estimator::encoder_deg(settings_, {outer, inner, azimuth_deg});
-    for (double& angle : encoder) angle = std::remainder(angle, 360.0);
-    return encoder;
+    return estimator::azimuth_upright_deg(settings_, azimuth_deg, down);
 }
 
 Vector RigFrame::force(const Vector& raw, double one) const {

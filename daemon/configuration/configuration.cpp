@@ -188,6 +188,15 @@ void to_readings(Configuration& c) {
     for (auto& stop : c.campaign.stops) convert(stop.position_deg);
 }
 
+/// A default that depends on another key: zeros both ways where the outer gimbal turns that far.
+void take_the_ways_of_zeroing(Configuration& c) {
+    if (!c.campaign.zeroing || c.estimator.up.axis == 0) return;  // refused elsewhere
+    const auto& travel = c.gimbal.travel_deg[0];
+    const double outer_deg = estimator::azimuth_upright_deg(c.estimator, 0, true)[0];
+    c.campaign.zero.both_ways =
+        travel[1] - travel[0] >= 360 || drivers::within_travel(outer_deg, travel).has_value();
+}
+
 /// Where the opening check looks, as far as the travel allows it: the azimuth axis upright this way
 /// or that, and all gimbals turned.
 std::vector<campaign::OpeningStop> opening_stops(const Configuration& c) {
@@ -263,6 +272,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     Problems problems;
     Reader reader(c, problems);
     reader.read(table, "");
+    if (!reader.places().contains("zeroing.both_ways")) take_the_ways_of_zeroing(c);
     loaded.effective = effective_of(c, name, reader.places());
 
     const double factor = to_g_peak(c.amplitude_unit, c.estimator.gravity_mps2);

@@ -60,7 +60,8 @@ void add_zeroing_keys(std::vector<Key>& keys) {
     zero("slew_deg_per_s", "deg/s", {0.1, 25}, "rate of the azimuth gimbal, checked",
          &Z::slew_deg_per_s);
     keys.push_back(boolean("zeroing.both_ways",
-                           "platform z down too: zeros apart from misalignment and scale error",
+                           "platform z down too: zeros apart from misalignment and scale error; "
+                           "default: where gimbal.travel_deg lets it",
                            [](C& c) -> bool& { return c.campaign.zero.both_ways; }));
     zero("scale_factor", "", {0, 0.1}, "of the accelerometers, not known better, 1 sigma",
          &Z::scale_factor);

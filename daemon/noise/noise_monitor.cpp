@@ -299,11 +299,12 @@ void NoiseMonitor::learn(const std::array<DwellAngles, 3>& angles) {
 
 void NoiseMonitor::draw(const estimator::DwellSummary& dwell,
                         const std::array<DwellAngles, 3>& angles, bool alarm) {
-    NoiseStatus::Curve curve{dwell.run, dwell.position, alarm, {}, {}};
+    NoiseStatus::Curve curve{dwell.run, dwell.position, alarm, {}, {}, {}};
     for (std::size_t j = 0; j < 3; ++j) {
         for (const auto& point : DwellMonitor::curve_of(angles[j])) {
             if (j == 0) curve.tau_s.push_back(point.tau_s);
             curve.deviation_deg_h[j].push_back(point.deviation);
+            curve.classical_deg_h[j].push_back(point.classical);
         }
     }
     // Readers keep what they have: a status is taken by other threads.

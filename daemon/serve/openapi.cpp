@@ -124,8 +124,8 @@ constexpr std::array<Path, 13> kPaths{{
      "steps of equal length; null where nothing is known.",
      "application/json", nullptr, kHistoryParameters},
     {"/api/v1/surface",
-     "Modified Allan deviation of the residuals of each gyro in each of the newest 128 dwells, by "
-     "averaging time; those with an alarm too.",
+     "Modified Allan and classical deviation of the residuals of each gyro in each of the newest "
+     "128 dwells, by averaging time; those with an alarm too.",
      "application/json", "Surface"},
     {"/api/v1/config", "The configuration in force, as vibrigd --check prints it.",
      "application/json", "Configuration"},

@@ -139,6 +139,9 @@ std::string surface_json(const NoiseStatus& noise) {
             to.add_x_deg_h(x[i]);
             to.add_y_deg_h(y[i]);
             to.add_z_deg_h(z[i]);
+            to.add_x_classical_deg_h(curve.classical_deg_h[0][i]);
+            to.add_y_classical_deg_h(curve.classical_deg_h[1][i]);
+            to.add_z_classical_deg_h(curve.classical_deg_h[2][i]);
         }
     }
     return to_json(message);

@@ -18,10 +18,11 @@ namespace {
 
 constexpr std::size_t kLongestNumber = 4096;
 
-/// One number; an empty line and "nan" are a missing sample.
+/// One number; an empty line, "nan" and JSON's "null" are a missing sample.
 double live_sample(std::string_view line, std::size_t number) {
     const std::string_view text = proto::trimmed(line);
-    if (text.empty() || text == "nan" || text == "NaN" || text == "NA") return kNaN;
+    if (text.empty() || text == "nan" || text == "NaN" || text == "NA" || text == "null")
+        return kNaN;
     double value = 0;
     if (text.size() > kLongestNumber || !proto::read_number(text, value) ||
         !(std::abs(value) <= kLargestValue)) {

@@ -45,6 +45,7 @@ struct Options {
     bool json = false;
     std::string plot;
     std::string file;
+    std::string down;  ///< the same with z down
     std::string azimuth = "azimuth_deg";
     // simulate
     std::vector<double> zero_mg{5, -5, 5};
@@ -205,9 +206,17 @@ std::string apart_table(const zeros::ZerosApart& apart) {
 }
 
 int report(const Options& options, const zeros::Calibration& run,
-           const std::optional<zeros::ZerosApart>& apart) {
+           const std::optional<zeros::Calibration>& down) {
     const zeros::CalibrationSettings s = settings_of(options);
-    const zeros::CalibrationResult result = run.result();
+    zeros::CalibrationResult result = run.result();
+    std::optional<zeros::ZerosApart> apart;
+    if (down) {
+        const zeros::CalibrationResult below = down->result();
+        apart = zeros::separate(result, below);
+        result.valid = result.valid && below.valid;
+        for (const std::string& problem : below.problems)
+            result.problems.push_back("z down: " + problem);
+    }
     const zeros::Observability seen = zeros::observability(s.plan.segments_deg(), s.site);
     if (!options.plot.empty()) {
         plot::write_file(options.plot, chart_of(run.trace()).svg());
@@ -227,25 +236,23 @@ int report(const Options& options, const zeros::Calibration& run,
     return result.valid ? 0 : kNo;
 }
 
-int run_file(const Options& options) {
-    if (options.file.empty()) {
-        throw std::invalid_argument("zero: FILE or `simulate` expected");
-    }
+zeros::Calibration calibration_of(const Options& options, const std::string& file, bool down) {
     zeros::CalibrationSettings settings = settings_of(options);
+    settings.inverted = settings.inverted || down;
     // Of a file the reference is zero: how still the unit may have stood, not a measured noise.
     settings.noise.reference_is_bound = true;
     zeros::Calibration calibration(settings);
-    Progress progress("reading " + options.file);
+    Progress progress("reading " + file);
     const auto show = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
     std::array<ColumnFile, 6> columns;
     for (std::size_t i = 0; i < 6; ++i) {
         const std::string name = i < 3 ? std::string("turn_") + kAxisLetters[i] + "_arcsec"
                                        : std::string("dv_") + kAxisLetters[i - 3] + "_mps";
-        columns[i] = read_columns(options.file, {name, "time_s"}, show);
+        columns[i] = read_columns(file, {name, "time_s"}, show);
     }
     ColumnFile azimuth;
     if (options.azimuth != "none") {
-        azimuth = read_columns(options.file, {options.azimuth, "time_s"}, show);
+        azimuth = read_columns(file, {options.azimuth, "time_s"}, show);
     }
     for (std::size_t k = 0; k < columns[0].values.size(); ++k) {
         zeros::Increment in;
@@ -257,7 +264,17 @@ int run_file(const Options& options) {
         in.azimuth_rad = azimuth.values.empty() ? std::nan("") : azimuth.values[k] * kDegree;
         if (!calibration.add(in)) break;
     }
-    return report(options, calibration, {});
+    return calibration;
+}
+
+int run_file(const Options& options) {
+    if (options.file.empty()) {
+        throw std::invalid_argument("zero: FILE or `simulate` expected");
+    }
+    const zeros::Calibration up = calibration_of(options, options.file, false);
+    std::optional<zeros::Calibration> down;
+    if (!options.down.empty()) down = calibration_of(options, options.down, true);
+    return report(options, up, down);
 }
 
 void write_increments(const Options& options, const zeros::CalibrationSettings& s,
@@ -301,14 +318,12 @@ int run_simulate(const Options& options) {
         return 0;
     }
     const zeros::Calibration up = zeros::simulate(s, errors, options.period_s, options.seed);
-    std::optional<zeros::ZerosApart> apart;
+    std::optional<zeros::Calibration> down;
     if (options.both_ways) {
         s.inverted = true;
-        const zeros::Calibration down =
-            zeros::simulate(s, errors, options.period_s, options.seed + 1);
-        apart = zeros::separate(up.result(), down.result());
+        down = zeros::simulate(s, errors, options.period_s, options.seed + 1);
     }
-    return report(options, up, apart);
+    return report(options, up, down);
 }
 
 void add_common(CLI::App& command, Options& o) {
@@ -373,8 +388,14 @@ void add_zero(CLI::App& app, int& exit_code) {
     command->add_option("--azimuth", options->azimuth,
                         "column of the azimuth read-out (azimuth_deg), or none");
     add_common(*command, *options);
+    command
+        ->add_option("--down", options->down,
+                     "the same unit with platform z down, a second file: zeros apart from "
+                     "misalignment and scale error")
+        ->excludes("--inverted");
     command->footer(
         "Example: vibrig zero increments.csv --slews 0,90,-90,90 --rate 5 --plot zeros.svg\n"
+        "         vibrig zero up.csv --down down.csv\n"
         "Exit codes: 0 valid, 1 not valid (says why), 2 bad usage or input.");
     CLI::App* simulate = command->add_subcommand("simulate", "A simulated unit instead of a file");
     add_common(*simulate, *options);

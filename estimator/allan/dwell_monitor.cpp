@@ -31,6 +31,31 @@ VectorXd centred(const DwellAngles& dwell) {
     return (angle.array() - angle[0]).matrix();
 }
 
+/// Variance of averages over m blocks side by side in the longest part without gaps, about the mean
+/// of just those, over all positions of the first. For blocks of unit length.
+double classical_variance_of(const VectorXd& angle, const std::vector<std::size_t>& present,
+                             std::size_t m) {
+    std::size_t first = 0, count = 0;
+    for (std::size_t from = 0, i = 1; i <= present.size(); ++i) {
+        if (i < present.size() && present[i] == present[i - 1] + 1) continue;
+        if (i - from > count) {
+            first = from;
+            count = i - from;
+        }
+        from = i;
+    }
+    const std::size_t tiles = (count - 1) / m;  // two at least: an octave has 3 m blocks in a row
+    const auto at = [&](std::size_t i) { return angle[static_cast<Eigen::Index>(first + i)]; };
+    double sum = 0;
+    const std::size_t covered = tiles * m;
+    for (std::size_t start = 0; start + covered < count; ++start) {
+        const double mean = (at(start + covered) - at(start)) / static_cast<double>(tiles);
+        for (std::size_t i = start; i < start + covered; i += m)
+            sum += squared(at(i + m) - at(i) - mean);
+    }
+    return sum / (static_cast<double>(tiles * (count - covered)) * squared(static_cast<double>(m)));
+}
+
 double scale_of(std::size_t slow_term, double block_s) {
     return std::pow(block_s, static_cast<double>(slow_term) + 2);
 }
@@ -200,7 +225,10 @@ std::vector<DwellPoint> DwellMonitor::curve_of(const DwellAngles& dwell) {
         const double tau = static_cast<double>(octave.m) * dwell.block_s;
         const auto differences = static_cast<double>(octave.differences.rows());
         const double sum = (octave.differences * angles).squaredNorm();
-        curve.push_back({tau, std::sqrt(sum / (2 * differences)) / tau, 0});
+        const double classical =
+            std::sqrt(classical_variance_of(angles, dwell.basis->present(), octave.m));
+        curve.push_back(
+            {tau, std::sqrt(sum / (2 * differences)) / tau, 0, classical / dwell.block_s});
     }
     return curve;
 }

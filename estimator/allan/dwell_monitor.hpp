@@ -28,6 +28,8 @@ struct DwellPoint {
     double tau_s = 0;
     double deviation = 0;  ///< deg/h
     double expected = 0;   ///< of the identified resolver noise and random walk, deg/h
+    /// Classical: of rates averaged side by side about their own mean, deg/h. Of one dwell only.
+    double classical = 0;
 };
 
 struct DwellMonitorSettings {
@@ -60,7 +62,7 @@ class DwellMonitor {
     /// the newest dwell's level. Zeros before learn().
     [[nodiscard]] const std::array<FittedTerm, kTerms>& terms() const { return terms_; }
     /// Of one dwell alone, by growing averaging time; `expected` stays 0. One row of the dynamic
-    /// surface (docs/theory/dynamic-allan.md).
+    /// surface (docs/theory/allan.md).
     [[nodiscard]] static std::vector<DwellPoint> curve_of(const DwellAngles& dwell);
     /// Measured, by growing averaging time; none before learn().
     [[nodiscard]] std::vector<DwellPoint> points() const;

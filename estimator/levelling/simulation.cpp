@@ -81,8 +81,8 @@ SimulatedStart simulate(const Scenario& scenario) {
             input.reference[i] = scenario.internal ? 0 : velocity[i] + error;
         }
         for (std::size_t i = 0; k == 0 && i < 2; ++i) {
-            conventional[i].start(input.reference[i]);
-            plain[i].start(input.reference[i]);
+            conventional[i].start(input.reference[i] + scenario.start_velocity[i]);
+            plain[i].start(input.reference[i] + scenario.start_velocity[i]);
         }
         Pair rate{};
         if (scenario.network == Network::fast) {

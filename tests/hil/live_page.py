@@ -350,6 +350,7 @@ def check_page(checks, rig, page, address, remote, pki):
                  "the keyboard reaches the page's first link")
     page.ask("evaluate", script="document.activeElement.blur()")
     until("measured points are in the Allan plot", "document.getElementById('c-allan').dataset.points >= 6", 60)
+    until("and the classical deviation beside them", "Number(document.getElementById('c-allan').dataset.classical) >= 6", 60)
     until("the dynamic surface has a column for each dwell judged", "Number(document.getElementById('surface').dataset.dwells) === "
           "document.getElementById('surface').width && document.getElementById('surface').width >= 3", 60)
     until("and what is above the expected is red, below it blue", "(() => { const c = document.getElementById('surface'), "

@@ -27,7 +27,7 @@ const Draw = (() => {
         axes: [minutes, log], series: [{}, line(0), line(1), line(2), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
       default: return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3}},
         axes: [{...axis, values: (u, v) => v.map(x => (x === null ? '' : String(+x.toPrecision(2)))), label: 's', labelSize: 16, size: 34, labelFont: '12px system-ui'}, log],
-        series: [{}, line(0), line(1), line(2), dots(0), dots(1), dots(2)]};
+        series: [{}, line(0), line(1), line(2), dots(0), dots(1), dots(2), ...[0, 1, 2].map(k => line(k, {width: 1, dash: [2, 4]}))]};
     }
   }
   const dots = k => ({stroke: css('--c' + k), paths: () => null, points: {show: true, size: 8, fill: css('--c' + k)}});

@@ -175,11 +175,24 @@
       show();
     } catch { /* the stream tells when the link is lost */ }
   }
-  let seenDwells = null;
+  let seenDwells = null, classical = [new Map(), new Map(), new Map()];
   async function getSurface(expected) {
     try {
-      Draw.surface((await (await fetch('/api/v1/surface')).json()).curves || [], expected);
+      const curves = (await (await fetch('/api/v1/surface')).json()).curves || [];
+      classical = ['x', 'y', 'z'].map(gyro => meanSquare(curves, gyro + '_classical_deg_h'));
+      Draw.surface(curves, expected);
     } catch { seenDwells = null; }   // asked again with the next status
+  }
+  // By averaging time, over the dwells.
+  function meanSquare(curves, key) {
+    const sums = new Map();
+    for (const c of curves) {
+      c.tau_s.forEach((tau, i) => {
+        const s = sums.get(tau) || [0, 0];
+        sums.set(tau, [s[0] + c[key][i] ** 2, s[1] + 1]);
+      });
+    }
+    return new Map([...sums].map(([tau, [sum, n]]) => [tau, Math.sqrt(sum / n)]));
   }
   const column = k => history.rows.map(r => r[k]);
   function charts(s) {
@@ -210,7 +223,8 @@
     const at = (m, tau, key) => { const p = m.get(tau); return p && p[key] > 0 ? p[key] : null; };
     const lines = gyros.map((g, i) => taus.map(tau => (measured.length ? at(points[i], tau, 'expected_deg_h')
       : g.in_force_deg_per_rt_h ? g.in_force_deg_per_rt_h / Math.sqrt(2 * tau / 3600) : null)));
-    Draw.chart('allan', [taus, ...lines, ...points.map(m => taus.map(tau => at(m, tau, 'deviation_deg_h')))]);
+    Draw.chart('allan', [taus, ...lines, ...points.map(m => taus.map(tau => at(m, tau, 'deviation_deg_h'))),
+      ...classical.map(m => taus.map(tau => m.get(tau) || null))]);
     const dwells = `${instance} ${noise.dwells} ${noise.dwells_left_out}`;
     if (seenDwells !== dwells) {
       seenDwells = dwells;
@@ -220,9 +234,10 @@
       const n = g.fit && g.fit.N;
       return `${g.gyro} ${n && n.value !== undefined ? n.value.toExponential(1) : 'N as configured'}`;
     }).join(', ');
-    set('noise', noise.dwells ? `   points measured, lines identified; N, deg/√h, from ${noise.dwells} dwells: ${words}` : '   as configured; no dwell yet');
+    set('noise', noise.dwells ? `   points measured, lines identified, dashed the classical deviation within a dwell; N, deg/√h, from ${noise.dwells} dwells: ${words}` : '   as configured; no dwell yet');
     const chart = byId('c-allan');
     chart.dataset.points = points.reduce((n, m) => n + m.size, 0);
+    chart.dataset.classical = classical.reduce((n, m) => n + m.size, 0);
     chart.setAttribute('aria-label', `Modified Allan deviation of the residuals, ${chart.dataset.points} points measured. ${words}`);
   }
 

@@ -303,6 +303,9 @@ TEST_F(AllanCommand, LivePrintsWindowsAsTheyComplete) {
         }
     }
     EXPECT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live --shape hann <louder.txt"), 1);
+    // As jq prints what a status does not have: a missing sample, not a wrong one
+    write("absent.txt", noise(499, 0.06) + "null\n");
+    EXPECT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live <absent.txt"), 0) << error;
     write("word.txt", "1\n2\nthree\n");
     expect_refusal("allan - --tau0 1 --dynamic 500 --live <word.txt",
                    {"standard input:3", "'three'", "expected a number"});

@@ -116,6 +116,41 @@ TEST(DwellMonitor, TheCurvesOfTheDwellsAreThePointsOfAll) {
         EXPECT_NEAR(std::sqrt(squares[i]) / points[i].deviation, 1, 1e-12) << points[i].tau_s;
 }
 
+TEST(DwellMonitor, MonteCarloTheClassicalVarianceIsThatOfAveragesAboutTheDwellsOwnMean) {
+    // GIVEN dwells of resolver noise and random walk with any offset and rate, of which one block
+    // is missing after 70 of 98
+    constexpr std::uint64_t kSeed = 34;
+    constexpr int kDwells = 200;
+    constexpr std::size_t kRow = 70;
+    std::vector<std::size_t> present(kBlocks - 1);
+    for (std::size_t i = 0; i < present.size(); ++i) present[i] = i + (i >= kRow ? 1 : 0);
+    const auto gapped = std::make_shared<const DwellBasis>(std::move(present));
+    std::mt19937_64 generator(kSeed);
+    const Noise noise{5, 3e-3, 0, 0};
+    std::vector<double> squares(gapped->octaves.size(), 0);
+    for (int d = 0; d < kDwells; ++d) {
+        const auto curve = DwellMonitor::curve_of(dwell_of(noise, generator, 6, gapped));
+        for (std::size_t i = 0; i < curve.size(); ++i)
+            squares[i] += curve[i].classical * curve[i].classical / kDwells;
+    }
+    // THEN it is sigma_c^2(tau) - sigma_c^2(T), T covered by whole averages in the longest row
+    const double white = noise.angle_arcsec * noise.angle_arcsec / kRate;
+    const double walk = 60 * noise.walk * 60 * noise.walk;
+    // Of block means a third of a block of the walk is lost.
+    const auto classical = [&](double tau) {
+        return (2 * white + walk * (tau - 1.0 / 3)) / (tau * tau);
+    };
+    for (std::size_t i = 0; i < squares.size(); ++i) {
+        const std::size_t m = gapped->octaves[i].m, tiles = (kRow - 1) / m;
+        const double theory =
+            classical(static_cast<double>(m)) - classical(static_cast<double>(m * tiles));
+        // The tiles of one position alone have about so many degrees of freedom.
+        const double degrees = kDwells * static_cast<double>(tiles - 1);
+        EXPECT_NEAR(squares[i] / theory, 1, 4 * std::sqrt(2 / degrees))
+            << m << " s, seed " << kSeed;
+    }
+}
+
 TEST(DwellMonitor, MonteCarloErrorsOfNAreThoseItStates) {
     // GIVEN campaigns of 28 dwells of 100 s at two levels, the noise of the default rig
     constexpr int kRuns = 24;

@@ -145,6 +145,30 @@ TEST(Positions, BeyondTheTravelAreRefused) {
     EXPECT_THAT(complaint("site.elevation_deg = 2.1"), HasSubstr("site.elevation_deg: found 2.1"));
 }
 
+TEST(Zeroing, IsBothWaysWhereTheOuterGimbalTurnsThatFar) {
+    const auto of = [](const std::string& more) {
+        return accepted(
+                   "campaign = { zeroing = true, positions_deg = [[0, 0, 0]], identify = "
+                   "\"what-it-can\" }\n" +
+                       more,
+                   true)
+            .campaign.zero.both_ways;
+    };
+    // Platform y is up at zero angles: the azimuth axis is upright at 90 and at -90 deg.
+    EXPECT_TRUE(of(""));
+    EXPECT_TRUE(of("gimbal.travel_deg = [[-95, 95], [-30, 30], [-175, 175]]"));
+    EXPECT_FALSE(of("gimbal.travel_deg = [[-80, 95], [-30, 30], [-175, 175]]"));
+    // AND as the encoder counts
+    EXPECT_TRUE(
+        of("gimbal.travel_deg = [[20, 210], [-30, 30], [-175, 175]]\n"
+           "platform.encoder_zero_deg = [115, 0, 0]"));
+    // BUT what is stated holds, and is refused later where it cannot be
+    EXPECT_TRUE(
+        of("gimbal.travel_deg = [[-80, 95], [-30, 30], [-175, 175]]\n"
+           "zeroing.both_ways = true"));
+    EXPECT_FALSE(of("zeroing.both_ways = false"));
+}
+
 TEST(OpeningCheck, IsOfRigsThatAreArmedByTheRecord) {
     const auto of = [](const std::string& text) {
         return parse(text, "rig.toml", true).configuration.campaign.opening;

@@ -184,6 +184,8 @@ TEST_F(NoiseMonitorTest, TheSurfaceHasTheNewestDwellsThoseWithAnAlarmToo) {
         // Three times the noise of the angle, at the same angles: 96 second differences are 49
         // degrees of freedom, the ratio is known to 14 %; four of those.
         EXPECT_NEAR(newest.deviation_deg_h[j][0] / (*early)[3].deviation_deg_h[j][0], 3, 1.7);
+        ASSERT_EQ(newest.classical_deg_h[j].size(), newest.tau_s.size());
+        EXPECT_NEAR(newest.classical_deg_h[j][0] / (*early)[3].classical_deg_h[j][0], 3, 1.7);
     }
     // WHEN there are more than are kept, THEN the oldest go, and who has them keeps what it has
     while (position_ < static_cast<int>(NoiseStatus::kMostCurves) + 9)

@@ -77,14 +77,20 @@ TEST(StatusJson, CarriesEveryFieldOfTheSchema) {
 TEST(StatusJson, CarriesEveryFieldOfTheParameters) {
     NoiseStatus noise;
     noise.surface = std::make_shared<const std::vector<NoiseStatus::Curve>>(
-        1,
-        NoiseStatus::Curve{2, 5, true, {1, 2}, {{{0.5, 0.25}, {0.5, 0.25}, {0.5, std::nan("")}}}});
+        1, NoiseStatus::Curve{2,
+                              5,
+                              true,
+                              {1, 2},
+                              {{{0.5, 0.25}, {0.5, 0.25}, {0.5, std::nan("")}}},
+                              {{{0.4, 0.2}, {0.4, 0.2}, {0.3, 0.2}}}});
     const auto surface = parsed<v1::Surface>(surface_json(noise));
     ASSERT_EQ(surface.curves_size(), 1);
     EXPECT_EQ(surface.curves(0).position(), 5U);
     EXPECT_TRUE(surface.curves(0).alarm());
     ASSERT_EQ(surface.curves(0).tau_s_size(), 1);  // what is not a number is in no answer
     EXPECT_EQ(surface.curves(0).z_deg_h(0), 0.5);
+    ASSERT_EQ(surface.curves(0).z_classical_deg_h_size(), 1);
+    EXPECT_EQ(surface.curves(0).z_classical_deg_h(0), 0.3);
     const auto result = parsed<v1::Parameters>(parameters_json(full_result()));
     std::vector<std::string> empty;
     collect_empty(result, "", empty);

@@ -54,11 +54,13 @@ TEST_F(Reproduce, LinesAreAtMost120ColumnsAndEveryRowHasValues) {
         EXPECT_NE(out.find("theory"), std::string::npos);
         EXPECT_NE(out.find("seed"), std::string::npos) << name << ": what was drawn is not named";
     }
-    for (const char* chart : {"dplan-growth.svg", "dplan-allocation.svg", "accelerometer-zeros.svg",
-                              "zha2019-start.svg", "zha2019-four-hours.svg", "zha2019-drive.svg",
-                              "zha2019-internal.svg", "zha2019-velocity.svg", "allan-surface.svg",
-                              "allan-coefficients.svg", "allan-deviation.svg",
-                              "tang2009-figure3-12g-trial3-one-level-z.svg"})
+    for (const char* chart :
+         {"dplan-growth.svg", "dplan-allocation.svg", "accelerometer-zeros.svg",
+          "zha2019-start.svg", "zha2019-four-hours.svg", "zha2019-drive.svg",
+          "zha2019-internal.svg", "zha2019-velocity.svg", "zha2019-networks.svg",
+          "zha2019-drift.svg", "zha2019-schedule.svg", "zha2019-noisy-reference.svg",
+          "allan-surface.svg", "allan-coefficients.svg", "allan-deviation.svg",
+          "tang2009-figure3-12g-trial3-one-level-z.svg"})
         EXPECT_TRUE(std::filesystem::exists(folder_ / "charts" / chart)) << chart;
     for (const std::string name : {"dplan", "zha2019 --seeds 2", "accelerometer --seeds 2",
                                    "allan --seeds 2", "tang2009 --seeds 2"}) {

@@ -49,6 +49,30 @@ TEST_F(ZeroCommand, AFileGivesWhatTheSimulatedUnitGave) {
     expect_refusal("zero none.csv", "none.csv");
 }
 
+TEST_F(ZeroCommand, TwoFilesZUpAndZDownTellAZeroFromAMisalignment) {
+    // GIVEN a unit with x 50 arcsec, y -100 arcsec towards z, z 200 ppm too large, both ways
+    const std::string unit = "zero simulate --zero 3,-2,1 --misalignment 50,-100 --scale 0,0,200";
+    ASSERT_EQ(vibrig(unit + " --seed 5 --write up.csv"), 0) << error;
+    ASSERT_EQ(vibrig(unit + " --seed 6 --inverted --write down.csv"), 0) << error;
+    // THEN one way the zeros are as wrong as the misalignment says, and are not said to be more
+    EXPECT_EQ(json("zero up.csv", 0)["zeros"][1]["observable"], false);
+    // AND both ways they are the unit's, within five sigma
+    const Json result = json("zero up.csv --down down.csv", 0);
+    const std::array<double, 3> zero{3, -2, 1}, share{50, -100, 200};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Json& axis = result["apart"][i];
+        const std::string name = i < 2 ? "misalignment_arcsec" : "scale_ppm";
+        EXPECT_EQ(axis["observable"], true);
+        EXPECT_NEAR(axis["zero_mg"], zero[i], 5 * axis["sigma_mg"].get<double>());
+        EXPECT_NEAR(axis[name], share[i], 5 * axis[name + "_sigma"].get<double>());
+    }
+    // WHEN the second file is z up too THEN it is not valid, and it is said which
+    EXPECT_EQ(vibrig("zero up.csv --down up.csv"), 1) << out;
+    EXPECT_NE(out.find("not valid: z down: "), std::string::npos) << out;
+    expect_refusal("zero up.csv --down down.csv --inverted", "--inverted");
+    expect_refusal("zero up.csv --down none.csv", "none.csv");
+}
+
 TEST_F(ZeroCommand, SimulatesAndExplains) {
     const Json result = json("zero simulate --scale 0,0,100 --both-ways", 0);
     EXPECT_TRUE(result["valid"].get<bool>());
