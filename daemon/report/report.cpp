@@ -11,6 +11,7 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/report/conditions_section.hpp"
 #include "daemon/report/journal_section.hpp"
+#include "daemon/report/lead_section.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/report/plan_section.hpp"
@@ -99,10 +100,11 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
     add_files(page, campaign);
     if (!unit.instruments.empty()) {
         std::vector<std::vector<std::string>> table{
-            {"Instrument", "Serial number", "Certificate", "Due", ""}};
+            {"Instrument", "Serial number", "Certificate", "Uncertainty", "Due", ""}};
         const std::string day = utc_text(head.utc_ns).substr(0, 10);
         for (const auto& i : unit.instruments)
-            table.push_back({i.name, or_dash(i.serial), or_dash(i.certificate), or_dash(i.due),
+            table.push_back({i.name, or_dash(i.serial), or_dash(i.certificate),
+                             or_dash(i.uncertainty), or_dash(i.due),
                              i.overdue(day) ? "!overdue at the time of the campaign" : ""});
         page.table(table, "words");
     } else {
@@ -570,6 +572,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
     add_uncertainty(page, analysis.assessed);
+    add_lead(page, campaign, analysis.replayed);
     add_coefficients(page, analysis);
     add_campaign(page, campaign, analysis);
     add_plan(page, campaign, analysis);

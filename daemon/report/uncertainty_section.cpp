@@ -19,12 +19,13 @@ constexpr std::size_t kMostPatterns = 8;
 
 std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment& a) {
     std::vector<std::vector<std::string>> rows{
-        {"coefficient", "value", "u", "U", "k", "sigma of noise alone", "largest parts of u"}};
+        {"coefficient", "value", "U", "k", "unit", "u", "noise alone", "largest parts of u"}};
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const auto& c = a.coefficients[i];
         const char* name = estimator::parameter_names()[i];
         if (!(c.u > 0)) {
-            rows.push_back({name, "!not determined", "-", "-", "-", "-", "-"});
+            rows.push_back(
+                {name, "!not determined", "-", "-", estimator::parameter_unit(i), "-", "-", "-"});
             continue;
         }
         std::string parts;
@@ -34,9 +35,9 @@ std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment&
                                  part.element.empty() ? "" : " " + part.element,
                                  part.declared ? "" : " (not declared)", part.contribution);
         }
-        rows.push_back({name, fmt::format("{:.6f}", c.value), fmt::format("{:.6f}", c.u),
-                        fmt::format("{:.6f}", c.expanded), fmt::format("{:.2f}", c.k),
-                        fmt::format("{:.6f}", c.sigma), parts});
+        rows.push_back({name, fmt::format("{:.6f}", c.value), fmt::format("{:.6f}", c.expanded),
+                        fmt::format("{:.2f}", c.k), estimator::parameter_unit(i),
+                        fmt::format("{:.6f}", c.u), fmt::format("{:.6f}", c.sigma), parts});
     }
     return rows;
 }
@@ -72,7 +73,7 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
     for (std::size_t i = 1; i < a.verdict.reasons.size(); ++i)
         page.paragraph("Also: " + a.verdict.reasons[i].text);
     if (!a.done) return;
-    page.table(budget_rows(a));
+    page.table(budget_rows(a), "budget");
     page.paragraph(
         "u combines noise, a bias that may have moved during the campaign, and the inputs declared "
         "in the configuration; U = k u covers with the probability declared. Where nothing was "

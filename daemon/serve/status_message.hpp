@@ -29,6 +29,7 @@ void fill_outside(v1::Status& out, const StatusData& status);
 void fill_checks(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);
+void fill(v1::Verdict& out, const VerdictStatus& verdict);
 void fill(v1::Plan& out, const PlanData& plan);
 void fill(v1::Event& out, const EventRecord& event);
 
