@@ -94,7 +94,6 @@ std::string Campaign::not_fit_to_excite(Time now) const {
 
 /// What a position is made of; all else is waited for, or done once.
 static bool is_stop(CampaignState state) {
-    using State = CampaignState;
     return state == State::slewing || state == State::levelling || state == State::ramping ||
            state == State::settling || state == State::recording || state == State::resting;
 }

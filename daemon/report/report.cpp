@@ -16,6 +16,7 @@
 #include "daemon/report/paperwork.hpp"
 #include "daemon/report/plan_section.hpp"
 #include "daemon/report/proof_section.hpp"
+#include "daemon/report/result_charts.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
@@ -151,31 +152,10 @@ void add_coefficients(Page& page, const Analysis& a) {
             fmt::format("Determined together: {} = {:.6f}, sigma {:.6f}", sum, c.value, c.sigma));
     }
     for (const auto& warning : a.replayed.result.warnings) page.paragraph("Warning: " + warning);
-    Chart chart;
-    chart.title = "Correlation of the coefficients";
-    chart.x = Axis("coefficient, in the order of the table");
-    chart.y = Axis("coefficient");
-    for (Axis* axis : {&chart.x, &chart.y}) {
-        axis->exact = true;
-        // As many names as there is room for.
-        for (std::size_t i = 0; i < kParameters; i += axis == &chart.x ? 5 : 2)
-            axis->named.emplace_back(static_cast<double>(i + 1), estimator::parameter_names()[i]);
-    }
-    tool::plot::HeatMap map;
-    map.label = "absolute correlation";
-    for (std::size_t i = 0; i <= kParameters; ++i) {
-        map.x.push_back(static_cast<double>(i) + 0.5);
-        map.y.push_back(static_cast<double>(i) + 0.5);
-    }
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        map.value.emplace_back();
-        for (std::size_t j = 0; j < kParameters; ++j) {
-            const bool both = a.coefficients.observable[i] && a.coefficients.observable[j];
-            map.value.back().push_back(both ? std::abs(correlation(a.coefficients, i, j))
-                                            : std::nan(""));
-        }
-    }
-    chart.maps.push_back(std::move(map));
+    const Chart chart = correlation_chart([&](std::size_t i, std::size_t j) {
+        const bool both = a.coefficients.observable[i] && a.coefficients.observable[j];
+        return both ? correlation(a.coefficients, i, j) : std::nan("");
+    });
     page.figure(chart.svg(), "In the order of the table: gyro x, y, z.");
 }
 

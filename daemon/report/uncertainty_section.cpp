@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "daemon/tool/plot/chart.hpp"
+#include "daemon/report/result_charts.hpp"
 #include "estimator/uncertainty/leverage.hpp"
 
 namespace vibrig::report {
@@ -42,28 +42,6 @@ std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment&
     return rows;
 }
 
-void add_residuals(Page& page, const uncertainty::Assessment& a) {
-    tool::plot::Chart chart;
-    chart.title = "Residuals of the dwells' rates";
-    chart.x.label = "h";
-    chart.y.label = "deg/h";
-    for (std::size_t j = 0; j < 3; ++j) {
-        tool::plot::Curve curve;
-        curve.name = fmt::format("gyro {}", "xyz"[j]);
-        curve.look = tool::plot::Look::dots;
-        for (const auto& dwell : a.rates) {
-            curve.x.push_back(dwell.time_h);
-            curve.y.push_back(dwell.residual[j]);
-            curve.low.push_back(dwell.residual[j] - dwell.residual_sigma[j]);
-            curve.high.push_back(dwell.residual[j] + dwell.residual_sigma[j]);
-        }
-        chart.curves.push_back(std::move(curve));
-    }
-    page.figure(chart.svg(),
-                "About the model with constant coefficients, 1 sigma of noise and "
-                "declared inputs.");
-}
-
 }  // namespace
 
 void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
@@ -90,7 +68,9 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
                             fmt::format("{}{:.1f}", e.named() ? "!" : "", e.log_odds)});
     }
     if (evidence.size() > 1) page.table(evidence);
-    add_residuals(page, a);
+    page.figure(residuals_chart(a).svg(),
+                "About the model with constant coefficients, 1 sigma of noise and declared "
+                "inputs.");
 }
 
 }  // namespace vibrig::report
