@@ -14,6 +14,7 @@ class Mqtt;
 class Parameters;
 class Plan;
 class Status;
+class Verdict;
 }  // namespace vibrig::v1
 
 /// The daemon's structs carried into the messages of proto/vibrig.proto: SI and rad become the
