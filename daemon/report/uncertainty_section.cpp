@@ -3,6 +3,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 
 #include "daemon/report/result_charts.hpp"
 #include "estimator/uncertainty/leverage.hpp"
@@ -15,7 +17,34 @@ namespace {
 
 /// Lesser parts of the budget are left to `vibrig uncertainty`.
 constexpr double kSmallest = 0.05;
+constexpr std::size_t kMostParts = 3;
 constexpr std::size_t kMostPatterns = 8;
+
+/// Elements of one input, such as three axes, as the root of their squares' sum; largest first.
+std::string largest_parts(const uncertainty::Coefficient& c) {
+    struct Part {
+        std::string input;
+        double square = 0;
+        bool declared = true;
+    };
+    std::vector<Part> parts;
+    for (const auto& one : c.budget) {
+        auto part = std::ranges::find(parts, one.input, &Part::input);
+        if (part == parts.end()) part = parts.insert(part, {one.input});
+        part->square += one.contribution * one.contribution;
+        part->declared = part->declared && one.declared;
+    }
+    std::ranges::stable_sort(parts, std::greater{}, &Part::square);
+    std::string text;
+    for (std::size_t i = 0; i < std::min(parts.size(), kMostParts); ++i) {
+        auto& [input, square, declared] = parts[i];
+        if (!(std::sqrt(square) >= kSmallest * c.u)) break;
+        std::ranges::replace(input, '_', ' ');
+        text += fmt::format("{}{}{} {:.2g}", text.empty() ? "" : ", ", input, declared ? "" : "*",
+                            std::sqrt(square));
+    }
+    return text;
+}
 
 std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment& a) {
     std::vector<std::vector<std::string>> rows{
@@ -28,13 +57,7 @@ std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment&
                 {name, "!not determined", "-", "-", estimator::parameter_unit(i), "-", "-", "-"});
             continue;
         }
-        std::string parts;
-        for (const auto& part : c.budget) {
-            if (part.contribution < kSmallest * c.u) break;
-            parts += fmt::format("{}{}{}{} {:.2g}", parts.empty() ? "" : "; ", part.input,
-                                 part.element.empty() ? "" : " " + part.element,
-                                 part.declared ? "" : " (not declared)", part.contribution);
-        }
+        const std::string parts = largest_parts(c);
         rows.push_back({name, fmt::format("{:.6f}", c.value), fmt::format("{:.6f}", c.expanded),
                         fmt::format("{:.2f}", c.k), estimator::parameter_unit(i),
                         fmt::format("{:.6f}", c.u), fmt::format("{:.6f}", c.sigma), parts});
@@ -54,8 +77,8 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
     page.table(budget_rows(a), "budget");
     page.paragraph(
         "u combines noise, a bias that may have moved during the campaign, and the inputs declared "
-        "in the configuration; U = k u covers with the probability declared. Where nothing was "
-        "declared a default stands in.");
+        "in the configuration; U = k u covers with the probability declared. *: nothing was "
+        "declared, a default stands in.");
     for (const auto& of : uncertainty::leverages(a)) {
         page.paragraph("What would shrink it most: " + uncertainty::advice(of) + ".");
         break;

@@ -7,19 +7,21 @@ const Draw = (() => {
   const sizes = new ResizeObserver(() => resize());   // the room of a chart is what the tables beside it leave
 
   function options(element, name) {
-    const axis = {stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
+    const axis = {space: 20, stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
     const line = (k, extra) => ({stroke: css('--c' + k), width: 2, points: {show: false}, ...extra});
     const cursor = {y: false, points: {size: 6}, drag: {x: true, y: false}, ...(name === 'allan' ? {} : {sync: {key: 'min', filters: {pub: hovers, sub: hovers}}})};
     const sized = {width: element.clientWidth || 300, height: element.clientHeight || 200, cursor, legend: {show: false},
       hooks: {setScale: [(u, key) => { if (key === 'x') element.dataset.from = u.scales.x.min; }], setCursor: [read], setSelect: [u => { u.zoomed = u.select.width > 0; }]}};
-    const minutes = {...axis, label: 'min', labelSize: 16, size: 34, labelFont: '12px system-ui'};
+    const minutes = {...axis, space: 50, size: 24, values: (u, v) => v.map((x, i) => (i + 1 < v.length ? String(x) : x + ' min'))};
     const none = {stroke: 'transparent', points: {show: false}};
     // Whole decades; where there are less than two of them, 2 and 5 too.
     const marked = (scale, v) => v.map(x => {
       const whole = 10 ** Math.floor(Math.log10(x) + 1e-9), first = Math.round(x / whole);
       return x !== null && (first === 1 || (scale.max / scale.min < 30 && (first === 2 || first === 5))) ? String(+x.toPrecision(2)) : '';
     });
-    const log = {...axis, size: 54, filter: (u, v) => v, values: (u, v) => marked(u.scales.y, v)};
+    const decades = (u, v) => v.map(x => (x !== null && Math.abs(Math.log10(x) - Math.round(Math.log10(x))) < 1e-9 ? x : null));
+    const grid = {...axis.grid, filter: decades}, ticks = {...axis.ticks, filter: decades};
+    const log = {...axis, grid, ticks, size: 54, filter: (u, v) => v, values: (u, v) => marked(u.scales.y, v)};
     switch (name) {
       case 'amplitude': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [0, Math.max(1, hi * 1.05)]}},
         axes: [minutes, {...axis, size: 40}],
@@ -34,7 +36,7 @@ const Draw = (() => {
       case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},
         axes: [minutes, log], series: [{label: 'min'}, ...['bias', 'linear', 'quadratic'].map((kind, k) => line(k, {label: kind})), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
       default: return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3}},
-        axes: [{...axis, filter: (u, v) => v, values: (u, v) => marked(u.scales.x, v), label: 's', labelSize: 16, size: 34, labelFont: '12px system-ui'}, log],
+        axes: [{...axis, grid, ticks, size: 24, filter: (u, v) => v, values: (u, v) => marked(u.scales.x, v).map(x => x && x + ' s')}, log],
         series: [{label: 's'}, ...['x', 'y', 'z'].map((g, k) => line(k, {label: g + ' expected, deg/h'})), ...['x', 'y', 'z'].map((g, k) => ({...dots(k), label: g + ' measured'}))]};
     }
   }
@@ -43,7 +45,7 @@ const Draw = (() => {
   function read(u) {
     const note = u.root.querySelector('.read'), i = u.cursor.idx;
     if (!note) return;
-    const known = i === null || i === undefined ? [] : u.series.slice(1).map((s, k) => [s.label, u.data[k + 1][i]]).filter(([label, y]) => label && y !== null && y !== undefined);
+    const known = i === null || i === undefined ? [] : u.series.slice(1).map((s, k) => [s.label, u.data[k + 1][i]]).filter(([label, y]) => label !== 'Value' && y !== null && y !== undefined);
     note.hidden = known.length === 0;
     note.textContent = known.length ? `${+u.data[0][i].toPrecision(4)} ${u.series[0].label}: ` + known.map(([label, y]) => {
       const [name, unit] = label.split(', ');

@@ -193,7 +193,7 @@
     const left = (s.verdict && s.verdict.residuals) || [], axes = ['x', 'y', 'z'];
     Draw.chart('residuals', [left.map(d => 60 * d.time_h), ...axes.map(a => left.map(d => d[a + '_deg_h']))]);
     const scatter = axes.map(a => Math.sqrt(left.reduce((sum, d) => sum + (d[a + '_deg_h'] / d[a + '_sigma_deg_h']) ** 2, 0) / left.length));
-    const words = left.length ? `root mean square over sigma: ${axes.map((a, i) => `${a} ${scatter[i].toFixed(2)}`).join(', ')}` : 'none before nine degrees of freedom';
+    const words = left.length ? `rms/σ ${scatter.map(x => x.toFixed(2)).join(', ')}` : 'too few yet';
     byId('c-residuals').dataset.points = left.length;
     set('residual-note', '   ' + words);
     byId('c-residuals').setAttribute('aria-label', `Residual drift of ${left.length} dwells, ${words}`);
@@ -201,7 +201,7 @@
     set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
     set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`);
     byId('c-amplitude').setAttribute('aria-label', `Table amplitude ${fixed(s.shaker.measured_g, 3, 'g')}, commanded ${fixed(c.command_table_g, 2, 'g')}, since ${duration(s.time_s - start)}`);
-    set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)} (1 when consistent)`);
+    set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)}, 1 expected`);
     byId('c-innovations').setAttribute('aria-label', `Innovations ${['x', 'y', 'z'].map(a => fixed((e.innovation || {})[a + '_arcsec'], 1, 'arc seconds')).join(', ')}`);
     const worst = history.rows[history.rows.length - 1].slice(9, 12);
     byId('c-sigma').setAttribute('aria-label', `Largest sigma over target: bias ${worst[0] || 'unknown'}, linear ${worst[1] || 'unknown'}, quadratic ${worst[2] || 'unknown'}`);
