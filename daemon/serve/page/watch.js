@@ -78,7 +78,7 @@ const Watch = (() => {
       if (li.className !== kind) li.className = kind;
       const value = r.raised && r.value !== undefined ? r.value : r.present;
       const words = r.limit === undefined ? (r.raised ? 'RAISED' : r.present === undefined ? 'not watched now' : 'ok')
-        : `${r.raised ? 'RAISED ' : ''}${value === undefined ? '–' : short(value)} / ${short(r.limit)} ${r.unit}`;
+        : `${r.raised ? 'RAISED ' : ''}${value === undefined ? '–' : short(value)} / ${short(r.limit)} ${r.unit.replace('of the motion along it', 'of axial')}`;
       const used = r.raised ? 1 : r.margin === undefined ? 0 : Math.min(1, Math.max(0, 1 - r.margin));
       const [name, text, bar] = li.children;
       if (name.textContent !== person(r.name)) name.textContent = person(r.name);
