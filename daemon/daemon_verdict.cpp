@@ -1,4 +1,8 @@
 // What can be believed of a campaign, while it runs and in the end.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
 #include "daemon/daemon.hpp"
 #include "daemon/journal/reread.hpp"
 
@@ -161,13 +165,20 @@ void Daemon::tell_verdict(const uncertainty::Assessment& assessed) {
             campaign_.doubted(said, run, position);
         }
     }
+    auto residuals = std::make_shared<std::vector<VerdictStatus::Residual>>();
+    for (const auto& r : assessed.rates) {
+        const auto known = [](double x) { return std::isfinite(x); };
+        if (std::ranges::all_of(r.residual, known) && std::ranges::all_of(r.residual_sigma, known))
+            residuals->push_back({r.run, r.position, r.time_h, r.residual, r.residual_sigma});
+    }
     const std::lock_guard lock(mutex_);
     campaign_status_.verdict = {static_cast<std::uint32_t>(assessed.rates.size()),
                                 static_cast<int>(verdict.level),
                                 uncertainty::word_of(verdict.level),
                                 verdict.sentence,
                                 assessed.widening,
-                                concluding_};
+                                concluding_,
+                                std::move(residuals)};
 }
 
 }  // namespace vibrig

@@ -337,6 +337,13 @@ struct VerdictStatus {
     std::string word, sentence;
     double widening = 1;    ///< of the uncertainty over that of noise alone, median
     bool complete = false;  ///< of the whole campaign, which is over
+    /// Of a dwell's drift, by gyro, deg/h.
+    struct Residual {
+        int run = 0, position = 0;
+        double time_h = 0;
+        std::array<double, 3> value{}, sigma{};
+    };
+    std::shared_ptr<const std::vector<Residual>> residuals;  ///< null: none
 };
 
 struct StatusData {

@@ -92,6 +92,12 @@ std::string Campaign::not_fit_to_excite(Time now) const {
     return {};
 }
 
+/// What a position is made of; all else is waited for, or done once.
+static bool is_stop(CampaignState state) {
+    return state == State::slewing || state == State::levelling || state == State::ramping ||
+           state == State::settling || state == State::recording || state == State::resting;
+}
+
 void Campaign::enter(State state, Time now) {
     state_ = state;
     if (state == State::paused) ports_.gimbal.forget_position();
@@ -106,6 +112,7 @@ void Campaign::enter(State state, Time now) {
     }
     // A loop check begins at rest, and has to learn where the gimbals are.
     ports_.guard(state == State::checking ? rt::Guard::armed : guard_in(state));
+    pace_.enter(is_stop(state), now);
     entered_ = now;
     requested_ = false;
     stop_sent_ = false;
@@ -219,6 +226,7 @@ void Campaign::begin(const std::string& by, Time now) {
     origin_.reset();
     if (zero_) zero_->reset();
     started_ = now;
+    pace_.begin(now);
     enter(State::waiting, now);
 }
 
@@ -448,6 +456,7 @@ Time Campaign::record(Time now) {
 
 void Campaign::next_position(Time now) {
     ++positions_done_;
+    pace_.stop_done(now);
     if (ports_.position_done) {
         ports_.position_done(dwell_info(), dwells_.back(),
                              {here().stop.position_deg, table_g(), repeats_, used_s(now),

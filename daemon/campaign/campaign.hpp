@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/campaign/pace.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/rt/dwell_order.hpp"
@@ -320,6 +321,8 @@ class Campaign {
         return times_.levelling_s + times_.look_s + settings_.dwell_s + settings_.settle_s +
                2 * settings_.ramp_s;
     }
+    /// And with the slews between the stops.
+    [[nodiscard]] double expected_stop_s() const;
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
     /// Of the dwell that is being done.
     [[nodiscard]] estimator::DwellInfo dwell_info() const {
@@ -340,6 +343,7 @@ class Campaign {
     CampaignState state_ = CampaignState::idle;
     drivers::Time entered_ = 0;  ///< when state_ began
     drivers::Time started_ = 0;  ///< when the campaign began
+    Pace pace_;
     std::vector<NumberedStop> stops_;
     std::size_t at_ = 0;          ///< the stop that is being done
     std::size_t expected_ = 0;    ///< stops in all, as far as can be foreseen

@@ -92,7 +92,7 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
         settings_.adaptive ? std::string("positions chosen one by one")
                            : fmt::format("{} positions{}", stops_.size(),
                                          settings_.plan.empty() ? "" : " of " + settings_.plan);
-    const double left_s = static_cast<double>(stops_.size() - offer_.size()) * nominal_stop_s();
+    const double left_s = static_cast<double>(stops_.size() - offer_.size()) * expected_stop_s();
     const std::string lasts =
         settings_.adaptive ? settings_.time_limit_s > 0
                                  ? "at most " + duration_text(settings_.time_limit_s)

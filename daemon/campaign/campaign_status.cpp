@@ -54,12 +54,11 @@ void Campaign::fill(StatusData& status, Time now) const {
     }
     status.progress = begun ? done / total : 0;
     if (active()) {
-        // What is left at the pace so far, at first at the nominal one.
-        const auto before = static_cast<double>(positions_before_);
-        const double pace = positions_done_ > positions_before_
-                                ? drivers::to_seconds(now - started_) / (done - before)
-                                : nominal_stop_s();
-        status.remaining_s = (total - done) * pace + times_.closing_s;
+        const double dwell_s =
+            state_ == State::recording ? drivers::to_seconds(dwell_to_ - now) : settings_.dwell_s;
+        status.remaining_s = pace_.left_s(expected_ - std::min(positions_done_, expected_),
+                                          expected_stop_s(), std::max(dwell_s, 0.0), now) +
+                             times_.closing_s;
         const bool vibrating =
             state_ == State::ramping || state_ == State::settling || state_ == State::recording;
         status.command_table_g = vibrating ? table_g() : 0;
@@ -69,6 +68,21 @@ void Campaign::fill(StatusData& status, Time now) const {
             check_ == Check::look || check_ == Check::rest ? 0 : settings_.loop.table_g;
         status.command_frequency_hz = settings_.frequency_hz;
     }
+}
+
+double Campaign::expected_stop_s() const {
+    if (stops_.empty()) return nominal_stop_s();
+    double slew_s = 0;
+    for (std::size_t i = 1; i < stops_.size(); ++i) {
+        double farthest_deg = 0;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            farthest_deg = std::max(
+                farthest_deg, std::abs(std::remainder(stops_[i].stop.position_deg[axis] -
+                                                          stops_[i - 1].stop.position_deg[axis],
+                                                      360.0)));
+        slew_s += farthest_deg / settings_.zero.slew_deg_per_s;
+    }
+    return nominal_stop_s() + slew_s / static_cast<double>(stops_.size());
 }
 
 void Campaign::fill_rest(StatusData& status, Time now) const {

@@ -13,7 +13,7 @@ constexpr std::size_t kLongestText = 120;
 constexpr const char* kInstrumentSchema =
     R"({"type":"array","maxItems":50,"items":{"type":"object","required":["name"],)"
     R"("additionalProperties":false,"properties":{"name":{"type":"string"},)"
-    R"("serial":{"type":"string"},"certificate":{"type":"string"},"due":{}}}})";
+    R"("serial":{"type":"string"},"certificate":{"type":"string"},"uncertainty":{"type":"string"},"due":{}}}})";
 
 std::string short_text_rule(const std::string& text) {
     for (const char c : text) {
@@ -42,6 +42,7 @@ bool read_instrument(const toml::table& table, const std::string& key, record::I
         std::string* text = part == "name"          ? &to.name
                             : part == "serial"      ? &to.serial
                             : part == "certificate" ? &to.certificate
+                            : part == "uncertainty" ? &to.uncertainty
                                                     : nullptr;
         if (part == "due") {
             if (const auto* date = node.as_date()) {
@@ -50,7 +51,7 @@ bool read_instrument(const toml::table& table, const std::string& key, record::I
                 refuse(node, part, describe(node), "a date such as 2027-03-31");
             }
         } else if (text == nullptr) {
-            refuse(node, part, "an unknown key", "name, serial, certificate or due");
+            refuse(node, part, "an unknown key", "name, serial, certificate, uncertainty or due");
         } else if (const auto* value = node.as_string(); value == nullptr) {
             refuse(node, part, describe(node), "a string");
         } else if (const auto wrong = short_text_rule(value->get()); !wrong.empty()) {
@@ -89,6 +90,7 @@ std::string write_instruments(Configuration& c) {
         text += (text.empty() ? "" : ", ") + std::string("{ name = ") + write_text(i.name) +
                 ", serial = " + write_text(i.serial) +
                 ", certificate = " + write_text(i.certificate) +
+                (i.uncertainty.empty() ? "" : ", uncertainty = " + write_text(i.uncertainty)) +
                 (i.due.empty() ? "" : ", due = " + i.due) + " }";
     }
     return "[" + text + "]";
@@ -103,7 +105,8 @@ void add_paperwork_keys(std::vector<Key>& keys) {
     keys.push_back(text(
         "unit.serial", "at most 120 bytes", "its serial number", short_text_rule,
         [](Configuration & c) -> auto& { return c.paperwork.unit_serial; }));
-    keys.push_back({"instrument", "tables", "", "rows: name, serial, certificate, due (a date)",
+    keys.push_back({"instrument", "tables", "",
+                    "rows: name, serial, certificate, uncertainty, due (a date)",
                     "what it is measured with, for the report; an overdue one warns before arming",
                     read_instruments, write_instruments, kInstrumentSchema});
 }

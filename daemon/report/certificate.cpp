@@ -23,10 +23,6 @@ namespace {
 constexpr const char* kMethod =
     "Identification under linear vibration (Tang et al. 2009): 30 coefficients from the platform's "
     "drift at rest and under sinusoidal vibration along the vertical, estimated jointly.";
-constexpr const char* kEquation =
-    "D = D_F + D_I aI + D_O aO + D_S aS + D_II aI^2 + D_OO aO^2 + D_SS aS^2 + D_IO aI aO + D_IS aI "
-    "aS + D_OS aO aS; a: specific force along input, output and spin axis of the gyro, g; under "
-    "vibration the squares are means over it";
 
 /// Refuses what no customer may be given; else "valid" or "doubtful".
 std::string word_of(const Campaign& campaign, const Json& result,
@@ -154,6 +150,18 @@ Json annex_of(const Campaign& campaign, const Json& result, const record::Replay
             {"issued_with", std::string("vibrig ") + kVersion}};
 }
 
+/// What was not as the method has it.
+Json deviations_of(const record::ReplayResult& replayed) {
+    Json rows = Json::array();
+    for (const auto& dwell : replayed.dwells) {
+        const auto& s = dwell.summary;
+        if (s.flagged || s.left_out)
+            rows.push_back(fmt::format("run {} position {} {}: {}", s.run, s.position,
+                                       s.left_out ? "left out" : "flagged", dwell.reason));
+    }
+    return rows;
+}
+
 Json instruments_of(const Campaign& campaign) {
     const auto paperwork = paperwork_of(campaign);
     const std::string day = utc_text(campaign.head.utc_ns).substr(0, 10);
@@ -162,6 +170,7 @@ Json instruments_of(const Campaign& campaign) {
         rows.push_back({{"name", i.name},
                         {"serial", i.serial},
                         {"certificate", i.certificate},
+                        {"uncertainty", i.uncertainty},
                         {"due", i.due},
                         {"overdue", i.overdue(day)}});
     return rows;
@@ -190,7 +199,8 @@ Json certificate_of(const Campaign& campaign, const Json& result,
     root["simulated"] = campaign.head.simulated;
     root["laboratory"] = {{"name", issue.laboratory},
                           {"address", issue.laboratory_address},
-                          {"accreditation", issue.accreditation}};
+                          {"accreditation", issue.accreditation},
+                          {"location", issue.location}};
     root["customer"] = {{"name", issue.customer}, {"address", issue.customer_address}};
     root["item"] = {{"what", "gyros of an inertial platform"},
                     {"type", paperwork.unit_type},
@@ -204,16 +214,18 @@ Json certificate_of(const Campaign& campaign, const Json& result,
     root["performed_by"] = campaign.head.started_by;
     root["issued_by"] = issue.by;
     root["method"] = kMethod;
-    root["equation"] = kEquation;
+    root["deviations"] = deviations_of(replayed);
+    root["equation"] = kDriftModel;
     root["conditions"] = conditions_of(campaign);
     root["traceability"] = instruments_of(campaign);
     root["verdict"] = {{"word", word},
                        {"reasons", result["verdict"].value("reasons", Json::array())}};
     root["mark"] = campaign.mark;
     root["results"] = std::move(coefficients);
-    root["coverage"] =
+    root["coverage"] = fmt::format(
         "U = k u is the expanded uncertainty; for the k given the interval value +- U has a "
-        "coverage probability of about 95 % (JCGM 100).";
+        "coverage probability of about {:g} % (JCGM 100).",
+        100 * coverage_of(campaign));
     root["decision_rule"] = {
         {"guard_band", issue.guard_band},
         {"words",
@@ -221,7 +233,8 @@ Json certificate_of(const Campaign& campaign, const Json& result,
                      "moved out by it, and is inconclusive between (ISO 14253-1).",
                      issue.guard_band)}};
     root["statements"] = std::move(statements);
-    root["remarks"] = {"The results apply to the item as tested, and to it alone.",
+    root["remarks"] = {"The item was not adjusted: the results are those as found.",
+                       "The results apply to the item as tested, and to it alone.",
                        "This certificate may be reproduced only in full, unless the laboratory "
                        "agrees in writing."};
     root["annex"] = annex_of(campaign, result, replayed);

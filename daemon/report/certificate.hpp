@@ -22,6 +22,7 @@ struct Issue {
     std::string number, by;
     std::int64_t utc_ns = 0;
     std::string laboratory, laboratory_address, accreditation;
+    std::string location;  ///< where it was measured; empty: at the laboratory's address
     std::string customer, customer_address;
     std::string received, condition;  ///< of the item; a date, words
     std::vector<Limit> limits;

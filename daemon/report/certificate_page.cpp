@@ -35,6 +35,8 @@ void add_who(Page& page, const Json& c) {
     page.section("about", "Laboratory, customer, item");
     page.table({{"", ""},
                 {"Laboratory", text(lab, "name") + ", " + text(lab, "address")},
+                {"Measured at", lab.value("location", "").empty() ? "the laboratory's address"
+                                                                  : text(lab, "location")},
                 {"Accreditation", text(lab, "accreditation")},
                 {"Customer", text(customer, "name") + ", " + text(customer, "address")},
                 {"Item", item.value("what", "") + ", " + text(item, "type") + ", serial number " +
@@ -83,6 +85,10 @@ void add_method(Page& page, const Json& c) {
     page.section("method", "Method and conditions");
     page.paragraph(c["method"]);
     page.paragraph(c["equation"]);
+    page.paragraph(c["deviations"].empty() ? "Deviations from the method: none."
+                                           : "Deviations from the method:");
+    for (const auto& deviation : c["deviations"])
+        page.paragraph("- " + deviation.get<std::string>());
     Rows rows{{"condition", "least", "mean", "greatest", "unit"}};
     for (const auto& r : c["conditions"])
         rows.push_back({r["what"], fixed(r["least"], 2), fixed(r["mean"], 2),
@@ -93,15 +99,46 @@ void add_method(Page& page, const Json& c) {
         page.paragraph("Environmental conditions: none were recorded.");
     }
     page.section("traceability", "Traceability");
-    Rows instruments{{"Instrument", "Serial number", "Certificate", "Due", ""}};
+    Rows instruments{{"Instrument", "Serial number", "Certificate", "Uncertainty", "Due", ""}};
     for (const auto& i : c["traceability"])
-        instruments.push_back({i["name"], text(i, "serial"), text(i, "certificate"), text(i, "due"),
+        instruments.push_back({i["name"], text(i, "serial"), text(i, "certificate"),
+                               text(i, "uncertainty"), text(i, "due"),
                                i.value("overdue", false) ? "!overdue at the time" : ""});
     if (instruments.size() > 1) {
         page.table(instruments, "words");
     } else {
         page.paragraph("No instruments are stated.");
     }
+}
+
+/// A row for each coefficient, a column for each input.
+Rows budget_of(const Json& budget) {
+    std::vector<std::string> inputs;
+    for (const auto& parts : budget) {
+        for (const auto& part : parts) {
+            const std::string input = part.value("input", "");
+            if (std::ranges::find(inputs, input) == inputs.end()) inputs.push_back(input);
+        }
+    }
+    Rows rows{{"coefficient"}};
+    for (std::string input : inputs) {
+        std::ranges::replace(input, '_', ' ');
+        rows.front().push_back(input);
+    }
+    for (const auto& [name, parts] : budget.items()) {
+        std::vector<double> squares(inputs.size());
+        for (const auto& part : parts) {
+            const auto column = std::ranges::find(inputs, part.value("input", ""));
+            const auto contribution = part.find("contribution");
+            if (contribution == part.end() || !contribution->is_number()) continue;
+            squares[static_cast<std::size_t>(column - inputs.begin())] +=
+                std::pow(contribution->get<double>(), 2);
+        }
+        rows.push_back({name});
+        for (const double square : squares)
+            rows.back().push_back(fmt::format("{:.1e}", std::sqrt(square)));
+    }
+    return rows;
 }
 
 void add_annex(Page& page, const Json& c) {
@@ -113,18 +150,15 @@ void add_annex(Page& page, const Json& c) {
     rows.push_back({"configuration", annex["configuration_sha256"]});
     rows.push_back({"result", annex["result_sha256"]});
     page.table(rows, "words hashes");
-    Rows budget{{"coefficient", "input", "contribution"}};
-    for (const auto& [name, inputs] : annex["budget"].items()) {
-        for (const auto& input : inputs)
-            budget.push_back({name, input.value("input", ""),
-                              number_or(input.value("contribution", Json()), "-")});
-    }
-    if (budget.size() > 1) {
-        page.paragraph("Contributions to u, in the coefficient's unit:");
-        page.table(budget);
+    if (const auto budget = budget_of(annex["budget"]); budget.size() > 1) {
+        page.paragraph(
+            "Contributions to u, in the coefficient's unit; what comes in several elements, such "
+            "as three axes, as the root of their squares' sum. One by one they are in the JSON.");
+        page.table(budget, "matrix");
     }
     page.paragraph("Recorded by " + annex.value("recorded_by", "") + ", issued with " +
                    annex.value("issued_with", "") + ".");
+    page.paragraph("End of certificate " + c.value("number", "") + ".");
 }
 
 }  // namespace
@@ -136,6 +170,8 @@ std::string certificate_page(const Json& certificate) {
     } else if (certificate["verdict"].value("word", "") != "valid") {
         page.mark("DOUBTFUL");
     }
+    page.foot("Certificate " + certificate.value("number", "") + ", " +
+              certificate["laboratory"].value("name", ""));
     page.paragraph("Number " + certificate.value("number", "") + ". " +
                    text(certificate["laboratory"], "name"));
     add_who(page, certificate);

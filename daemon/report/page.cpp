@@ -1,5 +1,9 @@
 #include "daemon/report/page.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
+#include <cctype>
+
 #include "daemon/tool/plot/xml_text.hpp"
 
 namespace vibrig::report {
@@ -26,6 +30,8 @@ th{font-weight:600;vertical-align:bottom;border-bottom:2px solid var(--rule)}
 th:first-child,td:first-child{text-align:left;padding-left:.2rem}
 table.words th,table.words td{text-align:left;white-space:normal;vertical-align:top}
 table.words td:first-child{white-space:nowrap;color:var(--soft)}
+table.budget th:last-child,table.budget td:last-child{text-align:left;white-space:normal}
+table.matrix th{white-space:normal}
 tr:nth-child(even) td{background:var(--band)}
 .bad{color:var(--bad);font-weight:600}
 figure{margin:1rem 0}figure svg{max-width:100%;height:auto;display:block}
@@ -76,6 +82,17 @@ void Page::details(const std::string& summary, const std::string& preformatted) 
              "</pre></details>\n";
 }
 
+void Page::foot(const std::string& text) {
+    // Whatever somebody wrote: neither the style sheet nor the page ends in it.
+    std::string content;
+    for (const char one : text) {
+        const auto c = static_cast<unsigned char>(one);
+        content +=
+            std::isalnum(c) != 0 || c >= 0x80 ? std::string(1, one) : fmt::format("\\{:x} ", c);
+    }
+    foot_ = "@page{@bottom-left{content:\"" + content + "\";font:8pt sans-serif}}\n";
+}
+
 void Page::mark(const std::string& word) {
     mark_ = "<div class=\"mark\" role=\"note\"><span>" + xml_text(word) + "</span></div>\n";
 }
@@ -86,9 +103,9 @@ std::string Page::html(const std::string& title, const std::vector<std::string>&
     const std::size_t head = body_.find("<h2");
     return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
            "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>" +
-           xml_text(title) + "</title>\n<style>" + kStyle + "</style></head><body>\n" + mark_ +
-           "<h1>" + xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" + contents_ +
-           "</nav>\n" + (head == std::string::npos ? "" : body_.substr(head)) +
+           xml_text(title) + "</title>\n<style>" + kStyle + foot_ + "</style></head><body>\n" +
+           mark_ + "<h1>" + xml_text(title) + "</h1>\n" + body_.substr(0, head) + "<nav>" +
+           contents_ + "</nav>\n" + (head == std::string::npos ? "" : body_.substr(head)) +
            "<div class=\"sign\">" + signs + "</div>\n</body></html>\n";
 }
 

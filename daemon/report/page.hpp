@@ -16,13 +16,15 @@ class Page {
     void details(const std::string& summary, const std::string& preformatted);
     /// Across every page, such as "SIMULATED".
     void mark(const std::string& word);
+    /// Left of the page's number, on every printed page.
+    void foot(const std::string& text);
     /// `signatures`: who signs below.
     [[nodiscard]] std::string html(const std::string& title,
                                    const std::vector<std::string>& signatures = {
                                        "Operator, date", "Approved by, date"}) const;
 
   private:
-    std::string body_, contents_, mark_;
+    std::string body_, contents_, mark_, foot_;
 };
 
 }  // namespace vibrig::report

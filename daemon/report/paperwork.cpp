@@ -7,10 +7,22 @@
 
 namespace vibrig::report {
 
-record::Paperwork paperwork_of(const record::Campaign& campaign) {
+namespace {
+
+configuration::Configuration configuration_of(const record::Campaign& campaign) {
     return configuration::parse(record::identification_sections(campaign.head.configuration),
                                 "configuration in " + campaign.path, false)
-        .configuration.paperwork;
+        .configuration;
+}
+
+}  // namespace
+
+double coverage_of(const record::Campaign& campaign) {
+    return configuration_of(campaign).estimator.uncertainty.coverage;
+}
+
+record::Paperwork paperwork_of(const record::Campaign& campaign) {
+    return configuration_of(campaign).paperwork;
 }
 
 std::string or_dash(const std::string& text) { return text.empty() ? "not stated" : text; }

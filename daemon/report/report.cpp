@@ -11,10 +11,12 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/report/conditions_section.hpp"
 #include "daemon/report/journal_section.hpp"
+#include "daemon/report/lead_section.hpp"
 #include "daemon/report/page.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/report/plan_section.hpp"
 #include "daemon/report/proof_section.hpp"
+#include "daemon/report/result_charts.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/tool/plot/chart.hpp"
 #include "daemon/version.hpp"
@@ -99,10 +101,11 @@ void add_campaign(Page& page, const Campaign& campaign, const Analysis& a) {
     add_files(page, campaign);
     if (!unit.instruments.empty()) {
         std::vector<std::vector<std::string>> table{
-            {"Instrument", "Serial number", "Certificate", "Due", ""}};
+            {"Instrument", "Serial number", "Certificate", "Uncertainty", "Due", ""}};
         const std::string day = utc_text(head.utc_ns).substr(0, 10);
         for (const auto& i : unit.instruments)
-            table.push_back({i.name, or_dash(i.serial), or_dash(i.certificate), or_dash(i.due),
+            table.push_back({i.name, or_dash(i.serial), or_dash(i.certificate),
+                             or_dash(i.uncertainty), or_dash(i.due),
                              i.overdue(day) ? "!overdue at the time of the campaign" : ""});
         page.table(table, "words");
     } else {
@@ -149,31 +152,10 @@ void add_coefficients(Page& page, const Analysis& a) {
             fmt::format("Determined together: {} = {:.6f}, sigma {:.6f}", sum, c.value, c.sigma));
     }
     for (const auto& warning : a.replayed.result.warnings) page.paragraph("Warning: " + warning);
-    Chart chart;
-    chart.title = "Correlation of the coefficients";
-    chart.x = Axis("coefficient, in the order of the table");
-    chart.y = Axis("coefficient");
-    for (Axis* axis : {&chart.x, &chart.y}) {
-        axis->exact = true;
-        // As many names as there is room for.
-        for (std::size_t i = 0; i < kParameters; i += axis == &chart.x ? 5 : 2)
-            axis->named.emplace_back(static_cast<double>(i + 1), estimator::parameter_names()[i]);
-    }
-    tool::plot::HeatMap map;
-    map.label = "absolute correlation";
-    for (std::size_t i = 0; i <= kParameters; ++i) {
-        map.x.push_back(static_cast<double>(i) + 0.5);
-        map.y.push_back(static_cast<double>(i) + 0.5);
-    }
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        map.value.emplace_back();
-        for (std::size_t j = 0; j < kParameters; ++j) {
-            const bool both = a.coefficients.observable[i] && a.coefficients.observable[j];
-            map.value.back().push_back(both ? std::abs(correlation(a.coefficients, i, j))
-                                            : std::nan(""));
-        }
-    }
-    chart.maps.push_back(std::move(map));
+    const Chart chart = correlation_chart([&](std::size_t i, std::size_t j) {
+        const bool both = a.coefficients.observable[i] && a.coefficients.observable[j];
+        return both ? correlation(a.coefficients, i, j) : std::nan("");
+    });
     page.figure(chart.svg(), "In the order of the table: gyro x, y, z.");
 }
 
@@ -570,6 +552,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
     add_uncertainty(page, analysis.assessed);
+    add_lead(page, campaign, analysis.replayed);
     add_coefficients(page, analysis);
     add_campaign(page, campaign, analysis);
     add_plan(page, campaign, analysis);

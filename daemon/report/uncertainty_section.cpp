@@ -3,8 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 
-#include "daemon/tool/plot/chart.hpp"
+#include "daemon/report/result_charts.hpp"
 #include "estimator/uncertainty/leverage.hpp"
 
 namespace vibrig::report {
@@ -15,52 +17,52 @@ namespace {
 
 /// Lesser parts of the budget are left to `vibrig uncertainty`.
 constexpr double kSmallest = 0.05;
+constexpr std::size_t kMostParts = 3;
 constexpr std::size_t kMostPatterns = 8;
+
+/// Elements of one input, such as three axes, as the root of their squares' sum; largest first.
+std::string largest_parts(const uncertainty::Coefficient& c) {
+    struct Part {
+        std::string input;
+        double square = 0;
+        bool declared = true;
+    };
+    std::vector<Part> parts;
+    for (const auto& one : c.budget) {
+        auto part = std::ranges::find(parts, one.input, &Part::input);
+        if (part == parts.end()) part = parts.insert(part, {one.input});
+        part->square += one.contribution * one.contribution;
+        part->declared = part->declared && one.declared;
+    }
+    std::ranges::stable_sort(parts, std::greater{}, &Part::square);
+    std::string text;
+    for (std::size_t i = 0; i < std::min(parts.size(), kMostParts); ++i) {
+        auto& [input, square, declared] = parts[i];
+        if (!(std::sqrt(square) >= kSmallest * c.u)) break;
+        std::ranges::replace(input, '_', ' ');
+        text += fmt::format("{}{}{} {:.2g}", text.empty() ? "" : ", ", input, declared ? "" : "*",
+                            std::sqrt(square));
+    }
+    return text;
+}
 
 std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment& a) {
     std::vector<std::vector<std::string>> rows{
-        {"coefficient", "value", "u", "U", "k", "sigma of noise alone", "largest parts of u"}};
+        {"coefficient", "value", "U", "k", "unit", "u", "noise alone", "largest parts of u"}};
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const auto& c = a.coefficients[i];
         const char* name = estimator::parameter_names()[i];
         if (!(c.u > 0)) {
-            rows.push_back({name, "!not determined", "-", "-", "-", "-", "-"});
+            rows.push_back(
+                {name, "!not determined", "-", "-", estimator::parameter_unit(i), "-", "-", "-"});
             continue;
         }
-        std::string parts;
-        for (const auto& part : c.budget) {
-            if (part.contribution < kSmallest * c.u) break;
-            parts += fmt::format("{}{}{}{} {:.2g}", parts.empty() ? "" : "; ", part.input,
-                                 part.element.empty() ? "" : " " + part.element,
-                                 part.declared ? "" : " (not declared)", part.contribution);
-        }
-        rows.push_back({name, fmt::format("{:.6f}", c.value), fmt::format("{:.6f}", c.u),
-                        fmt::format("{:.6f}", c.expanded), fmt::format("{:.2f}", c.k),
-                        fmt::format("{:.6f}", c.sigma), parts});
+        const std::string parts = largest_parts(c);
+        rows.push_back({name, fmt::format("{:.6f}", c.value), fmt::format("{:.6f}", c.expanded),
+                        fmt::format("{:.2f}", c.k), estimator::parameter_unit(i),
+                        fmt::format("{:.6f}", c.u), fmt::format("{:.6f}", c.sigma), parts});
     }
     return rows;
-}
-
-void add_residuals(Page& page, const uncertainty::Assessment& a) {
-    tool::plot::Chart chart;
-    chart.title = "Residuals of the dwells' rates";
-    chart.x.label = "h";
-    chart.y.label = "deg/h";
-    for (std::size_t j = 0; j < 3; ++j) {
-        tool::plot::Curve curve;
-        curve.name = fmt::format("gyro {}", "xyz"[j]);
-        curve.look = tool::plot::Look::dots;
-        for (const auto& dwell : a.rates) {
-            curve.x.push_back(dwell.time_h);
-            curve.y.push_back(dwell.residual[j]);
-            curve.low.push_back(dwell.residual[j] - dwell.residual_sigma[j]);
-            curve.high.push_back(dwell.residual[j] + dwell.residual_sigma[j]);
-        }
-        chart.curves.push_back(std::move(curve));
-    }
-    page.figure(chart.svg(),
-                "About the model with constant coefficients, 1 sigma of noise and "
-                "declared inputs.");
 }
 
 }  // namespace
@@ -72,11 +74,11 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
     for (std::size_t i = 1; i < a.verdict.reasons.size(); ++i)
         page.paragraph("Also: " + a.verdict.reasons[i].text);
     if (!a.done) return;
-    page.table(budget_rows(a));
+    page.table(budget_rows(a), "budget");
     page.paragraph(
         "u combines noise, a bias that may have moved during the campaign, and the inputs declared "
-        "in the configuration; U = k u covers with the probability declared. Where nothing was "
-        "declared a default stands in.");
+        "in the configuration; U = k u covers with the probability declared. *: nothing was "
+        "declared, a default stands in.");
     for (const auto& of : uncertainty::leverages(a)) {
         page.paragraph("What would shrink it most: " + uncertainty::advice(of) + ".");
         break;
@@ -89,7 +91,9 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
                             fmt::format("{}{:.1f}", e.named() ? "!" : "", e.log_odds)});
     }
     if (evidence.size() > 1) page.table(evidence);
-    add_residuals(page, a);
+    page.figure(residuals_chart(a).svg(),
+                "About the model with constant coefficients, 1 sigma of noise and declared "
+                "inputs.");
 }
 
 }  // namespace vibrig::report

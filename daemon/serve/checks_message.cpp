@@ -1,4 +1,4 @@
-// Loop check and safe-state proof, carried into the messages of proto/vibrig.proto.
+// Verdict, loop check and safe-state proof, carried into the messages of proto/vibrig.proto.
 #include <cmath>
 
 #include "daemon/serve/status_message.hpp"
@@ -55,6 +55,28 @@ void fill_proof(v1::Proof& out, const ProofStatus& proof) {
 }
 
 }  // namespace
+
+void fill(v1::Verdict& out, const VerdictStatus& verdict) {
+    out.set_level(verdict.level);
+    out.set_word(verdict.word);
+    out.set_sentence(verdict.sentence);
+    out.set_dwells(verdict.dwells);
+    out.set_widening(verdict.widening);
+    out.set_complete(verdict.complete);
+    if (!verdict.residuals) return;
+    for (const auto& r : *verdict.residuals) {
+        v1::Verdict::Residual& to = *out.add_residuals();
+        to.set_run(r.run);
+        to.set_position(r.position);
+        to.set_time_h(r.time_h);
+        to.set_x_deg_h(r.value[0]);
+        to.set_y_deg_h(r.value[1]);
+        to.set_z_deg_h(r.value[2]);
+        to.set_x_sigma_deg_h(r.sigma[0]);
+        to.set_y_sigma_deg_h(r.sigma[1]);
+        to.set_z_sigma_deg_h(r.sigma[2]);
+    }
+}
 
 void fill_checks(v1::Status& out, const StatusData& status) {
     fill_loop_check(*out.mutable_loop_check(), status.loop_check);

@@ -305,15 +305,6 @@ void fill(v1::Estimate& out, const estimator::Estimate& estimate) {
     out.set_dwells(estimate.dwells);
 }
 
-void fill(v1::Verdict& out, const VerdictStatus& verdict) {
-    out.set_level(verdict.level);
-    out.set_word(verdict.word);
-    out.set_sentence(verdict.sentence);
-    out.set_dwells(verdict.dwells);
-    out.set_widening(verdict.widening);
-    out.set_complete(verdict.complete);
-}
-
 void fill(v1::Noise& out, const NoiseStatus& noise) {
     namespace allan = estimator::allan;
     constexpr std::array<const char*, 3> kGyroNames{"x", "y", "z"};

@@ -14,6 +14,7 @@ class Mqtt;
 class Parameters;
 class Plan;
 class Status;
+class Verdict;
 }  // namespace vibrig::v1
 
 /// The daemon's structs carried into the messages of proto/vibrig.proto: SI and rad become the
@@ -29,6 +30,7 @@ void fill_outside(v1::Status& out, const StatusData& status);
 void fill_checks(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);
+void fill(v1::Verdict& out, const VerdictStatus& verdict);
 void fill(v1::Plan& out, const PlanData& plan);
 void fill(v1::Event& out, const EventRecord& event);
 

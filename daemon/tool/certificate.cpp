@@ -124,11 +124,13 @@ Issue read_paper(const std::string& file) {
         if (node->as_table() == nullptr) refuse(file, *node, std::string(name) + ": not a table");
         take(PaperTable(file, *node->as_table(), std::move(known)));
     };
-    section("laboratory", {"name", "address", "accreditation"}, [&](const PaperTable& t) {
-        issue.laboratory = t.text("name");
-        issue.laboratory_address = t.text("address");
-        issue.accreditation = t.text("accreditation");
-    });
+    section("laboratory", {"name", "address", "accreditation", "location"},
+            [&](const PaperTable& t) {
+                issue.laboratory = t.text("name");
+                issue.laboratory_address = t.text("address");
+                issue.accreditation = t.text("accreditation");
+                issue.location = t.text("location");
+            });
     section("customer", {"name", "address"}, [&](const PaperTable& t) {
         issue.customer = t.text("name");
         issue.customer_address = t.text("address");

@@ -17,6 +17,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/in_order.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/report/result_charts.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
@@ -208,6 +209,7 @@ bool is_campaign(const std::string& argument) {
 struct IdentifyOptions {
     std::string recording;
     std::string config;
+    std::string plot;
     std::string instruction_set = "auto";
     bool json = false;
     bool strict = false;
@@ -219,6 +221,7 @@ int run(const IdentifyOptions& options) {
     estimator::use_instruction_set(options.instruction_set);
     const Identified identified = identify_recording(options.recording, options.config);
     const auto& assessed = identified.assessed;
+    if (!options.plot.empty()) report::plot_result(options.plot, identified.result, assessed);
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
@@ -281,12 +284,16 @@ void add_identify(CLI::App& app, int& exit_code) {
         ->add_option("--instruction-set", options->instruction_set,
                      "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
+    command->add_option("--plot", options->plot,
+                        "an SVG file: uncertainties of the coefficients; or a folder: their "
+                        "correlation and the dwells' residuals, too");
     command->add_flag("--json", options->json, "print the result as JSON");
     command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
     command->add_flag("--monte-carlo", options->monte_carlo,
                       "draw the declared inputs (JCGM 101) to check the combined uncertainty");
     command->footer(
-        "Example: vibrig identify recording.csv --config rig.toml --json > result.json\n"
+        "Example: vibrig identify recording.csv --config rig.toml --plot pictures --json > "
+        "result.json\n"
         "Exit codes: 0 the result is valid or doubtful (the verdict says why), 1 it is not valid, "
         "the configuration does not\nfit the recording (the warnings name what contradicts, and "
         "the keys suspected), or\ncoefficients are not observable (the result names them and the "

@@ -14,6 +14,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/report/result_charts.hpp"
 #include "daemon/tool/campaign_argument.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/exit_status.hpp"
@@ -32,7 +33,7 @@ namespace fs = std::filesystem;
 
 struct ReplayArguments {
     std::vector<std::string> files;
-    std::string config, dwells, speed = "max";
+    std::string config, dwells, plot, speed = "max";
     std::string instruction_set = "auto";
     bool json = false;
     bool strict = false;
@@ -147,6 +148,7 @@ int replay(const ReplayArguments& arguments) {
     const auto assessed = estimator::uncertainty::assess(
         dwells::Anew::settings_of(settings, replayed.found), replayed.result);
     const bool simulated = campaign.head.simulated;
+    if (!arguments.plot.empty()) report::plot_result(arguments.plot, replayed.result, assessed);
     std::cout << (arguments.json
                       ? replayed_json(replayed, assessed, settings, simulated, same_build) + "\n"
                       : simulated_line(simulated) + result_table(replayed.result, assessed))
@@ -197,6 +199,9 @@ void add_replay(CLI::App& app, int& exit_code) {
         ->add_option("--instruction-set", arguments->instruction_set,
                      "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
+    command->add_option("--plot", arguments->plot,
+                        "an SVG file: uncertainties of the coefficients; or a folder: their "
+                        "correlation and the dwells' residuals, too");
     command->add_flag("--json", arguments->json, "print the result as JSON");
     command->add_flag("--strict", arguments->strict, "a doubtful result is a no as well");
     command->footer(

@@ -22,6 +22,16 @@ const commands = {
   async open({url}) { await page.goto(url, {waitUntil: 'load'}); return bytes; },
   async as({origin, certPath, keyPath}) { await page.context().close(); await start([{origin, certPath, keyPath}]); },   // another person
   async click({selector}) { await page.click(selector, {timeout: 10000}); },
+  async drag({selector, from, to}) {   // shares of its width; without `to` the pointer rests there
+    await page.locator(selector).scrollIntoViewIfNeeded();
+    const box = await page.locator(selector).boundingBox(), y = box.y + box.height / 2;
+    await page.mouse.move(box.x + from * box.width, y);
+    if (to === undefined) return;
+    await page.mouse.down();
+    await page.mouse.move(box.x + (from + to) / 2 * box.width, y);
+    await page.mouse.move(box.x + to * box.width, y);
+    await page.mouse.up();
+  },
   async text({selector}) { return (await page.textContent(selector)) ?? null; },
   async evaluate({script}) { return page.evaluate(script); },
   async until({script, timeout}) {   // waitForFunction() evaluates inside the page, which its policy forbids

@@ -101,6 +101,32 @@ def check_accessible(checks, page, when):
                      f"{when}, {name}, {scheme}: axe-core finds no breach of WCAG AA", "\n".join(value.get("violations", [str(found)])))
 
 
+def check_whole(checks, page, what, height=None):
+    """Nothing is cut off, and on the wall, `height` high, nothing below it."""
+    cut = page.ask("evaluate", script="[...document.querySelectorAll('section, .scroll')].filter(e => e.scrollWidth > e.clientWidth + 2 || "
+                   "(innerWidth > 1900 && e.scrollHeight > e.clientHeight + 2)).map(e => e.getAttribute('aria-labelledby'))").get("value")
+    checks.equal(cut, [], f"{what}: nothing is cut off")
+    if height is not None:
+        tall = page.ask("evaluate", script="document.documentElement.scrollHeight").get("value", 10**6)
+        checks.check(tall <= height, f"{what}: one screen, without scrolling", f"{tall} of {height} pixels")
+
+
+def check_charts(checks, page, until):
+    """Values under the pointer, and a part that is looked at stays while data come in."""
+    page.ask("drag", selector="#c-amplitude .u-over", **{"from": .5})
+    until("the pointer over a chart tells the values", "/min: .*measured [0-9.e-]+ g/.test(document.querySelector('#c-amplitude .read').textContent)")
+    until("and those of the same moment beside it", "!document.querySelector('#c-temperature .read').hidden")
+    ticks = "document.getElementById('c-amplitude').dataset.from"
+    before = page.ask("evaluate", script=ticks).get("value")
+    page.ask("drag", selector="#c-amplitude .u-over", **{"from": .5, "to": .8})
+    until("a drag zooms", f"Number({ticks}) > Number('{before}') + 1")
+    zoomed = page.ask("evaluate", script=ticks).get("value")
+    time.sleep(2)
+    checks.equal(page.ask("evaluate", script=ticks).get("value"), zoomed, "and stays while data come in")
+    page.ask("evaluate", script="document.querySelector('#c-amplitude .u-over').dispatchEvent(new MouseEvent('dblclick', {bubbles: true}))")
+    until("a double click shows all again", f"Number({ticks}) < 1")
+
+
 def check_description(checks, rig, address):
     """Every path of the OpenAPI description answers as it says."""
     status, _, text = get(address, "/api/v1/openapi.json")
@@ -342,7 +368,7 @@ def check_page(checks, rig, page, address, remote, pki):
     until("its progress grows", "document.getElementById('progress').value > 20", 60)
     until("coefficients with sigma are shown", "document.querySelectorAll('#coefficients td small').length >= 10")
     until("positions done are marked", "document.querySelectorAll('#stops li.done').length >= 1")
-    until("charts are drawn", "document.querySelectorAll('.chart canvas').length === 5")
+    until("charts are drawn", "document.querySelectorAll('.chart canvas').length === 6")
     until("events are listed", "document.querySelectorAll('#events li').length > 3")
     checks.check(page.ask("names").get("value") == [], "everything has a name for a screen reader", str(page.ask("names")))
     page.ask("press", key="Tab")
@@ -372,12 +398,9 @@ def check_page(checks, rig, page, address, remote, pki):
             file = os.path.join(SHOTS, f"recording-{name}-{scheme}.png")
             wide = page.ask("shot", file=file, width=width, height=height, scheme=scheme).get("value", 10**6)
             checks.check(wide <= width, f"{name}, {scheme}: no wider than the screen", f"{wide} of {width} pixels")
-            cut = page.ask("evaluate", script="[...document.querySelectorAll('section, .scroll')].filter(e => e.scrollWidth > e.clientWidth + 2 || "
-                           "(innerWidth > 1900 && e.scrollHeight > e.clientHeight + 2)).map(e => e.getAttribute('aria-labelledby'))").get("value")
-            checks.equal(cut, [], f"{name}, {scheme}: nothing is cut off")
-            if name == "wall":
-                tall = page.ask("evaluate", script="document.documentElement.scrollHeight").get("value", 10**6)
-                checks.check(tall <= height, f"{name}, {scheme}: one screen, without scrolling", f"{tall} of {height} pixels")
+            check_whole(checks, page, f"{name}, {scheme}", height if name == "wall" else None)
+    check_charts(checks, page, until)
+    until("the dwells' residual drift is drawn", "document.getElementById('c-residuals').dataset.points >= 12", 60)
     check_accessible(checks, page, "while it records")
     seen = get(address, "/metrics")[2]
     rig.daemon.process.send_signal(signal.SIGSTOP)
@@ -405,6 +428,9 @@ def check_page(checks, rig, page, address, remote, pki):
     checks.equal(rig.status()["campaign"].get("remaining_s", 0), 0, "nor in the status")
     check_accessible(checks, page, "after a trip")
     page.ask("shot", file=os.path.join(SHOTS, "tripped-wall.png"), width=1920, height=1080, scheme="dark")
+    check_whole(checks, page, "wall, after a trip", 1080)
+    room = page.ask("evaluate", script="document.getElementById('events').clientHeight").get("value", 0)
+    checks.check(room > 150, "and the events have room", f"{room} pixels")
     page.ask("shot", file=os.path.join(SHOTS, "tripped-desktop.png"), width=1400, height=1000, scheme="light")
     page.ask("shot", file=os.path.join(SHOTS, "tripped-phone.png"), width=390, height=844, scheme="dark")
     rig.order("estop close")

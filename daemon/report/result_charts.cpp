@@ -1,0 +1,114 @@
+#include "daemon/report/result_charts.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "estimator/parameters.hpp"
+
+namespace vibrig::report {
+
+using estimator::kParameters;
+using estimator::uncertainty::Assessment;
+using tool::plot::Axis;
+using tool::plot::Chart;
+using tool::plot::Curve;
+using tool::plot::Look;
+
+namespace {
+
+/// Coefficients along an axis: as many names as there is room for.
+void name_coefficients(Axis& axis, std::size_t every) {
+    axis.exact = true;
+    for (std::size_t i = 0; i < kParameters; i += every)
+        axis.named.emplace_back(static_cast<double>(i + 1), estimator::parameter_names()[i]);
+}
+
+}  // namespace
+
+Chart correlation_chart(const std::function<double(std::size_t, std::size_t)>& correlation) {
+    Chart chart;
+    chart.title = "Correlation of the coefficients";
+    chart.x = Axis("coefficient, in the order of the table");
+    chart.y = Axis("coefficient");
+    name_coefficients(chart.x, 5);
+    name_coefficients(chart.y, 2);
+    tool::plot::HeatMap map;
+    map.label = "absolute correlation";
+    for (std::size_t i = 0; i <= kParameters; ++i) {
+        map.x.push_back(static_cast<double>(i) + 0.5);
+        map.y.push_back(static_cast<double>(i) + 0.5);
+    }
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        map.value.emplace_back();
+        for (std::size_t j = 0; j < kParameters; ++j)
+            map.value.back().push_back(std::abs(correlation(i, j)));
+    }
+    chart.maps.push_back(std::move(map));
+    return chart;
+}
+
+Chart residuals_chart(const Assessment& of) {
+    Chart chart;
+    chart.title = "Residuals of the dwells' rates";
+    chart.x.label = "time since the first dwell, h";
+    chart.y.label = "deg/h";
+    for (std::size_t j = 0; j < 3; ++j) {
+        Curve curve;
+        curve.name = fmt::format("gyro {}", "xyz"[j]);
+        curve.look = Look::dots;
+        for (const auto& dwell : of.rates) {
+            curve.x.push_back(dwell.time_h);
+            curve.y.push_back(dwell.residual[j]);
+            curve.low.push_back(dwell.residual[j] - dwell.residual_sigma[j]);
+            curve.high.push_back(dwell.residual[j] + dwell.residual_sigma[j]);
+        }
+        chart.curves.push_back(std::move(curve));
+    }
+    return chart;
+}
+
+Chart uncertainties_chart(const estimator::Result& result, const Assessment& of) {
+    Chart chart;
+    chart.title = "Standard uncertainty of the coefficients";
+    chart.x = Axis("coefficient, in the order of the table");
+    chart.y = Axis("deg/h, deg/h/g, deg/h/g^2", true);
+    name_coefficients(chart.x, 5);
+    chart.x.low = 0.5;
+    chart.x.high = static_cast<double>(kParameters) + 0.5;
+    Curve noise, combined;
+    noise.name = "sigma of noise alone";
+    combined.name = "combined, u";
+    noise.look = combined.look = Look::dots;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (auto* curve : {&noise, &combined}) curve->x.push_back(static_cast<double>(i + 1));
+        noise.y.push_back(result.observable[i] ? result.sigma[i] : std::nan(""));
+        combined.y.push_back(of.done && result.observable[i] ? of.coefficients[i].u : std::nan(""));
+    }
+    chart.curves = {std::move(noise), std::move(combined)};
+    if (!of.verdict.sentence.empty()) chart.notes.push_back(of.verdict.sentence);
+    return chart;
+}
+
+void plot_result(const std::string& path, const estimator::Result& result,
+                 const Assessment& assessed) {
+    const std::filesystem::path where(path);
+    const auto uncertainties = uncertainties_chart(result, assessed);
+    if (where.extension() == ".svg") return tool::plot::write_file(path, uncertainties.svg());
+    tool::plot::make_folder(path);
+    const auto write = [&](const char* name, const Chart& chart) {
+        tool::plot::write_file((where / name).string(), chart.svg());
+    };
+    const auto& p = result.covariance;
+    const auto correlation = [&p](std::size_t i, std::size_t j) {
+        const auto r = static_cast<Eigen::Index>(i), c = static_cast<Eigen::Index>(j);
+        return p(r, c) / std::sqrt(p(r, r) * p(c, c));
+    };
+    write("uncertainties.svg", uncertainties);
+    write("correlation.svg", correlation_chart(correlation));
+    if (assessed.done) write("residuals.svg", residuals_chart(assessed));
+}
+
+}  // namespace vibrig::report

@@ -1,0 +1,75 @@
+#include "daemon/report/result_charts.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace vibrig::report {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class PlotOfAResult : public ::testing::Test {
+  protected:
+    PlotOfAResult() {
+        folder_ = fs::temp_directory_path() / ("plot." + std::to_string(::getpid()));
+        fs::create_directories(folder_);
+        result_.observable.fill(true);
+        result_.sigma.fill(0.01);
+        result_.covariance.setIdentity();
+        assessed_.done = true;
+        assessed_.verdict.sentence = "doubtful, because of the moon";
+        for (auto& c : assessed_.coefficients) c.u = 0.02;
+        assessed_.rates.resize(3);
+    }
+    ~PlotOfAResult() override { fs::remove_all(folder_); }
+    static std::string text_of(const fs::path& path) {
+        std::ostringstream text;
+        text << std::ifstream(path).rdbuf();
+        return text.str();
+    }
+    fs::path folder_;
+    estimator::Result result_;
+    estimator::uncertainty::Assessment assessed_;
+};
+
+TEST_F(PlotOfAResult, IsOneFileOrAFolderOfThem) {
+    plot_result((folder_ / "one.svg").string(), result_, assessed_);
+    const std::string svg = text_of(folder_ / "one.svg");
+    EXPECT_THAT(svg, HasSubstr("combined, u"));
+    EXPECT_THAT(svg, HasSubstr("doubtful, because of the moon"));
+    plot_result((folder_ / "all").string(), result_, assessed_);
+    for (const char* name : {"uncertainties.svg", "correlation.svg", "residuals.svg"})
+        EXPECT_THAT(text_of(folder_ / "all" / name), HasSubstr("</svg>")) << name;
+}
+
+TEST_F(PlotOfAResult, NamesAPathThatCannotBeWritten) {
+    const std::string path = (folder_ / "none" / "one.svg").string();
+    try {
+        plot_result(path, result_, assessed_);
+        FAIL() << "wrote it";
+    } catch (const std::runtime_error& error) {
+        EXPECT_THAT(error.what(), HasSubstr(path));
+    }
+}
+
+TEST_F(PlotOfAResult, LeavesAHoleForWhatIsNotDetermined) {
+    // GIVEN a result of which one coefficient is not determined, and nothing to assess
+    result_.observable[4] = false;
+    result_.covariance.row(4).setConstant(std::nan(""));
+    result_.covariance.col(4).setConstant(std::nan(""));
+    assessed_ = {};
+    // WHEN it is drawn THEN nothing in the picture is no number
+    plot_result((folder_ / "all").string(), result_, assessed_);
+    for (const char* name : {"uncertainties.svg", "correlation.svg"})
+        EXPECT_EQ(text_of(folder_ / "all" / name).find("nan"), std::string::npos) << name;
+    EXPECT_FALSE(fs::exists(folder_ / "all" / "residuals.svg"));
+}
+
+}  // namespace
+}  // namespace vibrig::report
