@@ -1,12 +1,14 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -26,6 +28,8 @@
 #include "daemon/tool/result_table.hpp"
 #include "daemon/tool/rig_doubts.hpp"
 #include "daemon/tool/simulated.hpp"
+#include "daemon/tool/spectrum_dwells.hpp"
+#include "daemon/tool/spectrum_result.hpp"
 #include "estimator/hann.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
@@ -170,16 +174,39 @@ void tell_before(const Dwells& dwells, const estimator::Settings& settings, cons
 struct Found {
     estimator::Result result;
     std::string contradiction;  ///< the first; empty: none
+    std::vector<estimator::spectrum::SpectralDwell> spectral;
+    std::vector<estimator::spectrum::Kind> kinds;
 };
 
 Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
-    Found found{std::move(result), {}};
+    Found found;
+    found.result = std::move(result);
     found.contradiction = doubts.tell(found.result);
     return found;
 }
 
-Found identify(const std::vector<RecordingRow>& rows, const estimator::Settings& settings) {
+DwellKinds kinds_of(const std::vector<Dwell>& dwells, const estimator::Settings& settings,
+                    const SpectrumRequest& request, const std::string& file) {
+    DwellKinds kinds(settings.frequency_hz, request.spectra);
+    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, file);
+    return kinds;
+}
+
+/// What a dwell at another frequency than the filter's says: by a filter of its own, so that the
+/// coefficients at the reference frequency take nothing of it.
+void add_apart(estimator::Identification& apart, estimator::Result& to) {
+    estimator::Result one = apart.result();
+    to.samples += one.samples;
+    to.rejected += one.rejected;
+    std::move(one.dwells.begin(), one.dwells.end(), std::back_inserter(to.dwells));
+}
+
+Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settings,
+               const SpectrumRequest& request, const std::string& file) {
     const std::vector<Dwell> dwells = dwells_of(rows);
+    const DwellKinds kinds = kinds_of(dwells, settings, request, file);
+    const auto reference = kinds.reference();
+    if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
     tell_before(dwells, settings, [](const Dwell& dwell, SeenDwell& seen) {
         for (const RecordingRow* row : dwell.rows) seen.add(measurement_of(*row));
     });
@@ -188,23 +215,53 @@ Found identify(const std::vector<RecordingRow>& rows, const estimator::Settings&
     RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
-    for (const Dwell& dwell : dwells) {
+    Found found;
+    found.kinds = kinds.kinds();
+    estimator::Result others;
+    for (std::size_t d = 0; d < dwells.size(); ++d) {
+        const Dwell& dwell = dwells[d];
+        const auto kind = kinds.of(d);
+        std::optional<estimator::Identification> apart;
+        if (kind && kind != reference) {
+            estimator::Settings own = settings;
+            own.frequency_hz = kinds.kinds()[*kind].hz();
+            apart.emplace(own, 1);
+        }
+        estimator::Identification& filter = apart ? *apart : identification;
+        const std::size_t before = filter.rows().size();
         estimator::DwellInfo info{dwell.run, dwell.position};
         if (common_clock) info.begin_s = 0;
-        identification.begin_dwell(info);
+        filter.begin_dwell(info);
         doubts.begin_dwell();
         for (const RecordingRow* row : dwell.rows) {
             const auto measurement = measurement_of(*row);
-            static_cast<void>(identification.add(measurement));
+            static_cast<void>(filter.add(measurement));
             doubts.add(measurement);
             // Asking a clock costs more than a filter step.
             if (++done % 1024 == 0) {
                 progress.show(done, rows.size());
             }
         }
-        static_cast<void>(identification.end_dwell());
+        static_cast<void>(filter.end_dwell());
+        if (filter.rows().size() > before) {
+            const estimator::DwellRow& row = filter.rows().back();
+            const bool shook = row.vibration.kappa > 1;
+            if (shook && !kind)
+                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
+                                         ": found a dwell at rest that vibrates by " +
+                                         std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
+                                         " g, expected its frequency");
+            found.spectral.push_back({row, shook ? kind : std::nullopt, 0});
+        }
+        if (apart) add_apart(*apart, others);
     }
-    return with_doubts(identification.result(), doubts);
+    Found whole = with_doubts(identification.result(), doubts);
+    found.result = std::move(whole.result);
+    found.contradiction = std::move(whole.contradiction);
+    found.result.samples += others.samples;
+    found.result.rejected += others.rejected;
+    std::move(others.dwells.begin(), others.dwells.end(), std::back_inserter(found.result.dwells));
+    return found;
 }
 
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
@@ -287,29 +344,41 @@ struct IdentifyOptions {
     bool json = false;
     bool strict = false;
     bool monte_carlo = false;
+    std::string spectra;
+    std::string spectrum = "auto";
 };
 
 /// What it throws names file, line, key and value already.
 int run(const IdentifyOptions& options) {
     estimator::use_instruction_set(options.instruction_set);
-    const Identified identified = identify_recording(options.recording, options.config);
+    SpectrumRequest request;
+    request.form = form_of(options.spectrum);
+    if (!options.spectra.empty()) request.spectra = read_spectra(options.spectra);
+    const Identified identified = identify_recording(options.recording, options.config, request);
     const auto& assessed = identified.assessed;
+    const auto* spectrum = identified.spectrum ? &*identified.spectrum : nullptr;
+    if (options.monte_carlo && spectrum != nullptr && spectrum->several())
+        throw std::runtime_error(
+            "--monte-carlo: found dwells at several frequencies, expected one frequency");
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
     const auto* live = identified.live ? &*identified.live : nullptr;
-    std::cout
-        << (options.json
-                ? result_json(identified.result, assessed, identified.simulated, check, live) + "\n"
-                : simulated_line(identified.simulated) + result_table(identified.result, assessed) +
-                      (check != nullptr ? monte_carlo_text(*check) : ""))
-        << std::flush;
+    std::cout << (options.json ? result_json(identified.result, assessed, identified.simulated,
+                                             check, live, spectrum) +
+                                     "\n"
+                               : simulated_line(identified.simulated) +
+                                     result_table(identified.result, assessed) +
+                                     (spectrum != nullptr ? spectrum_text(*spectrum) : "") +
+                                     (check != nullptr ? monte_carlo_text(*check) : ""))
+              << std::flush;
     return exit_status(assessed.verdict.level, options.strict);
 }
 
 }  // namespace
 
-Identified identify_recording(const std::string& file, const std::string& config) {
+Identified identify_recording(const std::string& file, const std::string& config,
+                              const SpectrumRequest& request) {
     Identified identified;
     Found found;
     if (is_campaign(file)) {
@@ -319,10 +388,15 @@ Identified identify_recording(const std::string& file, const std::string& config
         const auto loaded = configuration::load(config, false);
         identified.settings = loaded.configuration.estimator;
         identified.simulated = loaded.configuration.simulated() || proto::says_simulated(file);
-        found = identify(read(file), identified.settings);
+        found = identify(read(file), identified.settings, request, file);
     }
     identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    if (identified.assessed.done && found.spectral.size() >= 2) {
+        identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
+                                          std::move(found.kinds), request.form);
+        adopt(*identified.spectrum, identified.settings, identified.assessed);
+    }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }
@@ -354,6 +428,14 @@ void add_identify(CLI::App& app, int& exit_code) {
                      "of the filter: auto (the best), or one of this processor's")
         ->envname("VIBRIG_INSTRUCTION_SET");
     command->add_flag("--json", options->json, "print the result as JSON");
+    command
+        ->add_option("--spectrum", options->spectrum,
+                     "quadratic coefficients over frequency, where a recording has several "
+                     "(column frequency_hz): flat, groups, resonance, or auto, which weighs them")
+        ->check(CLI::IsMember({"auto", "flat", "groups", "resonance"}));
+    command->add_option("--spectra", options->spectra,
+                        "JSON list of {run, position, lines: [[hz, g_peak], ..]}, for a recording "
+                        "without the column");
     command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
     command->add_flag("--monte-carlo", options->monte_carlo,
                       "draw the declared inputs (JCGM 101) to check the combined uncertainty");
