@@ -112,14 +112,16 @@ Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
         (!scattered || uncertainty::f_tail(ratio, out.degrees, std::max(1.0, spare)) < kAlarm);
 
     const double needed = noncentrality(out.degrees);
-    const VectorXd value = flat.value(y);
+    // Of the lowest frequency: a flat fit of what is not flat has coefficients of no meaning.
+    const VectorXd value = grouped.value(y);
+    const Index of_gyro = groups[0].cols();
     const auto share_seen = [&](double hz) {
         const VectorXd weights = table.elastic_weights({hz, kDampingTold});
         VectorXd moved(rates.size());
         for (Index j = 0; j < 3; ++j) {
             const auto g = static_cast<std::size_t>(j);
             const VectorXd quadratic =
-                table.vibration(g) * value.segment(kBase * j + kBase - kElastic, kElastic);
+                table.vibration(g) * value.segment(of_gyro * j + kBase - kElastic, kElastic);
             for (Index k = 0; k < table.dwells(); ++k) moved[3 * k + j] = weights[k] * quadratic[k];
         }
         return std::sqrt(needed / std::max(1e-300, flat.left(whitened(moved))));

@@ -1,5 +1,6 @@
 #include "tests/plant/elasticity.hpp"
 
+#include <algorithm>
 #include <numbers>
 
 namespace vibrig::plant {
@@ -18,8 +19,7 @@ void Elasticity::prepare(double step_s) noexcept {
         const auto slope = [&](const State& x, double force) {
             return State{x[1], w * w * (force - x[0]) - loss * x[1]};
         };
-        const auto run = [&](const State& x, double begin, double end) {
-            const double middle = (begin + end) / 2;
+        const auto run = [&](const State& x, double begin, double middle, double end) {
             const auto along = [&](const State& k, double part) {
                 return State{x[0] + part * step_s * k[0], x[1] + part * step_s * k[1]};
             };
@@ -30,9 +30,11 @@ void Elasticity::prepare(double step_s) noexcept {
                 out[i] = x[i] + step_s / 6 * (a[i] + 2 * b[i] + 2 * c[i] + d[i]);
             return out;
         };
-        const State first = run({1, 0}, 0, 0), second = run({0, 1}, 0, 0);
-        step_[j] = {
-            {{{first[0], second[0]}, {first[1], second[1]}}}, run({0, 0}, 1, 0), run({0, 0}, 0, 1)};
+        const State first = run({1, 0}, 0, 0, 0), second = run({0, 1}, 0, 0, 0);
+        step_[j] = {{{{first[0], second[0]}, {first[1], second[1]}}},
+                    run({0, 0}, 1, 0, 0),
+                    run({0, 0}, 0, 1, 0),
+                    run({0, 0}, 0, 0, 1)};
     }
 }
 
@@ -50,16 +52,24 @@ std::array<Elasticity::Excess, 3> Elasticity::advance(double dt_s,
         if (share_[j] == 0) continue;
         const Step& step = step_[j];
         Mass& mass = mass_[j];
-        const auto moved = [&step](std::array<double, 2>& x, double begin, double end) {
+        const auto moved = [&](std::array<double, 2>& x, std::size_t i, double Shake::*force) {
+            const double begin = shakes[i - 1].*force, end = shakes[i].*force;
+            // Half way by a parabola: a straight line would lose some of the vibration.
+            const std::size_t near = std::max<std::size_t>(i, 2);
+            const double bend =
+                shakes[near].*force - 2 * shakes[near - 1].*force + shakes[near - 2].*force;
+            const double middle = (begin + end) / 2 - bend / 8;
             const auto& t = step.transition;
-            x = {t[0][0] * x[0] + t[0][1] * x[1] + step.begin[0] * begin + step.end[0] * end,
-                 t[1][0] * x[0] + t[1][1] * x[1] + step.begin[1] * begin + step.end[1] * end};
+            const std::array<double, 2> before = x;
+            for (std::size_t r = 0; r < 2; ++r)
+                x[r] = t[r][0] * before[0] + t[r][1] * before[1] + step.begin[r] * begin +
+                       step.middle[r] * middle + step.end[r] * end;
         };
         Excess& sum = out[j];
         for (std::size_t i = 0; i <= last; ++i) {
             if (i > 0) {
-                moved(mass.in_phase, shakes[i - 1].in_phase, shakes[i].in_phase);
-                moved(mass.quadrature, shakes[i - 1].quadrature, shakes[i].quadrature);
+                moved(mass.in_phase, i, &Shake::in_phase);
+                moved(mass.quadrature, i, &Shake::quadrature);
             }
             // Simpson's rule.
             const double weight = (i == 0 || i == last ? 1.0

@@ -33,7 +33,7 @@ class Elasticity {
     /// One step of Runge and Kutta's method: linear in what it begins with.
     struct Step {
         std::array<std::array<double, 2>, 2> transition{};
-        std::array<double, 2> begin{}, end{};  ///< by the force at both ends
+        std::array<double, 2> begin{}, middle{}, end{};  ///< by the force there
     };
     void prepare(double step_s) noexcept;
 
