@@ -24,7 +24,8 @@ int count_of(const SpectraJson& entry, const char* key, const std::string& place
     return found->get<int>();
 }
 
-std::vector<std::pair<double, double>> lines_of(const SpectraJson& entry, const std::string& place) {
+std::vector<std::pair<double, double>> lines_of(const SpectraJson& entry,
+                                                const std::string& place) {
     const auto found = entry.find("lines");
     if (found == entry.end() || !found->is_array())
         throw std::runtime_error(place + "lines: found " +
