@@ -20,15 +20,18 @@ struct Column {
     const char* unit = "";
 };
 
-constexpr std::array<Column, 9> kColumns = {{{"time_s", 1e12, "s"},
-                                             {"run", 0, ""},
-                                             {"position", 0, ""},
-                                             {"alpha_deg", 1e4, "deg"},
-                                             {"beta_deg", 1e4, "deg"},
-                                             {"gamma_deg", 1e4, "deg"},
-                                             {"ax_g", 1e3, "g"},
-                                             {"ay_g", 1e3, "g"},
-                                             {"az_g", 1e3, "g"}}};
+constexpr std::array<Column, 10> kColumns = {{{"time_s", 1e12, "s"},
+                                              {"run", 0, ""},
+                                              {"position", 0, ""},
+                                              {"alpha_deg", 1e4, "deg"},
+                                              {"beta_deg", 1e4, "deg"},
+                                              {"gamma_deg", 1e4, "deg"},
+                                              {"ax_g", 1e3, "g"},
+                                              {"ay_g", 1e3, "g"},
+                                              {"az_g", 1e3, "g"},
+                                              {"frequency_hz", 2e3, "Hz"}}};
+constexpr std::size_t kNeeded = 9;  ///< the others may be missing
+constexpr std::size_t kFrequency = 9;
 constexpr std::size_t kTime = 0;
 constexpr std::size_t kRun = 1;
 constexpr std::size_t kPosition = 2;
@@ -75,6 +78,7 @@ class RecordingReader::Rows {
         read_header();
         simulated_ =
             std::ranges::any_of(fields_, [](auto name) { return same("simulated", name); });
+        frequency_ = std::ranges::count(roles_, kFrequency) > 0;
     } catch (const RecordingError&) {
         throw;
     } catch (const std::runtime_error& error) {
@@ -92,6 +96,7 @@ class RecordingReader::Rows {
         return false;
     }
     [[nodiscard]] bool simulated() const { return simulated_; }
+    [[nodiscard]] bool has_frequency() const { return frequency_; }
     [[nodiscard]] std::uint64_t bytes() const { return lines_.bytes(); }
 
   private:
@@ -187,7 +192,7 @@ class RecordingReader::Rows {
             roles_.push_back(index);
         }
         std::string missing;
-        for (std::size_t i = 0; i < kColumns.size(); ++i) {
+        for (std::size_t i = 0; i < kNeeded; ++i) {
             if (!seen.at(i))
                 missing += (missing.empty() ? "" : ", ") + std::string(kColumns.at(i).name);
         }
@@ -202,7 +207,7 @@ class RecordingReader::Rows {
         const bool trailing_comma = fields_.size() == roles_.size() + 1 && fields_.back().empty();
         if (fields_.size() != roles_.size() && !trailing_comma) {
             const bool decimal_commas =
-                separator_ == ',' && fields_.size() > roles_.size() + kColumns.size() / 2;
+                separator_ == ',' && fields_.size() > roles_.size() + kNeeded / 2;
             fail("", "found " + std::to_string(fields_.size()) + " fields, expected " +
                          std::to_string(roles_.size()) + " as in the header" +
                          (decimal_commas ? " (decimal commas want ';' or a tab between the fields)"
@@ -226,6 +231,9 @@ class RecordingReader::Rows {
                 case kPosition:
                     row.position = count(role, field);
                     break;
+                case kFrequency:
+                    row.frequency_hz = frequency(field);
+                    break;
                 default:
                     if (role < kForces) {
                         row.angle_deg.at(role - kAngles) = real(role, field);
@@ -236,6 +244,13 @@ class RecordingReader::Rows {
         }
         check_time(row, time_text);
         return row;
+    }
+
+    double frequency(std::string_view field) const {
+        const double hz = real(kFrequency, field);
+        if (hz < 0)
+            fail(kColumns.at(kFrequency).name, "found " + quoted(field) + ", expected 0 or above");
+        return hz;
     }
 
     double real(std::size_t role, std::string_view field) const {
@@ -291,6 +306,7 @@ class RecordingReader::Rows {
     std::string path_;
     LineReader lines_;
     bool simulated_ = false;
+    bool frequency_ = false;
     char separator_ = ',';
     std::vector<std::string_view> fields_;
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
@@ -306,6 +322,7 @@ RecordingReader::RecordingReader(const std::string& path) : rows_(std::make_uniq
 RecordingReader::~RecordingReader() = default;
 bool RecordingReader::next(RecordingRow& row) { return rows_->next(row); }
 bool RecordingReader::simulated() const { return rows_->simulated(); }
+bool RecordingReader::has_frequency() const { return rows_->has_frequency(); }
 std::uint64_t RecordingReader::bytes() const { return rows_->bytes(); }
 
 }  // namespace vibrig::proto

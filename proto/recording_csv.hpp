@@ -18,6 +18,8 @@ struct RecordingRow {
     std::array<double, 3> angle_deg{};  ///< outer alpha, inner beta, azimuth gamma
     std::array<double, 3> force_g{};    ///< specific force, platform axes
     std::size_t line = 0;               ///< where the row stands in its file, from 1
+    /// Of the vibration, 0 at rest; negative: the file has no such column.
+    double frequency_hz = -1;
 };
 
 /// A recording that cannot be read or written: "file:line: column X: found Y, expected Z".
@@ -35,10 +37,11 @@ class RecordingError : public std::runtime_error {
 };
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
-/// ax_g, ay_g, az_g in any order and any case, row by row in bounded memory; other columns are
-/// ignored. Fields are separated by commas, or by semicolons or tabs as the header says; then
-/// numbers may have decimal commas. Lines of comment (#) may come before the header. A (run,
-/// position) pair that comes back after another one begins a new dwell. Throws RecordingError.
+/// ax_g, ay_g, az_g, and if it likes frequency_hz, in any order and any case, row by row in bounded
+/// memory; other columns are ignored. Fields are separated by commas, or by semicolons or tabs as
+/// the header says; then numbers may have decimal commas. Lines of comment (#) may come before the
+/// header. A (run, position) pair that comes back after another one begins a new dwell. Throws
+/// RecordingError.
 class RecordingReader {
   public:
     /// Reads the header.
@@ -51,6 +54,8 @@ class RecordingReader {
     bool next(RecordingRow& row);
     /// The header names the column `simulated`.
     [[nodiscard]] bool simulated() const;
+    /// There is a column frequency_hz.
+    [[nodiscard]] bool has_frequency() const;
     [[nodiscard]] std::uint64_t bytes() const;  ///< read so far
 
   private:

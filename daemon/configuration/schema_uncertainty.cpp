@@ -271,6 +271,9 @@ void add_inputs(std::vector<Key>& keys) {
     keys.push_back(declared("uncertainty.accelerometer_gain", "", 1,
                             "gain at the vibration's frequency over that for gravity",
                             [in](C& c) { return One{&in(c).accelerometer_gain}; }));
+    keys.push_back(declared("uncertainty.gain_between_frequencies", "", 1,
+                            "scatter of that gain from one frequency to another",
+                            [in](C& c) { return One{&in(c).gain_between_frequencies}; }));
     keys.push_back(declared("uncertainty.accelerometer_zero_g", "g", 1,
                             "of the accelerometers' zeros: x, y, z",
                             [in](C& c) { return each(in(c).accelerometer_zero_g); }));

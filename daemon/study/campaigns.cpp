@@ -98,7 +98,7 @@ plant::CampaignPlan plan_of(const configuration::Configuration& c,
     plant::CampaignPlan plan;
     plan.positions_deg = c.campaign.positions_deg;
     plan.table_g = c.campaign.table_g;
-    plan.frequency_hz = c.campaign.frequency_hz;
+    plan.frequency_hz = {c.campaign.frequency_hz};
     plan.dwell_s = c.campaign.dwell_s;
     plan.ramp_s = c.campaign.ramp_s;
     plan.settle_s = c.campaign.settle_s;

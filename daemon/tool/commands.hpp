@@ -12,6 +12,7 @@ void add_identify(CLI::App& app, int& exit_code);
 void add_uncertainty(CLI::App& app, int& exit_code);
 void add_allan(CLI::App& app, int& exit_code);
 void add_plan(CLI::App& app, int& exit_code);
+void add_predict(CLI::App& app, int& exit_code);
 void add_calibrate(CLI::App& app, int& exit_code);
 void add_level(CLI::App& app, int& exit_code);
 void add_zero(CLI::App& app, int& exit_code);

@@ -1,15 +1,19 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +33,8 @@
 #include "daemon/tool/rig_doubts.hpp"
 #include "daemon/tool/seen_plan.hpp"
 #include "daemon/tool/simulated.hpp"
+#include "daemon/tool/spectrum_dwells.hpp"
+#include "daemon/tool/spectrum_result.hpp"
 #include "estimator/identification.hpp"
 #include "estimator/instruction_set.hpp"
 #include "proto/recording_csv.hpp"
@@ -53,10 +59,12 @@ estimator::Measurement measurement_of(const RecordingRow& row) {
 struct Found {
     estimator::Result result;
     std::string contradiction;  ///< the first; empty: none
+    std::vector<estimator::spectrum::SpectralDwell> spectral;
+    std::vector<estimator::spectrum::Kind> kinds;
 };
 
 Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
-    Found found{std::move(result), {}};
+    Found found{std::move(result), {}, {}, {}};
     found.contradiction = doubts.tell(found.result);
     return found;
 }
@@ -110,7 +118,7 @@ class RowsIdentified {
 
 /// A file of any length, in memory that does not grow with it: another thread reads ahead.
 Found identify(proto::RecordingReader& file, std::uint64_t size,
-               const estimator::Settings& settings) {
+               const estimator::Settings& settings, const std::string& path) {
     struct Block {
         std::vector<RecordingRow> rows;
         std::uint64_t bytes = 0;  ///< of the file, up to its end
@@ -133,7 +141,132 @@ Found identify(proto::RecordingReader& file, std::uint64_t size,
         for (const RecordingRow& row : block->rows) identified.add(row);
         progress.show(block->bytes, std::max(size, block->bytes));
     }
-    return identified.found();
+    Found found = identified.found();
+    // All that shook did so at the frequency of the configuration.
+    const Spectra none;
+    DwellKinds kinds(settings.frequency_hz, none);
+    const RecordingRow any;
+    kinds.add({&any}, path);
+    found.kinds = kinds.kinds();
+    for (const estimator::DwellRow& row : found.result.rows)
+        found.spectral.push_back({row, row.vibration.kappa > 1 ? kinds.of(0) : std::nullopt, 0});
+    return found;
+}
+
+std::vector<RecordingRow> rows_of(proto::RecordingReader& file) {
+    std::vector<RecordingRow> rows(1);
+    while (file.next(rows.back())) rows.emplace_back();
+    rows.pop_back();
+    return rows;
+}
+
+struct Dwell {
+    int run = 0;
+    int position = 0;
+    std::vector<const RecordingRow*> rows;
+};
+
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
+std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
+    std::vector<Dwell> dwells;
+    for (const RecordingRow& row : rows) {
+        if (dwells.empty() || dwells.back().run != row.run ||
+            dwells.back().position != row.position)
+            dwells.push_back({row.run, row.position, {}});
+        dwells.back().rows.push_back(&row);
+    }
+    return dwells;
+}
+
+/// The times of the file go on from dwell to dwell.
+bool has_common_clock(const std::vector<Dwell>& dwells) {
+    for (std::size_t d = 1; d < dwells.size(); ++d) {
+        if (!(dwells[d].rows.front()->time_s > dwells[d - 1].rows.back()->time_s)) return false;
+    }
+    return true;
+}
+
+DwellKinds kinds_of(const std::vector<Dwell>& dwells, const estimator::Settings& settings,
+                    const SpectrumRequest& request, const std::string& file) {
+    DwellKinds kinds(settings.frequency_hz, request.spectra);
+    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, file);
+    return kinds;
+}
+
+/// What a dwell at another frequency than the filter's says: by a filter of its own, so that the
+/// coefficients at the reference frequency take nothing of it.
+void add_apart(estimator::Identification& apart, estimator::Result& to) {
+    estimator::Result one = apart.result();
+    to.samples += one.samples;
+    to.rejected += one.rejected;
+    std::move(one.dwells.begin(), one.dwells.end(), std::back_inserter(to.dwells));
+}
+
+/// A recording that says with which frequency each dwell shook: kept whole, since the frequency
+/// that the filter takes is known at its end.
+Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settings,
+               const SpectrumRequest& request, const std::string& file) {
+    const std::vector<Dwell> dwells = dwells_of(rows);
+    const DwellKinds kinds = kinds_of(dwells, settings, request, file);
+    const auto reference = kinds.reference();
+    if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
+    const bool common_clock = has_common_clock(dwells);
+    estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
+    SeenPlan plan(settings);
+    Progress progress("identifying");
+    std::size_t done = 0;
+    Found found;
+    found.kinds = kinds.kinds();
+    estimator::Result others;
+    for (std::size_t d = 0; d < dwells.size(); ++d) {
+        const Dwell& dwell = dwells[d];
+        const auto kind = kinds.of(d);
+        std::optional<estimator::Identification> apart;
+        if (kind && kind != reference) {
+            estimator::Settings own = settings;
+            own.frequency_hz = kinds.kinds()[*kind].hz();
+            apart.emplace(own, 1);
+        }
+        estimator::Identification& filter = apart ? *apart : identification;
+        const std::size_t before = filter.rows().size();
+        estimator::DwellInfo info{dwell.run, dwell.position};
+        if (common_clock) info.begin_s = 0;
+        filter.begin_dwell(info);
+        doubts.begin_dwell();
+        plan.begin_dwell(dwell.run);
+        for (const RecordingRow* row : dwell.rows) {
+            const auto measurement = measurement_of(*row);
+            static_cast<void>(filter.add(measurement));
+            doubts.add(measurement);
+            plan.add(measurement);
+            // Asking a clock costs more than a filter step.
+            if (++done % 1024 == 0) {
+                progress.show(done, rows.size());
+            }
+        }
+        static_cast<void>(filter.end_dwell());
+        if (filter.rows().size() > before) {
+            const estimator::DwellRow& row = filter.rows().back();
+            const bool shook = row.vibration.kappa > 1;
+            if (shook && !kind)
+                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
+                                         ": found a dwell at rest that vibrates by " +
+                                         std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
+                                         " g, expected its frequency");
+            found.spectral.push_back({row, shook ? kind : std::nullopt, 0});
+        }
+        if (apart) add_apart(*apart, others);
+    }
+    plan.tell();
+    Found whole = with_doubts(identification.result(), doubts);
+    found.result = std::move(whole.result);
+    found.contradiction = std::move(whole.contradiction);
+    found.result.samples += others.samples;
+    found.result.rejected += others.rejected;
+    std::move(others.dwells.begin(), others.dwells.end(), std::back_inserter(found.result.dwells));
+    return found;
 }
 
 /// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
@@ -214,30 +347,42 @@ struct IdentifyOptions {
     bool json = false;
     bool strict = false;
     bool monte_carlo = false;
+    std::string spectra;
+    std::string spectrum = "auto";
 };
 
 /// What it throws names file, line, key and value already.
 int run(const IdentifyOptions& options) {
     estimator::use_instruction_set(options.instruction_set);
-    const Identified identified = identify_recording(options.recording, options.config);
+    SpectrumRequest request;
+    request.form = form_of(options.spectrum);
+    if (!options.spectra.empty()) request.spectra = read_spectra(options.spectra);
+    const Identified identified = identify_recording(options.recording, options.config, request);
     const auto& assessed = identified.assessed;
+    const auto* spectrum = identified.spectrum ? &*identified.spectrum : nullptr;
+    if (options.monte_carlo && spectrum != nullptr && spectrum->several())
+        throw std::runtime_error(
+            "--monte-carlo: found dwells at several frequencies, expected one frequency");
     if (!options.plot.empty()) report::plot_result(options.plot, identified.result, assessed);
     std::optional<estimator::uncertainty::MonteCarlo> drawn;
     if (options.monte_carlo) drawn = draw(identified);
     const auto* check = drawn ? &*drawn : nullptr;
     const auto* live = identified.live ? &*identified.live : nullptr;
-    std::cout
-        << (options.json
-                ? result_json(identified.result, assessed, identified.simulated, check, live) + "\n"
-                : simulated_line(identified.simulated) + result_table(identified.result, assessed) +
-                      (check != nullptr ? monte_carlo_text(*check) : ""))
-        << std::flush;
+    std::cout << (options.json ? result_json(identified.result, assessed, identified.simulated,
+                                             check, live, spectrum) +
+                                     "\n"
+                               : simulated_line(identified.simulated) +
+                                     result_table(identified.result, assessed) +
+                                     (spectrum != nullptr ? spectrum_text(*spectrum) : "") +
+                                     (check != nullptr ? monte_carlo_text(*check) : ""))
+              << std::flush;
     return exit_status(assessed.verdict.level, options.strict);
 }
 
 }  // namespace
 
-Identified identify_recording(const std::string& file, const std::string& config) {
+Identified identify_recording(const std::string& file, const std::string& config,
+                              const SpectrumRequest& request) {
     Identified identified;
     Found found;
     if (is_campaign(file)) {
@@ -250,10 +395,17 @@ Identified identify_recording(const std::string& file, const std::string& config
         identified.simulated = loaded.configuration.simulated() || reader.simulated();
         std::error_code unknown;
         const auto size = std::filesystem::file_size(file, unknown);
-        found = identify(reader, unknown ? 0 : size, identified.settings);
+        found = reader.has_frequency() || !request.spectra.empty()
+                    ? identify(rows_of(reader), identified.settings, request, file)
+                    : identify(reader, unknown ? 0 : size, identified.settings, file);
     }
     identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    if (identified.assessed.done && found.spectral.size() >= 2) {
+        identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
+                                          std::move(found.kinds), request.form);
+        adopt(*identified.spectrum, identified.settings, identified.assessed);
+    }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }
@@ -288,6 +440,14 @@ void add_identify(CLI::App& app, int& exit_code) {
                         "an SVG file: uncertainties of the coefficients; or a folder: their "
                         "correlation and the dwells' residuals, too");
     command->add_flag("--json", options->json, "print the result as JSON");
+    command
+        ->add_option("--spectrum", options->spectrum,
+                     "quadratic coefficients over frequency, where a recording has several "
+                     "(column frequency_hz): flat, groups, resonance, or auto, which weighs them")
+        ->check(CLI::IsMember({"auto", "flat", "groups", "resonance"}));
+    command->add_option("--spectra", options->spectra,
+                        "JSON list of {run, position, lines: [[hz, g_peak], ..]}, for a recording "
+                        "without the column");
     command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
     command->add_flag("--monte-carlo", options->monte_carlo,
                       "draw the declared inputs (JCGM 101) to check the combined uncertainty");

@@ -111,7 +111,7 @@ Json identified_anew(const dwells::Live& live) {
 
 std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed,
                         bool simulated, const uncertainty::MonteCarlo* drawn,
-                        const dwells::Live* live) {
+                        const dwells::Live* live, const SpectrumResult* spectrum) {
     Json root;
     root["parameters"] = parameters(result, assessed, drawn);
     root["covariance"] = covariance(result);
@@ -132,6 +132,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
     if (!assessed.verdict.sentence.empty()) root.update(assessment_json(assessed));
     if (drawn != nullptr) root["monte_carlo"] = monte_carlo_json(*drawn);
     if (live != nullptr) root["identified_anew"] = identified_anew(*live);
+    if (spectrum != nullptr) add_spectrum(*spectrum, root);
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
     root["simulated"] = simulated;

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
     vibrig::tool::add_uncertainty(app, exit_code);
     vibrig::tool::add_allan(app, exit_code);
     vibrig::tool::add_plan(app, exit_code);
+    vibrig::tool::add_predict(app, exit_code);
     vibrig::tool::add_calibrate(app, exit_code);
     vibrig::tool::add_level(app, exit_code);
     vibrig::tool::add_zero(app, exit_code);

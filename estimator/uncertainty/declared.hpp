@@ -43,6 +43,8 @@ struct Inputs {
     bool resolver_harmonics_declared = false;
     Declared time_base{1e-5, Shape::rectangular};
     Declared accelerometer_gain{0.005, Shape::rectangular};
+    /// Its scatter from one frequency of the vibration to another.
+    Declared gain_between_frequencies{0.005};
     std::array<Declared, 3> accelerometer_zero_g{{{1e-4}, {1e-4}, {1e-4}}};
     /// Off-diagonal elements xy, xz, yx, yz, zx, zy, rad.
     std::array<Declared, 6> accelerometer_cross{

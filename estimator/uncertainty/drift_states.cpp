@@ -322,6 +322,28 @@ DriftAverage average_drift(const GyroRates& gyro, const Drift& drift) {
     return out;
 }
 
+MatrixXd mean_covariance(const GyroRates& gyro, const DriftAverage& average) {
+    const Kernels kernels(gyro);
+    const double unit = kernels.s0 * kernels.s0;
+    double scatter = 0, walk = 0;
+    MatrixXd out = gyro.variance.asDiagonal();
+    for (const auto& [what, weight] : average.likeliest) {
+        scatter += weight * what.scatter * what.scatter;
+        walk += weight * what.walk * what.walk;
+        const MatrixXd columns = kernels.columns(gyro, what);
+        if (columns.cols() > 0) out += weight * columns * columns.transpose();
+    }
+    const VectorXd& mean = kernels.walk_mean;
+    for (Index i = 0; i < out.rows(); ++i) {
+        out(i, i) += unit * scatter;
+        for (Index k = 0; k < out.cols(); ++k)
+            out(i, k) += unit * walk *
+                         (std::min(kernels.elapsed[i], kernels.elapsed[k]) - mean[i] - mean[k] +
+                          mean.mean());
+    }
+    return out;
+}
+
 namespace {
 
 double log_likelihood(const GyroRates& gyro, double scatter, double walk) {

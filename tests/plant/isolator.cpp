@@ -41,9 +41,12 @@ Complex turned(const Complex& phasor, const Complex& turn) noexcept {
 }  // namespace
 
 Isolator::Isolator(double transmission, double frequency_hz, double damping, double step_s)
-    : omega0_(natural_omega(transmission, frequency_hz, damping)),
-      damping_(damping),
-      step_s_(step_s) {
+    : Isolator(natural_omega(transmission, frequency_hz, damping), damping, step_s) {}
+
+Isolator Isolator::hard(double step_s) { return {kTwoPi * 20000, 0.5, step_s}; }
+
+Isolator::Isolator(double omega0, double damping, double step_s)
+    : omega0_(omega0), damping_(damping), step_s_(step_s) {
     const double sigma = damping_ * omega0_;
     const double omega_d = omega0_ * std::sqrt(1 - damping_ * damping_);
     const double decay = std::exp(-sigma * step_s);

@@ -24,6 +24,9 @@ class Isolator {
     /// the resonance. Throws PlantError if no such frequency exists.
     Isolator(double transmission, double frequency_hz, double damping, double step_s);
 
+    /// None: the platform is bolted to the table, and follows it to 4e-5 up to 125 Hz.
+    [[nodiscard]] static Isolator hard(double step_s);
+
     [[nodiscard]] double natural_frequency_hz() const noexcept;
     /// a0/a and phase at a frequency; Tang et al. 2009, eq. 3, and eq. 4 with its sign put right.
     [[nodiscard]] std::complex<double> transfer(double frequency_hz) const noexcept;
@@ -49,6 +52,8 @@ class Isolator {
     [[nodiscard]] bool at_rest() const noexcept;                      ///< below 1e-9 g
 
   private:
+    Isolator(double omega0, double damping, double step_s);
+
     using Complex = std::complex<double>;
     struct Harmonic {
         double relative = 0;

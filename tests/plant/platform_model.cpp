@@ -25,6 +25,7 @@ Vec3 turned(const Vec3& v, const Vec3& axis, double angle) noexcept {
 
 PlatformModel::PlatformModel(const Truth& truth)
     : shape_(truth),
+      elasticity_(truth),
       coefficients_(truth.coefficients),
       cubic_(truth.cubic_deg_h_g3),
       gyro_axes_(truth.gyro_axes),
@@ -244,10 +245,32 @@ Vec3 PlatformModel::mean_rate(const Turn& at, double dt_s,
     return drift_sign_ * drift_under(moments) + (1 / (kRadPerSecondOfDegPerHour * dt_s)) * cone;
 }
 
+Vec3 PlatformModel::yielding(const Turn& at, double dt_s, std::span<const Shake> shakes) noexcept {
+    const Vec3 a = seen(at, shape_.acceleration({1, 0}));
+    const Vec3 b = seen(at, shape_.acceleration({0, 1}));
+    const auto excess = elasticity_.advance(dt_s, shakes);
+    Vec3 drift{};
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
+        const auto& e = excess[gyro];
+        const auto& axes = gyro_axes_[gyro];
+        const GyroCoefficients& d = coefficients_[gyro];
+        const auto second = [&](std::size_t i, std::size_t k) {
+            const double ai = along(a, axes[i]), ak = along(a, axes[k]);
+            const double bi = along(b, axes[i]), bk = along(b, axes[k]);
+            return e.pp * ai * ak + e.pq * (ai * bk + bi * ak) + e.qq * bi * bk;
+        };
+        const double sum = d[kII] * second(0, 0) + d[kOO] * second(1, 1) + d[kSS] * second(2, 2) +
+                           d[kIO] * second(0, 1) + d[kIS] * second(0, 2) + d[kOS] * second(1, 2);
+        drift[gyro] = elasticity_.share(gyro) * sum;
+    }
+    return drift;
+}
+
 void PlatformModel::advance(double dt_s, std::span<const Shake> shakes,
                             const Vec3& extra) noexcept {
     const Turn at = here_.further((dt_s / 2) * rates_of(here_, rate_ + extra));
     rate_ = mean_rate(at, dt_s, shakes);
+    if (elasticity_.any()) rate_ = rate_ + drift_sign_ * yielding(at, dt_s, shakes);
     set_angles(angles_ + dt_s * rates_of(at, rate_ + extra));
 }
 

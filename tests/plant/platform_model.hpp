@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "tests/plant/elasticity.hpp"
 #include "tests/plant/frame.hpp"
 #include "tests/plant/truth.hpp"
 #include "tests/plant/vibration_shape.hpp"
@@ -110,10 +111,15 @@ class PlatformModel {
     [[nodiscard]] Vec3 mean_rate(const Turn& at, double dt_s,
                                  std::span<const Shake> shakes) const noexcept;
 
+    /// Drift of the elastic parts beyond that of the coefficients at rest, deg/h.
+    [[nodiscard]] Vec3 yielding(const Turn& at, double dt_s,
+                                std::span<const Shake> shakes) noexcept;
+
     Vec3 angles_{};
     Turn here_{Vec3{}};  ///< of the angles
     Vec3 rate_{};        ///< of the last step, due to drift and rocking, deg/h
     VibrationShape shape_;
+    Elasticity elasticity_;
     Vec3 up_{};     ///< against gravity, in the reference frame
     Vec3 earth_{};  ///< in the reference frame, deg/h
     std::array<GyroCoefficients, 3> coefficients_;

@@ -37,7 +37,10 @@ void add_record_command(CLI::App& app, int& exit_code) {
         ->delimiter(',')
         ->check(proto::finite(0.0, 100.0))
         ->capture_default_str();
-    command->add_option("--frequency", o->plan.frequency_hz, "of the vibration, Hz")
+    command
+        ->add_option("--frequency", o->plan.frequency_hz,
+                     "of the vibration, Hz; or one for each of --table-g: a column frequency_hz")
+        ->delimiter(',')
         ->check(proto::finite(1.0, 200.0))
         ->capture_default_str();
     command->add_option("--dwell", o->plan.dwell_s, "recorded at each position, s")

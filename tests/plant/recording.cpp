@@ -41,7 +41,8 @@ void set_shaker(ShakerController& shaker, const proto::Register& reg, double val
 }
 
 // Slews with the shaker at rest, then ramps it up and waits until the isolators have rung down.
-void prepare(Rig& rig, const CampaignPlan& plan, const Vec3& position, double table_g) {
+void prepare(Rig& rig, const CampaignPlan& plan, const Vec3& position, std::size_t run) {
+    const double table_g = plan.table_g[run - 1];
     const proto::ShakerRegisters map;
     const auto wait_until = [&rig](auto done) {
         while (!done()) rig.advance();
@@ -55,7 +56,7 @@ void prepare(Rig& rig, const CampaignPlan& plan, const Vec3& position, double ta
     rig.slew_to(position);
     wait_until([&] { return rig.gimbals().in_position(); });
     rig.release();
-    set_shaker(rig.shaker(), map.frequency, plan.frequency_hz);
+    set_shaker(rig.shaker(), map.frequency, plan.hz_of(run));
     set_shaker(rig.shaker(), map.ramp_time, plan.ramp_s);
     set_shaker(rig.shaker(), map.amplitude, table_g);
     if (table_g > 0) {
@@ -128,6 +129,10 @@ std::vector<Vec3> read_positions(const std::string& name) {
 std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
                        const std::function<void(const PlannedSample&)>& sink,
                        const std::function<void(std::size_t, std::size_t)>& progress) {
+    if (plan.frequency_hz.size() != 1 && plan.frequency_hz.size() != plan.table_g.size())
+        throw PlantError("--frequency: found " + std::to_string(plan.frequency_hz.size()) +
+                         " frequencies, expected one, or one for each of " +
+                         std::to_string(plan.table_g.size()) + " levels");
     Rig rig(truth);
     std::uint64_t samples = 0;
     std::size_t dwell = 0;
@@ -147,7 +152,7 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
                              std::to_string(plan.positions_deg.size()) + " and " +
                              std::to_string(plan.table_g.size()));
         }
-        prepare(rig, plan, plan.positions_deg[position - 1], plan.table_g[run - 1]);
+        prepare(rig, plan, plan.positions_deg[position - 1], run);
         for (std::int64_t i = 0; i < ticks; ++i) {
             rig.advance();
             sink({run, position, 1e-6 * static_cast<double>(rig.time_us()), rig.readings(),
@@ -178,7 +183,9 @@ std::vector<std::pair<std::size_t, std::size_t>> parse_order(const std::string& 
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
                      std::array<GyroCoefficients, 3>* mean,
                      const std::function<void(std::size_t, std::size_t)>& progress) {
-    out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g\n";
+    const bool several = plan.frequency_hz.size() > 1;
+    out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g"
+        << (several ? ",frequency_hz\n" : "\n");
     std::array<GyroCoefficients, 3> sum{};
     const auto write = [&](const PlannedSample& s) {
         std::array<char, 400> row{};
@@ -194,7 +201,9 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
             *at++ = ',';
         }
         for (const double angle : s.readings.encoder_deg) fixed(angle, 7, ',');
-        for (std::size_t i = 0; i < 3; ++i) fixed(s.readings.raw_g[i], 7, i < 2 ? ',' : '\n');
+        for (std::size_t i = 0; i < 3; ++i)
+            fixed(s.readings.raw_g[i], 7, i < 2 || several ? ',' : '\n');
+        if (several) fixed(plan.table_g[s.run - 1] > 0 ? plan.hz_of(s.run) : 0, 4, '\n');
         out.write(row.data(), at - row.data());
         for (std::size_t g = 0; g < 3; ++g) {
             for (std::size_t t = 0; t < kTerms; ++t) sum[g][t] += s.coefficients[g][t];

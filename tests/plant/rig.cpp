@@ -17,11 +17,13 @@ Rig::Rig(const Truth& truth)
       tick_us_(std::llround(1e6 / truth.sample_rate_hz)),
       tick_s_(1e-6 * static_cast<double>(tick_us_)),
       passing_s_(tick_s_ / (1 + truth.time_base)),
-      steps_(2 * static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
+      steps_((truth.elastic_share == Vec3{} ? 2 : 8) *
+             static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
       gimbals_(truth.slew_deg_per_s, truth.stuck_gimbal),
-      isolator_(truth.transmission, truth.frequency_hz, truth.damping,
-                passing_s_ / static_cast<double>(steps_)),
+      isolator_(truth.hard ? Isolator::hard(passing_s_ / static_cast<double>(steps_))
+                           : Isolator(truth.transmission, truth.frequency_hz, truth.damping,
+                                      passing_s_ / static_cast<double>(steps_))),
       shaker_(truth.limit_g, truth.limit_mm),
       sensors_(truth, truth.seed),
       increments_(truth, tick_us_),

@@ -63,7 +63,8 @@ class Rig {
     std::int64_t tick_us_;
     double tick_s_;      ///< by the rig's clock
     double passing_s_;   ///< really, in a tick
-    std::size_t steps_;  ///< of the vibration per tick, even, 0.5 ms or a little less
+    std::size_t steps_;  ///< of the vibration per tick, even, 0.5 ms or a little less; 0.125 ms
+                         ///< where a gyro is elastic
     PlatformModel platform_;
     Gimbals gimbals_;
     Isolator isolator_;

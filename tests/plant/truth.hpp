@@ -127,6 +127,13 @@ struct Truth {
     /// up, east. Only the resolvers see it.
     Vec3 base_rocking_arcsec_g{}, base_rocking_quadrature_arcsec_g{};
 
+    bool hard = false;  ///< the platform is bolted to the table: no pads
+
+    // elastic: gyros x, y, z; a part of all their quadratic coefficients is of a mass that yields
+    Vec3 elastic_share{};
+    Vec3 elastic_resonance_hz{60, 60, 60};
+    Vec3 elastic_damping{0.05, 0.05, 0.05};
+
     // shaker
     double second_harmonic = 0;  ///< of the table's acceleration, relative to the fundamental
     double third_harmonic = 0;

@@ -73,6 +73,10 @@ void for_each_field(T& t, Field&& field) {
     field("isolator", "base_rocking_arcsec_g", t.base_rocking_arcsec_g, -1e3, 1e3);
     field("isolator", "base_rocking_quadrature_arcsec_g", t.base_rocking_quadrature_arcsec_g, -1e3,
           1e3);
+    field("isolator", "hard", t.hard, 0, 0);
+    field("elastic", "share", t.elastic_share, -2.0, 2.0);
+    field("elastic", "resonance_hz", t.elastic_resonance_hz, 5.0, 2000.0);
+    field("elastic", "damping", t.elastic_damping, 1e-3, 1.0);
     field("shaker", "second_harmonic", t.second_harmonic, 0.0, 0.5);
     field("shaker", "third_harmonic", t.third_harmonic, 0.0, 0.5);
     field("shaker", "fourth_harmonic", t.fourth_harmonic, 0.0, 0.5);

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "estimator/spectrum/analysis.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+
+namespace vibrig::tool {
+
+/// A campaign over frequency, as results show it.
+struct SpectrumResult {
+    estimator::spectrum::Analysis analysis;
+    estimator::spectrum::SpectralTable table;
+    double reference_hz = 0;  ///< of the coefficients that are not static
+
+    [[nodiscard]] bool several() const { return table.kinds().size() > 1; }
+};
+
+/// "auto", "flat", "groups" or "resonance".
+[[nodiscard]] estimator::spectrum::Form form_of(const std::string& name);
+
+[[nodiscard]] SpectrumResult spectrum_of(const estimator::Settings& settings,
+                                         std::vector<estimator::spectrum::SpectralDwell> dwells,
+                                         std::vector<estimator::spectrum::Kind> kinds,
+                                         estimator::spectrum::Form form);
+
+/// With several frequencies the assessment's coefficients become those of the analysis, its rates
+/// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.
+void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
+           estimator::uncertainty::Assessment& assessed);
+
+/// Root `spectrum`, `at_hz` of the parameters and `lines` of the dwells' rates.
+void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
+/// For people; empty with one frequency.
+[[nodiscard]] std::string spectrum_text(const SpectrumResult& spectrum);
+
+/// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
+[[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
+                                                    const std::string& path);
+
+}  // namespace vibrig::tool

@@ -1,0 +1,296 @@
+#include "estimator/spectrum/analysis.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/parameters.hpp"
+#include "estimator/uncertainty/budget.hpp"
+#include "estimator/uncertainty/distributions.hpp"
+#include "estimator/uncertainty/drift_states.hpp"
+#include "estimator/uncertainty/signatures.hpp"
+
+namespace vibrig::estimator::spectrum {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kFewestForTwo = 40;
+constexpr double kOneFrequencyReach = 1.5;
+
+MatrixXd prior_sigmas(const Settings& settings) {
+    const ParameterArray sigma = prior_sigma(settings);
+    MatrixXd out(kBase, 3);
+    for (std::size_t g = 0; g < kGroups; ++g) {
+        for (std::size_t j = 0; j < kGyros; ++j)
+            out(static_cast<Index>(g), static_cast<Index>(j)) = sigma[internal_index(g, j)];
+    }
+    return out;
+}
+
+/// The rates of a gyro with the groups model, what is not known of their vibration in the noise.
+uncertainty::GyroRates rates_of(const SpectralTable& table, const uncertainty::DwellTable& times,
+                                const VectorXd& prior, std::size_t j, const MatrixXd& shaken) {
+    uncertainty::GyroRates gyro;
+    const Index n = table.dwells(), g = static_cast<Index>(j);
+    gyro.time_h = times.time_h;
+    gyro.rate.resize(n);
+    gyro.variance.resize(n);
+    for (Index k = 0; k < n; ++k) {
+        const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
+        gyro.rate[k] = dwell.row.rate[g];
+        const double level = dwell.relative_error * shaken(k, g);
+        gyro.variance[k] = dwell.row.variance(g, g) + level * level;
+    }
+    gyro.regressors = table.grouped(j);
+    gyro.prior_information = prior.array().square().inverse();
+    return gyro;
+}
+
+/// Drift of all dwells due to their vibration, by the groups' coefficients of a gyro.
+VectorXd vibration_part(const SpectralTable& table, std::size_t j, const VectorXd& groups) {
+    VectorXd out = VectorXd::Zero(table.dwells());
+    for (Index k = 0; k < table.dwells(); ++k) {
+        const auto& kind = table.list()[static_cast<std::size_t>(k)].kind;
+        if (!kind) continue;
+        const Index begin = kBase - kElastic + kElastic * static_cast<Index>(*kind);
+        out[k] = table.vibration(j).row(k).dot(groups.segment(begin, kElastic));
+    }
+    return out;
+}
+
+struct Declared {
+    MatrixXd rates;  ///< 3 n x m, one standard uncertainty each
+    std::vector<std::pair<std::string, std::string>> names;
+};
+
+/// The declared inputs' effect on the rates, correlations worked in.
+Declared declared_of(const Settings& settings, const SpectralTable& table, const MatrixXd& groups,
+                     const MatrixXd& shaken) {
+    const uncertainty::DwellTable times = uncertainty::dwell_table(table.rows());
+    ParameterArray coefficients{};
+    for (std::size_t g = 0; g < kGroups; ++g) {
+        for (std::size_t j = 0; j < kGyros; ++j)
+            coefficients[internal_index(g, j)] =
+                groups(static_cast<Index>(g), static_cast<Index>(j));
+    }
+    uncertainty::InputSignatures inputs = uncertainty::input_signatures(
+        settings.uncertainty, times, uncertainty::ForwardModel(settings, coefficients));
+    VectorXd of_vibration(3 * table.dwells());
+    for (Index k = 0; k < table.dwells(); ++k)
+        of_vibration.segment<3>(3 * k) = shaken.row(k).transpose();
+    // What a gain does depends on the coefficients at the frequency of each dwell.
+    for (std::size_t i = 0; i < inputs.list.size(); ++i) {
+        if (inputs.list[i].input == "accelerometer_gain")
+            inputs.rates.col(static_cast<Index>(i)) = -2 * of_vibration;
+    }
+    const MatrixXd u = uncertainty::input_covariance(settings.uncertainty, inputs.list);
+    const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
+    Declared out;
+    out.rates = inputs.rates * MatrixXd(root.matrixL());
+    for (const auto& input : inputs.list) out.names.emplace_back(input.input, input.element);
+    const double between = settings.uncertainty.gain_between_frequencies.u;
+    if (table.kinds().size() < 2 || !(between > 0)) return out;
+    for (std::size_t kind = 0; kind < table.kinds().size(); ++kind) {
+        VectorXd z = VectorXd::Zero(of_vibration.size());
+        for (Index k = 0; k < table.dwells(); ++k) {
+            if (table.list()[static_cast<std::size_t>(k)].kind == kind)
+                z.segment<3>(3 * k) = 2 * between * of_vibration.segment<3>(3 * k);
+        }
+        out.rates.conservativeResize(Eigen::NoChange, out.rates.cols() + 1);
+        out.rates.rightCols<1>() = z;
+        out.names.emplace_back("gain_between_frequencies",
+                               table.kinds()[kind].profile.empty()
+                                   ? std::to_string(table.kinds()[kind].hz()) + " Hz"
+                                   : table.kinds()[kind].profile);
+    }
+    return out;
+}
+
+/// Rows of gyro j out of those of all.
+MatrixXd of_gyro(const MatrixXd& all, Index j) {
+    MatrixXd out(all.rows() / 3, all.cols());
+    for (Index k = 0; k < out.rows(); ++k) out.row(k) = all.row(3 * k + j);
+    return out;
+}
+
+/// Of all rates: the gyros' own, what the encoders and levels have in common, what is declared.
+MatrixXd joint_covariance(const SpectralTable& table, const std::array<MatrixXd, 3>& gyros,
+                          const MatrixXd& shaken, const MatrixXd& declared) {
+    MatrixXd out = declared * declared.transpose();
+    for (Index k = 0; k < table.dwells(); ++k) {
+        const SpectralDwell& dwell = table.list()[static_cast<std::size_t>(k)];
+        for (Index a = 0; a < 3; ++a) {
+            for (Index b = 0; b < 3; ++b) {
+                if (a == b) continue;
+                out(3 * k + a, 3 * k + b) +=
+                    dwell.row.variance(a, b) +
+                    dwell.relative_error * dwell.relative_error * shaken(k, a) * shaken(k, b);
+            }
+        }
+        for (Index i = 0; i < table.dwells(); ++i) {
+            for (Index j = 0; j < 3; ++j)
+                out(3 * k + j, 3 * i + j) += gyros[static_cast<std::size_t>(j)](k, i);
+        }
+    }
+    return out;
+}
+
+/// One gyro's form: none, one or two resonances, as asked for and as the rates need.
+void settle(const SpectralTable& table, std::size_t j, const GyroProblem& problem,
+            const MatrixXd& declared, Form form, Analysis& out) {
+    Mixture& mixture = out.gyros[j];
+    if (form == Form::flat || form == Form::groups || table.kinds().size() < 2) {
+        mixture.list = {without_resonance(table, j, problem)};
+        return;
+    }
+    mixture = one_resonance(table, j, problem);
+    if (form == Form::resonance && mixture.list.size() > 1)
+        std::erase_if(mixture.list, [](const Hypothesis& one) { return one.resonances.empty(); });
+    double all = 0;
+    for (const Hypothesis& one : mixture.list) all += one.weight;
+    for (Hypothesis& one : mixture.list) one.weight /= all;
+    // What is declared is no lack of fit.
+    const MatrixXd null = problem.covariance + declared * declared.transpose();
+    const Eigen::LLT<MatrixXd> factor(null);
+    const auto tail = [&](const Mixture& of) {
+        const Hypothesis& best = of.list.front();
+        const VectorXd left = problem.rate - design(table, j, best.resonances) * best.x;
+        return uncertainty::chi_square_tail(left.dot(factor.solve(left)), std::max(1, of.degrees));
+    };
+    out.lack_of_fit[j] = tail(mixture);
+    if (out.lack_of_fit[j] >= kAlarm || table.dwells() < kFewestForTwo || !mixture.resonant())
+        return;
+    Mixture two = two_resonances(table, j, problem, mixture.list.front().resonances[0].hz);
+    two.log_odds = mixture.log_odds;
+    mixture = std::move(two);
+    out.second[j] = true;
+    out.lack_of_fit[j] = tail(mixture);
+}
+
+/// Mean and covariance of the ten static coefficients over a mixture.
+void put_together(Analysis& out, const MatrixXd& declared_effect) {
+    const auto all = static_cast<Index>(kParameters);
+    out.value = VectorXd::Zero(all);
+    out.covariance_a = MatrixXd::Zero(all, all);
+    for (Index j = 0; j < 3; ++j) {
+        const auto& list = out.gyros[static_cast<std::size_t>(j)].list;
+        VectorXd mean = VectorXd::Zero(kBase);
+        MatrixXd square = MatrixXd::Zero(kBase, kBase);
+        for (const Hypothesis& one : list) {
+            const VectorXd x = one.x.head(kBase);
+            mean += one.weight * x;
+            square += one.weight * (one.covariance.topLeftCorner(kBase, kBase) + x * x.transpose());
+        }
+        square -= mean * mean.transpose();
+        for (Index a = 0; a < kBase; ++a) {
+            out.value[3 * a + j] = mean[a];
+            for (Index b = 0; b < kBase; ++b) out.covariance_a(3 * a + j, 3 * b + j) = square(a, b);
+        }
+    }
+    out.covariance = out.covariance_a + declared_effect * declared_effect.transpose();
+}
+
+/// What the declared inputs do to each gyro's coefficients, and to the 30 together.
+MatrixXd add_effects(const SpectralTable& table, const std::array<GyroProblem, 3>& problems,
+                     const Declared& declared, Analysis& out) {
+    const Index m = declared.rates.cols();
+    MatrixXd on_all = MatrixXd::Zero(static_cast<Index>(kParameters), m);
+    out.model.effects.resize(static_cast<std::size_t>(m));
+    for (Index i = 0; i < m; ++i) {
+        Effect& effect = out.model.effects[static_cast<std::size_t>(i)];
+        std::tie(effect.input, effect.element) = declared.names[static_cast<std::size_t>(i)];
+    }
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto g = static_cast<Index>(j);
+        const MatrixXd moved =
+            gain(table, j, problems[j], out.gyros[j].list.front()) * of_gyro(declared.rates, g);
+        for (Index i = 0; i < m; ++i) {
+            out.model.effects[static_cast<std::size_t>(i)].change[j] = moved.col(i);
+            for (Index a = 0; a < kBase; ++a) on_all(3 * a + g, i) = moved(a, i);
+        }
+    }
+    return on_all;
+}
+
+void set_reach(const Settings& settings, const SpectralTable& table, Analysis& out) {
+    Model& model = out.model;
+    model.frame = settings;
+    for (std::size_t j = 0; j < 3; ++j) model.mixture[j] = out.gyros[j].list;
+    if (!table.kinds().empty()) {
+        const auto by_hz = [](const Band& a, const Band& b) { return a.hz < b.hz; };
+        const auto& first = table.kinds().front().bands;
+        model.lowest_hz = std::min_element(first.begin(), first.end(), by_hz)->hz;
+        const double alone = std::max_element(first.begin(), first.end(), by_hz)->hz;
+        model.highest_hz = std::max(out.flat.highest_hz, kOneFrequencyReach * alone);
+        if (table.kinds().size() > 1) model.highest_hz = std::max(out.flat.highest_hz, alone);
+    }
+    for (std::size_t j = 0; j < 3; ++j) {
+        if (out.lack_of_fit[j] < kAlarm)
+            model.refusal = std::string("gyro ") + "xyz"[j] +
+                            (out.second[j] ? ": more than two resonances"
+                                           : ": one resonance does not fit, and there are too few "
+                                             "dwells for two (40)");
+    }
+    if (out.form == Form::groups)
+        model.refusal = "coefficients in groups know nothing between their frequencies";
+}
+
+}  // namespace
+
+const char* name_of(Form form) noexcept {
+    constexpr std::array<const char*, 4> kNames{"auto", "flat", "groups", "resonance"};
+    return kNames[static_cast<std::size_t>(form)];
+}
+
+bool Analysis::resonant() const {
+    return std::any_of(gyros.begin(), gyros.end(),
+                       [](const Mixture& one) { return one.resonant(); });
+}
+
+Analysis analyse(const Settings& settings, const SpectralTable& table, Form form) {
+    Analysis out;
+    const uncertainty::DwellTable times = uncertainty::dwell_table(table.rows());
+    const MatrixXd prior = prior_sigmas(settings);
+    const Index n = table.dwells(), columns = table.grouped(0).cols();
+    const bool twice = std::any_of(table.list().begin(), table.list().end(),
+                                   [](const auto& dwell) { return dwell.relative_error > 0; });
+    out.vibration_rates = MatrixXd::Zero(n, 3);
+    out.groups.value.resize(columns, 3);
+    out.groups.sigma.resize(columns, 3);
+    std::array<GyroProblem, 3> problems;
+    std::array<MatrixXd, 3> covariances;
+    bool scattered = false;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto g = static_cast<Index>(j);
+        const VectorXd sigma = grouped_prior(prior.col(g), columns);
+        // What a level's error does is known once the coefficients are.
+        for (int pass = 0; pass < (twice ? 2 : 1); ++pass) {
+            const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
+            const auto average = uncertainty::average_drift(gyro, settings.drift);
+            out.vibration_rates.col(g) = vibration_part(table, j, average.value);
+            covariances[j] = uncertainty::mean_covariance(gyro, average);
+            out.groups.value.col(g) = average.value;
+            out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
+            scattered |= average.weights.scatter > 0.5;
+            problems[j] = {gyro.rate, covariances[j], prior.col(g)};
+        }
+    }
+    const Declared declared = declared_of(settings, table, out.groups.value, out.vibration_rates);
+    VectorXd rates(3 * n);
+    for (Index k = 0; k < n; ++k)
+        rates.segment<3>(3 * k) = table.rows()[static_cast<std::size_t>(k)].rate;
+    out.flat = test_flatness(
+        table, rates, joint_covariance(table, covariances, out.vibration_rates, declared.rates),
+        prior, scattered);
+    for (std::size_t j = 0; j < 3; ++j)
+        settle(table, j, problems[j], of_gyro(declared.rates, static_cast<Index>(j)), form, out);
+    out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
+    put_together(out, add_effects(table, problems, declared, out));
+    set_reach(settings, table, out);
+    return out;
+}
+
+}  // namespace vibrig::estimator::spectrum

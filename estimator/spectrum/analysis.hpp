@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "estimator/spectrum/flatness.hpp"
+#include "estimator/spectrum/prediction.hpp"
+#include "estimator/spectrum/resonance.hpp"
+#include "estimator/spectrum/table.hpp"
+
+namespace vibrig::estimator::spectrum {
+
+/// What the quadratic coefficients are taken to be over frequency.
+enum class Form { automatic, flat, groups, resonance };
+[[nodiscard]] const char* name_of(Form form) noexcept;
+
+/// All that a campaign says of its coefficients over frequency.
+struct Analysis {
+    Form form = Form::flat;  ///< what is in force
+    Flatness flat;
+    Groups groups;
+    std::array<Mixture, 3> gyros;
+    std::array<double, 3> lack_of_fit{1, 1, 1};  ///< p
+    std::array<bool, 3> second{};                ///< a second resonance was added
+    Model model;
+    Eigen::MatrixXd vibration_rates;  ///< of the dwells, due to their vibration, n x 3, deg/h
+    /// Of all 30 together, filter order: noise and drift states, and with the declared inputs.
+    Eigen::VectorXd value;
+    Eigen::MatrixXd covariance_a, covariance;
+
+    /// Some gyro's elastic part is named.
+    [[nodiscard]] bool resonant() const;
+};
+
+/// A pure function of its arguments; some tenths of a second. Needs two dwells or more.
+[[nodiscard]] Analysis analyse(const Settings& settings, const SpectralTable& table, Form form);
+
+}  // namespace vibrig::estimator::spectrum

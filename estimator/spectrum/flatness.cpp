@@ -1,0 +1,138 @@
+#include "estimator/spectrum/flatness.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "estimator/uncertainty/distributions.hpp"
+
+namespace vibrig::estimator::spectrum {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kSeen = 1.2816;  ///< 90 % of a normal distribution
+constexpr double kDampingTold = 0.05;
+constexpr double kShare = 0.2;
+constexpr std::array<double, 5> kTold{40, 60, 120, 300, 1000};
+
+/// Columns of three gyros, one below the other in the order of the rates.
+MatrixXd interleaved(const std::array<MatrixXd, 3>& of) {
+    const Index n = of[0].rows(), columns = of[0].cols();
+    MatrixXd out = MatrixXd::Zero(3 * n, 3 * columns);
+    for (Index j = 0; j < 3; ++j) {
+        for (Index k = 0; k < n; ++k)
+            out.block(3 * k + j, columns * j, 1, columns) = of[static_cast<std::size_t>(j)].row(k);
+    }
+    return out;
+}
+
+/// Least squares of whitened columns with a prior about zero.
+class Fitted {
+  public:
+    Fitted(MatrixXd white, const VectorXd& sigma) : white_(std::move(white)) {
+        MatrixXd normal = white_.transpose() * white_;
+        normal.diagonal().array() += sigma.array().square().inverse();
+        factor_.compute(normal);
+    }
+    /// z' Q z of a whitened column.
+    [[nodiscard]] double left(const VectorXd& z) const {
+        const VectorXd seen = white_.transpose() * z;
+        return z.squaredNorm() - seen.dot(factor_.solve(seen));
+    }
+    [[nodiscard]] VectorXd value(const VectorXd& z) const {
+        return factor_.solve(white_.transpose() * z);
+    }
+
+  private:
+    MatrixXd white_;
+    Eigen::LLT<MatrixXd> factor_;
+};
+
+VectorXd stacked(const MatrixXd& per_gyro) {
+    return Eigen::Map<const VectorXd>(per_gyro.data(), per_gyro.size());
+}
+
+/// Chi-square that a clean campaign exceeds with kAlarm.
+double critical(int degrees) {
+    double low = 0, high = 40.0 * degrees + 100;
+    for (int i = 0; i < 100; ++i) {
+        const double middle = (low + high) / 2;
+        (uncertainty::chi_square_tail(middle, degrees) > kAlarm ? low : high) = middle;
+    }
+    return high;
+}
+
+/// Noncentrality with which the alarm is 90 % sure, by its mean and variance.
+double noncentrality(int degrees) {
+    const double over = critical(degrees) - degrees;
+    double lambda = over;
+    for (int i = 0; i < 60; ++i) lambda = over + kSeen * std::sqrt(2 * (degrees + 2 * lambda));
+    return lambda;
+}
+
+}  // namespace
+
+VectorXd grouped_prior(const VectorXd& base, Index columns) {
+    VectorXd out(columns);
+    out.head(kBase) = base;
+    for (Index i = kBase; i < columns; ++i)
+        out[i] = base[kBase - kElastic + (i - kBase) % kElastic];
+    return out;
+}
+
+Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
+                       const MatrixXd& covariance, const MatrixXd& prior_sigma, bool scattered) {
+    const Eigen::LLT<MatrixXd> root(covariance);
+    const auto whitened = [&](const MatrixXd& x) { return MatrixXd(root.matrixL().solve(x)); };
+    std::array<MatrixXd, 3> base, groups;
+    for (std::size_t j = 0; j < 3; ++j) {
+        base[j] = table.base(j);
+        groups[j] = table.grouped(j);
+    }
+    MatrixXd prior_groups(groups[0].cols(), 3);
+    for (Index j = 0; j < 3; ++j)
+        prior_groups.col(j) = grouped_prior(prior_sigma.col(j), groups[0].cols());
+    const Fitted flat(whitened(interleaved(base)), stacked(prior_sigma));
+    const Fitted grouped(whitened(interleaved(groups)), stacked(prior_groups));
+    const VectorXd y = whitened(rates);
+    Flatness out;
+    out.grouped_chi_square = grouped.left(y);
+    const auto kinds = static_cast<int>(table.kinds().size());
+    if (kinds < 2) return out;
+    out.degrees = 18 * (kinds - 1);
+    out.chi_square = flat.left(y) - out.grouped_chi_square;
+    out.p = uncertainty::chi_square_tail(out.chi_square, out.degrees);
+    const double spare = 3.0 * static_cast<double>(table.dwells() - 4 - 6 * kinds);
+    const double ratio =
+        out.chi_square / out.degrees / (out.grouped_chi_square / std::max(1.0, spare));
+    out.alarm =
+        out.p < kAlarm &&
+        (!scattered || uncertainty::f_tail(ratio, out.degrees, std::max(1.0, spare)) < kAlarm);
+
+    const double needed = noncentrality(out.degrees);
+    // Of the lowest frequency: a flat fit of what is not flat has coefficients of no meaning.
+    const VectorXd value = grouped.value(y);
+    const Index of_gyro = groups[0].cols();
+    const auto share_seen = [&](double hz) {
+        const VectorXd weights = table.elastic_weights({hz, kDampingTold});
+        VectorXd moved(rates.size());
+        for (Index j = 0; j < 3; ++j) {
+            const auto g = static_cast<std::size_t>(j);
+            const VectorXd quadratic =
+                table.vibration(g) * value.segment(of_gyro * j + kBase - kElastic, kElastic);
+            for (Index k = 0; k < table.dwells(); ++k) moved[3 * k + j] = weights[k] * quadratic[k];
+        }
+        return std::sqrt(needed / std::max(1e-300, flat.left(whitened(moved))));
+    };
+    for (const double hz : kTold) out.smallest_seen.emplace_back(hz, share_seen(hz));
+    for (const Kind& kind : table.kinds()) {
+        for (const Band& band : kind.bands) {
+            if (band.hz > out.highest_hz && share_seen(band.hz) <= kShare) out.highest_hz = band.hz;
+        }
+    }
+    return out;
+}
+
+}  // namespace vibrig::estimator::spectrum

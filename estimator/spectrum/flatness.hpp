@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "estimator/spectrum/table.hpp"
+
+namespace vibrig::estimator::spectrum {
+
+/// Rates of all gyros, element 3 k + j, against one set of quadratic coefficients and against one
+/// for every kind of vibration.
+struct Flatness {
+    double chi_square = 0;  ///< of the flat model less that of the groups
+    int degrees = 0;        ///< 18 (F - 1)
+    double p = std::numeric_limits<double>::quiet_NaN();
+    bool alarm = false;
+    double grouped_chi_square = 0;
+    /// For a resonance at so many Hz the share of all quadratic coefficients, elastic, that is seen
+    /// with 90 %.
+    std::vector<std::pair<double, double>> smallest_seen;
+    /// Frequency up to which the plan would see a share of 20 %.
+    double highest_hz = 0;
+};
+
+inline constexpr double kAlarm = 1e-3;
+
+/// Coefficients of the groups model, one gyro a column: (4 + 6 F) x 3.
+struct Groups {
+    Eigen::MatrixXd value, sigma;
+};
+
+/// `covariance`: 3 n x 3 n, everything that is declared included; `prior_sigma`: 10 x 3, filter
+/// order. `scattered`: the dwells scatter beyond their noise; then the alarm needs an F test too.
+[[nodiscard]] Flatness test_flatness(const SpectralTable& table, const Eigen::VectorXd& rates,
+                                     const Eigen::MatrixXd& covariance,
+                                     const Eigen::MatrixXd& prior_sigma, bool scattered);
+
+/// Prior of the groups model: that of the base for every group.
+[[nodiscard]] Eigen::VectorXd grouped_prior(const Eigen::VectorXd& base, Eigen::Index columns);
+
+}  // namespace vibrig::estimator::spectrum

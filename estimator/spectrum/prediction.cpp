@@ -1,0 +1,258 @@
+#include "estimator/spectrum/prediction.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/uncertainty/distributions.hpp"
+
+namespace vibrig::estimator::spectrum {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kLowerReach = 1.5;  ///< below the lowest frequency a resonance shows no more
+
+/// What is the same for all hypotheses of a gyro.
+struct Columns {
+    std::vector<Attitude> at;
+    const std::vector<Situation>& situations;
+
+    /// m x (10 + 6 r).
+    [[nodiscard]] MatrixXd of(std::size_t gyro, const std::vector<Resonance>& resonances) const {
+        MatrixXd x(static_cast<Index>(at.size()),
+                   kBase + kElastic * static_cast<Index>(resonances.size()));
+        for (std::size_t k = 0; k < at.size(); ++k) {
+            const auto row = static_cast<Index>(k);
+            x.row(row).head(kBase) = at[k].base[gyro];
+            for (std::size_t r = 0; r < resonances.size(); ++r)
+                x.row(row).segment(kBase + kElastic * static_cast<Index>(r), kElastic) =
+                    elastic_weight(situations[k].bands, resonances[r]) * at[k].vibration[gyro];
+        }
+        return x;
+    }
+    /// With what a change of the resonances does, where the covariance holds it.
+    [[nodiscard]] MatrixXd gradient(std::size_t gyro, const Hypothesis& of_what) const {
+        const MatrixXd x = of(gyro, of_what.resonances);
+        if (!of_what.linearised) return x;
+        constexpr double kStep = 1e-5;
+        const std::size_t count = of_what.resonances.size();
+        MatrixXd out(x.rows(), x.cols() + 2 * static_cast<Index>(count));
+        out.leftCols(x.cols()) = x;
+        for (std::size_t i = 0; i < 2 * count; ++i) {
+            const auto moved = [&](double step) {
+                auto resonances = of_what.resonances;
+                Resonance& one = resonances[i % count];
+                (i < count ? one.hz : one.damping) *= std::exp(step);
+                return VectorXd(of(gyro, resonances) * of_what.x);
+            };
+            out.col(x.cols() + static_cast<Index>(i)) =
+                (moved(kStep) - moved(-kStep)) / (2 * kStep);
+        }
+        return out;
+    }
+};
+
+double share_outside(const Model& model, const Situation& in, bool above_only) {
+    double share = 0;
+    for (const Band& band : in.bands) {
+        if (band.hz > model.highest_hz || (!above_only && band.hz < model.lowest_hz / kLowerReach))
+            share += band.share;
+    }
+    return share;
+}
+
+/// Variance of the mean over the dwell: a band of a random vibration has 2 df T degrees of freedom.
+double realisation(const Situation& in, const Attitude& at, std::size_t gyro,
+                   const Hypothesis& of) {
+    if (!(in.duration_s > 0) || in.realised) return 0;
+    const double still = at.vibration[gyro].dot(of.x.segment<kElastic>(kBase - kElastic));
+    std::vector<double> elastic;
+    for (std::size_t r = 0; r < of.resonances.size(); ++r)
+        elastic.push_back(at.vibration[gyro].dot(
+            of.x.segment<kElastic>(kBase + kElastic * static_cast<Index>(r))));
+    double sum = 0;
+    for (const Band& band : in.bands) {
+        if (!(band.width_hz > 0)) continue;
+        double drift = still;
+        for (std::size_t r = 0; r < elastic.size(); ++r)
+            drift += elastic[r] * (in_phase(band.hz, of.resonances[r]) - 1);
+        sum += drift * drift * band.share * band.share / (band.width_hz * in.duration_s);
+    }
+    return sum;
+}
+
+void add_blocks(MatrixXd& to, const MatrixXd& of, Index gyro) {
+    for (Index a = 0; a < of.rows(); ++a) {
+        for (Index b = 0; b < of.cols(); ++b) to(3 * a + gyro, 3 * b + gyro) += of(a, b);
+    }
+}
+
+/// Over the hypotheses: mean, and covariance within and between them.
+void average(const Model& model, const Columns& columns, std::size_t gyro, Prediction& out) {
+    const auto j = static_cast<Index>(gyro);
+    const auto m = static_cast<Index>(columns.at.size());
+    MatrixXd within = MatrixXd::Zero(m, m), between = within;
+    VectorXd mean = VectorXd::Zero(m);
+    std::vector<VectorXd> values;
+    for (const Hypothesis& one : model.mixture[gyro]) {
+        const MatrixXd g = columns.gradient(gyro, one);
+        values.emplace_back(g.leftCols(one.x.size()) * one.x);
+        mean += one.weight * values.back();
+        within += one.weight * g * one.covariance * g.transpose();
+        for (Index k = 0; k < m; ++k)
+            out.realisation(k, j) +=
+                one.weight * realisation(columns.situations[static_cast<std::size_t>(k)],
+                                         columns.at[static_cast<std::size_t>(k)], gyro, one);
+    }
+    for (std::size_t h = 0; h < values.size(); ++h) {
+        const VectorXd off = values[h] - mean;
+        between += model.mixture[gyro][h].weight * off * off.transpose();
+    }
+    out.drift.col(j) = mean;
+    out.coefficients.col(j) = within.diagonal().cwiseSqrt();
+    out.resonance.col(j) = between.diagonal().cwiseSqrt();
+    out.realisation.col(j) = out.realisation.col(j).cwiseSqrt().eval();
+    add_blocks(out.covariance, within + between, j);
+}
+
+void add_declared(const Model& model, const Columns& columns, const PredictionOptions& options,
+                  Prediction& out) {
+    const auto m = static_cast<Index>(columns.at.size());
+    std::array<MatrixXd, 3> x;
+    for (std::size_t j = 0; j < 3; ++j) x[j] = columns.of(j, model.mixture[j].front().resonances);
+    MatrixXd square = MatrixXd::Zero(m, 3);
+    for (const Effect& effect : model.effects) {
+        // What scales the profile's level as it scaled the campaign's cancels.
+        if (options.same_accelerometers && effect.input == "accelerometer_gain") continue;
+        VectorXd moved(3 * m);
+        for (Index j = 0; j < 3; ++j) {
+            const VectorXd of_gyro =
+                x[static_cast<std::size_t>(j)] * effect.change[static_cast<std::size_t>(j)];
+            for (Index k = 0; k < m; ++k) moved[3 * k + j] = of_gyro[k];
+            square.col(j) += of_gyro.cwiseAbs2();
+        }
+        out.covariance += moved * moved.transpose();
+    }
+    out.gain = square.cwiseSqrt();
+}
+
+void add_outside(const Model& model, const Columns& columns, const PredictionOptions& options,
+                 Prediction& out) {
+    for (std::size_t k = 0; k < columns.at.size(); ++k) {
+        const auto row = static_cast<Index>(k);
+        const Situation& in = columns.situations[k];
+        out.power_outside = std::max(out.power_outside, share_outside(model, in, false));
+        const double above = share_outside(model, in, true);
+        for (std::size_t j = 0; j < 3; ++j) {
+            double still = 0, shaken = 0;
+            for (const Hypothesis& one : model.mixture[j]) {
+                const double own =
+                    columns.at[k].vibration[j].dot(one.x.segment<kElastic>(kBase - kElastic));
+                still += one.weight * own;
+                double all = own;
+                for (std::size_t r = 0; r < one.resonances.size(); ++r)
+                    all += elastic_weight(in.bands, one.resonances[r]) *
+                           columns.at[k].vibration[j].dot(
+                               one.x.segment<kElastic>(kBase + kElastic * static_cast<Index>(r)));
+                shaken += one.weight * all;
+            }
+            out.outside(row, static_cast<Index>(j)) =
+                options.elastic_beyond * std::abs(above * still) / std::sqrt(3.0);
+            out.vibration(row, static_cast<Index>(j)) = shaken;
+        }
+    }
+}
+
+}  // namespace
+
+double Prediction::u(Index situation, Index gyro) const {
+    const Index at = 3 * situation + gyro;
+    return std::sqrt(covariance(at, at));
+}
+
+Prediction predict(const Model& model, const std::vector<Situation>& situations,
+                   const PredictionOptions& options) {
+    Columns columns{{}, situations};
+    for (const Situation& in : situations)
+        columns.at.push_back(attitude(model.frame, in.gimbal_rad, in.moment));
+    const auto m = static_cast<Index>(situations.size());
+    Prediction out;
+    out.covariance = MatrixXd::Zero(3 * m, 3 * m);
+    for (MatrixXd* part : {&out.drift, &out.coefficients, &out.resonance, &out.gain,
+                           &out.realisation, &out.outside, &out.vibration})
+        *part = MatrixXd::Zero(m, 3);
+    for (std::size_t j = 0; j < 3; ++j) average(model, columns, j, out);
+    add_declared(model, columns, options, out);
+    add_outside(model, columns, options, out);
+    for (Index k = 0; k < m; ++k) {
+        for (Index j = 0; j < 3; ++j)
+            out.covariance(3 * k + j, 3 * k + j) += out.realisation(k, j) * out.realisation(k, j) +
+                                                    out.outside(k, j) * out.outside(k, j);
+    }
+    return out;
+}
+
+namespace {
+
+/// The part of the budget that has to grow least until `off` is within two standard deviations.
+void blame(const Prediction& of, double off, double variance, double noise, Verification& out) {
+    const std::array<std::pair<const char*, double>, 6> parts{
+        {{"coefficients", of.coefficients(out.dwell, out.gyro)},
+         {"resonance", of.resonance(out.dwell, out.gyro)},
+         {"gain", of.gain(out.dwell, out.gyro)},
+         {"realisation", of.realisation(out.dwell, out.gyro)},
+         {"outside", of.outside(out.dwell, out.gyro)},
+         {"noise of the dwell", noise}}};
+    const auto largest =
+        std::max_element(parts.begin(), parts.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    out.part = largest->first;
+    const double lacking = std::max(0.0, off * off / 4 - variance);
+    out.larger = std::sqrt(1 + lacking / (largest->second * largest->second));
+}
+
+}  // namespace
+
+Verification verify(const Prediction& prediction, const MatrixXd& measured,
+                    const std::vector<Eigen::Matrix3d>& variances,
+                    const std::vector<double>& relative_errors, double tolerance) {
+    const Index m = measured.rows();
+    MatrixXd s = prediction.covariance;
+    VectorXd d(3 * m);
+    for (Index k = 0; k < m; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const Eigen::Vector3d level = relative_errors[i] * prediction.vibration.row(k).transpose();
+        s.block<3, 3>(3 * k, 3 * k) += variances[i] + level * level.transpose();
+        d.segment<3>(3 * k) = (measured.row(k) - prediction.drift.row(k)).transpose();
+    }
+    Verification out;
+    out.chi_square = d.dot(Eigen::LLT<MatrixXd>(s).solve(d));
+    out.degrees = static_cast<int>(3 * m);
+    out.p = uncertainty::chi_square_tail(out.chi_square, out.degrees);
+    out.z.resize(m, 3);
+    for (Index k = 0; k < m; ++k) {
+        const Eigen::Vector3d own = d.segment<3>(3 * k);
+        const Eigen::Matrix3d block = s.block<3, 3>(3 * k, 3 * k);
+        out.least_p =
+            std::min(out.least_p, uncertainty::chi_square_tail(
+                                      own.dot(Eigen::LLT<Eigen::Matrix3d>(block).solve(own)), 3));
+        for (Index j = 0; j < 3; ++j) {
+            const double z = out.z(k, j) = own[j] / std::sqrt(block(j, j));
+            out.tight &= !(tolerance > 0) || 2 * std::sqrt(block(j, j)) <= tolerance;
+            if (std::abs(z) <= std::abs(out.largest_z)) continue;
+            out.largest_z = z;
+            out.dwell = k;
+            out.gyro = j;
+        }
+    }
+    out.confirmed = out.p >= 0.01 && out.least_p >= 1e-3;
+    const Index at = 3 * out.dwell + out.gyro;
+    const auto worst = static_cast<std::size_t>(out.dwell);
+    blame(prediction, d[at], s(at, at), std::sqrt(variances[worst](out.gyro, out.gyro)), out);
+    return out;
+}
+
+}  // namespace vibrig::estimator::spectrum

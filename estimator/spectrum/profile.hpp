@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimator/spectrum/elastic.hpp"
+
+namespace vibrig::estimator::spectrum {
+
+/// A vibration as a user states it: stationary, along one line.
+struct Profile {
+    std::string name;
+    /// Hz and g^2/Hz, one-sided, straight between the points on logarithmic scales, 0 outside.
+    std::vector<std::pair<double, double>> psd;
+    std::vector<std::pair<double, double>> sines;  ///< Hz and g peak
+    Eigen::Vector3d direction{0, 1, 0};            ///< level frame: north, up, east; of length 1
+    double g_rms = 0;                              ///< as stated; 0: not
+};
+
+/// Throws SettingsError naming the element, what was found and what was expected. `path` stands
+/// before it, such as "profile.json: ".
+void check(const Profile& profile, const std::string& path = {});
+
+/// Of the whole profile, g^2.
+[[nodiscard]] double mean_square(const Profile& profile);
+
+/// The bands of a profile, with their shares of its mean square: so many for each decade, each with
+/// its exact power, and the sines.
+[[nodiscard]] std::vector<Band> bands_of(const Profile& profile, int per_decade = 800);
+
+/// The isolators' |platform over table|^2 at a frequency.
+[[nodiscard]] double pads_power(double hz, const Resonance& pads) noexcept;
+/// Natural frequency of pads with this damping whose transmission at `hz` is `ratio` (below 1).
+[[nodiscard]] Resonance pads_with(double hz, double ratio, double damping) noexcept;
+/// Bands of mean square `mean_square` behind the pads: theirs there, with what the mean square
+/// becomes.
+[[nodiscard]] std::pair<std::vector<Band>, double> behind(std::span<const Band> bands,
+                                                          double mean_square,
+                                                          const Resonance& pads);
+
+/// Examples of the types, not a standard's text.
+[[nodiscard]] std::span<const Profile> built_in_profiles();
+
+}  // namespace vibrig::estimator::spectrum

@@ -1,0 +1,371 @@
+#include "estimator/spectrum/resonance.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace vibrig::estimator::spectrum {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Point = Eigen::Vector2d;  ///< ln hz, ln damping
+
+constexpr double kLeastWeight = 1e-4;
+constexpr double kWorse = 12;  ///< so much less likely a maximum does not count
+constexpr int kScanned = 90, kDampings = 5;
+constexpr std::size_t kMaxima = 3;
+constexpr int kReach = 3;  ///< nodes either way, one standard deviation apart
+
+double log_sum(double a, double b) {
+    const double most = std::max(a, b);
+    return most + std::log(std::exp(a - most) + std::exp(b - most));
+}
+
+Resonance at(const Point& p) { return {std::exp(p[0]), std::exp(p[1])}; }
+
+VectorXd prior_of(const VectorXd& base_sigma, std::size_t resonances, double elastic_sigma) {
+    VectorXd sigma(kBase + kElastic * static_cast<Index>(resonances));
+    sigma.head(kBase) = base_sigma;
+    sigma.tail(sigma.size() - kBase).setConstant(elastic_sigma);
+    return sigma;
+}
+
+/// Normal equations of whitened columns with a prior about zero.
+struct Solved {
+    VectorXd x;
+    MatrixXd covariance;
+    double log_evidence = 0;  ///< less what is common to all models of the same rates
+};
+Solved solve(const MatrixXd& normal, const VectorXd& right, double square, const VectorXd& sigma) {
+    MatrixXd information = normal;
+    information.diagonal().array() += sigma.array().square().inverse();
+    const Eigen::LLT<MatrixXd> factor(information);
+    Solved out;
+    out.x = factor.solve(right);
+    out.covariance = factor.solve(MatrixXd::Identity(normal.rows(), normal.cols()));
+    out.log_evidence = -factor.matrixLLT().diagonal().array().log().sum() -
+                       sigma.array().log().sum() - 0.5 * (square - right.dot(out.x));
+    return out;
+}
+
+/// The likelihood of a resonance, linear terms integrated out.
+class Likelihood {
+  public:
+    Likelihood(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem)
+        : table_(table),
+          gyro_(gyro),
+          problem_(problem),
+          factor_(problem.covariance),
+          base_(factor_.matrixL().solve(table.base(gyro))),
+          rate_(factor_.matrixL().solve(problem.rate)),
+          base_normal_(base_.transpose() * base_) {}
+
+    struct Both {
+        std::array<Solved, 2> by_size;
+        double log_prior = 0;
+        [[nodiscard]] double total() const {
+            return log_prior + std::log(0.5) +
+                   log_sum(by_size[0].log_evidence, by_size[1].log_evidence);
+        }
+    };
+    /// With the prior's density in ln hz and ln damping.
+    [[nodiscard]] Both both(const Point& p) const {
+        const VectorXd weights = table_.elastic_weights(at(p));
+        const MatrixXd elastic =
+            factor_.matrixL().solve(MatrixXd(weights.asDiagonal() * table_.vibration(gyro_)));
+        MatrixXd normal(kColumns, kColumns);
+        normal.topLeftCorner(kBase, kBase) = base_normal_;
+        normal.topRightCorner(kBase, kElastic).noalias() = base_.transpose() * elastic;
+        normal.bottomLeftCorner(kElastic, kBase) =
+            normal.topRightCorner(kBase, kElastic).transpose();
+        normal.bottomRightCorner(kElastic, kElastic).noalias() = elastic.transpose() * elastic;
+        VectorXd right(kColumns);
+        right << base_.transpose() * rate_, elastic.transpose() * rate_;
+        Both out;
+        for (std::size_t s = 0; s < kElasticSizes.size(); ++s)
+            out.by_size[s] = solve(normal, right, rate_.squaredNorm(),
+                                   prior_of(problem_.prior_sigma, 1, kElasticSizes[s]));
+        const double z = (p[1] - std::log(kDamping)) / kDampingSpread;
+        out.log_prior = -std::log(std::log(kHighestResonance / kLowestResonance)) - z * z / 2 -
+                        std::log(kDampingSpread * std::sqrt(2 * kPi));
+        return out;
+    }
+    [[nodiscard]] double operator()(const Point& p) const {
+        if (p[0] < std::log(kLowestResonance) || p[0] > std::log(kHighestResonance) ||
+            !(std::abs(p[1]) < 20))
+            return -1e300;
+        return both(p).total();
+    }
+    [[nodiscard]] Solved flat() const {
+        return solve(base_normal_, base_.transpose() * rate_, rate_.squaredNorm(),
+                     problem_.prior_sigma);
+    }
+
+  private:
+    static constexpr double kPi = 3.14159265358979323846;
+    const SpectralTable& table_;
+    std::size_t gyro_;
+    const GyroProblem& problem_;
+    Eigen::LLT<MatrixXd> factor_;
+    MatrixXd base_;
+    VectorXd rate_;
+    MatrixXd base_normal_;
+};
+
+/// Maximum by Nelder and Mead's simplex: no derivatives of a likelihood that is steep far away.
+Point climb(const Likelihood& likelihood, const Point& start) {
+    std::array<std::pair<double, Point>, 3> simplex;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const Point p = start + Point(i == 1 ? 0.02 : 0, i == 2 ? 0.3 : 0);
+        simplex[i] = {likelihood(p), p};
+    }
+    const auto better = [](const auto& a, const auto& b) { return a.first > b.first; };
+    for (int step = 0; step < 160; ++step) {
+        std::stable_sort(simplex.begin(), simplex.end(), better);
+        if (simplex[0].first - simplex[2].first < 1e-6) break;
+        const Point middle = (simplex[0].second + simplex[1].second) / 2;
+        const auto tried = [&](double factor) {
+            const Point p = middle + factor * (simplex[2].second - middle);
+            return std::pair(likelihood(p), p);
+        };
+        auto next = tried(-1);
+        if (next.first > simplex[0].first) {
+            const auto further = tried(-2);
+            if (further.first > next.first) next = further;
+        } else if (next.first < simplex[1].first) {
+            next = tried(next.first > simplex[2].first ? -0.5 : 0.5);
+        }
+        if (next.first > simplex[2].first) {
+            simplex[2] = next;
+            continue;
+        }
+        for (std::size_t i = 1; i < 3; ++i) {
+            simplex[i].second = (simplex[0].second + simplex[i].second) / 2;
+            simplex[i].first = likelihood(simplex[i].second);
+        }
+    }
+    std::stable_sort(simplex.begin(), simplex.end(), better);
+    return simplex[0].second;
+}
+
+/// The best local maxima of a scan.
+std::vector<Point> scan(const Likelihood& likelihood) {
+    MatrixXd value(kScanned, kDampings);
+    const auto point = [](int i, int k) {
+        const double share = (i + 0.5) / kScanned;
+        return Point(
+            std::log(kLowestResonance) + share * std::log(kHighestResonance / kLowestResonance),
+            std::log(kDamping) + 0.8 * kDampingSpread * (k - kDampings / 2));
+    };
+    for (int i = 0; i < kScanned; ++i) {
+        for (int k = 0; k < kDampings; ++k) value(i, k) = likelihood(point(i, k));
+    }
+    std::vector<std::pair<double, Point>> maxima;
+    for (int i = 0; i < kScanned; ++i) {
+        for (int k = 0; k < kDampings; ++k) {
+            const int rows = std::min(3, kScanned - std::max(0, i - 1));
+            const int columns = std::min(3, kDampings - std::max(0, k - 1));
+            const auto near = value.block(std::max(0, i - 1), std::max(0, k - 1),
+                                          std::min(rows, i == 0 ? 2 : rows),
+                                          std::min(columns, k == 0 ? 2 : columns));
+            if (value(i, k) >= near.maxCoeff()) maxima.emplace_back(value(i, k), point(i, k));
+        }
+    }
+    std::stable_sort(maxima.begin(), maxima.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    // Before they are climbed, peaks narrower than the grid tell little by their height.
+    if (maxima.size() > 2 * kMaxima) maxima.resize(2 * kMaxima);
+    for (auto& [height, p] : maxima) {
+        p = climb(likelihood, p);
+        height = likelihood(p);
+    }
+    std::stable_sort(maxima.begin(), maxima.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<Point> out;
+    for (const auto& [height, p] : maxima) {
+        const bool again = std::any_of(out.begin(), out.end(), [&p = p](const Point& other) {
+            return std::abs(p[0] - other[0]) < 1e-3 && std::abs(p[1] - other[1]) < 0.05;
+        });
+        if (!again && out.size() < kMaxima && height > maxima.front().first - kWorse)
+            out.push_back(p);
+    }
+    return out;
+}
+
+/// Along one direction: so far that the likelihood falls by about a half.
+double drop(const Likelihood& likelihood, const Point& top, double height, const Point& along,
+            double most) {
+    double step = 1e-4;
+    while (step < most) {
+        const double fall =
+            height - (likelihood(top + step * along) + likelihood(top - step * along)) / 2;
+        if (fall > 0.1) return step / std::sqrt(2 * fall);
+        step *= 1.5;
+    }
+    return most;
+}
+
+/// Axes of the curvature, each a standard deviation long.
+Eigen::Matrix2d axes(const Likelihood& likelihood, const Point& top) {
+    const double height = likelihood(top);
+    const double of_hz = drop(likelihood, top, height, Point(1, 0), 0.5);
+    const double of_damping = drop(likelihood, top, height, Point(0, 1), kDampingSpread);
+    // In units of the two, where the curvature is one on the diagonal.
+    const auto corner = [&](double a, double b) {
+        return likelihood(top + Point(0.5 * a * of_hz, 0.5 * b * of_damping));
+    };
+    const double mixed =
+        std::clamp(-(corner(1, 1) + corner(-1, -1) - corner(1, -1) - corner(-1, 1)), -0.98, 0.98);
+    Eigen::Matrix2d curvature;
+    curvature << 1, mixed, mixed, 1;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(curvature);
+    Eigen::Matrix2d out = eigen.eigenvectors();
+    for (int k = 0; k < 2; ++k) out.col(k) /= std::sqrt(eigen.eigenvalues()[k]);
+    return Eigen::Vector2d(of_hz, of_damping).asDiagonal() * out;
+}
+
+struct Node {
+    double log_weight;
+    Hypothesis what;
+};
+
+void add_nodes(const Likelihood& likelihood, const Point& top, std::vector<Node>& nodes) {
+    const Eigen::Matrix2d axis = axes(likelihood, top);
+    const double log_area = std::log(std::abs(axis.determinant()));
+    for (int a = -kReach; a <= kReach; ++a) {
+        for (int b = -kReach; b <= kReach; ++b) {
+            const Point p = top + axis * Point(a, b);
+            if (!(likelihood(p) > -1e299)) continue;
+            const Likelihood::Both both = likelihood.both(p);
+            for (const Solved& one : both.by_size)
+                nodes.push_back({both.log_prior + std::log(0.5) + one.log_evidence + log_area,
+                                 {0, {at(p)}, one.x, one.covariance}});
+        }
+    }
+}
+
+void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
+            Mixture& out) {
+    std::stable_sort(out.list.begin(), out.list.end(),
+                     [](const auto& a, const auto& b) { return a.weight > b.weight; });
+    const Hypothesis& best = out.list.front();
+    const VectorXd left = problem.rate - design(table, gyro, best.resonances) * best.x;
+    out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
+    out.degrees = static_cast<int>(problem.rate.size() - best.x.size()) -
+                  2 * static_cast<int>(best.resonances.size());
+}
+
+}  // namespace
+
+MatrixXd design(const SpectralTable& table, std::size_t gyro,
+                const std::vector<Resonance>& resonances) {
+    MatrixXd out(table.dwells(), kBase + kElastic * static_cast<Index>(resonances.size()));
+    out.leftCols(kBase) = table.base(gyro);
+    for (std::size_t r = 0; r < resonances.size(); ++r)
+        out.middleCols(kBase + kElastic * static_cast<Index>(r), kElastic) =
+            table.elastic_weights(resonances[r]).asDiagonal() * table.vibration(gyro);
+    return out;
+}
+
+MatrixXd gain(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
+              const Hypothesis& of) {
+    const MatrixXd x = design(table, gyro, of.resonances);
+    const Eigen::LLT<MatrixXd> factor(problem.covariance);
+    const VectorXd sigma =
+        prior_of(problem.prior_sigma, of.resonances.size(), kElasticSizes.back());
+    MatrixXd information = x.transpose() * factor.solve(x);
+    information.diagonal().array() += sigma.array().square().inverse();
+    return Eigen::LLT<MatrixXd>(information).solve(MatrixXd(factor.solve(x).transpose()));
+}
+
+Hypothesis without_resonance(const SpectralTable& table, std::size_t gyro,
+                             const GyroProblem& problem) {
+    Solved flat = Likelihood(table, gyro, problem).flat();
+    return {1, {}, std::move(flat.x), std::move(flat.covariance)};
+}
+
+Mixture one_resonance(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem) {
+    const Likelihood likelihood(table, gyro, problem);
+    std::vector<Node> nodes;
+    for (const Point& top : scan(likelihood)) add_nodes(likelihood, top, nodes);
+    Solved flat = likelihood.flat();
+    double most = flat.log_evidence;
+    for (const Node& node : nodes) most = std::max(most, node.log_weight);
+    double resonant = 0;
+    for (Node& node : nodes) resonant += node.what.weight = std::exp(node.log_weight - most);
+    const double none = std::exp(flat.log_evidence - most);
+    Mixture out;
+    // Where the one or the other is beyond a double: by the largest term.
+    out.log_odds = none > 0 && resonant > 0 ? std::log(resonant / none)
+                   : none > 0               ? -700
+                                            : most - flat.log_evidence + std::log(resonant);
+    const double all = none + resonant;
+    double kept = 0;
+    const auto keep = [&](Hypothesis what, double weight) {
+        if (weight / all < kLeastWeight) return;
+        what.weight = weight;
+        kept += weight;
+        out.list.push_back(std::move(what));
+    };
+    keep({none, {}, std::move(flat.x), std::move(flat.covariance)}, none);
+    for (Node& node : nodes) {
+        const double weight = node.what.weight;
+        keep(std::move(node.what), weight);
+    }
+    for (Hypothesis& one : out.list) one.weight /= kept;
+    finish(table, gyro, problem, out);
+    return out;
+}
+
+std::vector<Told> tell(const Mixture& mixture) {
+    const std::size_t count = mixture.list.front().resonances.size();
+    std::vector<Told> out;
+    for (std::size_t r = 0; r < count; ++r) {
+        const Index begin = kBase + kElastic * static_cast<Index>(r);
+        double all = 0;
+        Eigen::Vector2d mean = Eigen::Vector2d::Zero(), square = mean;
+        Eigen::Matrix<double, kElastic, 1> value, squares;
+        value.setZero();
+        squares.setZero();
+        for (const Hypothesis& one : mixture.list) {
+            if (one.resonances.size() != count) continue;
+            const Eigen::Vector2d p(one.resonances[r].hz, one.resonances[r].damping);
+            Eigen::Vector2d own = Eigen::Vector2d::Zero();
+            if (one.linearised) {
+                const Index at = one.x.size() + static_cast<Index>(r);
+                own[0] = p[0] * p[0] * one.covariance(at, at);
+                const Index of_damping = at + static_cast<Index>(count);
+                own[1] = p[1] * p[1] * one.covariance(of_damping, of_damping);
+            }
+            const auto x = one.x.segment<kElastic>(begin);
+            all += one.weight;
+            mean += one.weight * p;
+            square += one.weight * (p.cwiseAbs2() + own);
+            value += one.weight * x;
+            squares +=
+                one.weight * (x.cwiseAbs2() + one.covariance.diagonal().segment<kElastic>(begin));
+        }
+        mean /= all;
+        square /= all;
+        Told told;
+        const auto spread = [](double m, double s) {
+            const double sigma = std::sqrt(std::max(0.0, s - m * m));
+            // On a logarithmic scale: neither goes below zero.
+            const double factor = std::exp(1.96 * sigma / m);
+            return Spread{m, sigma, m / factor, m * factor};
+        };
+        told.hz = spread(mean[0], square[0]);
+        told.damping = spread(mean[1], square[1]);
+        told.elastic = value / all;
+        told.sigma = (squares / all - told.elastic.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+        out.push_back(told);
+    }
+    return out;
+}
+
+}  // namespace vibrig::estimator::spectrum

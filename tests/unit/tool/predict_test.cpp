@@ -1,0 +1,224 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+using ::testing::HasSubstr;
+using PredictJson = nlohmann::json;
+
+struct Ended {
+    int exit_code = -1;
+    std::string out, error;
+    [[nodiscard]] PredictJson json() const { return PredictJson::parse(out); }
+};
+
+/// The real programs over a survey of a rig that is half elastic, 40 s a dwell, made once.
+class Predict : public ::testing::Test {
+  protected:
+    static void SetUpTestSuite() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder() = mkdtemp(name.data());
+        write("truth.json", "{}");
+        ASSERT_EQ(plant("--dwell 1 --write-truth truth.json --table-g 6 -o x.csv").exit_code, 0);
+        std::ifstream in(folder() / "truth.json");
+        PredictJson truth = PredictJson::parse(in);
+        truth["isolator"]["hard"] = true;
+        truth["elastic"]["share"] = {0.5, 0.5, 0.5};
+        write("truth.json", truth.dump());
+        // Balanced over time by a step of 26 through the 63, which have no common factor.
+        std::vector<std::string> dwells;
+        const auto add = [&](int position, int run) {
+            dwells.push_back(std::to_string(position) + "." + std::to_string(run));
+        };
+        for (int p = 1; p <= 14; ++p) add(p, 1);
+        for (int p = 1; p <= 13; p += 2) add(p, 2);
+        for (int run = 3; run <= 8; ++run) {
+            for (const int p : {4, 5, 6, 7, 10, 13, 14}) add(p, run);
+        }
+        std::string order;
+        for (std::size_t i = 0; i < dwells.size(); ++i)
+            order += (i > 0 ? "," : "") + dwells[i * 26 % dwells.size()];
+        ASSERT_EQ(plant("--truth truth.json --seed 5 --dwell 40 --table-g 6,0,6,6,6,6,6,6 "
+                        "--frequency 15,15,25,35,45,65,85,125 --order " +
+                        order + " -o survey.csv")
+                      .exit_code,
+                  0);
+        const Ended found = run("identify survey.csv --json");
+        ASSERT_EQ(found.exit_code, 0) << found.error << found.out.substr(0, 2000);
+        write("result.json", found.out);
+        // Held-out dwells at 55 Hz, at positions of their own.
+        write("held.csv", "alpha_deg,beta_deg,gamma_deg\n30,10,-20\n-50,0,70\n100,15,30\n");
+        ASSERT_EQ(plant("--truth truth.json --seed 6 --dwell 40 --table-g 3 --frequency 55 "
+                        "--positions held.csv -o held_out.csv")
+                      .exit_code,
+                  0);
+        write("held.toml", "[vibration]\nfrequency_hz = 55.0\n");
+        write("sine.json", R"({"name": "55 Hz", "sines": [[55, 3]]})");
+    }
+    static void TearDownTestSuite() { std::filesystem::remove_all(folder()); }
+
+    static std::filesystem::path& folder() {
+        static std::filesystem::path path;
+        return path;
+    }
+    static std::string content(const char* name) {
+        std::ostringstream text;
+        text << std::ifstream(folder() / name, std::ios::binary).rdbuf();
+        return text.str();
+    }
+    static Ended start(const std::string& program, const std::string& arguments) {
+        const std::string command = "cd '" + folder().string() + "' && '" + program +
+                                    "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content("out"), content("error")};
+    }
+    static Ended run(const std::string& arguments) { return start(VIBRIG, arguments); }
+    static Ended plant(const std::string& arguments) {
+        return start(VIBRIG_PLANT, "record " + arguments);
+    }
+    static void write(const std::string& name, const std::string& text) {
+        std::ofstream(folder() / name, std::ios::binary) << text;
+    }
+    static PredictJson result() { return PredictJson::parse(content("result.json")); }
+};
+
+TEST_F(Predict, SurveyNamesTheResonanceAndTellsStaticCoefficients) {
+    const PredictJson found = result();
+    const PredictJson& spectrum = found["spectrum"];
+    EXPECT_EQ(spectrum["model"], "resonance");
+    ASSERT_EQ(spectrum["frequencies"].size(), 7U);
+    EXPECT_EQ(spectrum["frequencies"][0]["dwells"], 14);
+    EXPECT_EQ(spectrum["frequencies"][0]["coefficients"].size(), 18U);
+    EXPECT_EQ(spectrum["highest_hz"], 125);
+    EXPECT_TRUE(spectrum["flat"]["alarm"]);
+    EXPECT_EQ(spectrum["flat"]["dof"], 108);
+    for (int gyro = 0; gyro < 3; ++gyro) {
+        EXPECT_GT(spectrum["log_odds"][gyro], 4);
+        EXPECT_NEAR(spectrum["resonance"][gyro]["hz"].get<double>(), 60, 1);
+        EXPECT_LE(spectrum["mixture"][gyro].size(), 300U);
+    }
+    // 0.03 at rest, 6.6 % of the elastic half more at 15 Hz: five sigmas.
+    const PredictJson& square = found["parameters"][4];
+    EXPECT_EQ(square["at_hz"], 0);
+    EXPECT_NEAR(square["value"].get<double>(), 0.03, 3 * square["u"].get<double>());
+    EXPECT_EQ(found["dwell_rates"].size(), 63U);
+    EXPECT_EQ(found["dwell_rates"][0]["lines"][0][0], 15);
+}
+
+TEST_F(Predict, HeldOutDwellsConfirm) {
+    const Ended ended =
+        run("predict result.json --profile sine.json --verify held_out.csv --config held.toml "
+            "--attitude 30,10,-20 --json");
+    ASSERT_EQ(ended.exit_code, 0) << ended.error << ended.out;
+    const PredictJson prediction = ended.json()["prediction"];
+    EXPECT_EQ(prediction["verification"]["word"], "confirmed");
+    EXPECT_EQ(prediction["verification"]["dof"], 9);
+    EXPECT_EQ(prediction["attitudes"].size(), 1U);
+    EXPECT_EQ(prediction["attitudes"][0]["drift"].size(), 3U);
+    EXPECT_EQ(prediction["power_outside"], 0);
+}
+
+TEST_F(Predict, HeldOutDwellsContradictAResultWithoutItsElasticPart) {
+    PredictJson broken = result();
+    for (auto& gyro : broken["spectrum"]["mixture"]) {
+        for (auto& one : gyro) {
+            for (std::size_t i = 10; i < one["x"].size(); ++i) one["x"][i] = 0.0;
+        }
+    }
+    write("broken.json", broken.dump());
+    const Ended ended =
+        run("predict broken.json --profile sine.json --verify held_out.csv --config held.toml");
+    EXPECT_EQ(ended.exit_code, 1) << ended.error;
+    EXPECT_THAT(ended.out, HasSubstr("contradicted"));
+    EXPECT_THAT(ended.out, HasSubstr("times as large"));
+}
+
+TEST_F(Predict, CampaignAtOneFrequencyDoesNotCoverAProfile) {
+    ASSERT_EQ(plant("--truth truth.json --dwell 40 --table-g 6,0 -o today.csv").exit_code, 0);
+    const Ended today = run("identify today.csv --json");
+    EXPECT_EQ(today.json()["parameters"][4]["at_hz"], 15);
+    EXPECT_EQ(today.json()["spectrum"]["model"], "flat");
+    write("today.json", today.out);
+    for (const char* profile : {"truck", "minimum-integrity", "sine.json"}) {
+        const Ended ended =
+            run(std::string("predict today.json --attitude 45,0,90 --profile ") + profile);
+        EXPECT_EQ(ended.exit_code, 1) << ended.error;
+        EXPECT_THAT(ended.out, HasSubstr("NOT COVERED"));
+    }
+}
+
+TEST_F(Predict, TimeAndPadsMatter) {
+    const auto of = [&](const std::string& more) {
+        return run("predict result.json --profile truck --attitude 45,0,90 --json " + more)
+            .json()["prediction"]["attitudes"][0];
+    };
+    const PredictJson for_ever = of(""), short_one = of("--seconds 100"), pads = of("--at table");
+    EXPECT_EQ(for_ever["budget"]["realisation"][0], 0);
+    EXPECT_GT(short_one["budget"]["realisation"][0], 0);
+    EXPECT_GT(short_one["u"][0], for_ever["u"][0]);
+    EXPECT_NE(pads["drift"][0], for_ever["drift"][0]);
+}
+
+TEST_F(Predict, ListsItsProfiles) {
+    const Ended ended = run("predict --list");
+    EXPECT_EQ(ended.exit_code, 0);
+    EXPECT_THAT(ended.out, HasSubstr("minimum-integrity: 7.69 g rms"));
+    EXPECT_THAT(ended.out, HasSubstr("truck: 1.04 g rms"));
+    EXPECT_EQ(run("predict --list --json").json()["profiles"].size(), 2U);
+}
+
+TEST_F(Predict, BadInputIsNamedByPlaceAndValue) {
+    const auto refused = [&](const std::string& arguments, const std::string& message) {
+        const Ended ended = run("predict " + arguments);
+        EXPECT_EQ(ended.exit_code, 2) << arguments;
+        EXPECT_THAT(ended.error, HasSubstr(message));
+        EXPECT_EQ(ended.out, "");
+    };
+    const auto profile = [&](const std::string& text, const std::string& message) {
+        write("bad.json", text);
+        refused("result.json --attitude 0,0,0 --profile bad.json", "bad.json: " + message);
+    };
+    profile(R"({"psd": [[60, 0.1], [40, 0.1]]})",
+            "psd[1]: found 40 Hz after 60 Hz, expected growing frequencies");
+    profile(R"({"psd": [[20, 0.1], [40, 0]]})",
+            "psd[1]: found 0 g^2/Hz, expected a density above 0");
+    profile(R"({"psd": [[20, 0.1], [40, -1]]})", "psd[1]: found -1 g^2/Hz");
+    profile(R"({"psd": [[20, 0.05], [40, 0.05]], "g_rms": 3})", "g_rms: found 3, expected");
+    profile(R"({"psd": [[20, 0.05], [40]]})", "psd[1]: found [40], expected [hz, g2_hz]");
+    profile(R"({"cross_spectra": []})", "cross_spectra: found an unknown key");
+    profile("{}", "psd: found neither");
+    profile("nonsense", "found no JSON");
+    refused("result.json --profile none.json --attitude 0,0,0", "--profile: found 'none.json'");
+    refused("result.json --profile truck --attitude 0,0", "--attitude: found '0,0'");
+    refused("result.json --profile truck --attitude 0,85,0", "inner angle");
+    refused("result.json --profile truck", "found no --attitude");
+    refused("missing.json --profile truck --attitude 0,0,0", "missing.json: cannot be read");
+    refused("result.json --profile truck --verify held_out.csv --config held.toml",
+            "--verify: found a random profile");
+    write("old.json", R"({"parameters": []})");
+    refused("old.json --profile truck --attitude 0,0,0", "old.json: spectrum: found nothing");
+}
+
+TEST_F(Predict, SpectraOfARecordingWithoutTheColumn) {
+    ASSERT_EQ(plant("--truth truth.json --dwell 5 --table-g 6 -o plain.csv").exit_code, 0);
+    write("spectra.json", R"([{"run": 1, "position": 1, "lines": [[15, 6]]}])");
+    Ended ended = run("identify plain.csv --spectra spectra.json");
+    EXPECT_EQ(ended.exit_code, 2);
+    EXPECT_THAT(ended.error, HasSubstr("run 1, position 2: found no spectrum in --spectra"));
+    write("spectra.json", R"([{"run": 1, "position": 1, "lines": [[15, -6]]}])");
+    ended = run("identify plain.csv --spectra spectra.json");
+    EXPECT_EQ(ended.exit_code, 2);
+    EXPECT_THAT(ended.error, HasSubstr("spectra.json: [0].lines[0]: found [15,-6]"));
+    EXPECT_EQ(run("identify plain.csv --spectrum bent").exit_code, 2);
+}
+
+}  // namespace
