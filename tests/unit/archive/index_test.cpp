@@ -69,8 +69,12 @@ TEST_F(ArchiveIndex, ComesFromEachOlderVersionWithWhatItHad) {
         EXPECT_EQ(index.database().version(), newest_version());
         const auto found = index.campaigns({});
         ASSERT_EQ(found.size(), version == 0 ? 0U : 1U);
-        if (version > 0) EXPECT_EQ(found[0].name, "an old one");
-        if (version > 1) EXPECT_EQ(found[0].unit_serial, "17");
+        if (version > 0) {
+            EXPECT_EQ(found[0].name, "an old one");
+        }
+        if (version > 1) {
+            EXPECT_EQ(found[0].unit_serial, "17");
+        }
         index.put(entry_of("new", 1), true);
         EXPECT_EQ(index.campaigns({}).size(), found.size() + 1);
     }

@@ -50,11 +50,12 @@ TEST(Trend, FTestsSayNoAsOftenAsTheyClaim) {
         operating += found.within.p < kLevel;
         shutdown += found.between.p < kLevel;
     }
-    EXPECT_NEAR(operating / double(kTrials), kLevel, four_sigma(kLevel, kTrials))
+    EXPECT_NEAR(static_cast<double>(operating) / kTrials, kLevel, four_sigma(kLevel, kTrials))
         << "seed " << kSeed;
     // Against whichever is larger, the scatter within or what it should be: at most the level.
-    EXPECT_LT(shutdown / double(kTrials), kLevel + four_sigma(kLevel, kTrials)) << "seed " << kSeed;
-    EXPECT_GT(shutdown / double(kTrials), kLevel / 3) << "seed " << kSeed;
+    EXPECT_LT(static_cast<double>(shutdown) / kTrials, kLevel + four_sigma(kLevel, kTrials))
+        << "seed " << kSeed;
+    EXPECT_GT(static_cast<double>(shutdown) / kTrials, kLevel / 3) << "seed " << kSeed;
 }
 
 TEST(Trend, FindsTheInstabilitiesThatAreThere) {
@@ -67,7 +68,7 @@ TEST(Trend, FindsTheInstabilitiesThatAreThere) {
         const auto found = analyse_variance(of.value, of.u, of.group);
         operating += found.within.value * found.within.value / kTrials;
         shutdown += found.between.value * found.between.value / kTrials;
-        found_shutdown += (found.between.p < 0.01) / double(kTrials);
+        found_shutdown += (found.between.p < 0.01 ? 1.0 / kTrials : 0);
     }
     // Variances of chi-square with 60 and 11 degrees of freedom: 4 sigma of the mean of 400.
     EXPECT_NEAR(operating, kOperating * kOperating, 4 * 0.04 * 1.7 * std::sqrt(2 / 60. / kTrials));
