@@ -19,13 +19,11 @@ namespace vibrig::serve {
 namespace {
 
 constexpr std::string_view kCommands = "/api/v1/commands";
-constexpr std::array<std::string_view, 14> kReadable{"/api/v1/status",   "/api/v1/parameters",
-                                                     "/api/v1/campaign", "/api/v1/events",
-                                                     "/api/v1/history",  "/api/v1/config",
-                                                     "/api/v1/plan",     "/api/v1/openapi.json",
-                                                     "/api/v1/selftest", "/api/v1/surface",
-                                                     "/api/v1/stream",   "/metrics",
-                                                     "/healthz",         "/readyz"};
+constexpr std::array<std::string_view, 15> kReadable{
+    "/api/v1/status",   "/api/v1/parameters", "/api/v1/campaign", "/api/v1/events",
+    "/api/v1/history",  "/api/v1/config",     "/api/v1/plan",     "/api/v1/openapi.json",
+    "/api/v1/selftest", "/api/v1/surface",    "/api/v1/unit",     "/api/v1/stream",
+    "/metrics",         "/healthz",           "/readyz"};
 constexpr int kDeepestBody = 8;                 // levels of JSON; a command has one
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
@@ -354,6 +352,9 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
         answer.body = parameters_json(source_.result());
     } else if (path == "/api/v1/campaign") {
         answer.body = campaign_json(source_.status());
+    } else if (path == "/api/v1/unit") {
+        answer.body = source_.unit_history();
+        if (answer.body.empty()) answer.body = R"({"campaigns":[],"coefficients":[]})";
     } else if (path == "/api/v1/surface") {
         answer.body = surface_json(source_.status().noise);
     } else if (path == "/api/v1/config") {
