@@ -225,7 +225,7 @@ bool Api::is_stop(const ApiRequest& request, const Caller& caller) {
 void Api::answer(const ApiRequest& request, const Caller& caller, Done done) {
     ++traffic.requests;
     const std::size_t mark = std::min(request.target.find('?'), request.target.size());
-    if (request.method != "POST" || request.target.substr(0, mark) != kCommands)
+    if (documents_ || request.method != "POST" || request.target.substr(0, mark) != kCommands)
         return done(answer_at_once(request, caller));
     auto found = command_of(request, caller);
     if (auto* const refusal = std::get_if<ApiAnswer>(&found)) return done(std::move(*refusal));
@@ -250,6 +250,27 @@ ApiAnswer Api::without_a_command(const ApiRequest& request, const Caller& caller
     return {};
 }
 
+ApiAnswer Api::document(const ApiRequest& request, std::string_view path, std::string_view query) {
+    if (request.method != "GET") {
+        ApiAnswer refusal = problem(405, "here is only read: GET");
+        refusal.allow = "GET";
+        return refusal;
+    }
+    if (path == "/healthz") return get(path, query);
+    Document found;
+    try {
+        found = documents_(path, query);
+    } catch (const std::exception& error) {
+        return problem(503, error.what());
+    }
+    if (found.status != 200) return problem(found.status, found.body);
+    ApiAnswer answer;
+    answer.content_type = std::move(found.content_type);
+    answer.body = std::move(found.body);
+    answer.is_page = answer.content_type.starts_with("text/html");
+    return answer;
+}
+
 ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
     try {
         if (ApiAnswer refusal = without_a_command(request, caller); refusal.status != 200)
@@ -261,6 +282,7 @@ ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
         const std::string_view path = request.target.substr(0, mark);
         const std::string_view query =
             request.target.substr(std::min(mark + 1, request.target.size()));
+        if (documents_) return document(request, path, query);
         const bool takes_commands = path == kCommands;
         if (caller.browser && request.method == "GET") {
             if (const auto* file = page_file(path)) {

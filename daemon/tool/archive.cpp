@@ -10,6 +10,7 @@
 #include "daemon/archive/trend.hpp"
 #include "daemon/archive/verify.hpp"
 #include "daemon/tool/archive_place.hpp"
+#include "daemon/tool/archive_serve.hpp"
 #include "daemon/tool/assessment_json.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/progress.hpp"
@@ -167,6 +168,8 @@ void add_archive(CLI::App& app, int& exit_code) {
     adding->callback([to_add, where, &exit_code] {
         exit_code = guarded([&] { return add(to_add->folders, *where, to_add->json); });
     });
+
+    add_archive_serve(*group, where, exit_code);
 
     auto to_verify = std::make_shared<VerifyOptions>();
     CLI::App* verifying = group->add_subcommand(
