@@ -247,6 +247,7 @@ void Daemon::start() {
         }
     }
     open_journal();
+    open_outbox();
     if (recorder_) recorder_->start();
     if (pre_trip_) pre_trip_->start();
     annunciator_ = std::make_unique<drivers::Annunciator>(
@@ -301,6 +302,7 @@ bool Daemon::wait_for_end(double wall_seconds) {
 }
 
 void Daemon::join() {
+    if (outbox_) outbox_->stop();
     if (publisher_) publisher_->stop();
     if (guard_link_) guard_link_->stop();
     give_up_.store(true);
@@ -543,6 +545,7 @@ StatusData Daemon::status() const {
     status.interlock = interlock_status(std::move(status.interlock.latches));
     if (journal_) status.journal = journal_->status();
     if (recorder_) status.recorder = recorder_->status();
+    if (outbox_) status.archive = outbox_->status();
     if (publisher_) status.mqtt = publisher_->status();
     if (log_queue_ != nullptr) {
         const auto lines = log_queue_->counts();

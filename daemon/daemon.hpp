@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "daemon/archive/outbox.hpp"
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign_forecast.hpp"
 #include "daemon/commission/procedure.hpp"
@@ -88,6 +89,9 @@ class Daemon final : public StatusSource {
     [[nodiscard]] std::string effective_configuration() const override;
     CommandReply command(const CommandRequest& request) override;
     [[nodiscard]] PlanData plan() const override { return plan_; }
+    [[nodiscard]] std::string unit_history() const override {
+        return outbox_ ? outbox_->history() : std::string();
+    }
     void refused(const std::string& who, const std::string& what, const std::string& why) override;
     StatusData serving(const ServerStatus& server) override;
     void told(Severity severity, const std::string& text) override;
@@ -158,6 +162,7 @@ class Daemon final : public StatusSource {
     void tell_watchdog();
     void tell_journal();
     void tell_recorder();
+    void open_outbox();
     void watch_onlookers();
     [[nodiscard]] InterlockStatus interlock_status(std::vector<Latch> latches) const;
     /// What vibrig-guard is told of this daemon.
@@ -318,6 +323,7 @@ class Daemon final : public StatusSource {
     drivers::Time started_ = 0;
     serve::EventLog event_log_;
     std::unique_ptr<journal::Journal> journal_;     ///< null: none is kept
+    std::unique_ptr<archive::Outbox> outbox_;       ///< start() makes it; null: no archive
     bool journal_was_running_ = true;               ///< control thread
     bool recorder_was_stuck_ = false;               ///< control thread
     std::string misfit_told_;                       ///< thread of stuck_stage()

@@ -134,13 +134,28 @@ std::unique_ptr<record::Recorder> Daemon::make_recorder() {
     const std::string& folder = settings.folder.empty() ? configuration_.results : settings.folder;
     if (!settings.enabled || folder.empty()) return nullptr;
     recorder_waiter_ = clock_.make_waiter();
-    auto recorder = std::make_unique<record::Recorder>(
-        settings, folder, clock_, *recorder_waiter_,
-        [this](Severity severity, const std::string& text) { log(severity, "recorder", text); });
+    auto recorder =
+        std::make_unique<record::Recorder>(settings, folder, clock_, *recorder_waiter_,
+                                           [this](Severity severity, const std::string& text) {
+                                               log(severity, "recorder", text);
+                                               if (outbox_) outbox_->look();
+                                           });
     recorder->watch([this] { return estimator_stage_.view().estimate; },
                     [this] { return conditions(); });
     recorder->sign_with([this] { return journal_ ? journal_->status().head : std::string(); });
     return recorder;
+}
+
+/// What is recorded is delivered; it goes by the recordings' folder alone.
+void Daemon::open_outbox() {
+    if (configuration_.archive.folder.empty() || !recorder_) return;
+    outbox_ = std::make_unique<archive::Outbox>(
+        configuration_.archive,
+        configuration_.record.folder.empty() ? configuration_.results
+                                             : configuration_.record.folder,
+        configuration_.paperwork.unit_serial,
+        [this](Severity severity, const std::string& text) { log(severity, "archive", text); });
+    outbox_->start();
 }
 
 void Daemon::tell_recorder() {

@@ -71,11 +71,11 @@ std::string Daemon::result_configuration() const {
     for (const auto& value : loaded_.effective) {
         const auto section = value.key.substr(0, value.key.find('.'));
         if (section == "server" || section == "log" || section == "threads" ||
-            section == "journal" || section == "mqtt" || section == "clock" || section == "guard" ||
-            section == "annunciator" || section == "record" || section == "unit" ||
-            section == "instrument" || section == "selftest" || section == "commission" ||
-            value.key == "campaign.results" || value.key == "campaign.arming_valid_s" ||
-            value.key == "campaign.second_person")
+            section == "journal" || section == "archive" || section == "mqtt" ||
+            section == "clock" || section == "guard" || section == "annunciator" ||
+            section == "record" || section == "unit" || section == "instrument" ||
+            section == "selftest" || section == "commission" || value.key == "campaign.results" ||
+            value.key == "campaign.arming_valid_s" || value.key == "campaign.second_person")
             continue;
         text += value.key + " = " + value.value + "\n";
     }

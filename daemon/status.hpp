@@ -119,6 +119,17 @@ struct MqttStatus {
     std::uint64_t left_out = 0;  ///< times the broker was too slow to be told
 };
 
+/// Campaigns on their way to the archive; nothing is lost of what waits.
+struct ArchiveStatus {
+    std::string folder;                            ///< empty: nothing is archived
+    bool good = false;                             ///< the newest attempt was one
+    std::string note;                              ///< why not
+    std::string delivering;                        ///< the campaign that is on its way; empty: none
+    std::uint64_t waiting = 0, waiting_bytes = 0;  ///< over and not delivered
+    std::uint64_t delivered = 0, failures = 0;     ///< attempts since the start
+    std::uint64_t removed = 0;                     ///< here, delivered and beyond archive.keep_mb
+};
+
 /// Lines of the log on their way to stderr or the file; taken = written + dropped + waiting.
 struct LogStatus {
     std::uint64_t taken = 0, written = 0, dropped = 0, waiting = 0;
@@ -374,6 +385,7 @@ struct StatusData {
     InterlockStatus interlock;
     JournalStatus journal;
     RecorderStatus recorder;
+    ArchiveStatus archive;
     RealTimeStatus real_time;
     MqttStatus mqtt;
     LogStatus log;
@@ -478,6 +490,8 @@ class StatusSource {
     /// Takes its time, as the control thread does; but for an abort, which is answered at once.
     virtual CommandReply command(const CommandRequest& request) = 0;
     [[nodiscard]] virtual PlanData plan() const { return {}; }
+    /// The unit's earlier campaigns, JSON as of `vibrig trend`; empty: none are known.
+    [[nodiscard]] virtual std::string unit_history() const { return {}; }
     /// The server's thread goes on, and this is how its doors are; told twice a second. The status
     /// at that moment is for its history.
     virtual StatusData serving(const ServerStatus& /*server*/) { return {}; }

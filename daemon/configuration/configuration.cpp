@@ -330,6 +330,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     for (auto* const path : {&c.mqtt.ca, &c.mqtt.certificate, &c.mqtt.key, &c.mqtt.password_file})
         resolve(*path, folder);
     resolve(c.commission.folder, folder);
+    resolve(c.archive.folder, folder);
     resolve(c.journal, folder);
     resolve(c.log_file, folder);
     return loaded;

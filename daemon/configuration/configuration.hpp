@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/archive/settings.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/fleet/settings.hpp"
 #include "daemon/record/settings.hpp"
@@ -78,6 +79,7 @@ struct Configuration {
     std::vector<rt::Rule> interlock = rt::default_interlock();  ///< [[interlock]]
     record::Settings record;                                    ///< [record]
     record::Paperwork paperwork;                                ///< [unit], [[instrument]]
+    archive::Settings archive;                                  ///< [archive]
     int acquisition_priority = 60;  ///< [threads] SCHED_FIFO; 0: ordinary scheduling
     int estimator_priority = 50;
     int acquisition_cpu = -1;  ///< [threads] keeps to this one; -1: any

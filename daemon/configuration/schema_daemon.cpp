@@ -31,6 +31,44 @@ void add_record_keys(std::vector<Key>& keys) {
                            [](C& c) -> int& { return c.record.keep_free_mb; }));
 }
 
+/// A password would be read by whoever may see the configuration.
+std::string index_rule(const std::string& text) {
+    if (text.empty()) return "";
+    const std::size_t scheme = text.find("://");
+    if (!text.starts_with("postgresql://") && !text.starts_with("postgres://"))
+        return "\"postgresql://...\", or \"\" for SQLite in archive.folder";
+    const std::size_t at = text.find('@', scheme + 3), colon = text.find(':', scheme + 3);
+    if ((at != std::string::npos && colon < at) || text.find("password=") != std::string::npos)
+        return "no password in it: ?passfile=PATH names a file that has it, as ~/.pgpass";
+    return line_rule(text);
+}
+
+void add_archive_keys(std::vector<Key>& keys) {
+    keys.push_back(text(
+        "archive.folder", "a path",
+        "of a mounted file system: a campaign's folder is copied there when it is over, verified "
+        "and registered; empty: none is",
+        path_rule, [](C & c) -> auto& { return c.archive.folder; }));
+    keys.push_back(text(
+        "archive.index", "\"postgresql://...\" without a password",
+        "index that several rigs share; empty: recordings.sqlite3 in archive.folder", index_rule,
+        [](C & c) -> auto& { return c.archive.index; }));
+    keys.push_back(text(
+        "archive.rig", "letters, digits, ' ', '.', '_', '-'",
+        "this rig's name in the archive; empty: the machine's",
+        [](const std::string& name) {
+            return name.empty() ? std::string() : campaign_name_rule(name);
+        },
+        [](C & c) -> auto& { return c.archive.rig; }));
+    keys.push_back(number("archive.retry_max_s", "s", {0.5, 86'400},
+                          "longest wait before what could not be delivered is tried again",
+                          [](C& c) -> double& { return c.archive.retry_max_s; }));
+    keys.push_back(integer("archive.keep_mb", "MB", 0, 1'000'000'000,
+                           "share of the rig's disk for recordings: beyond it the oldest that are "
+                           "delivered and verified are removed here; 0: none is",
+                           [](C& c) -> int& { return c.archive.keep_mb; }));
+}
+
 void add_mqtt_keys(std::vector<Key>& keys) {
     keys.push_back(text(
         "mqtt.host", "a host name or numeric address, or \"\"",
@@ -154,6 +192,7 @@ void add_daemon_keys(std::vector<Key>& keys) {
         "SQLite: campaigns, results, events, commands; empty: journal.sqlite3 in campaign.results",
         path_rule, [](C & c) -> auto& { return c.journal; }));
     add_record_keys(keys);
+    add_archive_keys(keys);
     constexpr int kLastCpu = 1023;
     keys.push_back(integer("threads.acquisition_priority", "", 0, 99,
                            "SCHED_FIFO; 0: ordinary scheduling",

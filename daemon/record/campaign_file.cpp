@@ -363,6 +363,17 @@ Campaign read_part_head(const std::string& path) {
     return campaign;
 }
 
+Campaign read_part_around(const std::string& path) {
+    Campaign campaign;
+    campaign.path = path;
+    campaign.folder = folder_of(path);
+    const File file = File::open(path, File::Mode::read);
+    read_head(file, campaign);
+    read_conditions(file, campaign);
+    campaign.parts = {{path, campaign.state, 0, file.rows("/dwells/time_ns")}};
+    return campaign;
+}
+
 Span part_span(const std::string& path) {
     const auto times = File::open(path, File::Mode::read).integers("/samples/time_ns").values;
     if (times.empty()) return {};

@@ -64,6 +64,8 @@ struct RecordedDwell {
 [[nodiscard]] Campaign read_part(const std::string& path);
 /// Without its tables.
 [[nodiscard]] Campaign read_part_head(const std::string& path);
+/// Without its samples, but with the conditions around them and the number of its dwells.
+[[nodiscard]] Campaign read_part_around(const std::string& path);
 /// Times of the first and the last sample of a file, and how many there are.
 struct Span {
     drivers::Time first = 0, last = 0;

@@ -19,13 +19,11 @@ namespace vibrig::serve {
 namespace {
 
 constexpr std::string_view kCommands = "/api/v1/commands";
-constexpr std::array<std::string_view, 14> kReadable{"/api/v1/status",   "/api/v1/parameters",
-                                                     "/api/v1/campaign", "/api/v1/events",
-                                                     "/api/v1/history",  "/api/v1/config",
-                                                     "/api/v1/plan",     "/api/v1/openapi.json",
-                                                     "/api/v1/selftest", "/api/v1/surface",
-                                                     "/api/v1/stream",   "/metrics",
-                                                     "/healthz",         "/readyz"};
+constexpr std::array<std::string_view, 15> kReadable{
+    "/api/v1/status",   "/api/v1/parameters", "/api/v1/campaign", "/api/v1/events",
+    "/api/v1/history",  "/api/v1/config",     "/api/v1/plan",     "/api/v1/openapi.json",
+    "/api/v1/selftest", "/api/v1/surface",    "/api/v1/unit",     "/api/v1/stream",
+    "/metrics",         "/healthz",           "/readyz"};
 constexpr int kDeepestBody = 8;                 // levels of JSON; a command has one
 constexpr std::uint64_t kDefaultEvents = 1000;  // in one answer
 constexpr std::uint64_t kMostEvents = 10'000;
@@ -227,7 +225,7 @@ bool Api::is_stop(const ApiRequest& request, const Caller& caller) {
 void Api::answer(const ApiRequest& request, const Caller& caller, Done done) {
     ++traffic.requests;
     const std::size_t mark = std::min(request.target.find('?'), request.target.size());
-    if (request.method != "POST" || request.target.substr(0, mark) != kCommands)
+    if (documents_ || request.method != "POST" || request.target.substr(0, mark) != kCommands)
         return done(answer_at_once(request, caller));
     auto found = command_of(request, caller);
     if (auto* const refusal = std::get_if<ApiAnswer>(&found)) return done(std::move(*refusal));
@@ -252,6 +250,27 @@ ApiAnswer Api::without_a_command(const ApiRequest& request, const Caller& caller
     return {};
 }
 
+ApiAnswer Api::document(const ApiRequest& request, std::string_view path, std::string_view query) {
+    if (request.method != "GET") {
+        ApiAnswer refusal = problem(405, "here is only read: GET");
+        refusal.allow = "GET";
+        return refusal;
+    }
+    if (path == "/healthz") return get(path, query);
+    Document found;
+    try {
+        found = documents_(path, query);
+    } catch (const std::exception& error) {
+        return problem(503, error.what());
+    }
+    if (found.status != 200) return problem(found.status, found.body);
+    ApiAnswer answer;
+    answer.content_type = std::move(found.content_type);
+    answer.body = std::move(found.body);
+    answer.is_page = answer.content_type.starts_with("text/html");
+    return answer;
+}
+
 ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
     try {
         if (ApiAnswer refusal = without_a_command(request, caller); refusal.status != 200)
@@ -263,6 +282,7 @@ ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
         const std::string_view path = request.target.substr(0, mark);
         const std::string_view query =
             request.target.substr(std::min(mark + 1, request.target.size()));
+        if (documents_) return document(request, path, query);
         const bool takes_commands = path == kCommands;
         if (caller.browser && request.method == "GET") {
             if (const auto* file = page_file(path)) {
@@ -354,6 +374,9 @@ ApiAnswer Api::get(std::string_view path, std::string_view query) {
         answer.body = parameters_json(source_.result());
     } else if (path == "/api/v1/campaign") {
         answer.body = campaign_json(source_.status());
+    } else if (path == "/api/v1/unit") {
+        answer.body = source_.unit_history();
+        if (answer.body.empty()) answer.body = R"({"campaigns":[],"coefficients":[]})";
     } else if (path == "/api/v1/surface") {
         answer.body = surface_json(source_.status().noise);
     } else if (path == "/api/v1/config") {

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "daemon/serve/caller.hpp"
+#include "daemon/serve/documents.hpp"
 #include "daemon/serve/history.hpp"
 #include "daemon/serve/rate_limit.hpp"
 #include "daemon/serve/stream_feed.hpp"
@@ -41,6 +42,8 @@ class Api {
     /// false: too many commands wait.
     using CarryOut = std::function<bool(CommandRequest, std::function<void(CommandReply)>)>;
     Api(StatusSource& source, std::string instance, CarryOut carry_out);
+    /// From now on these are what is read here, and no command is taken.
+    void show(Documents documents) { documents_ = std::move(documents); }
     using Done = std::function<void(ApiAnswer)>;
     /// Calls back at once, unless it is a command. Never throws for what a client sends; a failing
     /// source is a 500.
@@ -68,6 +71,8 @@ class Api {
   private:
     ApiAnswer get(std::string_view path, std::string_view query);
     [[nodiscard]] ApiAnswer answer_at_once(const ApiRequest& request, const Caller& caller);
+    [[nodiscard]] ApiAnswer document(const ApiRequest& request, std::string_view path,
+                                     std::string_view query);
     [[nodiscard]] ApiAnswer without_a_command(const ApiRequest& request, const Caller& caller);
     /// The command of the request; else why there is none to be carried out.
     [[nodiscard]] std::variant<ApiAnswer, CommandRequest> command_of(const ApiRequest& request,
@@ -79,6 +84,7 @@ class Api {
     StatusSource& source_;
     std::string instance_;
     CarryOut carry_out_;
+    Documents documents_;
     StreamFeed feed_;
     History history_;
     TokenBuckets commands_{10, 50};

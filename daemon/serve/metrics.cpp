@@ -368,6 +368,17 @@ std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) 
                           {{{"outcome", "failed"}}, status.annunciator.failed},
                           {{{"outcome", "timed_out"}}, status.annunciator.timed_out},
                           {{{"outcome", "left_out"}}, status.annunciator.left_out}});
+    if (!status.archive.folder.empty()) {
+        families.gauge("vibrig_archive_up", "1 while campaigns can be delivered to the archive.",
+                       yes(status.archive.good));
+        families.gauge("vibrig_archive_waiting", "Campaigns that are over and not delivered.",
+                       static_cast<double>(status.archive.waiting));
+        families.gauge("vibrig_archive_waiting_bytes", "Bytes of them.",
+                       static_cast<double>(status.archive.waiting_bytes));
+        families.counter("vibrig_archive_deliveries_total", "Attempts to deliver a campaign.",
+                         {{{{"outcome", "delivered"}}, status.archive.delivered},
+                          {{{"outcome", "failed"}}, status.archive.failures}});
+    }
     if (!status.mqtt.broker.empty()) {
         families.gauge("vibrig_mqtt_up", "1 while the broker is connected.",
                        yes(status.mqtt.connected));

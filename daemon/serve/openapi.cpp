@@ -112,7 +112,7 @@ constexpr const char* kHistoryParameters =
     R"({"name":"channel","in":"query","required":true,"description":"one or more, with commas","schema":{"type":"string"}},)"
     R"({"name":"from","in":"query","description":"s of the daemon's clock","schema":{"type":"number"}})";
 
-constexpr std::array<Path, 13> kPaths{{
+constexpr std::array<Path, 14> kPaths{{
     {"/api/v1/status", "The whole status.", "application/json", "Status"},
     {"/api/v1/parameters", "The result so far: 30 coefficients with their covariance.",
      "application/json", "Parameters"},
@@ -127,6 +127,9 @@ constexpr std::array<Path, 13> kPaths{{
      "Modified Allan and classical deviation of the residuals of each gyro in each of the newest "
      "128 dwells, by averaging time; those with an alarm too.",
      "application/json", "Surface"},
+    {"/api/v1/unit",
+     "The unit's earlier campaigns in the archive, as `vibrig trend SERIAL --json` prints them.",
+     "application/json", nullptr},
     {"/api/v1/config", "The configuration in force, as vibrigd --check prints it.",
      "application/json", "Configuration"},
     {"/api/v1/plan", "What the campaign does, and the standard errors to be expected.",

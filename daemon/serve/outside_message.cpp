@@ -33,6 +33,18 @@ void fill_annunciator(v1::Annunciator& out, const drivers::AnnunciatorStatus& an
     out.set_command_note(mend_utf8(annunciator.command_note));
 }
 
+void fill_archive(v1::Archive& out, const ArchiveStatus& archive) {
+    out.set_folder(mend_utf8(archive.folder));
+    out.set_good(archive.good);
+    out.set_note(mend_utf8(archive.note));
+    out.set_delivering(mend_utf8(archive.delivering));
+    out.set_waiting(archive.waiting);
+    out.set_waiting_bytes(archive.waiting_bytes);
+    out.set_delivered(archive.delivered);
+    out.set_failures(archive.failures);
+    out.set_removed(archive.removed);
+}
+
 }  // namespace
 
 void fill(v1::Mqtt& out, const MqttStatus& mqtt) {
@@ -55,6 +67,7 @@ void fill(v1::Log& out, const LogStatus& log) {
 
 void fill_outside(v1::Status& out, const StatusData& status) {
     if (!status.guard.socket.empty()) fill_guard(*out.mutable_guard(), status.guard);
+    if (!status.archive.folder.empty()) fill_archive(*out.mutable_archive(), status.archive);
     if (status.annunciator.horn || status.annunciator.command)
         fill_annunciator(*out.mutable_annunciator(), status.annunciator);
 }

@@ -336,6 +336,16 @@ Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
                           (mqtt.connected() ? format("%llu messages, %llu left out",
                                                      count(mqtt.messages()), count(mqtt.left_out()))
                                             : mqtt.note())));
+    if (status.has_archive()) {
+        const v1::Archive& archive = status.archive();
+        lines.push_back(labelled(
+            "archive",
+            format("%llu waiting, %llu delivered", count(archive.waiting()),
+                   count(archive.delivered())) +
+                (!archive.good()                ? ", DOWN: " + archive.note()
+                 : archive.delivering().empty() ? ""
+                                                : ", on its way: " + archive.delivering())));
+    }
     lines.push_back(labelled("daemon", "vibrigd " + status.version() + ", clock " + status.clock() +
                                            ", up " + render_duration(status.uptime_s())));
     for (std::string& line : lines) line = marked(status, line, width);

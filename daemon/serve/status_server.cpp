@@ -112,7 +112,8 @@ struct StatusServer::Impl {
                   return carry_out(std::move(request), std::move(done));
               }) {
         if (!settings.operator_group.empty()) operators = group_named(settings.operator_group);
-        open_unix(Door::control, settings.socket);
+        if (settings.documents) api.show(settings.documents);
+        if (!settings.socket.empty()) open_unix(Door::control, settings.socket);
         if (!settings.status_socket.empty()) open_unix(Door::status, settings.status_socket);
         if (!settings.page.empty())
             page = open_tcp(Door::page, listen_tcp("server.page", settings.page, true));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "daemon/serve/documents.hpp"
 #include "daemon/serve/socket_file.hpp"
 #include "daemon/status.hpp"
 
@@ -31,6 +32,7 @@ struct ServerSettings {
     std::string certificate, key, clients_ca;  ///< of `remote`, PEM files
     std::string revoked;  ///< list of clients' certificates that no longer count; empty: none
     ServerLimits limits = {};
+    Documents documents = {};  ///< all there is to be read; empty: the daemon's own API and page
 };
 
 /// HTTP/1.1 and WebSocket on a thread of its own: it asks the StatusSource, and nothing waits for

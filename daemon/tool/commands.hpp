@@ -28,6 +28,9 @@ void add_commission_bus(CLI::App& commissioning, int& exit_code);
 void add_commission_registers(CLI::App& commissioning, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_reports(CLI::App& app, int& exit_code);  ///< report, compensate
+void add_list(CLI::App& app, int& exit_code);
+void add_trend(CLI::App& app, int& exit_code);
+void add_archive(CLI::App& app, int& exit_code);  ///< archive add, verify, serve
 void add_certificate(CLI::App& app, int& exit_code);
 void add_recordings(CLI::App& app, int& exit_code);  ///< export, recover
 

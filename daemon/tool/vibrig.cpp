@@ -38,6 +38,9 @@ int main(int argc, char** argv) {
     vibrig::tool::add_recordings(app, exit_code);
     vibrig::tool::add_reports(app, exit_code);
     vibrig::tool::add_certificate(app, exit_code);
+    vibrig::tool::add_list(app, exit_code);
+    vibrig::tool::add_trend(app, exit_code);
+    vibrig::tool::add_archive(app, exit_code);
     vibrig::tool::add_remote(app, exit_code);
     vibrig::tool::add_commission(app, exit_code);
     vibrig::tool::add_journal(app, exit_code);

@@ -162,7 +162,9 @@ const Draw = (() => {
   };
 
   let cells = null;
-  function coefficients(parameters, targets) {
+  // Digits as its uncertainty has them.
+  const before = c => { const half = (c.interval[1] - c.interval[0]) / 2; return `<br><small class="earlier">${digits(c.mean, half)} ± ${half.toPrecision(2)}</small>`; };
+  function coefficients(parameters, targets, earlier = {}) {
     const table = byId('coefficients');
     if (!cells || cells.length !== parameters.length) {
       const rows = parameters.length / 3;
@@ -175,12 +177,13 @@ const Draw = (() => {
       cells = parameters.map((p, i) => found[(i % rows) * 3 + Math.floor(i / rows)]);
     }
     parameters.forEach((p, i) => {
-      if (p.value === undefined || p.sigma === undefined) { cells[i].textContent = '–'; return; }
+      const past = earlier[p.name] ? before(earlier[p.name]) : '';
+      if (p.value === undefined || p.sigma === undefined) { cells[i].innerHTML = '–' + past; return; }
       const target = targets[p.name], factor = target ? p.sigma / target : NaN;
       const decades = Math.log10(factor);
       const width = Number.isFinite(decades) ? Math.min(100, Math.max(2, decades * 25)) : 0;
       const met = factor <= 1.02;
-      cells[i].innerHTML = `${digits(p.value, p.sigma)} <small>± ${p.sigma.toPrecision(2)}</small>` +
+      cells[i].innerHTML = `${digits(p.value, p.sigma)} <small>± ${p.sigma.toPrecision(2)}</small>${past}` +
         `<svg preserveAspectRatio="none" viewBox="0 0 100 4" role="img" aria-label="${Number.isFinite(factor) ? `sigma ${factor.toFixed(1)} times its target` : 'no target'}"><rect class="${met ? 'met' : 'over'}" width="${width}" height="4"/></svg>`;
     });
   }

@@ -176,6 +176,20 @@
       show();
     } catch { /* the stream tells when the link is lost */ }
   }
+  // What the archive has of this unit; a campaign that was delivered is part of it.
+  let seenDelivered = null, earlier = {};
+  async function getEarlier(s) {
+    const delivered = s.archive ? String(s.archive.delivered) : null;
+    if (seenDelivered === delivered) return;
+    seenDelivered = delivered;
+    try {
+      const unit = await (await fetch('/api/v1/unit')).json();
+      earlier = Object.fromEntries(unit.coefficients.map(c => [c.name, c]));
+      const last = unit.campaigns.at(-1), note = byId('earlier-note');
+      note.hidden = !last;
+      if (last) note.textContent = `Below each: unit ${unit.unit.serial} before, mean of ${unit.campaigns.length} campaigns with its 95 % interval; the newest ${last.started}, ${last.verdict || 'without a verdict'}.`;
+    } catch { seenDelivered = undefined; }   // asked again with the next status
+  }
   let seenDwells = null, classical = [new Map(), new Map(), new Map()];
   async function getSurface(expected) {
     try {
@@ -280,7 +294,8 @@
     gimbals(status);
     remember(status);
     charts(status);
-    Draw.coefficients(status.estimate.parameters || [], targets);
+    getEarlier(status);
+    Draw.coefficients(status.estimate.parameters || [], targets, earlier);
     health(status);
     Watch.show(status);
   }

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace soci {
+class session;
+}
+
+namespace vibrig::archive {
+
+/// An index' database: a SQLite file, or a PostgreSQL server by "postgresql://...". One thread.
+class Database {
+  public:
+    enum class Mode : std::uint8_t { write, read };
+    /// Brings it to the newest version when it is to be written. Throws ArchiveError that names it
+    /// without a password.
+    Database(const std::string& where, Mode mode);
+    ~Database();
+    Database(const Database&) = delete;
+    Database& operator=(const Database&) = delete;
+
+    [[nodiscard]] soci::session& sql() noexcept { return *session_; }
+    [[nodiscard]] const std::string& name() const noexcept { return name_; }
+    /// 0: a file with no tables, or one that has them without a number.
+    [[nodiscard]] int version();
+
+    /// What SOCI throws, as an ArchiveError that names the database.
+    template <typename Work>
+    auto guarded(Work&& work) -> decltype(work()) {
+        try {
+            return work();
+        } catch (...) {
+            rethrow();
+        }
+    }
+
+  private:
+    [[noreturn]] void rethrow() const;
+    void connect(const std::string& where, Mode mode);
+    void migrate();
+
+    std::string name_;
+    bool server_;
+    std::unique_ptr<soci::session> session_;
+};
+
+/// All of it or nothing; one writer at a time. Rolled back unless commit() was called.
+class Change {
+  public:
+    explicit Change(soci::session& sql);
+    ~Change();
+    Change(const Change&) = delete;
+    Change& operator=(const Change&) = delete;
+    void commit();
+
+  private:
+    soci::session& sql_;
+    bool open_ = true;
+};
+
+[[nodiscard]] bool is_server(const std::string& where);
+/// As it may be shown: without a password.
+[[nodiscard]] std::string shown(const std::string& where);
+
+}  // namespace vibrig::archive

@@ -1,0 +1,243 @@
+#include "daemon/archive/deliver.hpp"
+
+#include <fcntl.h>
+#include <spdlog/fmt/fmt.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "daemon/archive/manifest.hpp"
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/digest.hpp"
+
+namespace vibrig::archive {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kIncoming = ".incoming";
+constexpr std::size_t kPiece = 1 << 20;
+
+[[noreturn]] void fail(const fs::path& path, const char* doing) {
+    throw ArchiveError(
+        fmt::format("{}: cannot {}: {}", path.string(), doing, std::strerror(errno)));
+}
+
+/// A descriptor that closes itself.
+class Descriptor {
+  public:
+    Descriptor(const fs::path& path, int flags) : path_(path) {
+        number_ = ::open(path.c_str(), flags | O_CLOEXEC, 0644);
+        if (number_ < 0) fail(path, "open it");
+    }
+    ~Descriptor() {
+        if (number_ >= 0) ::close(number_);
+    }
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    [[nodiscard]] int number() const noexcept { return number_; }
+    void sync() const {
+        if (::fsync(number_) != 0) fail(path_, "bring it to the disk");
+    }
+    /// A mounted file system may refuse only now.
+    void close() {
+        if (::close(std::exchange(number_, -1)) != 0) fail(path_, "write it");
+    }
+
+  private:
+    fs::path path_;
+    int number_;
+};
+
+void sync_folder(const fs::path& folder) { Descriptor(folder, O_RDONLY | O_DIRECTORY).sync(); }
+
+void write_all(const Descriptor& to, const fs::path& path, const char* bytes, std::size_t size) {
+    while (size > 0) {
+        const auto n = ::write(to.number(), bytes, size);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) fail(path, "write it");
+        bytes += n;
+        size -= static_cast<std::size_t>(n);
+    }
+}
+
+void copy_file(const fs::path& from, const fs::path& to,
+               const std::function<void(std::size_t)>& copied) {
+    const Descriptor source(from, O_RDONLY);
+    Descriptor target(to, O_WRONLY | O_CREAT | O_TRUNC);
+    std::vector<char> piece(kPiece);
+    for (;;) {
+        const auto n = ::read(source.number(), piece.data(), piece.size());
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) fail(from, "read it");
+        if (n == 0) break;
+        write_all(target, to, piece.data(), static_cast<std::size_t>(n));
+        copied(static_cast<std::size_t>(n));
+    }
+    target.sync();
+    // What is compared is to come from the disk.
+    static_cast<void>(::posix_fadvise(target.number(), 0, 0, POSIX_FADV_DONTNEED));
+    target.close();
+}
+
+/// One delivery of a rig at a time, whoever makes it.
+class DeliveryLock {
+  public:
+    explicit DeliveryLock(const fs::path& path) : file_(path, O_RDWR | O_CREAT) {
+        while (::flock(file_.number(), LOCK_EX) != 0)
+            if (errno != EINTR) fail(path, "lock it");
+    }
+
+  private:
+    Descriptor file_;
+};
+
+/// A name that is one folder below another, whatever a configuration says.
+std::string as_name(std::string text) {
+    std::ranges::replace(text, '/', '_');
+    return text.empty() || text.front() == '.' ? "_" + text : text;
+}
+
+void stage(const std::string& source, const fs::path& incoming, const Entry& entry,
+           const Progress& progress) {
+    fs::remove_all(incoming);
+    fs::create_directories(incoming);
+    std::size_t all = 0, done = 0;
+    for (const File& file : entry.files) all += static_cast<std::size_t>(file.bytes);
+    for (const File& file : entry.files)
+        copy_file(fs::path(source) / file.name, incoming / file.name, [&](std::size_t bytes) {
+            done += bytes;
+            if (progress) progress(done, all);
+        });
+    if (const auto wrong = differences(incoming.string(), entry.files); !wrong.empty())
+        throw ArchiveError("the copy is not what was copied: " + wrong.front());
+    const std::string manifest = manifest_json(entry);
+    const Descriptor file(incoming / kManifestName, O_WRONLY | O_CREAT | O_TRUNC);
+    write_all(file, incoming / kManifestName, manifest.data(), manifest.size());
+    file.sync();
+    sync_folder(incoming);
+}
+
+bool is_that(const fs::path& folder, const Entry& entry) {
+    return fs::exists(folder / kManifestName) &&
+           campaign_hash(list_files(folder.string())) == entry.hash;
+}
+
+/// `incoming` becomes `target`; what is damaged there makes room.
+void show(const fs::path& incoming, const fs::path& target) {
+    fs::path aside = incoming;
+    aside += ".old";
+    std::error_code ignored;
+    fs::remove_all(aside, ignored);
+    if (fs::exists(target)) fs::rename(target, aside);
+    fs::rename(incoming, target);
+    sync_folder(target.parent_path());
+    fs::remove_all(aside, ignored);
+}
+
+}  // namespace
+
+std::string host_name() {
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "rig";
+}
+
+std::vector<std::string> campaign_folders(const std::string& folder) {
+    if (!record::part_files(folder).empty()) return {folder};
+    std::vector<std::string> found;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+        if (!entry.is_directory() || entry.path().filename().string().starts_with('.')) continue;
+        if (!record::part_files(entry.path().string()).empty()) {
+            found.push_back(entry.path().string());
+            continue;
+        }
+        for (const auto& below : fs::directory_iterator(entry.path()))
+            if (below.is_directory() && !record::part_files(below.path().string()).empty())
+                found.push_back(below.path().string());
+    }
+    std::ranges::sort(found);
+    return found;
+}
+
+Delivery deliver(const std::string& campaign_folder, const Place& place, const std::string& rig,
+                 const Progress& progress) {
+    Delivery delivery;
+    Entry& entry = delivery.entry;
+    entry = read_entry(campaign_folder);
+    if (entry.key.empty()) entry.key = fs::path(campaign_folder).filename().string();
+    const fs::path root = fs::weakly_canonical(place.folder);
+    const fs::path own = fs::weakly_canonical(campaign_folder);
+    const fs::path within = own.lexically_relative(root);
+    const bool inside = !within.empty() && *within.begin() != "..";
+    entry.rig = as_name(rig);
+    if (inside) {
+        if (const auto origin = origin_in(own.string()); !origin.rig.empty())
+            entry.rig = origin.rig;
+        entry.key = within.string();
+        delivery.kind = Delivery::Kind::was_there;
+        delivery.folder = own.string();
+    } else {
+        if (!fs::is_directory(root))
+            throw ArchiveError(root.string() + ": found no such folder, expected the archive's");
+        const fs::path incoming_root = root / kIncoming;
+        fs::create_directories(incoming_root);
+        const DeliveryLock lock(incoming_root / (entry.rig + ".lock"));
+        const std::string name = as_name(entry.key);
+        fs::path target = root / entry.rig / name;
+        const bool taken = fs::exists(target);
+        // Of another time: the campaign went on, or another rig has this one's name.
+        if (taken && origin_in(target.string()).hash != entry.hash)
+            target += "~" + entry.hash.substr(0, 8);
+        entry.key = entry.rig + "/" + target.filename().string();
+        delivery.folder = target.string();
+        if (is_that(target, entry)) {
+            delivery.kind = Delivery::Kind::was_there;
+        } else {
+            delivery.kind = fs::exists(target) ? Delivery::Kind::mended : Delivery::Kind::copied;
+            const fs::path incoming =
+                incoming_root / (entry.rig + "-" + name + "-" + entry.hash.substr(0, 8));
+            stage(own.string(), incoming, entry, progress);
+            fs::create_directories(target.parent_path());
+            show(incoming, target);
+        }
+    }
+    Index index(place.index, Database::Mode::write);
+    // The same recording under another name is the same campaign.
+    if (const auto known = index.key_of(entry.hash); known && *known != entry.key) {
+        if (inside || fs::exists(root / *known)) {
+            entry.key = *known;
+            return delivery;
+        }
+        index.forget(*known);
+    }
+    index.put(entry, true);
+    return delivery;
+}
+
+void read_results(Index& index, const std::string& folder, const std::string& rig,
+                  const std::function<void(const std::string&)>& tell, const Progress& progress) {
+    const auto keys = index.without_result();
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+        const fs::path path = fs::path(folder) / keys[i];
+        if (progress) progress(i, keys.size());
+        // Somebody has taken it away: what was noted of it stays.
+        if (!fs::exists(path)) continue;
+        try {
+            Entry entry = read_entry(path.string());
+            entry.key = keys[i];
+            entry.rig = rig;
+            index.put(entry, false);
+        } catch (const std::exception& error) {
+            tell(error.what());
+        }
+    }
+}
+
+}  // namespace vibrig::archive

@@ -1,0 +1,313 @@
+#include "daemon/archive/outbox.hpp"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <spdlog/fmt/fmt.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "daemon/archive/child.hpp"
+#include "daemon/record/disk.hpp"
+
+namespace vibrig::archive {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kFirstRetry_s = 0.5;
+constexpr double kLook_s = 60;  // a campaign's end wakes it; what came otherwise is found by a look
+constexpr int kFewFailures = 2;
+constexpr double kPatience_s = 600;
+constexpr double kSlowest_mb_per_s = 0.5;
+constexpr double kMega = 1e6;
+constexpr const char* kMarks = ".outbox";
+
+std::string program_beside() {
+    std::error_code error;
+    const auto self = fs::read_symlink("/proc/self/exe", error);
+    return (self.parent_path() / "vibrig").string();
+}
+
+bool is_part(const std::string& name) {
+    return name.starts_with("campaign") && name.ends_with(".h5");
+}
+
+std::string read_text(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// Its turn comes when nobody else wants processor or disk; its children inherit that.
+void be_last() {
+    const auto self = static_cast<id_t>(::syscall(SYS_gettid));
+    constexpr int kNice = 19, kIoWhoThread = 1, kIdle = 3 << 13;
+    ::setpriority(PRIO_PROCESS, self, kNice);
+    ::syscall(SYS_ioprio_set, kIoWhoThread, 0, kIdle);
+}
+
+}  // namespace
+
+Outbox::Outbox(Settings settings, std::string recordings, std::string serial, Event event)
+    : settings_(std::move(settings)),
+      recordings_(std::move(recordings)),
+      serial_(std::move(serial)),
+      program_(program_beside()),
+      event_(std::move(event)) {
+    status_.folder = settings_.folder;
+    status_.good = true;
+}
+
+Outbox::~Outbox() { stop(); }
+
+void Outbox::start() {
+    sigset_t all, before;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_BLOCK, &all, &before);
+    thread_ = std::thread([this] { loop(); });
+    ::pthread_setname_np(thread_.native_handle(), "outbox");
+    ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+void Outbox::stop() noexcept {
+    stop_.store(true);
+    {
+        const std::lock_guard lock(mutex_);
+        look_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+}
+
+void Outbox::look() {
+    {
+        const std::lock_guard lock(mutex_);
+        look_ = true;
+    }
+    changed_.notify_all();
+}
+
+ArchiveStatus Outbox::status() const {
+    const std::lock_guard lock(mutex_);
+    return status_;
+}
+
+std::string Outbox::history() const {
+    const std::lock_guard lock(mutex_);
+    return history_;
+}
+
+void Outbox::show(const std::function<void(ArchiveStatus&)>& change) {
+    const std::lock_guard lock(mutex_);
+    change(status_);
+}
+
+void Outbox::wait(double seconds) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::duration<double>(seconds), [this] { return look_; });
+    look_ = stop_.load();
+}
+
+std::vector<std::string> Outbox::command(std::vector<std::string> words) const {
+    words.insert(words.begin(), program_);
+    for (const auto& [option, value] :
+         {std::pair{"--archive", settings_.folder}, std::pair{"--index", settings_.index}}) {
+        if (value.empty()) continue;
+        words.emplace_back(option);
+        words.push_back(value);
+    }
+    words.emplace_back("--json");
+    return words;
+}
+
+void Outbox::loop() {
+    be_last();
+    ask_history();
+    double retry_s = kFirstRetry_s;
+    while (!stop_.load()) {
+        auto campaigns = scan();
+        // What failed comes last: one that can never be read must not keep the others.
+        std::ranges::stable_sort(campaigns, {}, [this](const Campaign& one) {
+            const auto found = failed_.find(one.key);
+            return found == failed_.end() ? 0 : found->second;
+        });
+        int failed = 0;
+        bool done = false;
+        for (const Campaign& campaign : campaigns) {
+            if (campaign.delivered || stop_.load()) continue;
+            const bool good = deliver(campaign);
+            done = done || good;
+            // The archive is gone, mostly: the others would fare no better now.
+            if (!good && ++failed >= kFewFailures && !done) break;
+        }
+        if (done && !stop_.load()) ask_history();
+        campaigns = scan();
+        if (failed == 0) make_room(campaigns);
+        const auto waiting = std::ranges::count(campaigns, false, &Campaign::delivered);
+        wait(failed > 0 ? retry_s : waiting > 0 ? kFirstRetry_s : kLook_s);
+        retry_s =
+            failed > 0 && !done ? std::min(2 * retry_s, settings_.retry_max_s) : kFirstRetry_s;
+    }
+}
+
+/// What is over, by name, which is by time for campaigns of one name.
+std::vector<Outbox::Campaign> Outbox::scan() const {
+    std::vector<Campaign> found;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(recordings_, error)) {
+        if (!entry.is_directory(error)) continue;
+        Campaign one;
+        one.key = entry.path().filename().string();
+        one.path = entry.path().string();
+        bool over = false, being_written = false;
+        std::map<std::string, std::uint64_t> files;
+        for (const auto& file : fs::directory_iterator(entry.path(), error)) {
+            const std::string name = file.path().filename().string();
+            const auto bytes = file.file_size(error);
+            if (error) continue;
+            if (is_part(name)) {
+                over = true;
+                being_written = being_written || record::WriterLock::held(file.path().string());
+            }
+            if (!is_part(name) && !name.starts_with("raw-") && name != "dwells.csv") continue;
+            files[name] = bytes;
+            one.bytes += bytes;
+        }
+        if (!over || being_written) continue;
+        for (const auto& [name, bytes] : files) one.print += fmt::format("{} {}\n", name, bytes);
+        one.delivered = read_text(fs::path(recordings_) / kMarks / one.key) == one.print;
+        found.push_back(std::move(one));
+    }
+    std::ranges::sort(found, {}, &Campaign::key);
+    return found;
+}
+
+bool Outbox::deliver(const Campaign& campaign) {
+    const auto waiting = scan();
+    show([&](ArchiveStatus& s) {
+        s.waiting = s.waiting_bytes = 0;
+        for (const Campaign& one : waiting) {
+            if (one.delivered) continue;
+            ++s.waiting;
+            s.waiting_bytes += one.bytes;
+        }
+        s.delivering = campaign.key;
+    });
+    auto words = command({"archive", "add", campaign.path});
+    if (!settings_.rig.empty()) {
+        words.emplace_back("--rig");
+        words.push_back(settings_.rig);
+    }
+    const double limit_s =
+        kPatience_s + static_cast<double>(campaign.bytes) / kMega / kSlowest_mb_per_s;
+    const Run run = run_child(words, limit_s, stop_);
+    const bool good = run.status == 0;
+    if (stop_.load() && !good) return false;
+    if (good) {
+        mark(campaign);
+        failed_.erase(campaign.key);
+        if (!std::exchange(told_, "").empty()) event_(Severity::info, "can be delivered to again");
+        event_(Severity::info, campaign.key + ": delivered and verified");
+        tell_moved(run.out);
+    } else {
+        ++failed_[campaign.key];
+        if (std::exchange(told_, run.error) != run.error)
+            event_(Severity::warning, campaign.key +
+                                          " cannot be delivered, it is kept and tried "
+                                          "again: " +
+                                          run.error);
+    }
+    const auto left = scan();
+    show([&](ArchiveStatus& s) {
+        s.waiting = s.waiting_bytes = 0;
+        for (const Campaign& one : left) {
+            if (one.delivered) continue;
+            ++s.waiting;
+            s.waiting_bytes += one.bytes;
+        }
+        s.delivering.clear();
+        s.good = good;
+        s.note = good ? "" : run.error;
+        good ? ++s.delivered : ++s.failures;
+    });
+    return good;
+}
+
+void Outbox::tell_moved(const std::string& line) {
+    const auto root = nlohmann::json::parse(line, nullptr, false);
+    if (!root.is_object()) return;
+    try {
+        std::string words;
+        for (const auto& one : root.at("moved"))
+            words +=
+                fmt::format("{}{} is {:.5g}, expected {:.5g} +- {:.2g} {} (p = {:.1g})",
+                            words.empty() ? "" : "; ", one.at("coefficient").get<std::string>(),
+                            one.at("value").get<double>(), one.at("expected").get<double>(),
+                            one.at("sigma").get<double>(), one.at("unit").get<std::string>(),
+                            one.at("p").get<double>());
+        if (!words.empty())
+            event_(Severity::alarm,
+                   fmt::format("unit {} has moved by more than its {} earlier campaigns allow: {}",
+                               root.at("unit").get<std::string>(), root.at("earlier").get<int>(),
+                               words));
+    } catch (const nlohmann::json::exception&) {  // of another version of vibrig
+    }
+}
+
+void Outbox::ask_history() {
+    if (serial_.empty()) return;
+    const Run run = run_child(command({"trend", serial_}), kPatience_s, stop_);
+    if (run.status != 0) return;  // a new unit, or an archive that does not answer
+    const std::lock_guard lock(mutex_);
+    history_ = run.out;
+}
+
+/// The mark is on the disk before anything that rests on it happens.
+void Outbox::mark(const Campaign& campaign) const {
+    const fs::path folder = fs::path(recordings_) / kMarks;
+    std::error_code error;
+    fs::create_directories(folder, error);
+    const fs::path path = folder / campaign.key, fresh = folder / (campaign.key + ".new");
+    const int file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (file < 0) return;  // delivered again, to find it there
+    const auto size = static_cast<ssize_t>(campaign.print.size());
+    const bool good =
+        ::write(file, campaign.print.data(), campaign.print.size()) == size && ::fsync(file) == 0;
+    ::close(file);
+    if (good) fs::rename(fresh, path, error);
+}
+
+void Outbox::make_room(const std::vector<Campaign>& campaigns) {
+    if (settings_.keep_mb <= 0) return;
+    double mega = 0;
+    for (const Campaign& one : campaigns) mega += static_cast<double>(one.bytes) / kMega;
+    std::vector<std::pair<fs::file_time_type, const Campaign*>> by_age;
+    std::error_code error;
+    for (const Campaign& one : campaigns)
+        by_age.emplace_back(fs::last_write_time(one.path, error), &one);
+    std::ranges::sort(by_age);
+    // The newest may be gone on with.
+    if (!by_age.empty()) by_age.pop_back();
+    for (const auto& [age, one] : by_age) {
+        if (mega <= settings_.keep_mb || stop_.load()) return;
+        // Verified anew: what the archive has lost since comes back.
+        if (!one->delivered || !deliver(*one)) continue;
+        fs::remove_all(one->path, error);
+        if (error) continue;
+        mega -= static_cast<double>(one->bytes) / kMega;
+        show([](ArchiveStatus& s) { ++s.removed; });
+        event_(Severity::info,
+               one->key + ": removed here, beyond archive.keep_mb; the archive has it");
+    }
+}
+
+}  // namespace vibrig::archive

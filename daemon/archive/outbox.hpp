@@ -1,0 +1,73 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/archive/settings.hpp"
+#include "daemon/status.hpp"
+
+namespace vibrig::archive {
+
+/// Brings campaigns that are over to the archive, on a thread of its own and in wall time, by
+/// `vibrig archive add` as a process of its own: whatever archive, index or network do, it is that
+/// process that waits. The outbox is the folder of recordings itself, with a mark for each campaign
+/// that was delivered and verified; so nothing that is recorded can be missed, and nothing is
+/// removed before. Any thread may call.
+class Outbox {
+  public:
+    using Event = std::function<void(Severity, const std::string&)>;
+    /// `recordings`: the folder of campaigns' folders; `serial`: of the unit on the rig, ""
+    /// without. `event` is called in its thread.
+    Outbox(Settings settings, std::string recordings, std::string serial, Event event);
+    ~Outbox();
+    Outbox(const Outbox&) = delete;
+    Outbox& operator=(const Outbox&) = delete;
+
+    void start();
+    void stop() noexcept;
+    /// A campaign is over: it looks at once.
+    void look();
+    [[nodiscard]] ArchiveStatus status() const;
+    /// The unit's earlier campaigns, as `vibrig trend SERIAL --json` prints them; empty: not known.
+    [[nodiscard]] std::string history() const;
+
+  private:
+    /// A campaign's folder, over.
+    struct Campaign {
+        std::string key, path, print;
+        std::uint64_t bytes = 0;
+        bool delivered = false;
+    };
+    void loop();
+    [[nodiscard]] std::vector<Campaign> scan() const;
+    /// False: it failed.
+    bool deliver(const Campaign& campaign);
+    void tell_moved(const std::string& line);
+    void ask_history();
+    void make_room(const std::vector<Campaign>& campaigns);
+    void mark(const Campaign& campaign) const;
+    void wait(double seconds);
+    [[nodiscard]] std::vector<std::string> command(std::vector<std::string> words) const;
+    void show(const std::function<void(ArchiveStatus&)>& change);
+
+    const Settings settings_;
+    const std::string recordings_, serial_, program_;
+    const Event event_;
+    std::map<std::string, int> failed_;  ///< campaigns that could not be delivered, and how often
+    std::string told_;                   ///< why the newest could not
+    std::atomic<bool> stop_{false};
+    mutable std::mutex mutex_;
+    std::condition_variable changed_;
+    bool look_ = false;
+    ArchiveStatus status_;
+    std::string history_;
+    std::thread thread_;
+};
+
+}  // namespace vibrig::archive

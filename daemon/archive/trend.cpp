@@ -1,0 +1,251 @@
+#include "daemon/archive/trend.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "estimator/uncertainty/distributions.hpp"
+
+namespace vibrig::archive {
+
+using estimator::uncertainty::chi_square_tail;
+using estimator::uncertainty::f_tail;
+using estimator::uncertainty::student_quantile;
+
+namespace {
+
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNanosecondsPerHour = 3.6e12;
+constexpr std::size_t kFewestBefore = 2;
+
+double squared(double x) { return x * x; }
+
+/// P(|t| >= this) with `dof` degrees of freedom.
+double two_sided(double t, double dof) { return f_tail(squared(t), 1, dof); }
+
+/// Of so many tests each, so that all together have this level.
+double level_of_each(double level, std::size_t tests) {
+    return tests == 0 ? level : 1 - std::pow(1 - level, 1 / static_cast<double>(tests));
+}
+
+/// What the values of one group tell, weighted by 1 / u^2.
+struct GroupSums {
+    double weight = 0, weight_squared = 0, mean = 0;
+    std::size_t count = 0;
+};
+
+std::map<std::size_t, GroupSums> sum_up(const std::vector<double>& value,
+                                        const std::vector<double>& u,
+                                        const std::vector<std::size_t>& group) {
+    std::map<std::size_t, GroupSums> groups;
+    for (std::size_t i = 0; i < value.size(); ++i) {
+        GroupSums& of = groups[group[i]];
+        const double w = 1 / squared(u[i]);
+        of.weight += w;
+        of.weight_squared += squared(w);
+        of.mean += w * (value[i] - of.mean) / of.weight;
+        ++of.count;
+    }
+    return groups;
+}
+
+}  // namespace
+
+Variance analyse_variance(const std::vector<double>& value, const std::vector<double>& u,
+                          const std::vector<std::size_t>& group) {
+    Variance out;
+    const auto groups = sum_up(value, u, group);
+    double q_within = 0, weight = 0, within_room = 0;
+    for (std::size_t i = 0; i < value.size(); ++i)
+        q_within += squared((value[i] - groups.at(group[i]).mean) / u[i]);
+    for (const auto& [number, of] : groups) {
+        weight += of.weight;
+        out.mean += of.weight * of.mean;
+        within_room += of.weight - of.weight_squared / of.weight;
+    }
+    out.mean /= weight;
+    const auto k = static_cast<double>(groups.size());
+    const double nu_within = static_cast<double>(value.size()) - k;
+    // DerSimonian and Laird's moments, group by group.
+    double variance_within = 0;
+    if (nu_within > 0) {
+        out.within = {true,
+                      0,
+                      q_within / nu_within,
+                      nu_within,
+                      std::numeric_limits<double>::infinity(),
+                      chi_square_tail(q_within, nu_within)};
+        variance_within = std::max(0.0, (q_within - nu_within) / within_room);
+        out.within.value = std::sqrt(variance_within);
+    }
+    double q_between = 0, between_room = 0, expected = 0;
+    for (const auto& [number, of] : groups) {
+        const double rest = 1 - of.weight / weight;
+        const double own = 1 / of.weight + variance_within * of.weight_squared / squared(of.weight);
+        q_between += of.weight * squared(of.mean - out.mean);
+        expected += of.weight * rest * own;
+        between_room += of.weight * rest;
+    }
+    if (k > 1) {
+        const double mean_square = q_between / (k - 1);
+        Instability& of = out.between;
+        of.tested = true;
+        of.dof = k - 1;
+        // The scatter within can only be larger than the uncertainties explain.
+        const bool against_within = nu_within > 0 && q_within > nu_within;
+        of.f = against_within ? mean_square / (q_within / nu_within) : mean_square;
+        of.dof_of_error = against_within ? nu_within : std::numeric_limits<double>::infinity();
+        of.p = f_tail(of.f, of.dof, of.dof_of_error);
+        of.value = std::sqrt(std::max(0.0, (q_between - expected) / between_room));
+    }
+    double variance = 0;
+    for (const auto& [number, of] : groups)
+        variance += squared(of.weight / weight) *
+                    (1 / of.weight + variance_within * of.weight_squared / squared(of.weight) +
+                     squared(out.between.value));
+    out.mean_sigma = std::sqrt(variance);
+    return out;
+}
+
+std::optional<Judgement> judge(double value, double u, const std::vector<double>& before,
+                               const std::vector<double>& before_u) {
+    if (before.size() < kFewestBefore) return {};
+    double weight = 0, weight_squared = 0, mean = 0, q = 0;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        const double w = 1 / squared(before_u[i]);
+        weight += w;
+        weight_squared += squared(w);
+        mean += w * (before[i] - mean) / weight;
+    }
+    for (std::size_t i = 0; i < before.size(); ++i) q += squared((before[i] - mean) / before_u[i]);
+    Judgement out;
+    out.dof = static_cast<double>(before.size() - 1);
+    const double instability =
+        std::max(0.0, (q - out.dof) / (weight - weight_squared / weight));  // its square
+    // With it the weights are others; of equal uncertainties the mean stays.
+    double total = 0;
+    mean = 0;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        const double w = 1 / (squared(before_u[i]) + instability);
+        total += w;
+        mean += w * (before[i] - mean) / total;
+    }
+    out.expected = mean;
+    out.sigma = std::sqrt(squared(u) + instability + 1 / total);
+    out.t = (value - mean) / out.sigma;
+    out.p = two_sided(out.t, out.dof);
+    return out;
+}
+
+namespace {
+
+void name_outliers(Trend& trend) {
+    std::vector<std::size_t> tests(trend.campaigns.size(), 0);
+    for (const auto& of : trend.coefficients)
+        if (of.points.size() > kFewestBefore)
+            for (const auto& point : of.points) ++tests[point.campaign];
+    for (auto& of : trend.coefficients) {
+        if (of.points.size() <= kFewestBefore) continue;
+        for (std::size_t i = 0; i < of.points.size(); ++i) {
+            std::vector<double> others, others_u;
+            for (std::size_t j = 0; j < of.points.size(); ++j) {
+                if (j == i) continue;
+                others.push_back(of.points[j].of.value);
+                others_u.push_back(of.points[j].u);
+            }
+            TrendPoint& point = of.points[i];
+            const auto judged = judge(point.of.value, point.u, others, others_u);
+            if (!judged) continue;
+            point.t = judged->t;
+            point.p = judged->p;
+            point.outlier = judged->p < level_of_each(kFalseAlarm, tests[point.campaign] *
+                                                                       trend.campaigns.size());
+        }
+    }
+}
+
+}  // namespace
+
+Trend trend_of(std::vector<Entry> campaigns, double shutdown_after_h) {
+    Trend trend;
+    const std::size_t all = campaigns.size();
+    std::erase_if(campaigns, [](const Entry& one) {
+        return one.verdict == "not valid" ||
+               std::ranges::none_of(one.coefficients, [](const auto& c) { return c.has_value(); });
+    });
+    trend.left_out = all - campaigns.size();
+    trend.campaigns = std::move(campaigns);
+    std::size_t turn = 0;
+    for (std::size_t i = 0; i < trend.campaigns.size(); ++i) {
+        if (i > 0) {
+            const Entry &before = trend.campaigns[i - 1], &now = trend.campaigns[i];
+            trend.several_rigs = trend.several_rigs || before.rig != now.rig;
+            const auto pause = static_cast<double>(now.started_utc_ns - before.ended_utc_ns);
+            if (pause > shutdown_after_h * kNanosecondsPerHour || before.rig != now.rig) ++turn;
+        }
+        trend.turn.push_back(turn);
+    }
+    for (std::size_t position = 0; position < estimator::kParameters; ++position) {
+        CoefficientTrend of;
+        of.position = position;
+        std::vector<double> value, u;
+        std::vector<std::size_t> group;
+        for (std::size_t i = 0; i < trend.campaigns.size(); ++i) {
+            const auto& c = trend.campaigns[i].coefficients[position];
+            // What one rig has wrong it has wrong each time: between its campaigns only noise
+            // differs.
+            const double own = c ? (trend.several_rigs ? c->u : c->u_a) : 0;
+            if (!(own > 0)) continue;
+            of.points.push_back({i, *c, own, kNotKnown, 1, false});
+            value.push_back(c->value);
+            u.push_back(own);
+            group.push_back(trend.turn[i]);
+        }
+        if (of.points.empty()) continue;
+        const Variance found = analyse_variance(value, u, group);
+        of.operating = found.within;
+        of.shutdown = found.between;
+        of.mean = found.mean;
+        // A scatter between turn-ons is known no better than by their number.
+        const double dof =
+            found.between.value > 0 ? found.between.dof : std::numeric_limits<double>::infinity();
+        const double half = student_quantile(0.95, dof) * found.mean_sigma;
+        of.mean_low = of.mean - half;
+        of.mean_high = of.mean + half;
+        trend.coefficients.push_back(std::move(of));
+    }
+    name_outliers(trend);
+    return trend;
+}
+
+std::vector<Moved> moved(const Entry& campaign, const std::vector<Entry>& history) {
+    std::vector<const Entry*> earlier;
+    bool several_rigs = false;
+    for (const Entry& one : history) {
+        if (one.hash == campaign.hash || one.verdict == "not valid" ||
+            one.simulated != campaign.simulated || one.started_utc_ns >= campaign.started_utc_ns)
+            continue;
+        earlier.push_back(&one);
+        several_rigs = several_rigs || one.rig != campaign.rig;
+    }
+    const auto u_of = [several_rigs](const Coefficient& c) { return several_rigs ? c.u : c.u_a; };
+    std::vector<Moved> tested;
+    for (std::size_t position = 0; position < estimator::kParameters; ++position) {
+        const auto& now = campaign.coefficients[position];
+        if (!now) continue;
+        std::vector<double> before, before_u;
+        for (const Entry* one : earlier) {
+            const auto& c = one->coefficients[position];
+            if (!c || !(u_of(*c) > 0)) continue;
+            before.push_back(c->value);
+            before_u.push_back(u_of(*c));
+        }
+        if (const auto by = judge(now->value, u_of(*now), before, before_u))
+            tested.push_back({position, now->value, *by});
+    }
+    const double level = level_of_each(kFalseAlarm, tested.size());
+    std::erase_if(tested, [level](const Moved& one) { return !(one.by.p < level); });
+    return tested;
+}
+
+}  // namespace vibrig::archive

@@ -1,0 +1,348 @@
+#!/usr/bin/python3
+"""Campaigns on their way to an archive that is gone, sick, slow, killed, or shared: none is lost, none comes twice, no half
+one is seen, and a measurement does not notice. The index in SQLite, and in a PostgreSQL of our own that is killed.
+
+usage: archive.py PROGRAMS [--seed N]
+"""
+import concurrent.futures
+import glob
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+import h5py
+import numpy
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import recording_faults  # noqa: E402
+import rig as r  # noqa: E402
+
+CAMPAIGN = {"name": "unit", "identify": "what-it-can", "dwell_s": 2.0}
+DAY_NS = 86_400 * 10**9
+POSTGRES = sorted(glob.glob("/usr/lib/postgresql/*/bin"))[-1:]
+
+
+class SickArchive(recording_faults.SickDisk):
+    """A folder that is as large as one likes."""
+
+    def __init__(self, folder):
+        self.folder, self.control = os.path.join(folder, "disk"), os.path.join(folder, "control")
+        self.library = os.path.join(folder, "sick_disk.so")
+        os.makedirs(self.folder)
+        self.set("-")
+        subprocess.run(["c++", "-shared", "-fPIC", "-O1", "-o", self.library,
+                        os.path.join(os.path.dirname(os.path.abspath(__file__)), "sick_disk.cpp")], check=True)
+
+
+class Archive:
+    def __init__(self, programs, folder, index=""):
+        self.program, self.folder, self.index = os.path.join(programs, "vibrig"), folder, index
+        os.makedirs(folder, exist_ok=True)
+
+    def where(self):
+        return ["--archive", self.folder] + (["--index", self.index] if self.index else [])
+
+    def run(self, *words, environment=None, timeout=60):
+        return subprocess.run([self.program, *words, *self.where()], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              timeout=timeout, env={**os.environ, **(environment or {})})
+
+    def add(self, folder, rig, **more):
+        return self.run("archive", "add", folder, "--rig", rig, **more)
+
+    def campaigns(self, *words):
+        run = self.run("list", "--json", *words)
+        return json.loads(run.stdout)["campaigns"] if run.returncode == 0 else None
+
+    def verify(self, *words):
+        run = self.run("archive", "verify", "--json", *words)
+        return json.loads(run.stdout or "{}").get("findings", [{"what": "error", "text": run.stderr}])
+
+    def half(self):
+        """Folders that look like a campaign and are not whole, by their own manifests."""
+        wrong = []
+        for folder in glob.glob(os.path.join(self.folder, "*", "*")):
+            try:
+                with open(os.path.join(folder, "archive.json"), encoding="utf-8") as file:
+                    wanted = {f["name"]: f["bytes"] for f in json.load(file)["files"]}
+            except (OSError, ValueError) as error:
+                wrong.append(f"{folder}: {error}")
+                continue
+            there = {name: os.path.getsize(os.path.join(folder, name)) for name in os.listdir(folder) if name != "archive.json"}
+            if there != wanted:
+                wrong.append(f"{folder}: {there}, {wanted}")
+        return wrong
+
+
+def clone(campaign, to, days, serial=None, shift=None):
+    """The same recording as of another day: of another unit, with the first coefficient elsewhere."""
+    shutil.copytree(campaign, to, ignore=shutil.ignore_patterns("raw-*"))
+    with h5py.File(os.path.join(to, "campaign.h5"), "r+") as file:
+        for name in ("started_utc_ns", "ended_utc_ns"):
+            file.attrs[name] += days * DAY_NS
+        file.attrs["campaign"] = numpy.bytes_(os.path.basename(to))
+        if serial:
+            replace(file, "configuration", file["configuration"][()].decode().replace('"0017"', f'"{serial}"'))
+        if shift is not None:
+            result = json.loads(file["result"][()])
+            result["parameters"][0]["value"] += shift
+            replace(file, "result", json.dumps(result))
+    return to
+
+
+def replace(file, name, text):
+    del file[name]
+    file[name] = numpy.bytes_(text.encode())   # of fixed length, as vibrigd writes it
+
+
+def measure(checks, rig, seed, archive_folder, disk):
+    """A whole campaign on the rig's clock, with an archive that is not there."""
+    rig.start_plant("--seed", str(seed))
+    rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": "0017"}, server={"page": "127.0.0.1:0"},
+                  archive={"folder": archive_folder, "rig": "rig-7", "retry_max_s": 1.0})
+    rig.daemon = r.Child("vibrigd", [rig.program("vibrigd"), "--config", rig.configuration], rig.folder, disk.environment())
+    rig.wait_for(r.measuring, 60)
+    for command in ("arm", "start"):
+        rig.tool(command, "--by", "test")
+    status = rig.wait_for_state(("finished", "aborted", "tripped"), 120)
+    checks.equal(r.state_of(status), "finished", "a campaign finishes beside an archive that is not there")
+    rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
+
+
+def outbox(checks, programs, folder, seed):
+    disk = SickArchive(os.path.join(folder, "sick"))
+    lab = Archive(programs, os.path.join(disk.folder, "lab"))
+    os.rmdir(lab.folder)
+    rig = r.Rig(programs, "seqpacket", "rig", os.path.join(folder, "beside"))
+    measure(checks, rig, seed, lab.folder, disk)
+    status = rig.wait_for(lambda s: number(s, "waiting") == 1 and number(s, "failures") > 1, 20)
+    checks.check(number(status, "waiting") == 1 and not status["archive"].get("good", False),
+                 "without the archive's folder the campaign waits, and the status says so", status.get("archive"))
+    losses = [number(status["recorder"], "samples_lost", top=True), number(status["recorder"], "frames_lost", top=True),
+              number(status["can"], "kernel_dropped", top=True), number(status["estimator_ring"], "dropped", top=True)]
+    checks.equal(losses, [0, 0, 0, 0], "and nothing of the measurement is lost")
+    checks.check("cannot be delivered, it is kept" in rig.tool("events").stdout, "and an event")
+    return rig, lab, disk
+
+
+def number(status, name, top=False):
+    of = status if top else (status or {}).get("archive", {})
+    return int(of.get(name, 0))
+
+
+def comes_back(checks, rig, lab):
+    before = number(rig.status(), "failures")
+    os.makedirs(lab.folder)
+    status = rig.wait_for(lambda s: number(s, "delivered") == 1, 30)
+    checks.check(number(status, "delivered") == 1 and number(status, "waiting") == 0 and number(status, "failures") >= before,
+                 "the archive comes back: it is delivered by itself", status.get("archive"))
+    checks.equal([(c["rig"], c["unit"]["serial"], c["state"]) for c in lab.campaigns() or []], [("rig-7", "0017", "finished")],
+                 "vibrig list shows it")
+    run = subprocess.run([lab.program, "archive", "verify", "--config", rig.configuration], capture_output=True, text=True, timeout=60)
+    checks.check(run.returncode == 0, "rig and archive have the same", run.stdout + run.stderr)
+    rig.daemon.end()
+    rig.start_daemon()
+    status = rig.wait_for(lambda s: r.measuring(s) and "archive" in s, 60)
+    time.sleep(1)
+    checks.equal(number(rig.status(), "delivered"), 0, "after a restart it is not delivered again")
+    page = next(line.split("live page: ")[1].strip() for line in rig.daemon.text().splitlines() if "live page: " in line)
+    with urllib.request.urlopen(page + "api/v1/unit", timeout=10) as answer:
+        unit = json.load(answer)
+    checks.equal(unit["unit"]["serial"], "0017", "the rig's server shows the unit's earlier campaigns")
+    with urllib.request.urlopen(page + "metrics", timeout=10) as answer:
+        checks.check("vibrig_archive_waiting 0" in answer.read().decode(), "and the metrics that none waits")
+
+
+def moves(checks, rig, lab, base):
+    """A unit whose history is elsewhere."""
+    for i in range(12):
+        clone(base, os.path.join(rig.folder, "history", f"old-{i}"), -30 + i, shift=-400 + 0.1 * i)
+    run = lab.add(os.path.join(rig.folder, "history"), "rig-7")
+    checks.check(run.returncode == 0, "twelve earlier campaigns are added", run.stdout + run.stderr)
+    for command in ("arm", "start"):
+        rig.tool(command, "--by", "test")
+    rig.wait_for_state(("preparing", "recording", "levelling", "settling", "slewing", "ramping", "zeroing"), 20)
+    rig.wait_for_state(("finished", "aborted", "tripped"), 120)
+    rig.wait_for(lambda s: number(s, "delivered") == 1, 30)
+    events = rig.tool("events").stdout
+    checks.check("has moved by more than its" in events and "D_Fx" in events,
+                 "a campaign that moves a coefficient by more than its unit's history allows is an alarm", events[-800:])
+    trend = lab.run("trend", "0017", "--json", "--plot", os.path.join(rig.folder, "trend"))
+    found = json.loads(trend.stdout or '{"campaigns": [], "coefficients": []}')
+    checks.equal(len(found["campaigns"]), 14, "vibrig trend has all its campaigns")
+    checks.check(any(c["name"] == "D_Fx" and c["shutdown_instability"]["p"] < 1e-6 for c in found["coefficients"]),
+                 "and says that D_Fx is not stable over shutdowns")
+    checks.equal(len(glob.glob(os.path.join(rig.folder, "trend", "*.svg"))), 31, "and draws a chart of each")
+
+
+def kills(checks, programs, folder, base, seed):
+    """SIGKILL before the n-th call that writes; each into an archive of its own, and then on from where it was."""
+    library, at = os.path.join(folder, "die_at.so"), os.path.join(folder, "die-at")
+    subprocess.run(["c++", "-shared", "-fPIC", "-O1", "-o", library,
+                    os.path.join(os.path.dirname(os.path.abspath(__file__)), "die_at.cpp")], check=True)
+    environment = {"LD_PRELOAD": library, "DIE_AT": at}
+    chance, n, killed, wrong = random.Random(seed), 1, 0, []
+    lab = Archive(programs, os.path.join(folder, "kills"))
+    while True:
+        with open(at, "w", encoding="ascii") as file:
+            print(n, file=file)
+        run = lab.add(base, "rig-7", environment=environment)
+        seen = lab.campaigns() or []
+        wrong += lab.half()
+        if run.returncode != -signal.SIGKILL:
+            wrong += [] if run.returncode == 0 else [f"{n}: {run.returncode} {run.stderr}"]
+            break
+        killed += 1
+        if seen and lab.verify():
+            wrong.append(f"{n}: listed and not whole")
+        again = lab.add(base, "rig-7")
+        if again.returncode != 0 or len(lab.campaigns() or []) != 1 or lab.verify():
+            wrong.append(f"{n}: {again.stderr} {lab.verify()}")
+        shutil.rmtree(lab.folder)
+        os.makedirs(lab.folder)
+        n += 1 + chance.randrange(max(1, n // 3))
+    checks.check(killed >= 10 and not wrong,
+                 f"killed before any of {n} calls that write, {killed} of them tried: no half campaign is seen, the next try delivers",
+                 "\n".join(wrong[:10]))
+
+
+def full_archive(checks, programs, folder, base):
+    disk = recording_faults.SickDisk(folder)
+    if disk.refused:
+        return checks.skip("a full archive takes nothing of a campaign", "no tmpfs here: " + disk.refused)
+    try:
+        disk.remount("rw")
+        lab = Archive(programs, os.path.join(disk.folder, "lab"))
+        disk.fill()
+        run = lab.add(base, "rig-1")
+        checks.check(run.returncode == 2 and "No space" in run.stderr and not lab.half(), "a full archive takes nothing of a campaign",
+                     run.stderr)
+        disk.make_room()
+        run = lab.add(base, "rig-1")
+        checks.check(run.returncode == 0 and lab.verify() == [], "with room it takes it", run.stderr)
+    finally:
+        subprocess.run(["umount", disk.folder], check=False)
+
+
+def sick_archive(checks, lab, disk, base):
+    """A disk that refuses while it is written."""
+    disk.set("e")
+    run = lab.add(base, "rig-9", environment=disk.environment())
+    checks.check(run.returncode == 2 and "cannot" in run.stderr, "an archive that refuses is told with why", run.stderr)
+    checks.equal(lab.campaigns("--rig", "rig-9") or [], [], "and shows nothing of it")
+    disk.set("-")
+    run = lab.add(base, "rig-9", environment=disk.environment())
+    checks.check(run.returncode == 0 and not lab.half(), "healthy again it takes it", run.stderr)
+
+
+class Postgres:
+    """A server of its own in a folder, as an unprivileged user where this one is root."""
+
+    def __init__(self, folder):
+        self.folder, self.process = folder, None
+        self.data, self.bin = os.path.join(folder, "data"), POSTGRES[0]
+        os.makedirs(folder)
+        self.user = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.getuid() == 0 else []
+        if self.user:
+            os.chown(folder, 65534, 65534)
+        self.run("initdb", "-D", self.data, "-U", "vibrig", "--auth=trust", "--no-sync", "--locale=C", "-E", "UTF8")
+        self.url = f"postgresql://vibrig@/postgres?host={folder}"
+
+    def run(self, program, *words):
+        subprocess.run([*self.user, os.path.join(self.bin, program), *words], check=True, capture_output=True, timeout=60, cwd=self.folder)
+
+    def start(self):
+        self.process = subprocess.Popen([*self.user, os.path.join(self.bin, "postgres"), "-D", self.data, "-k", self.folder, "-c",
+                                         "listen_addresses=", "-c", "fsync=off"], stdin=subprocess.DEVNULL,
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder,
+                                        preexec_fn=r.die_with_parent)
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            if subprocess.run([os.path.join(self.bin, "pg_isready"), "-q", "-h", self.folder]).returncode == 0:
+                return
+            time.sleep(0.1)
+        raise RuntimeError("postgres does not start")
+
+    def kill(self, number=signal.SIGKILL):
+        self.process.send_signal(number)
+        self.process.wait()
+        time.sleep(0.3)   # its children see that they are alone
+
+
+def until_delivered(lab, folder, rig):
+    """As the outbox does: again and again. How often it took."""
+    for attempt in range(1, 60):
+        if lab.add(folder, rig).returncode == 0:
+            return attempt
+        time.sleep(0.2)
+    return 0
+
+
+def shared(checks, programs, folder, base):
+    server = Postgres(os.path.join(folder, "postgres"))
+    lab = Archive(programs, os.path.join(folder, "shared"), server.url)
+    early = lab.add(base, "rig-1")
+    checks.check(early.returncode == 2 and server.folder in early.stderr, "a server that is not there is named", early.stderr)
+    server.start()
+    checks.check(until_delivered(lab, base, "rig-1") == 1 and len(lab.campaigns() or []) == 1, "what could not be registered then is now")
+    campaigns = [(base, "rig-1")] + [(clone(base, os.path.join(folder, "many", f"{rig}-{i}"), i, serial=f"{rig}-{i % 2}"), rig)
+                 for i in range(8) for rig in ("rig-1", "rig-2")]
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        rigs = [pool.submit(lambda mine: [until_delivered(lab, f, rig) for f, rig in mine], [c for c in campaigns if c[1] == rig])
+                for rig in ("rig-1", "rig-2")]
+        for _ in range(3):
+            time.sleep(0.6)
+            server.kill()
+            server.start()
+        attempts = [n for future in rigs for n in future.result()]
+    checks.check(all(attempts) and max(attempts) > 1, "two rigs deliver at once, the server is killed three times under it",
+                 str(attempts))
+    found = lab.campaigns() or []
+    checks.equal(sorted(c["campaign"] for c in found), sorted(f"{rig}/{os.path.basename(f)}" for f, rig in campaigns),
+                 "each campaign is there once")
+    checks.equal(lab.verify(), [], "archive and index agree")
+    checks.equal(len(lab.campaigns("--serial", "rig-2-1") or []), 4, "filters work there as in SQLite")
+    trend = lab.run("trend", "rig-1-0", "--json")
+    checks.check(trend.returncode == 0 and len(json.loads(trend.stdout)["campaigns"]) == 4, "and the trend", trend.stderr)
+    server.process.send_signal(signal.SIGSTOP)
+    begun = time.monotonic()
+    stopped = lab.run("list", timeout=60)
+    checks.check(stopped.returncode == 2 and time.monotonic() - begun < 20, "a server that does not answer is given up in time",
+                 f"{time.monotonic() - begun:.1f} s, {stopped.stderr}")
+    server.process.send_signal(signal.SIGCONT)
+    server.kill(signal.SIGQUIT)
+
+
+def main():
+    programs = os.path.abspath(sys.argv[1])
+    seed = int(sys.argv[sys.argv.index("--seed") + 1]) if "--seed" in sys.argv else 1
+    checks = r.Checks()
+    checks.note(f"seed {seed}")
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        rig, lab, disk = outbox(checks, programs, folder, seed)
+        comes_back(checks, rig, lab)
+        base = glob.glob(os.path.join(rig.results, "unit-*"))[0]
+        small = clone(base, os.path.join(folder, "small"), 0)
+        moves(checks, rig, lab, base)
+        rig.daemon.end()
+        rig.plant.end()
+        sick_archive(checks, lab, disk, clone(base, os.path.join(folder, "another"), 3))
+        os.mkdir(os.path.join(folder, "full"))
+        full_archive(checks, programs, os.path.join(folder, "full"), small)
+        kills(checks, programs, folder, small, seed)
+        if POSTGRES:
+            shared(checks, programs, folder, small)
+        else:
+            checks.check(False, "there is a PostgreSQL (tests/packages test)")
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
