@@ -13,8 +13,7 @@
 #include "drivers/can_port.hpp"
 #include "drivers/sample.hpp"
 #include "drivers/shaker.hpp"
-#include "estimator/allan/dwell_monitor.hpp"
-#include "estimator/allan/fit.hpp"
+#include "estimator/allan/noise_terms.hpp"
 #include "estimator/identification.hpp"
 
 namespace vibrig {

@@ -5,7 +5,8 @@
 #include <cstdint>
 
 #include "estimator/drift_model.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/measurement.hpp"
+#include "estimator/settings.hpp"
 #include "estimator/kinematics.hpp"
 #include "estimator/ud_filter.hpp"
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

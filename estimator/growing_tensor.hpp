@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/measurement.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

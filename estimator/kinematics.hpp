@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/result.hpp"
 #include "estimator/linear_algebra.hpp"
 #include "estimator/parameters.hpp"
 

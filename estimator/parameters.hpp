@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 
@@ -29,6 +29,11 @@ inline constexpr std::array<std::size_t, kGroups> kPublicGroup{kDt,  kDi,  kDo, 
 }
 
 using ParameterArray = std::array<double, kParameters>;
+
+/// D_Fx D_Ix D_Ox D_Sx D_IIx D_OOx D_SSx D_IOx D_ISx D_OSx, then y, z (IEEE Std 517 usage).
+[[nodiscard]] const std::array<const char*, kParameters>& parameter_names() noexcept;
+/// "deg/h", "deg/h/g" or "deg/h/g^2".
+[[nodiscard]] const char* parameter_unit(std::size_t index) noexcept;
 
 /// Prior standard deviations, filter order.
 [[nodiscard]] ParameterArray prior_sigma(const Settings& settings) noexcept;

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

@@ -2,7 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "estimator/identification.hpp"
+#include "estimator/vibration_moment.hpp"
+#include "estimator/settings.hpp"
 #include "estimator/kinematics.hpp"
 #include "estimator/product.hpp"
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::estimator {
 

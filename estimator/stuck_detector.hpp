@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "estimator/identification.hpp"
+#include "estimator/measurement.hpp"
 
 namespace vibrig::estimator {
 

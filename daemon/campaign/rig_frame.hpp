@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::campaign {
 

@@ -9,7 +9,7 @@
 #include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/rt/rest_monitor.hpp"
 #include "drivers/torquer.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::campaign {
 

@@ -15,7 +15,7 @@
 #include "drivers/can_port.hpp"
 #include "drivers/gimbal.hpp"
 #include "drivers/shaker.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::configuration {
 

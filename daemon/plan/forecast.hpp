@@ -6,7 +6,7 @@
 
 #include "daemon/plan/plan_file.hpp"
 #include "estimator/crlb.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 #include "estimator/plan/model.hpp"
 
 namespace vibrig::plan {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::report {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "estimator/identification.hpp"
+#include "estimator/measurement.hpp"
 
 namespace vibrig::rt {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 
 namespace vibrig::tool::tang2009 {
 

@@ -23,15 +23,6 @@ struct DwellAngles {
     double level = 0;        ///< vibration; dwells of different levels are never compared
 };
 
-/// Modified Allan deviation of the angle residuals, all kept dwells together.
-struct DwellPoint {
-    double tau_s = 0;
-    double deviation = 0;  ///< deg/h
-    double expected = 0;   ///< of the identified resolver noise and random walk, deg/h
-    /// Classical: of rates averaged side by side about their own mean, deg/h. Of one dwell only.
-    double classical = 0;
-};
-
 struct DwellMonitorSettings {
     double alpha = 1e-3;               ///< of one dwell, shared by the tests and the gyros
     std::size_t reference_dwells = 5;  ///< of one level, before alarms are raised

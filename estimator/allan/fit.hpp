@@ -25,13 +25,6 @@ inline constexpr double kBoundSlow = kBound * kDetectedSlow / kDetected;
 /// probability 1.35e-3 (half chi-square(1), half chi-square(2): two slow terms, not negative).
 inline constexpr double kLongTerm = 12.2;
 
-struct FittedTerm {
-    bool detected = false;
-    double value = 0;  ///< best estimate, detected or not; 0 where its square would be negative
-    double sigma = 0;  ///< 1 sigma of the value, meaningful when detected; 0 if the value is
-    double below = 0;  ///< the term is not larger, at two standard errors
-};
-
 /// A set of terms and how much speaks for it.
 struct NoiseModel {
     TermSet terms{};

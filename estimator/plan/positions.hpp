@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/settings.hpp"
 #include "estimator/plan/model.hpp"
 
 namespace vibrig::estimator::plan {

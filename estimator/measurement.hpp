@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+namespace vibrig::estimator {
+
+/// One sample as the estimator takes it: raw encoder angles and raw specific force.
+struct Measurement {
+    double time_s = 0;                  ///< grows within a dwell
+    std::array<double, 3> angle_rad{};  ///< outer, inner, azimuth
+    std::array<double, 3> force_g{};    ///< accelerometer axes
+    bool angles_good = true;
+    bool force_good = true;
+};
+
+struct DwellInfo {
+    int run = 1;          ///< from 1; the two-step route joins two runs
+    int position = 1;     ///< from 1
+    double table_g = -1;  ///< commanded peak at the table; negative: not known (a CSV recording)
+    /// When its measurements' time is 0, on a clock common to all dwells, s; NaN: there is none.
+    double begin_s = std::numeric_limits<double>::quiet_NaN();
+};
+
+enum class StepOutcome : std::uint8_t {
+    initialised,
+    used,
+    buffered,
+    gated,
+    bad_angles,
+    bad_force,
+    bad_time,
+    reinitialised
+};
+
+struct StepResult {
+    StepOutcome outcome = StepOutcome::used;
+    double nis = 0;  ///< three-axis, before the gate
+    std::array<double, 3> innovation_arcsec{};
+};
+
+}  // namespace vibrig::estimator
