@@ -13,7 +13,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
-#include "drivers/sample.hpp"
+#include "drivers/sample/sample.hpp"
 
 namespace vibrig::archive {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::archive {
 

@@ -7,7 +7,7 @@
 
 #include "daemon/archive/index.hpp"
 #include "daemon/record/campaign_file.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::archive {
 

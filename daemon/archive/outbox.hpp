@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "daemon/archive/settings.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::archive {
 

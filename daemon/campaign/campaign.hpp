@@ -15,12 +15,12 @@
 #include "daemon/campaign/settings.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/rt/dwell_order.hpp"
-#include "daemon/rt/interlock.hpp"
+#include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/stage_feed.hpp"
-#include "daemon/status.hpp"
-#include "drivers/gimbal.hpp"
-#include "drivers/shaker.hpp"
-#include "drivers/torquer.hpp"
+#include "daemon/domain/status.hpp"
+#include "drivers/gimbal/gimbal.hpp"
+#include "drivers/shaker/shaker.hpp"
+#include "drivers/gimbal/torquer.hpp"
 
 namespace vibrig::campaign {
 

@@ -8,7 +8,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/safety_proof.hpp"
-#include "estimator/ring_down.hpp"
+#include "estimator/level/ring_down.hpp"
 
 namespace vibrig::campaign {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/campaign/rig_frame.hpp"
-#include "daemon/rt/mean_motion.hpp"
+#include "daemon/interlock/mean_motion.hpp"
 
 namespace vibrig::campaign {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "daemon/rt/amplitude_witness.hpp"
+#include "daemon/interlock/amplitude_witness.hpp"
 
 namespace vibrig::campaign {
 

@@ -8,8 +8,8 @@
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/rt/stage_feed.hpp"
-#include "daemon/status.hpp"
-#include "estimator/loop_response.hpp"
+#include "daemon/domain/status.hpp"
+#include "estimator/level/loop_response.hpp"
 
 namespace vibrig::campaign {
 

@@ -6,7 +6,7 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/rt/mean_motion.hpp"
+#include "daemon/interlock/mean_motion.hpp"
 
 namespace vibrig::campaign {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::campaign {
 

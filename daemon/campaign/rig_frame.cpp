@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::campaign {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "estimator/settings.hpp"
+#include "estimator/filter/settings.hpp"
 
 namespace vibrig::campaign {
 

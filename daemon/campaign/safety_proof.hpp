@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "daemon/campaign/stop_monitor.hpp"
-#include "daemon/rt/rest_monitor.hpp"
-#include "daemon/status.hpp"
-#include "drivers/shaker.hpp"
+#include "daemon/interlock/rest_monitor.hpp"
+#include "daemon/domain/status.hpp"
+#include "drivers/shaker/shaker.hpp"
 
 namespace vibrig::campaign {
 

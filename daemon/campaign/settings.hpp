@@ -7,9 +7,9 @@
 
 #include "daemon/campaign/safety_proof.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
-#include "daemon/rt/rest_monitor.hpp"
-#include "drivers/torquer.hpp"
-#include "estimator/settings.hpp"
+#include "daemon/interlock/rest_monitor.hpp"
+#include "drivers/gimbal/torquer.hpp"
+#include "estimator/filter/settings.hpp"
 
 namespace vibrig::campaign {
 

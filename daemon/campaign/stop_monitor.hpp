@@ -6,8 +6,8 @@
 #include <functional>
 #include <string>
 
-#include "daemon/rt/rest_monitor.hpp"
-#include "drivers/shaker.hpp"
+#include "daemon/interlock/rest_monitor.hpp"
+#include "drivers/shaker/shaker.hpp"
 #include "proto/safety.hpp"
 
 namespace vibrig::campaign {

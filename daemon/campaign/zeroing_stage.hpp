@@ -7,7 +7,7 @@
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/rt/stage_feed.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 #include "estimator/zeros/calibration.hpp"
 
 namespace vibrig::campaign {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::commission {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "daemon/commission/finding.hpp"
-#include "daemon/status.hpp"
-#include "drivers/gimbal.hpp"
+#include "daemon/domain/status.hpp"
+#include "drivers/gimbal/gimbal.hpp"
 #include "estimator/commissioning/earth.hpp"
 
 namespace vibrig::commission {

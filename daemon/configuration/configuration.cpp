@@ -18,7 +18,7 @@
 #include "daemon/configuration/value.hpp"
 #include "daemon/plan/plan_file.hpp"
 #include "estimator/commissioning/opening.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::configuration {
 

@@ -9,13 +9,13 @@
 #include "daemon/campaign/settings.hpp"
 #include "daemon/fleet/settings.hpp"
 #include "daemon/record/settings.hpp"
-#include "daemon/rt/interlock_table.hpp"
-#include "drivers/annunciator.hpp"
-#include "drivers/assembler.hpp"
-#include "drivers/can_port.hpp"
-#include "drivers/gimbal.hpp"
-#include "drivers/shaker.hpp"
-#include "estimator/settings.hpp"
+#include "daemon/interlock/interlock_table.hpp"
+#include "drivers/annunciator/annunciator.hpp"
+#include "drivers/sample/assembler.hpp"
+#include "drivers/can/can_port.hpp"
+#include "drivers/gimbal/gimbal.hpp"
+#include "drivers/shaker/shaker.hpp"
+#include "estimator/filter/settings.hpp"
 
 namespace vibrig::configuration {
 

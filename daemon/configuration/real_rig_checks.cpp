@@ -5,7 +5,7 @@
 
 #include "daemon/configuration/cross_checks.hpp"
 #include "daemon/configuration/value.hpp"
-#include "estimator/settings_check.hpp"
+#include "estimator/filter/settings_check.hpp"
 
 namespace vibrig::configuration {
 

@@ -5,7 +5,7 @@
 
 #include "daemon/noise/noise_monitor.hpp"
 #include "daemon/rt/estimator_stage.hpp"
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::dwells {
 

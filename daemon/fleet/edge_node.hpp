@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::fleet {
 

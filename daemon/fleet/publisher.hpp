@@ -5,7 +5,7 @@
 #include <string>
 
 #include "daemon/fleet/settings.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::fleet {
 

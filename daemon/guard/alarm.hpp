@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "daemon/guard/modbus_tcp.hpp"
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::guard {
 

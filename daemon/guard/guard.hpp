@@ -12,7 +12,7 @@
 #include "daemon/guard/settings.hpp"
 #include "daemon/guard/shaker_line.hpp"
 #include "daemon/guard/witnesses.hpp"
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 
 namespace vibrig::guard {
 

@@ -6,7 +6,7 @@
 
 #include "daemon/guard/settings.hpp"
 #include "daemon/guard/witnesses.hpp"
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 #include "proto/guard_words.hpp"
 
 namespace vibrig::guard {

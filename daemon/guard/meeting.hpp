@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 #include "proto/guard_words.hpp"
 
 namespace vibrig::guard {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "daemon/guard/alarm.hpp"
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 #include "proto/register_map.hpp"
 #include "proto/safety.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "daemon/guard/motion.hpp"
 #include "daemon/guard/settings.hpp"
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::guard {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "daemon/noise/noise_monitor.hpp"
-#include "drivers/clock.hpp"
-#include "estimator/identification.hpp"
+#include "drivers/base/clock.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::journal {
 

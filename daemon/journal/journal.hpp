@@ -19,7 +19,7 @@
 #include "daemon/journal/watch.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::journal {
 

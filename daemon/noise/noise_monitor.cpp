@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "estimator/allan/edf.hpp"
-#include "estimator/parameters.hpp"
-#include "estimator/predicted_rate.hpp"
+#include "estimator/filter/parameters.hpp"
+#include "estimator/identification/predicted_rate.hpp"
 
 namespace vibrig::noise {
 

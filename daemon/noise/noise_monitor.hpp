@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "daemon/rt/angle_blocks.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 #include "estimator/allan/dwell_monitor.hpp"
-#include "estimator/dwell_residual.hpp"
+#include "estimator/identification/dwell_residual.hpp"
 
 namespace vibrig::noise {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/plan/plan_file.hpp"
-#include "estimator/settings.hpp"
+#include "estimator/filter/settings.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"

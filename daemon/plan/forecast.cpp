@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/positions.hpp"
 

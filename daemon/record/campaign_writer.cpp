@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::record {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "daemon/rt/ring.hpp"
-#include "daemon/status.hpp"
-#include "drivers/sample.hpp"
+#include "daemon/domain/status.hpp"
+#include "drivers/sample/sample.hpp"
 
 namespace vibrig::record {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 
 namespace vibrig::record {
 

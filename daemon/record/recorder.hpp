@@ -16,10 +16,10 @@
 #include "daemon/record/records.hpp"
 #include "daemon/record/settings.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/rt/snapshot.hpp"
-#include "daemon/status.hpp"
-#include "drivers/can_port.hpp"
-#include "drivers/clock.hpp"
+#include "drivers/base/snapshot.hpp"
+#include "daemon/domain/status.hpp"
+#include "drivers/can/can_port.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::record {
 

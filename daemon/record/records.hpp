@@ -9,9 +9,9 @@
 
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/frame_record.hpp"
-#include "daemon/status.hpp"
-#include "drivers/sample.hpp"
-#include "estimator/identification.hpp"
+#include "daemon/domain/status.hpp"
+#include "drivers/sample/sample.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::record {
 

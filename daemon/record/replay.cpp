@@ -17,7 +17,7 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/dwells/player.hpp"
 #include "daemon/record/raw_frames.hpp"
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 #include "proto/candump.hpp"
 #include "proto/text.hpp"
 

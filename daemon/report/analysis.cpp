@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "daemon/configuration/configuration.hpp"
-#include "estimator/crlb.hpp"
-#include "estimator/dwell_residual.hpp"
+#include "estimator/identification/crlb.hpp"
+#include "estimator/identification/dwell_residual.hpp"
 
 namespace vibrig::report {
 

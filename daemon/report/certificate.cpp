@@ -11,7 +11,7 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/report/paperwork.hpp"
 #include "daemon/version.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::report {
 

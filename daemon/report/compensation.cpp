@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimator/drift_model.hpp"
-#include "estimator/kinematics.hpp"
-#include "estimator/parameters.hpp"
-#include "estimator/second_moment.hpp"
+#include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
+#include "estimator/filter/second_moment.hpp"
 
 namespace vibrig::report {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/settings.hpp"
+#include "estimator/filter/settings.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::report {

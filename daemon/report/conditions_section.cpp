@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "daemon/tool/plot/chart.hpp"
+#include "daemon/plot/chart.hpp"
 
 namespace vibrig::report {
 

@@ -4,7 +4,7 @@
 
 #include <cctype>
 
-#include "daemon/tool/plot/xml_text.hpp"
+#include "daemon/plot/xml_text.hpp"
 
 namespace vibrig::report {
 

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/report/report.hpp"
-#include "daemon/tool/plot/chart.hpp"
+#include "daemon/plot/chart.hpp"
 
 namespace vibrig::report {
 

@@ -18,9 +18,9 @@
 #include "daemon/report/proof_section.hpp"
 #include "daemon/report/result_charts.hpp"
 #include "daemon/report/uncertainty_section.hpp"
-#include "daemon/tool/plot/chart.hpp"
+#include "daemon/plot/chart.hpp"
 #include "daemon/version.hpp"
-#include "estimator/instruction_set.hpp"
+#include "estimator/filter/instruction_set.hpp"
 
 namespace vibrig::report {
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::report {
 

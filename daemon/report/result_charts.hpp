@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
-#include "daemon/tool/plot/chart.hpp"
-#include "estimator/identification.hpp"
+#include "daemon/plot/chart.hpp"
+#include "estimator/identification/identification.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::report {

@@ -10,17 +10,17 @@
 
 #include "daemon/rt/frame_latency.hpp"
 #include "daemon/rt/frame_record.hpp"
-#include "daemon/rt/interlock.hpp"
+#include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/rate_meter.hpp"
 #include "daemon/rt/real_time.hpp"
-#include "daemon/rt/rest_monitor.hpp"
+#include "daemon/interlock/rest_monitor.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/rt/rig_time_link.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/rt/snapshot.hpp"
+#include "drivers/base/snapshot.hpp"
 #include "daemon/rt/stage_feed.hpp"
-#include "drivers/assembler.hpp"
-#include "drivers/can_port.hpp"
+#include "drivers/sample/assembler.hpp"
+#include "drivers/can/can_port.hpp"
 
 namespace vibrig::rt {
 

@@ -8,7 +8,7 @@
 
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/ring.hpp"
-#include "drivers/sample.hpp"
+#include "drivers/sample/sample.hpp"
 
 namespace vibrig::rt {
 

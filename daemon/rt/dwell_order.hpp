@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdint>
 
-#include "drivers/clock.hpp"
-#include "drivers/sample.hpp"
-#include "estimator/identification.hpp"
+#include "drivers/base/clock.hpp"
+#include "drivers/sample/sample.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::rt {
 

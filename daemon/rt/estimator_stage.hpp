@@ -8,10 +8,10 @@
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/rt/snapshot.hpp"
-#include "drivers/clock.hpp"
-#include "drivers/sample.hpp"
-#include "estimator/identification.hpp"
+#include "drivers/base/snapshot.hpp"
+#include "drivers/base/clock.hpp"
+#include "drivers/sample/sample.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::rt {
 

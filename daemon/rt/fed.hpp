@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "estimator/measurement.hpp"
+#include "estimator/filter/measurement.hpp"
 
 namespace vibrig::rt {
 

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::rt {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/sample.hpp"
+#include "drivers/sample/sample.hpp"
 
 namespace vibrig::rt {
 

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <ctime>
 
-#include "daemon/rt/event_fd.hpp"
+#include "drivers/base/event_fd.hpp"
 
 namespace vibrig::rt {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::rt {
 

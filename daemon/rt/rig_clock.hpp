@@ -4,8 +4,8 @@
 #include <mutex>
 #include <vector>
 
-#include "daemon/rt/event_fd.hpp"
-#include "drivers/clock.hpp"
+#include "drivers/base/event_fd.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::rt {
 

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::rt {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <span>
 
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 
 namespace vibrig::rt {
 

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "daemon/rt/ring.hpp"
-#include "daemon/rt/snapshot.hpp"
-#include "drivers/can_port.hpp"
-#include "drivers/clock.hpp"
-#include "drivers/sample.hpp"
-#include "drivers/signal_binding.hpp"
+#include "drivers/base/snapshot.hpp"
+#include "drivers/can/can_port.hpp"
+#include "drivers/base/clock.hpp"
+#include "drivers/sample/sample.hpp"
+#include "drivers/sample/signal_binding.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::rt {

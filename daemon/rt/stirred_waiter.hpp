@@ -4,7 +4,7 @@
 #include <memory>
 #include <utility>
 
-#include "drivers/clock.hpp"
+#include "drivers/base/clock.hpp"
 
 namespace vibrig::rt {
 

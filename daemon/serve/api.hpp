@@ -10,7 +10,7 @@
 #include "daemon/serve/history.hpp"
 #include "daemon/serve/rate_limit.hpp"
 #include "daemon/serve/stream_feed.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

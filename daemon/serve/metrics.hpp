@@ -3,7 +3,7 @@
 #include <string>
 
 #include "daemon/serve/api.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::v1 {
 class Campaign;

@@ -8,7 +8,7 @@
 
 #include "daemon/serve/documents.hpp"
 #include "daemon/serve/socket_file.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

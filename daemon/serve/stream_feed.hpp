@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/serve/caller.hpp"
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 
 namespace vibrig::serve {
 

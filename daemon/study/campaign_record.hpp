@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::study {
 

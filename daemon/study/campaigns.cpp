@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "daemon/campaign_order.hpp"
+#include "daemon/order/campaign_order.hpp"
 #include "daemon/dwells/anew.hpp"
 #include "daemon/dwells/player.hpp"
 #include "daemon/record/digest.hpp"

@@ -13,7 +13,7 @@
 #include "daemon/record/digest.hpp"
 #include "daemon/study/propagation.hpp"
 #include "daemon/study/recordings.hpp"
-#include "estimator/instruction_set.hpp"
+#include "estimator/filter/instruction_set.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::study {

@@ -8,7 +8,7 @@
 
 #include "daemon/study/study.hpp"
 #include "daemon/study/worker.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::study {
 

@@ -16,7 +16,7 @@
 #include "daemon/study/campaign_record.hpp"
 #include "daemon/study/campaigns.hpp"
 #include "daemon/study/json_number.hpp"
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::study {

@@ -2,7 +2,7 @@
 
 #include <CLI/App.hpp>
 
-#include "daemon/tool/exit_status.hpp"
+#include "daemon/results/exit_status.hpp"
 
 namespace vibrig::tool {
 

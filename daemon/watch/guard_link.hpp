@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/status.hpp"
+#include "daemon/domain/status.hpp"
 #include "proto/guard_words.hpp"
 
 namespace vibrig::watch {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 

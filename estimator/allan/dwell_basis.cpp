@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 

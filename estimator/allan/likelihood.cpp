@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::allan {
 

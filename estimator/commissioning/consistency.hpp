@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::estimator::commissioning {
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/drift_model.hpp"
-#include "estimator/kinematics.hpp"
-#include "estimator/parameters.hpp"
+#include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::commissioning {
 

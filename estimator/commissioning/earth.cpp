@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "estimator/commissioning/words.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
 

@@ -7,7 +7,7 @@
 
 #include "estimator/commissioning/gravity_fit.hpp"
 #include "estimator/commissioning/words.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
 

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <optional>
 
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
 

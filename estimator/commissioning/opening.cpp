@@ -10,8 +10,8 @@
 #include "estimator/commissioning/dwell_fit.hpp"
 #include "estimator/commissioning/suspect_search.hpp"
 #include "estimator/commissioning/words.hpp"
-#include "estimator/kinematics.hpp"
-#include "estimator/settings_check.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/settings_check.hpp"
 
 namespace vibrig::estimator::commissioning {
 

@@ -7,7 +7,7 @@
 
 // What is known of a rig whose configuration is not: readings and forces at rest, rates of free
 // drift. Theory, conventions and limits: docs/commissioning.md. Frames and signs are those of
-// estimator/kinematics.hpp with platform.up "+y".
+// estimator/filter/kinematics.hpp with platform.up "+y".
 
 namespace vibrig::estimator::commissioning {
 

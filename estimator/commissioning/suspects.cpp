@@ -9,7 +9,7 @@
 #include "estimator/commissioning/rig.hpp"
 #include "estimator/commissioning/suspect_search.hpp"
 #include "estimator/commissioning/words.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
 

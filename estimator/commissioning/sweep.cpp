@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "estimator/commissioning/gravity.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::commissioning {
 

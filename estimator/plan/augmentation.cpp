@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 
 namespace vibrig::estimator::plan {

@@ -6,7 +6,7 @@
 #include <map>
 #include <unsupported/Eigen/SpecialFunctions>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 
 namespace vibrig::estimator::plan {

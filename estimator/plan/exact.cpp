@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/plan/algebra.hpp"
 #include "estimator/plan/evaluation.hpp"
 

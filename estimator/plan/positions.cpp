@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::plan {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/settings.hpp"
+#include "estimator/filter/settings.hpp"
 #include "estimator/plan/model.hpp"
 
 namespace vibrig::estimator::plan {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/budget.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/drift_states.hpp"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "estimator/drift_model.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/dwell_row.hpp"
-#include "estimator/identification.hpp"
+#include "estimator/identification/dwell_row.hpp"
+#include "estimator/identification/identification.hpp"
 #include "estimator/spectrum/elastic.hpp"
 
 namespace vibrig::estimator::spectrum {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/verdict.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/uncertainty/declared.hpp"
+#include "estimator/filter/declared.hpp"
 #include "estimator/uncertainty/signatures.hpp"
 
 namespace vibrig::estimator::uncertainty {

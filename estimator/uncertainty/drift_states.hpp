@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/uncertainty/declared.hpp"
+#include "estimator/filter/declared.hpp"
 
 namespace vibrig::estimator::uncertainty {
 

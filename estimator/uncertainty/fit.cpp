@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "estimator/second_moment.hpp"
+#include "estimator/filter/second_moment.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {

@@ -4,9 +4,9 @@
 #include <array>
 #include <vector>
 
-#include "estimator/drift_model.hpp"
-#include "estimator/dwell_row.hpp"
-#include "estimator/kinematics.hpp"
+#include "estimator/filter/drift_model.hpp"
+#include "estimator/identification/dwell_row.hpp"
+#include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::uncertainty {
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::estimator::uncertainty {
 

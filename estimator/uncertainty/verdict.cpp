@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "estimator/parameters.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {

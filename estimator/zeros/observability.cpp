@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "estimator/linear_algebra.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/error_model.hpp"
 #include "estimator/zeros/units.hpp"
 

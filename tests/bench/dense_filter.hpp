@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "estimator/ud_memory.hpp"
+#include "estimator/filter/ud_memory.hpp"
 
 namespace vibrig::bench {
 

@@ -21,10 +21,10 @@
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/replay.hpp"
-#include "daemon/tool/plot/chart.hpp"
+#include "daemon/plot/chart.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
-#include "tests/unit/uncertainty/theory_rows.hpp"
+#include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
 namespace {
 

@@ -14,7 +14,7 @@
 #include <memory>
 #include <string>
 
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 
 // Taking frames with their time stamps from a socket: the port (readiness by Asio, batches of 32,
 // drops and kinds counted, frames handed on) against a bare loop of recvmmsg, the same frames

@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "daemon/study/campaigns.hpp"
-#include "estimator/instruction_set.hpp"
+#include "estimator/filter/instruction_set.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace {

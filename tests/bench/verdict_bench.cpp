@@ -3,7 +3,7 @@
 #include <random>
 
 #include "estimator/uncertainty/assessment.hpp"
-#include "tests/unit/uncertainty/theory_rows.hpp"
+#include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
 // What follows each dwell, outside the real-time threads.
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 
 namespace {
 

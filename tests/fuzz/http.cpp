@@ -11,7 +11,7 @@
 
 #include "daemon/serve/api.hpp"
 #include "daemon/serve/stream_feed.hpp"
-#include "tests/unit/serve/fake_source.hpp"
+#include "tests/unit/daemon/serve/fake_source.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace vibrig::serve;

@@ -12,7 +12,7 @@
 #include <string>
 #include <thread>
 
-#include "drivers/modbus_link.hpp"
+#include "drivers/shaker/modbus_link.hpp"
 
 namespace {
 

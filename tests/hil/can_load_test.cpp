@@ -24,7 +24,7 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 
 namespace vibrig::test {
 namespace {

@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 #include "tests/unit/drivers/rig_frames.hpp"
 
 namespace vibrig::test {

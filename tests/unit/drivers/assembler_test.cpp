@@ -1,4 +1,4 @@
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -16,8 +16,8 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/can_port.hpp"
-#include "drivers/receive_batch.hpp"
+#include "drivers/can/can_port.hpp"
+#include "drivers/can/receive_batch.hpp"
 #include "tests/unit/support/allocation_count.hpp"
 
 /// What any CAN port does, whatever bus it is on: included by the test of each kind, which brings

@@ -1,4 +1,4 @@
-#include "drivers/gimbal.hpp"
+#include "drivers/gimbal/gimbal.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "drivers/assembler.hpp"
+#include "drivers/sample/assembler.hpp"
 #include "tests/unit/drivers/rig_frames.hpp"
 
 namespace vibrig::test {

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/can_port.hpp"
+#include "drivers/can/can_port.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::test {

@@ -1,4 +1,4 @@
-#include "drivers/sync_clock.hpp"
+#include "drivers/sample/sync_clock.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "estimator/plan_report.hpp"
+#include "estimator/identification/plan_report.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

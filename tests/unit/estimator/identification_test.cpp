@@ -1,4 +1,4 @@
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 #include <gtest/gtest.h>
 

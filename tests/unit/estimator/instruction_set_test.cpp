@@ -1,11 +1,11 @@
-#include "estimator/instruction_set.hpp"
+#include "estimator/filter/instruction_set.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

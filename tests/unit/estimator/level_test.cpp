@@ -4,10 +4,10 @@
 #include <random>
 #include <vector>
 
-#include "estimator/kinematics.hpp"
-#include "estimator/lock_in.hpp"
-#include "estimator/paper_level.hpp"
-#include "estimator/vibration_level.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/level/lock_in.hpp"
+#include "estimator/level/paper_level.hpp"
+#include "estimator/level/vibration_level.hpp"
 
 namespace vibrig::estimator::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "estimator/loop_response.hpp"
+#include "estimator/level/loop_response.hpp"
 
 #include <gtest/gtest.h>
 

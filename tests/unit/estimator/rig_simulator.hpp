@@ -5,7 +5,7 @@
 #include <functional>
 #include <random>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::estimator::testing {
 

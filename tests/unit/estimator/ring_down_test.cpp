@@ -1,4 +1,4 @@
-#include "estimator/ring_down.hpp"
+#include "estimator/level/ring_down.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "estimator/identification.hpp"
+#include "estimator/identification/identification.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 // What goes wrong on a rig must be flagged and counted, and the coefficients stay within 4 sigma or

@@ -6,10 +6,10 @@
 #include <memory>
 #include <random>
 
-#include "estimator/kinematics.hpp"
-#include "estimator/normal_sums.hpp"
-#include "estimator/product.hpp"
-#include "estimator/ud_kernel.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/normal_sums.hpp"
+#include "estimator/filter/product.hpp"
+#include "estimator/filter/ud_kernel.hpp"
 
 namespace vibrig::estimator::testing {
 namespace {

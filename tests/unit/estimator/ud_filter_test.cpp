@@ -1,4 +1,4 @@
-#include "estimator/ud_filter.hpp"
+#include "estimator/filter/ud_filter.hpp"
 
 #include <gtest/gtest.h>
 

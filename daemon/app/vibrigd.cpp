@@ -1,0 +1,288 @@
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <iostream>
+#include <sstream>
+
+#include "daemon/app/campaign_forecast.hpp"
+#include "daemon/configuration/forms.hpp"
+#include "daemon/app/daemon.hpp"
+#include "daemon/log/log_sink.hpp"
+#include "daemon/app/rig_lock.hpp"
+#include "daemon/serve/openapi.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "daemon/domain/upgrade.hpp"
+#include "daemon/version.hpp"
+#include "daemon/app/watchdog.hpp"
+#include "estimator/filter/instruction_set.hpp"
+#include "proto/command_tree.hpp"
+#include "proto/dbc.hpp"
+#include "proto/shipped_text.hpp"
+
+namespace {
+
+vibrig::serve::ServerSettings settings_of(const vibrig::configuration::Configuration& c) {
+    vibrig::serve::ServerSettings settings{
+        c.socket,      c.server.operator_group, c.server.status_socket,
+        c.server.page, c.server.remote,         c.server.certificate,
+        c.server.key,  c.server.clients_ca,     c.server.revoked};
+    // Of each of four doors: together they leave descriptors for everything else.
+    settings.limits.connections = 224;
+    return settings;
+}
+
+std::string words_of(const vibrig::StatusData& status) {
+    std::string words = std::string("measuring; campaign ") + vibrig::name_of(status.state);
+    if (!status.reason.empty()) words += ": " + status.reason;
+    if (status.position > 0)
+        words += fmt::format(", run {} of {}, position {} of {}", status.run, status.runs,
+                             status.position, status.positions);
+    // The package's scripts read this.
+    return words + "; table " + status.rest.state;
+}
+
+/// Throws configuration::ConfigurationError where the campaign cannot determine what is asked.
+void insist(const vibrig::CampaignForecast& forecast) {
+    if (!forecast.refusal.empty())
+        throw vibrig::configuration::ConfigurationError(forecast.refusal);
+}
+
+/// The file as it is now; what is in force changes with a restart only, since another
+/// configuration ends an arming.
+void check_again(const std::string& path) {
+    try {
+        const auto loaded = vibrig::configuration::load(path, true);
+        vibrig::Daemon::check_bindings(loaded);
+        vibrig::Daemon::check_results(loaded.configuration);
+        insist(vibrig::forecast_campaign(loaded.configuration));
+        spdlog::info("configuration checked: valid; it takes effect with the next start");
+    } catch (const std::exception& error) {
+        spdlog::error("configuration checked, the old one stays in force: {}", error.what());
+    }
+}
+
+/// Whether an upgrade has asked for a restart and may have it now. Why it has to wait is told
+/// whenever that changes.
+bool starts_again(const vibrig::Daemon& daemon, std::string& waits_for) {
+    static const std::string request = vibrig::restart_request_file();
+    if (request.empty() || ::access(request.c_str(), F_OK) != 0) return false;
+    const auto why = vibrig::restart_waits_for(daemon.status());
+    if (why == waits_for && !why.empty()) return false;
+    waits_for = why;
+    if (!why.empty()) {
+        spdlog::warn("a new version is installed; the restart waits for rest: {}", why);
+        return false;
+    }
+    // One that cannot be removed would be found again after each restart.
+    if (::unlink(request.c_str()) == 0) return true;
+    spdlog::error("cannot remove {}: no restart", request);
+    return false;
+}
+
+/// Feeds the service manager's watchdog while every stage makes progress; returns the signal that
+/// ends the daemon, or 0: it is to be started again.
+int watch(vibrig::Daemon& daemon, const vibrig::ServiceManager& manager, vibrig::RigLock& lock,
+          const sigset_t& signals, const std::string& path) {
+    std::string told, stuck, waits_for;
+    for (;;) {
+        const double period_s = manager.period_s() > 0 ? std::min(1.0, manager.period_s()) : 1.0;
+        timespec wait{};
+        wait.tv_sec = static_cast<time_t>(period_s);
+        wait.tv_nsec = static_cast<long>((period_s - static_cast<double>(wait.tv_sec)) * 1e9);
+        const int signal = ::sigtimedwait(&signals, nullptr, &wait);
+        lock.answer();
+        if (signal == SIGHUP) {
+            manager.reloading();
+            check_again(path);
+            manager.ready(told);
+            continue;
+        }
+        if (signal > 0) return signal;
+        const auto now_stuck = daemon.stuck_stage();
+        if (now_stuck != stuck && !now_stuck.empty())
+            spdlog::error("no progress in: {}; the watchdog is not fed", now_stuck);
+        stuck = now_stuck;
+        if (stuck.empty()) manager.alive();
+        if (starts_again(daemon, waits_for)) return 0;
+        if (auto words = stuck.empty() ? words_of(daemon.status()) : "no progress in " + stuck;
+            words != told) {
+            told = std::move(words);
+            manager.status(told);
+        }
+    }
+}
+
+/// Nobody logs after this. Whoever does not read the log does not keep the daemon from ending.
+class LogEnd {
+  public:
+    explicit LogEnd(vibrig::log::LogQueue& queue) : queue_(queue) {}
+    ~LogEnd() {
+        constexpr auto kPatience = std::chrono::seconds(2);
+        queue_.end(kPatience);
+        spdlog::shutdown();
+    }
+    LogEnd(const LogEnd&) = delete;
+    LogEnd& operator=(const LogEnd&) = delete;
+
+  private:
+    vibrig::log::LogQueue& queue_;
+};
+
+int run(vibrig::configuration::Loaded loaded, const vibrig::log::LogQueue& log,
+        const sigset_t& signals, const std::string& path) {
+    const vibrig::ServiceManager manager;
+    // Before anything is opened, and long before anything is told to stop.
+    vibrig::RigLock lock(loaded.configuration, path);
+    // What an upgrade asked of the daemon before this one.
+    if (const auto request = vibrig::restart_request_file(); !request.empty())
+        ::unlink(request.c_str());
+    const auto socket = loaded.configuration.socket;
+    const auto server_settings = settings_of(loaded.configuration);
+    vibrig::Daemon daemon(std::move(loaded), &log);
+    // Before anything moves: it refuses to run beside another vibrigd.
+    vibrig::serve::StatusServer server(daemon, server_settings);
+    daemon.start();
+    server.answer();
+    spdlog::info("vibrigd {} answers at {}; measuring, shaker disarmed", vibrig::kVersion, socket);
+    if (const auto page = server.page_address(); !page.empty()) spdlog::info("live page: {}", page);
+    if (const auto remote = server.remote_address(); !remote.empty())
+        spdlog::info("remote, with certificates: {}", remote);
+    manager.ready(words_of(daemon.status()));
+    const int signal = watch(daemon, manager, lock, signals, path);
+    manager.stopping();
+    spdlog::info("{}: stopping", signal == 0 ? "a new version is installed" : ::strsignal(signal));
+    daemon.shut_down();
+    // In wall time: the rig's clock may stand still, a link may be gone. A second signal cuts it
+    // short.
+    bool orderly = false;
+    const timespec at_once{};
+    for (double left = daemon.longest_end_s(); left > 0 && !orderly; left -= 0.1) {
+        orderly = daemon.wait_for_end(0.1);
+        lock.answer();
+        if (::sigtimedwait(&signals, nullptr, &at_once) > 0) break;
+    }
+    const std::string moving = orderly ? std::string() : daemon.what_moves();
+    daemon.join();
+    if (!orderly) {
+        spdlog::error(
+            "ended without rest measured ({}): its watchdog stops it if it works; if the table "
+            "moves on, press the emergency stop",
+            moving);
+        return 1;
+    }
+    spdlog::info("stopped cleanly");
+    return signal == 0 ? vibrig::kStartAgain : 0;
+}
+
+/// What is only printed: a flag for each.
+struct Print {
+    const char* flag;
+    const char* text;
+    std::string (*words)();
+    bool asked = false;
+};
+
+std::array<Print, 6> prints() {
+    return {{{"--schema", "print every key with type, unit, default and bounds, and end",
+              vibrig::configuration::format_schema},
+             {"--json-schema", "print the JSON Schema of the configuration file, for editors",
+              vibrig::configuration::format_json_schema},
+             {"--init", "print a commented configuration of the keys that a rig needs, with blanks",
+              vibrig::configuration::format_essentials},
+             {"--print-dbc", "print the built-in rig.dbc: the messages of the bus",
+              [] { return std::string(vibrig::proto::rig_dbc_text()); }},
+             {"--print-proto", "print vibrig.proto: status and commands on the wire",
+              [] { return std::string(vibrig::proto::vibrig_proto_text()); }},
+             {"--print-openapi", "print the OpenAPI description of the HTTP interface",
+              [] { return vibrig::serve::openapi_json() + "\n"; }}}};
+}
+
+constexpr std::initializer_list<vibrig::proto::Exit> kExits{
+    {0, "ended cleanly, rest measured; or what was asked for is printed"},
+    {1, "ended without rest measured: the log says what moves"},
+    {2, "bad usage or configuration, or another daemon has this rig"},
+    {75, "ended at rest for an upgrade; the service manager starts the new version"}};
+
+}  // namespace
+
+// NOLINTNEXTLINE(bugprone-exception-escape): before anything runs only memory can be short
+int main(int argc, char** argv) {
+    CLI::App app{"Acquisition and identification daemon for vibration rigs", "vibrigd"};
+    app.footer("Example: vibrigd --config /etc/vibrig/vibrigd.toml --check");
+    app.set_version_flag("--version", vibrig::kVersion);
+    std::string path;
+    bool check = false;
+    app.add_option("--config", path, "configuration file (TOML); all defaults without one");
+    app.add_flag("--check", check,
+                 "validate, print the effective configuration with units and origins, and end");
+    auto printable = prints();
+    for (Print& print : printable) app.add_flag(print.flag, print.asked, print.text);
+    std::string instruction_set = "auto";
+    app.add_option("--instruction-set", instruction_set,
+                   "of the filter: auto (the best), or one of this processor's")
+        ->envname("VIBRIG_INSTRUCTION_SET");
+    if (vibrig::proto::asks_for_command_tree(argc, argv)) {
+        std::cout << vibrig::proto::command_tree_json(app, kExits);
+        return 0;
+    }
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+
+    // Blocked before any thread starts, so that sigwait in the main thread gets them all.
+    sigset_t signals;
+    ::sigemptyset(&signals);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::sigaddset(&signals, signal);
+    ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    // A file as large as is allowed is an answer of the disk, not the end.
+    std::signal(SIGXFSZ, SIG_IGN);
+    std::signal(SIGPIPE, SIG_IGN);
+
+    try {
+        vibrig::estimator::use_instruction_set(instruction_set);
+        for (const Print& print : printable) {
+            if (!print.asked) continue;
+            std::cout << print.words() << std::flush;
+            return std::cout ? 0 : 2;
+        }
+        auto loaded = vibrig::configuration::load(path, true);
+        if (check) {
+            vibrig::Daemon::check_bindings(loaded);
+            vibrig::Daemon::check_results(loaded.configuration);
+            std::cout << vibrig::configuration::format_effective(loaded);
+            // As comments: what stands above reads back as a configuration.
+            const auto forecast = vibrig::forecast_campaign(loaded.configuration);
+            std::istringstream words(forecast.words);
+            for (std::string line; std::getline(words, line);) {
+                std::cout << "# " << line << '\n';
+            }
+            for (const std::string& line : vibrig::Daemon::check_plan(loaded.configuration)) {
+                std::cerr << "warning: campaign: " << line << '\n';
+            }
+            insist(forecast);
+            return 0;
+        }
+        const auto& file = loaded.configuration.log_file;
+        const int descriptor = file.empty() ? STDERR_FILENO : vibrig::log::open_log_file(file);
+        vibrig::log::LogQueue log(descriptor);
+        const LogEnd at_the_end(log);
+        vibrig::log::log_through(log, loaded.configuration.log_level,
+                                 vibrig::log::shows_colours(descriptor));
+        const auto forecast = vibrig::forecast_campaign(loaded.configuration);
+        spdlog::info("campaign \"{}\": {}", loaded.configuration.campaign.name, forecast.words);
+        insist(forecast);
+        return run(std::move(loaded), log, signals, path);
+    } catch (const std::exception& error) {
+        std::cerr << "vibrigd: " << error.what() << '\n';
+        return 2;
+    }
+}

@@ -1,0 +1,120 @@
+#include "daemon/domain/status.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vibrig {
+
+const char* name_of(CampaignState state) noexcept {
+    switch (state) {
+        case CampaignState::idle:
+            return "idle";
+        case CampaignState::armed:
+            return "armed";
+        case CampaignState::waiting:
+            return "waiting";
+        case CampaignState::slewing:
+            return "slewing";
+        case CampaignState::ramping:
+            return "ramping";
+        case CampaignState::settling:
+            return "settling";
+        case CampaignState::recording:
+            return "recording";
+        case CampaignState::resting:
+            return "resting";
+        case CampaignState::paused:
+            return "paused";
+        case CampaignState::finished:
+            return "finished";
+        case CampaignState::aborted:
+            return "aborted";
+        case CampaignState::tripped:
+            return "tripped";
+        case CampaignState::zeroing:
+            return "zeroing";
+        case CampaignState::levelling:
+            return "levelling";
+        case CampaignState::checking:
+            return "checking";
+        case CampaignState::commissioning:
+            return "commissioning";
+    }
+    return "unknown";
+}
+
+const char* name_of(Severity severity) noexcept {
+    switch (severity) {
+        case Severity::info:
+            return "info";
+        case Severity::warning:
+            return "warning";
+        case Severity::alarm:
+            return "alarm";
+        case Severity::trip:
+            return "trip";
+    }
+    return "unknown";
+}
+
+const char* name_of(ChannelState state) noexcept {
+    switch (state) {
+        case ChannelState::good:
+            return "good";
+        case ChannelState::missing:
+            return "missing";
+        case ChannelState::flagged:
+            return "flagged";
+        case ChannelState::out_of_range:
+            return "out_of_range";
+        case ChannelState::unbound:
+            return "unbound";
+        case ChannelState::silent:
+            return "silent";
+        case ChannelState::never:
+            return "never";
+    }
+    return "?";
+}
+
+ChannelState StatusData::channel(std::size_t c) const noexcept {
+    using drivers::Quality;
+    if (sample.time == 0) return ChannelState::never;
+    if (sample.quality[c] == Quality::unbound) return ChannelState::unbound;
+    const bool ever = channel_age_s[c] >= 0;
+    if (silent || drivers::to_seconds(time - sample.time) > channel_deadline_s)
+        return ever ? ChannelState::silent : ChannelState::never;
+    switch (sample.quality[c]) {
+        case Quality::good:
+            return ChannelState::good;
+        case Quality::missing:
+            return ChannelState::missing;
+        case Quality::flagged:
+            return ChannelState::flagged;
+        case Quality::out_of_range:
+            return ChannelState::out_of_range;
+        default:
+            return ever ? ChannelState::silent : ChannelState::never;
+    }
+}
+
+ChannelState StatusData::platform_state() const noexcept {
+    if (platform.time == 0) return ChannelState::never;
+    return silent || drivers::to_seconds(time - platform.time) > platform_deadline_s
+               ? ChannelState::silent
+               : ChannelState::good;
+}
+
+double InterlockStatus::Row::margin() const noexcept {
+    if (!has_limit || !std::isfinite(present)) return std::numeric_limits<double>::quiet_NaN();
+    // What has to stay below zero, or above it, has no scale of its own.
+    const double left = below ? (present > 0        ? 1 - limit / present
+                                 : present >= limit ? 1.0
+                                                    : 0.0)
+                              : (limit > 0          ? 1 - present / limit
+                                 : present <= limit ? 1.0
+                                                    : 0.0);
+    return std::clamp(left, 0.0, 1.0);
+}
+
+}  // namespace vibrig

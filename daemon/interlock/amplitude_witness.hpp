@@ -1,0 +1,97 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "daemon/interlock/lock_in.hpp"
+#include "drivers/sample/sample.hpp"
+
+namespace vibrig::rt {
+
+/// What the table was told; amplitudes are peak at the table.
+struct Ramp {
+    double start_g = 0, target_g = 0;
+    drivers::Time begin = 0;  ///< when it was asked for; the controller begins at its last write
+    drivers::Time duration = 0;
+    double armed_g = 0;  ///< highest level of the arming; 0: none
+    /// False while the loop check measures it: then the platform tells within a factor of 2.
+    bool transmission_known = true;
+    /// What the raw accelerometers show of 1 g along the vertical at this position; all 0: unknown.
+    std::array<double, 3> raw_up{};
+
+    std::uint64_t number = 0;  ///< the interlock's
+
+    [[nodiscard]] double at(drivers::Time time, drivers::Time from) const noexcept;
+};
+
+/// Whether every accelerometer there is agrees with the command: the platform's over the
+/// transmission, and the table's. Amplitudes are of the fundamental, by lock-in over 0.3 s, longer
+/// only where the samples' alias is so near to zero or half the rate that less does not tell. The
+/// controller's own read-back is no witness. Acquisition thread; no allocation.
+class AmplitudeWitness {
+  public:
+    struct Settings {
+        double frequency_hz = 15;
+        drivers::Time sample_period = 25 * drivers::kMillisecond;
+        std::array<double, 3> zero_g{};
+        std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+        /// Resolution of accelerometers x, y, z and the table's, g; 0: not known.
+        std::array<double, 4> count_g{};
+    };
+    /// One judgement; channel: Channel::accel_x stands for the platform's accelerometers.
+    struct Verdict {
+        struct Finding {
+            bool wrong = false;
+            drivers::Channel channel = drivers::Channel::accel_x;
+            double value_g = 0;  ///< at the table
+        };
+        Finding off_command, over_armed, over_limit;
+        Finding stuck;                         ///< value: the vibration expected of it, g
+        std::array<double, 2> seen_g{-1, -1};  ///< platform, table; at the table; negative: unknown
+    };
+    /// What holds at the moment of a judgement.
+    struct Situation {
+        Ramp ramp;
+        drivers::Time controller_began = 0;  ///< with the ramp; 0: not yet
+        drivers::Time now = 0;               ///< sample time or later, where samples come late
+        bool steady = false;                 ///< the campaign has taken the level for reached
+        double transmission = 1, limit_g = 0;
+    };
+
+    static constexpr double kDecibel = 1.1220184543019633;  ///< 1 dB
+    static constexpr double kFromG = 0.3;                   ///< ramps are judged from here on
+    static constexpr double kToleranceG = 0.02;
+    static constexpr drivers::Time kCommandWindow = 500 * drivers::kMillisecond;
+
+    explicit AmplitudeWitness(const Settings& settings);
+    void begin() noexcept;  ///< excitation begins
+    /// True: a block is complete, and verdict() judges the newest.
+    [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
+    [[nodiscard]] Verdict verdict(const Situation& situation) noexcept;
+    [[nodiscard]] double window_s() const noexcept { return drivers::to_seconds(window_); }
+
+  private:
+    struct Bounds {
+        double low = 0, high = 0;
+    };
+    [[nodiscard]] Bounds bounds(const Situation& now, bool known, double low, double high) const;
+    [[nodiscard]] double platform_g() const noexcept;
+    [[nodiscard]] double table_g() const noexcept;
+    /// Of platform and table: one does not move where another does, and will be named as stuck.
+    [[nodiscard]] std::array<bool, 2> look_for_stuck(const Situation& now, double command_g,
+                                                     Verdict& verdict) const noexcept;
+    /// Largest less smallest reading in the newest blocks, g; infinite: too few.
+    [[nodiscard]] double range(std::size_t channel, std::size_t blocks) const noexcept;
+
+    Settings settings_;
+    drivers::Time window_, block_;
+    double fewest_;  ///< samples in a window
+    LockIn<3> force_;
+    LockIn<1> table_;
+    drivers::Time origin_ = 0, newest_ = 0;
+    std::int64_t block_number_ = 0;
+    drivers::Time steady_since_ = 0;
+    std::array<drivers::Time, 2> off_since_{}, over_since_{}, limit_since_{};  ///< platform, table
+};
+
+}  // namespace vibrig::rt

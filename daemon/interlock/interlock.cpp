@@ -1,0 +1,340 @@
+#include "daemon/interlock/interlock.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+namespace vibrig::rt {
+
+using drivers::Channel;
+using drivers::Time;
+
+Time wall_clock() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+const char* text_of(Trip trip) noexcept { return condition_of(trip).text; }
+
+void ReactionHistogram::add(Time taken) noexcept {
+    const double ms = drivers::to_seconds(taken) * 1e3;
+    const auto bound = std::ranges::lower_bound(kBounds_ms, ms);
+    ++count_[static_cast<std::size_t>(bound - kBounds_ms.begin())];
+    sum_ += taken;
+    Time largest = largest_.load();
+    while (taken > largest && !largest_.compare_exchange_weak(largest, taken)) {
+    }
+}
+
+ReactionHistogram::Counts ReactionHistogram::counts() const noexcept {
+    Counts counts;
+    for (std::size_t i = 0; i < counts.count.size(); ++i) counts.count[i] = count_[i].load();
+    counts.sum_ms = drivers::to_seconds(sum_.load()) * 1e3;
+    counts.largest_ms = drivers::to_seconds(largest_.load()) * 1e3;
+    return counts;
+}
+
+Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits limits)
+    : shaker_(shaker),
+      control_(control),
+      table_g_(limits.table_g),
+      platform_age_(limits.platform_age),
+      rules_(std::move(limits.rules)),
+      transmission_(limits.transmission),
+      seconds_(limits.witness.frequency_hz),
+      witness_(limits.witness) {
+    std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
+    if (rules_.size() > kMostRules) rules_.resize(kMostRules);
+    mismatches_ = shaker_.counters().read_back_mismatches;
+}
+
+void Interlock::command(double table_g, const std::array<double, 3>& position_deg) noexcept {
+    for (std::size_t i = 0; i < 3; ++i)
+        position_rad_[i].store(position_deg[i] * std::numbers::pi / 180);
+    position_known_.store(true);
+    commanded_g_.store(table_g);
+}
+
+void Interlock::trip(Trip cause, std::size_t row, double value, std::uint8_t channel) noexcept {
+    const Tripped mine{cause, static_cast<std::uint8_t>(row), channel, ++trips_,
+                       static_cast<float>(value)};
+    Tripped other = tripped_.load();
+    do {
+        if (other) return;  // the first cause stays
+    } while (!tripped_.compare_exchange_weak(other, mine));
+    shaker_.stop_now();
+    control_.notify();
+}
+
+void Interlock::judge(By by, Trip trip, bool wrong, Time now) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition == trip) judge_row(by, i, wrong, wrong ? 1 : 0, now);
+    }
+}
+
+void Interlock::judge(By by, Trip trip, double value, Time now) noexcept {
+    const bool below = condition_of(trip).below;
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition != trip) continue;
+        // A NaN is wrong either way.
+        const bool good = below ? value >= rules_[i].limit : value <= rules_[i].limit;
+        judge_row(by, i, !good, value, now);
+    }
+}
+
+void Interlock::judge(Trip trip, const AmplitudeWitness::Verdict::Finding& finding,
+                      Time now) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition != trip) continue;
+        judge_row(By::sample, i, finding.wrong, finding.value_g, now,
+                  static_cast<std::uint8_t>(finding.channel));
+    }
+}
+
+void Interlock::judge_row(By by, std::size_t row, bool wrong, double value, Time now,
+                          std::uint8_t channel) noexcept {
+    State& state = states_[row];
+    state.present.store(value);
+    std::atomic<Time>& since = state.since[static_cast<std::size_t>(by)];
+    const Rule& rule = rules_[row];
+    if (!wrong) {
+        since = 0;
+        // The other thread may see it otherwise.
+        if (!rule.latched && state.met() && state.raised.exchange(false)) control_.notify();
+        return;
+    }
+    now = std::max<Time>(now, 1);  // 0 says that the condition is met
+    if (since.load() == 0) since = now;
+    if (now - since.load() < drivers::from_seconds(rule.dwell_s)) return;
+    if (rule.reaction == Reaction::abort && !tripped_.load()) {
+        if (by == By::sample && arrived_ != 0) stop_asked_.store(arrived_);
+        trip(rule.condition, row, value, channel);
+    }
+    if (!state.raised.load()) {
+        state.value.store(value);
+        state.raised.store(true);
+        control_.notify();
+    }
+}
+
+/// What is not watched any more is not wrong for any time.
+void Interlock::forget(By by, Guard above) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        const Guard from = condition_of(rules_[i].condition).from;
+        if (from <= above) continue;
+        states_[i].since[static_cast<std::size_t>(by)] = 0;
+        states_[i].present.store(std::numeric_limits<double>::quiet_NaN());
+        if (!rules_[i].latched && states_[i].met() && states_[i].raised.exchange(false))
+            control_.notify();
+    }
+}
+
+void Interlock::check(const drivers::Sample& sample,
+                      const drivers::PlatformStatus& platform) noexcept {
+    const Time now = sample.time;
+    const Guard guard = follow_guard();
+    table_bound_ = sample.of(Channel::table_accel) != drivers::Quality::unbound;
+    if (seconds_.add(sample)) second_.publish(seconds_.mean());
+    if (guard == Guard::excitation) {
+        judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
+        judge(By::sample, Trip::platform_fault, platform.fault, now);
+        check_witnesses(sample);
+        const bool told = sample.of(Channel::table_accel) == drivers::Quality::good;
+        judge(By::sample, Trip::over_amplitude,
+              verdict_.over_limit.wrong || (told && !(std::abs(sample.table_accel) <= table_g_)),
+              now);
+        check_motion(sample);
+        if (const double nis = nis_.load(); nis != 0)
+            judge(By::sample, Trip::filter_divergence, nis, now);
+    }
+    if (platform.time > 0) judge(By::sample, Trip::temperature, platform.temperature_c, now);
+    if (const double free_mb = disk_free_mb_.load(); free_mb >= 0)
+        judge(By::sample, Trip::disk, free_mb, now);
+    judge(By::sample, Trip::recording, recording_degraded_.load(), now);
+    judge(By::sample, Trip::server, server_stuck_.load(), now);
+}
+
+void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
+    const std::uint64_t before = told_.number;
+    static_cast<void>(ramp_.try_read(told_));
+    if (told_.number != before) controller_began_ = 0;
+    const Time now = std::max(sample.time, now_);
+    if (controller_began_ == 0 && !shaker_.busy() && !shaker_.stop_pending())
+        controller_began_ = std::max(now, told_.begin);
+    if (!witness_.add(sample)) return;
+    verdict_ = witness_.verdict(
+        {told_, controller_began_, now, commanded_g_.load() > 0, transmission_.load(), table_g_});
+    for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(verdict_.seen_g[i]);
+    judge(Trip::over_armed, verdict_.over_armed, sample.time);
+    if (proving_.load()) return;
+    judge(Trip::stuck, verdict_.stuck, sample.time);
+    judge(Trip::amplitude_witness, verdict_.off_command, sample.time);
+}
+
+void Interlock::check_motion(const drivers::Sample& sample) noexcept {
+    if (sample.angles_good() && position_known_.load()) {
+        double farthest = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double off =
+                std::remainder(sample.angle[i] - position_rad_[i].load(), 2 * std::numbers::pi);
+            farthest = std::isnan(off) ? off : std::max(farthest, std::abs(off));
+        }
+        judge(By::sample, Trip::gimbal_off, farthest * 180 / std::numbers::pi, sample.time);
+    }
+    if (!sample.force_good()) return;
+    motion_.add(sample);
+    // A share of a motion that is only just beginning or ending means nothing.
+    if (const double share = motion_.cross_share(); share >= 0 && commanded_g_.load() > 0)
+        judge(By::sample, Trip::cross_axis, share, sample.time);
+    if (const double tilt = motion_.tilt_deg(); !(tilt < 0))
+        judge(By::sample, Trip::tilt, tilt, sample.time);
+}
+
+Guard Interlock::follow_guard() noexcept {
+    const Guard guard = guard_.load();
+    if (guard == Guard::excitation && sampled_under_ != Guard::excitation) {
+        motion_.begin();
+        witness_.begin();
+        verdict_ = {};
+        loss_ = {};
+    }
+    if ((guard == Guard::excitation) != (sampled_under_ == Guard::excitation))
+        seconds_.begin(guard == Guard::excitation);
+    if (guard < sampled_under_) forget(By::sample, guard);
+    if (guard < Guard::excitation && sampled_under_ == Guard::excitation)
+        for (auto& seen : seen_g_) seen.store(-1);
+    sampled_under_ = guard;
+    return guard;
+}
+
+void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) noexcept {
+    now_ = now;
+    const Guard guard = follow_guard();
+    if (guard == Guard::excitation) {
+        bool stale = false;
+        for (const auto c : {Channel::outer, Channel::inner, Channel::azimuth, Channel::accel_x,
+                             Channel::accel_y, Channel::accel_z}) {
+            stale = stale || assembler.stale(c, now);
+        }
+        // Without it the amplitude has one witness less.
+        stale = stale || (table_bound_ && assembler.stale(Channel::table_accel, now));
+        judge(By::sample, Trip::stale_channel, stale, now);
+        judge(By::sample, Trip::stale_platform, now - assembler.platform().time > platform_age_,
+              now);
+        const auto& counters = assembler.counters();
+        loss_.add(now, counters.samples, counters.incomplete, counters.gaps);
+        judge(By::sample, Trip::frame_loss, loss_.percent(), now);
+    }
+    // Of those outside, whether samples come or not.
+    judge(By::sample, Trip::guard_stop, guard_stopped_.load(), now);
+    judge(By::sample, Trip::horn, horn_silent_.load(), now);
+    if (guard < Guard::armed) return;
+    judge(By::sample, Trip::guard_lost, guard_lost_.load(), now);
+    judge(By::sample, Trip::shaker_lost, !shaker_.reading().valid, now);
+}
+
+void Interlock::lost_bus() noexcept {
+    if (at_least(Guard::armed)) judge(By::sample, Trip::can_lost, true, wall_clock());
+}
+
+void Interlock::check(const drivers::ShakerReading& reading) noexcept {
+    if (!reading.valid) return;
+    const Guard guard = guard_.load();
+    if (guard < read_under_) forget(By::read_back, guard);
+    read_under_ = guard;
+    const Time now = reading.time;
+    judge(By::read_back, Trip::uncommanded,
+          reading.running && guard < Guard::excitation && !shaker_.stop_pending(), now);
+    const std::uint64_t mismatches = shaker_.counters().read_back_mismatches;
+    const bool mismatch = std::exchange(mismatches_, mismatches) != mismatches;
+    if (guard < Guard::armed) return;
+    judge(By::read_back, Trip::emergency_stop, reading.emergency_stop_open, now);
+    judge(By::read_back, Trip::shaker_fault,
+          !proving_.load() && (reading.fault != 0 || reading.state == drivers::kShakerFault), now);
+    judge(By::read_back, Trip::over_amplitude, !(reading.measured_g <= table_g_), now);
+    judge(By::read_back, Trip::read_back, mismatch, now);
+    judge(By::read_back, Trip::watchdog_changed,
+          reading.watchdog == drivers::WatchdogTimeout::changed, now);
+    if (const double commanded = commanded_g_.load(); commanded > 0) {
+        judge(By::read_back, Trip::amplitude_off,
+              std::abs(20 * std::log10(reading.measured_g / commanded)), now);
+    }
+}
+
+/// It has lasted already: no row's dwell is waited for.
+void Interlock::uncommanded() noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].condition != Trip::uncommanded) continue;
+        states_[i].value.store(1);
+        states_[i].raised.store(true);
+        trip(Trip::uncommanded, i, 1, drivers::kChannels);
+    }
+}
+
+void Interlock::stop_written() noexcept {
+    if (const Time asked = stop_asked_.exchange(0); asked != 0)
+        reactions_.add(wall_clock() - asked);
+}
+
+std::string Interlock::text_of(const Tripped& tripped) const {
+    const Condition& condition = condition_of(tripped.cause);
+    std::array<char, 96> words{};
+    const auto channel = static_cast<Channel>(tripped.channel);
+    const auto value = static_cast<double>(tripped.value);
+    if (tripped.cause == Trip::stuck && tripped.channel < drivers::kChannels) {
+        std::snprintf(words.data(), words.size(), ": %s, %.3g g expected",
+                      drivers::name_of(channel), value);
+        return std::string(condition.text) + words.data();
+    }
+    if (tripped.channel < drivers::kChannels) {
+        const Ramp ramp = ramp_.read();
+        const bool armed = tripped.cause == Trip::over_armed;
+        std::snprintf(words.data(), words.size(), ": %s %.3g g at the table, %.3g g %s",
+                      channel == Channel::table_accel ? "table accelerometer" : "platform", value,
+                      armed ? ramp.armed_g : ramp.target_g, armed ? "armed" : "commanded");
+        return std::string(condition.text) + words.data();
+    }
+    if (!condition.has_limit() || tripped.row >= rules_.size() ||
+        rules_[tripped.row].condition != tripped.cause)
+        return condition.text;
+    std::snprintf(words.data(), words.size(), ": %.4g, limit %.4g %s", value,
+                  rules_[tripped.row].limit, condition.unit);
+    return std::string(condition.text) + words.data();
+}
+
+std::string Interlock::name_of(const Tripped& tripped) const {
+    if (!tripped) return {};
+    return tripped.row < rules_.size() && rules_[tripped.row].condition == tripped.cause
+               ? rules_[tripped.row].name
+               : condition_of(tripped.cause).name;
+}
+
+void Interlock::acknowledge(const Tripped& handled) noexcept {
+    Tripped now = tripped_.load();
+    do {
+        if (!now || !(now == handled)) return;
+    } while (!tripped_.compare_exchange_weak(now, Tripped{}));
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].reaction == Reaction::abort) states_[i].raised.store(false);
+    }
+}
+
+bool Interlock::acknowledge_alarm(const std::string& name) noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (rules_[i].name == name && rules_[i].reaction == Reaction::alarm)
+            return states_[i].raised.exchange(false);
+    }
+    return false;
+}
+
+Interlock::RowState Interlock::row(std::size_t i) const noexcept {
+    return {&rules_[i], states_[i].raised.load(), states_[i].value.load(),
+            states_[i].present.load()};
+}
+
+}  // namespace vibrig::rt

@@ -1,0 +1,220 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "daemon/interlock/amplitude_witness.hpp"
+#include "daemon/interlock/interlock_motion.hpp"
+#include "daemon/interlock/interlock_table.hpp"
+#include "daemon/interlock/mean_motion.hpp"
+#include "drivers/base/snapshot.hpp"
+#include "drivers/sample/assembler.hpp"
+#include "drivers/sample/sample.hpp"
+#include "drivers/shaker/shaker.hpp"
+
+namespace vibrig::rt {
+
+[[nodiscard]] const char* text_of(Trip trip) noexcept;
+
+/// A latched trip: cause, row of the table and value belong together, in one atomic value.
+struct alignas(8) Tripped {
+    Trip cause = Trip::none;
+    std::uint8_t row = 0;
+    std::uint8_t channel = drivers::kChannels;  ///< drivers::Channel that told; kChannels: none
+    std::uint8_t number = 0;  ///< of this trip, so that the same one again is another
+    float value = 0;          ///< as judged to be wrong
+    [[nodiscard]] explicit operator bool() const noexcept { return cause != Trip::none; }
+    bool operator==(const Tripped& other) const noexcept {
+        return cause == other.cause && row == other.row && number == other.number;
+    }
+};
+static_assert(sizeof(Tripped) == 8 && std::atomic<Tripped>::is_always_lock_free);
+static_assert(kMostRules <= 256, "a row's number fits into a byte");
+/// CLOCK_MONOTONIC, whatever clock the rig has.
+[[nodiscard]] drivers::Time wall_clock() noexcept;
+
+/// Software's share of a reaction: frames in to stop confirmed by the controller, wall time.
+class ReactionHistogram {
+  public:
+    /// Upper bounds, ms; one more class is open.
+    static constexpr std::array<double, 11> kBounds_ms{0.1, 0.2, 0.5, 1,   2,  5,
+                                                       10,  20,  50,  100, 200};
+    void add(drivers::Time taken) noexcept;
+    struct Counts {
+        std::array<std::uint64_t, kBounds_ms.size() + 1> count{};
+        double largest_ms = 0, sum_ms = 0;
+    };
+    [[nodiscard]] Counts counts() const noexcept;
+
+  private:
+    std::array<std::atomic<std::uint64_t>, kBounds_ms.size() + 1> count_{};
+    std::atomic<drivers::Time> largest_{0}, sum_{0};
+};
+
+/// Stops the shaker before anything else sees the sample: what comes with samples or by silence is
+/// judged in the acquisition thread, what comes with a read-back in the shaker's thread right after
+/// it. Aborts latch until acknowledged. Judging neither allocates, locks nor logs.
+class Interlock {
+  public:
+    struct Limits {
+        double table_g = 12.0;                                     ///< largest table acceleration
+        drivers::Time platform_age = 500 * drivers::kMillisecond;  ///< of the platform's status
+        std::vector<Rule> rules = default_interlock();             ///< kMostRules at most
+        AmplitudeWitness::Settings witness = {};
+        double transmission = 1;  ///< platform over table, until it is measured
+    };
+    /// One row as it stands now.
+    struct RowState {
+        const Rule* rule = nullptr;
+        bool raised = false;
+        double value = 0;    ///< as last judged to be wrong
+        double present = 0;  ///< as judged now; NaN: not watched now
+    };
+
+    Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits limits);
+
+    void guard(Guard level) noexcept { guard_.store(level); }  ///< control thread
+    /// Control thread: what the table is to do (0: nothing yet, or ramping) and where the gimbals
+    /// are to be, deg as the encoders count.
+    void command(double table_g, const std::array<double, 3>& position_deg) noexcept;
+    /// Control thread: what the table is told, as it is told.
+    void ramp(Ramp ramp) noexcept {
+        ramp.number = ++ramps_;
+        ramp_.publish(ramp);
+    }
+    /// Control thread: a stop is proved by making it happen. The amplitude may fall as it likes
+    /// then, and the controller may say fault once nobody feeds its watchdog; nothing may rise.
+    void proving(bool stop) noexcept { proving_.store(stop); }
+    /// Control thread: platform over table, as the loop check has measured it.
+    void transmission(double measured) noexcept { transmission_.store(measured); }
+    /// Platform and table as the accelerometers show them, g peak at the table; negative: unknown.
+    [[nodiscard]] std::array<double, 2> seen_g() const noexcept {
+        return {seen_g_[0].load(), seen_g_[1].load()};
+    }
+    /// The newest second of force and angles.
+    [[nodiscard]] MeanMotion second() const noexcept { return second_.read(); }
+    /// Control thread, slowly: innovations of the filter (0: none yet), free space.
+    void filter(double nis_per_dof) noexcept { nis_.store(nis_per_dof); }
+    void disk_free(double megabytes) noexcept { disk_free_mb_.store(megabytes); }
+    /// Control thread: whether those that only look on keep up.
+    void onlookers(bool recording_degraded, bool server_stuck) noexcept {
+        recording_degraded_.store(recording_degraded);
+        server_stuck_.store(server_stuck);
+    }
+    /// Control thread: what those outside say, and whether they can be heard.
+    void outside(bool guard_lost, bool guard_stopped, bool horn_silent) noexcept {
+        guard_lost_.store(guard_lost);
+        guard_stopped_.store(guard_stopped);
+        horn_silent_.store(horn_silent);
+    }
+
+    /// Acquisition thread: a batch of frames came in at this moment (CLOCK_MONOTONIC).
+    void arrived(drivers::Time wall) noexcept { arrived_ = wall; }
+    /// Acquisition thread, before the sample goes anywhere.
+    void check(const drivers::Sample& sample, const drivers::PlatformStatus& platform) noexcept;
+    /// Acquisition thread, on its timer: silence trips too.
+    void check_ages(const drivers::SampleAssembler& assembler, drivers::Time now) noexcept;
+    /// Shaker thread, after each read-back.
+    void check(const drivers::ShakerReading& reading) noexcept;
+    /// Acquisition thread: the CAN port is no longer running.
+    void lost_bus() noexcept;
+    /// Control thread, which alone judges this one: its row is raised whatever tripped before.
+    void stop_disobeyed(bool disobeyed) noexcept {
+        judge(By::read_back, Trip::stop_disobeyed, disobeyed, wall_clock());
+    }
+    /// Control thread: the accelerometers see motion where nothing was asked for.
+    void uncommanded() noexcept;
+    /// Any thread. The first cause stays.
+    void trip(Trip cause) noexcept { trip(cause, 0, 0, drivers::kChannels); }
+    /// Shaker thread: a stop was written and confirmed.
+    void stop_written() noexcept;
+
+    [[nodiscard]] Tripped latched() const noexcept { return tripped_.load(); }
+    [[nodiscard]] Trip tripped() const noexcept { return latched().cause; }
+    /// Control thread: cause in words, with the value and its limit.
+    [[nodiscard]] std::string text_of(const Tripped& tripped) const;
+    /// Of the row that tripped; empty: none.
+    [[nodiscard]] std::string name_of(const Tripped& tripped) const;
+    /// Clears the trip if it is `handled`; one that came meanwhile stays.
+    void acknowledge(const Tripped& handled) noexcept;
+    /// Clears a latched alarm by name; false if no row of that name is raised.
+    bool acknowledge_alarm(const std::string& name) noexcept;
+
+    [[nodiscard]] std::size_t rows() const noexcept { return rules_.size(); }
+    [[nodiscard]] RowState row(std::size_t i) const noexcept;
+    [[nodiscard]] ReactionHistogram::Counts reactions() const noexcept {
+        return reactions_.counts();
+    }
+
+  private:
+    /// Who judges: each keeps its own time since when a condition has not been met.
+    enum class By : std::uint8_t { sample, read_back };
+    struct State {
+        std::array<std::atomic<drivers::Time>, 2> since{};  ///< by By; 0: met
+        [[nodiscard]] bool met() const noexcept {
+            return since[0].load() == 0 && since[1].load() == 0;
+        }
+        std::atomic<bool> raised{false};
+        std::atomic<double> value{0};
+        std::atomic<double> present{std::numeric_limits<double>::quiet_NaN()};
+    };
+
+    [[nodiscard]] bool at_least(Guard level) const noexcept { return guard_.load() >= level; }
+    void judge(By by, Trip trip, bool wrong, drivers::Time now) noexcept;
+    void judge(By by, Trip trip, double value, drivers::Time now) noexcept;
+    void judge(Trip trip, const AmplitudeWitness::Verdict::Finding& finding,
+               drivers::Time now) noexcept;
+    void judge_row(By by, std::size_t row, bool wrong, double value, drivers::Time now,
+                   std::uint8_t channel = drivers::kChannels) noexcept;
+    void forget(By by, Guard above) noexcept;
+    void trip(Trip cause, std::size_t row, double value, std::uint8_t channel) noexcept;
+    void check_witnesses(const drivers::Sample& sample) noexcept;
+    Guard follow_guard() noexcept;
+    void check_motion(const drivers::Sample& sample) noexcept;
+
+    drivers::Shaker& shaker_;
+    drivers::Waiter& control_;
+    double table_g_;
+    bool table_bound_ = false;  ///< there is an accelerometer on the table; acquisition thread
+    drivers::Time platform_age_;
+    std::vector<Rule> rules_;
+    std::array<State, kMostRules> states_;
+    std::atomic<Guard> guard_{Guard::idle};
+    std::atomic<Tripped> tripped_{Tripped{}};
+    std::atomic<std::uint8_t> trips_{0};
+    std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
+    std::atomic<bool> proving_{false};
+    std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
+    std::atomic<bool> guard_lost_{false}, guard_stopped_{false}, horn_silent_{false};
+    std::array<std::atomic<double>, 3> position_rad_{};
+    std::atomic<bool> position_known_{false};
+    std::atomic<drivers::Time> stop_asked_{0};  ///< arrival of the frames that tripped; 0: none
+    ReactionHistogram reactions_;
+
+    Snapshot<Ramp> ramp_;
+    Snapshot<MeanMotion> second_;
+    std::uint64_t ramps_ = 0;  ///< control thread
+    std::atomic<double> transmission_;
+    std::array<std::atomic<double>, 2> seen_g_{-1, -1};
+
+    // Acquisition thread.
+    drivers::Time arrived_ = 0;
+    drivers::Time now_ = 0;  ///< when silence was last looked for
+    MeanMotionMeter seconds_;
+    AmplitudeWitness witness_;
+    AmplitudeWitness::Verdict verdict_;  ///< the newest
+    Ramp told_;
+    drivers::Time controller_began_ = 0;
+    Guard sampled_under_ = Guard::idle;
+    MotionMonitor motion_;
+    LossMonitor loss_;
+    // Shaker thread.
+    Guard read_under_ = Guard::idle;
+    std::uint64_t mismatches_ = 0;
+};
+
+}  // namespace vibrig::rt

@@ -1,0 +1,90 @@
+#include "daemon/interlock/rest_monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vibrig::rt {
+
+using drivers::Time;
+
+namespace {
+
+constexpr Time kStale = 200 * drivers::kMillisecond;
+constexpr Time kFewest = 8;  // samples that an rms rests on
+// Of the samples of a window so many have to be there: now and then one is lost.
+constexpr double kShare = 0.75;
+
+}  // namespace
+
+RestWindow::RestWindow(Time window, Time sample_period)
+    : window_(std::max(window, kFewest * sample_period)),
+      sample_period_(sample_period),
+      ring_(static_cast<std::size_t>(window_ / sample_period) + 2) {}
+
+void RestWindow::add(Time time, double value) noexcept {
+    if (!std::isfinite(value)) return;
+    if (count_ > 0) {
+        const Time newest = at(count_ - 1).time;
+        if (newest - time > window_) count_ = 0;  // another clock
+        if (count_ > 0 && time <= newest) return;
+    }
+    while (count_ > 0 && (at(0).time < time - window_ || count_ == ring_.size())) {
+        first_ = (first_ + 1) % ring_.size();
+        --count_;
+    }
+    ring_[(first_ + count_) % ring_.size()] = {time, value};
+    ++count_;
+}
+
+RestWitness RestWindow::judge(double limit_g) const noexcept {
+    RestWitness witness;
+    if (count_ == 0) return witness;
+    witness.from = at(0).time;
+    witness.to = at(count_ - 1).time;
+    const auto due = static_cast<double>(window_) / static_cast<double>(sample_period_);
+    if (witness.to - witness.from + 2 * sample_period_ < window_ ||
+        static_cast<double>(count_) < kShare * due)
+        return witness;
+    double mean = 0, square = 0;
+    for (std::size_t i = 0; i < count_; ++i) mean += at(i).value;
+    mean /= static_cast<double>(count_);
+    for (std::size_t i = 0; i < count_; ++i) {
+        const double away = at(i).value - mean;
+        square += away * away;
+    }
+    witness.rms_g = std::sqrt(square / static_cast<double>(count_));
+    witness.verdict = witness.rms_g < limit_g ? RestVerdict::still : RestVerdict::moving;
+    return witness;
+}
+
+RestMonitor::RestMonitor(const RestSettings& settings, Time sample_period)
+    : limit_g_(settings.limit_g),
+      stale_after_(std::max(kStale, 3 * sample_period)),
+      platform_(drivers::from_seconds(settings.window_s), sample_period),
+      table_(drivers::from_seconds(settings.window_s), sample_period) {}
+
+void RestMonitor::add(const drivers::Sample& sample) noexcept {
+    Rest rest;
+    if (sample.force_good()) {
+        const auto& f = sample.force;
+        platform_.add(sample.time, std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]));
+    }
+    rest.platform = platform_.judge(limit_g_);
+    const auto quality = sample.of(drivers::Channel::table_accel);
+    if (quality == drivers::Quality::good) table_.add(sample.time, sample.table_accel);
+    rest.table = table_.judge(limit_g_);
+    if (quality == drivers::Quality::unbound) rest.table = {RestVerdict::absent};
+    view_.publish(rest);
+}
+
+Rest RestMonitor::rest(Time now) const noexcept {
+    Rest rest = view_.read();
+    for (RestWitness* witness : {&rest.platform, &rest.table}) {
+        if (witness->verdict == RestVerdict::absent || now - witness->to <= stale_after_) continue;
+        witness->verdict = RestVerdict::unknown;
+        witness->rms_g = 0;
+    }
+    return rest;
+}
+
+}  // namespace vibrig::rt

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "drivers/base/snapshot.hpp"
+#include "drivers/sample/sample.hpp"
+#include "proto/safety.hpp"
+
+namespace vibrig::rt {
+
+/// When a body counts as at rest.
+struct RestSettings {
+    /// rms below; at least 6 sigma of the accelerometers' noise
+    double limit_g = safety::kRest_g;
+    double window_s =
+        safety::kRestWindow_s;  ///< of the rms; 8 samples at least, where they come slower
+};
+
+enum class RestVerdict : std::uint8_t {
+    absent,   ///< there is no such accelerometer
+    unknown,  ///< stale, invalid, or not yet a window of good values: nobody may call it rest
+    moving,
+    still,
+};
+
+/// What one accelerometer says.
+struct RestWitness {
+    RestVerdict verdict = RestVerdict::unknown;
+    double rms_g = 0;        ///< over the window; 0 while unknown
+    drivers::Time from = 0;  ///< first and last sample of the window
+    drivers::Time to = 0;
+};
+
+/// What all accelerometers say at one moment.
+struct Rest {
+    RestWitness platform, table;
+    [[nodiscard]] bool measured() const noexcept {
+        return platform.verdict == RestVerdict::still &&
+               (table.verdict == RestVerdict::still || table.verdict == RestVerdict::absent);
+    }
+    /// Measured, and by nothing that was before `moment`.
+    [[nodiscard]] bool measured_since(drivers::Time moment) const noexcept {
+        return measured() && platform.from >= moment &&
+               (table.verdict == RestVerdict::absent || table.from >= moment);
+    }
+    [[nodiscard]] bool moving() const noexcept {
+        return platform.verdict == RestVerdict::moving || table.verdict == RestVerdict::moving;
+    }
+};
+
+/// The last good values of one quantity: a sliding window in fixed memory.
+class RestWindow {
+  public:
+    RestWindow(drivers::Time window, drivers::Time sample_period);
+    /// g. What is not later than the newest is left out.
+    void add(drivers::Time time, double value) noexcept;
+    [[nodiscard]] RestWitness judge(double limit_g) const noexcept;
+
+  private:
+    struct Entry {
+        drivers::Time time = 0;
+        double value = 0;
+    };
+    [[nodiscard]] const Entry& at(std::size_t i) const noexcept {
+        return ring_[(first_ + i) % ring_.size()];
+    }
+    drivers::Time window_, sample_period_;
+    std::vector<Entry> ring_;
+    std::size_t first_ = 0, count_ = 0;
+};
+
+/// Rest as a measurement: the rms of the norm of the specific force less its mean, and of the table
+/// accelerometer where there is one. The norm, not the axes: a slow tilt is no vibration.
+class RestMonitor {
+  public:
+    RestMonitor(const RestSettings& settings, drivers::Time sample_period);
+
+    /// Acquisition thread; neither allocates, locks nor logs.
+    void add(const drivers::Sample& sample) noexcept;
+    /// Any thread. What is too old by `now` is unknown.
+    [[nodiscard]] Rest rest(drivers::Time now) const noexcept;
+
+  private:
+    double limit_g_;
+    drivers::Time stale_after_;
+    RestWindow platform_, table_;
+    Snapshot<Rest> view_;
+};
+
+}  // namespace vibrig::rt

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "daemon/plot/axis.hpp"
+
+namespace vibrig::tool::plot {
+
+enum class Look : unsigned char { line, dashed, dots };
+
+/// Points that are not finite (or not positive on a log axis) interrupt a curve.
+struct Curve {
+    std::string name;  ///< in the legend, if not empty
+    std::vector<double> x;
+    std::vector<double> y;
+    std::vector<double> low;  ///< a band or error bars, if as long as x
+    std::vector<double> high;
+    Look look = Look::line;
+};
+
+/// Cells between x[i] and x[i + 1], y[j] and y[j + 1]; value[i][j], NaN leaves a hole.
+struct HeatMap {
+    std::vector<double> x;
+    std::vector<double> y;
+    std::vector<std::vector<double>> value;
+    std::string label;  ///< of the colour scale, with unit
+    bool log = false;
+};
+
+/// One SVG file that follows the reader's light or dark theme.
+struct Chart {
+    std::string title;
+    Axis x;
+    Axis y;
+    std::vector<Curve> curves;
+    std::vector<HeatMap> maps;       ///< at most one is drawn
+    std::vector<std::string> notes;  ///< small print below
+
+    [[nodiscard]] std::string svg() const;
+};
+
+/// Throws std::runtime_error naming the path.
+void write_file(const std::string& path, const std::string& text);
+/// A folder for charts, made if there is none. Throws std::runtime_error naming the path.
+void make_folder(const std::string& path);
+
+}  // namespace vibrig::tool::plot

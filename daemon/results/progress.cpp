@@ -1,0 +1,47 @@
+#include "daemon/results/progress.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <utility>
+
+namespace vibrig::tool {
+
+namespace {
+
+constexpr std::chrono::milliseconds kPatience{500};
+constexpr std::chrono::milliseconds kRefresh{100};
+
+}  // namespace
+
+Progress::Progress(std::string what)
+    : what_(std::move(what)),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      next_(Clock::now() + kPatience) {}
+
+Progress::~Progress() {
+    if (shown_) {
+        std::fputs("\r\033[K", stderr);
+    }
+}
+
+bool Progress::is_time() {
+    if (!terminal_ || Clock::now() < next_) return false;
+    next_ = Clock::now() + kRefresh;
+    return shown_ = true;
+}
+
+void Progress::show(std::size_t done, std::size_t all) {
+    if (!is_time()) return;
+    const std::size_t percent = all == 0 ? 100 : done * 100 / all;
+    std::fprintf(stderr, "\r%s %zu %%\033[K", what_.c_str(), percent);
+    std::fflush(stderr);
+}
+
+void Progress::show(const std::string& line) {
+    if (!is_time()) return;
+    std::fprintf(stderr, "\r%s\033[K", line.c_str());
+    std::fflush(stderr);
+}
+
+}  // namespace vibrig::tool

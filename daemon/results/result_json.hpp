@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/dwells/anew.hpp"
+#include "daemon/tool/analysis/spectrum_result.hpp"
+#include "estimator/identification/identification.hpp"
+#include "estimator/uncertainty/monte_carlo.hpp"
+
+namespace vibrig::tool {
+
+/// The JSON form of a result, as `vibrig identify --json` prints it and vibrigd writes it to
+/// result.json: one line, keys in fixed order, numbers that read back exactly. What is not
+/// observable or does not exist is null, never NaN. Without an assessment there is no verdict, no
+/// budget, and `value` is that of a constant bias. `simulated`: the rig was a program. `drawn`: the
+/// Monte Carlo, if there was one. `live`: what the result replaced, if it was identified anew.
+/// `spectrum`: over frequency.
+[[nodiscard]] std::string result_json(const estimator::Result& result,
+                                      const estimator::uncertainty::Assessment& assessed = {},
+                                      bool simulated = false,
+                                      const estimator::uncertainty::MonteCarlo* drawn = nullptr,
+                                      const dwells::Live* live = nullptr,
+                                      const SpectrumResult* spectrum = nullptr);
+
+/// True if all 30 coefficients are determined one by one.
+[[nodiscard]] bool all_observable(const estimator::Result& result);
+
+}  // namespace vibrig::tool

@@ -1,0 +1,133 @@
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "daemon/tool/analysis/allan_analysis.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+constexpr std::size_t kLongestNumber = 4096;
+
+/// One number; an empty line, "nan" and JSON's "null" are a missing sample.
+double live_sample(std::string_view line, std::size_t number) {
+    const std::string_view text = proto::trimmed(line);
+    if (text.empty() || text == "nan" || text == "NaN" || text == "NA" || text == "null")
+        return kNaN;
+    double value = 0;
+    if (text.size() > kLongestNumber || !proto::read_number(text, value) ||
+        !(std::abs(value) <= kLargestValue)) {
+        throw std::runtime_error("standard input:" + std::to_string(number) + ": found '" +
+                                 proto::printable(text.substr(0, 60)) +
+                                 "', expected a number up to 1e60");
+    }
+    return value;
+}
+
+std::string live_text(const allan::WindowRow& row, const std::vector<allan::Alarm>& alarms) {
+    std::array<char, 160> line{};
+    std::snprintf(line.data(), line.size(), "%12.6g s  mean %13.6g deg/h", row.centre_s, row.mean);
+    std::string out = line.data();
+    if (row.refused) return out + "  refused: samples are missing, or nothing varies";
+    for (std::size_t j = 0; j < allan::kTerms; ++j) {
+        const allan::FittedTerm& term = row.fit.terms[j];
+        if (!term.detected) continue;
+        std::snprintf(line.data(), line.size(), "  %s %.3g", allan::kTermNames[j], term.value);
+        out += line.data();
+    }
+    if (row.fit.slow.found && !row.fit.slow.determined) out += "  " + row.fit.verdict();
+    for (const allan::Alarm& alarm : alarms) {
+        std::snprintf(line.data(), line.size(),
+                      "\n      alarm since %.6g s at tau %.4g s: ratio %.3g, "
+                      "limit %.3g; %s",
+                      alarm.since_s, alarm.tau, alarm.ratio, alarm.limit,
+                      allan::words_of(alarm.reading));
+        out += line.data();
+    }
+    return out;
+}
+
+constexpr std::size_t kShownWindows = 400;
+constexpr std::chrono::seconds kPagePeriod{2};
+
+/// What a browser shows while the windows come; complete at any moment it is read.
+void write_page(const std::string& path, const AllanAnalysis& shown) {
+    const std::string beside = path + ".new";
+    plot::write_file(beside,
+                     "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">"
+                     "<meta http-equiv=\"refresh\" content=\"2\"><title>Allan, live</title>" +
+                         surface_chart(shown).svg() + traces_chart(shown).svg() + "</html>\n");
+    std::error_code error;
+    std::filesystem::rename(beside, path, error);
+    if (error) throw std::runtime_error(path + ": cannot be written: " + error.message());
+}
+
+}  // namespace
+
+bool allan_live(const AllanRequest& request, bool json, const std::string& page) {
+    if (!page.empty() && !page.ends_with(".html")) {
+        throw std::runtime_error("--plot: found " + page +
+                                 ", expected with --live a name that ends in .html");
+    }
+    if (!(request.tau0 > 0) || !(request.window_s > 0) || request.phase || request.file != "-" ||
+        !request.column.empty() || !request.time.empty()) {
+        throw std::runtime_error(
+            "--live: expected rates, one a line, on standard input (FILE -), with --tau0 and "
+            "--dynamic");
+    }
+    const allan::DynamicSettings settings = dynamic_settings(request);
+    allan::DynamicAllan dynamic(settings);
+    allan::StationarityMonitor monitor({request.alpha, 5}, dynamic);
+    if (request.reference) monitor.set_reference(*request.reference);
+    const double to_deg_h = to_deg_per_hour(request.unit, false);
+    AllanAnalysis shown;
+    shown.request = request;
+    shown.request.file = "standard input";
+    shown.to_deg_h = to_deg_h;
+    shown.factors = dynamic.factors();
+    // A place that cannot be written is found now, not when the first window is full.
+    if (!page.empty()) {
+        plot::write_file(page + ".new", "");
+        std::filesystem::remove(page + ".new");
+    }
+    bool alarmed = false, written = true;
+    auto next_page = std::chrono::steady_clock::now();
+    std::size_t number = 0;
+    for (std::string line; std::getline(std::cin, line);) {
+        if (!dynamic.add(live_sample(line, ++number) * to_deg_h)) continue;
+        const allan::WindowRow row = dynamic.row();
+        const auto alarms = monitor.check(row);
+        alarmed = alarmed || row.refused || !alarms.empty();
+        std::cout << (json ? allan_window_json(row, alarms, dynamic, to_deg_h)
+                           : live_text(row, alarms))
+                  << std::endl;
+        if (!std::cout) throw std::runtime_error("standard output: cannot be written");
+        if (page.empty()) continue;
+        if (shown.windows.size() == kShownWindows) shown.windows.erase(shown.windows.begin());
+        shown.windows.push_back({row, alarms});
+        written = false;
+        // As often as the browser looks: a stream from a file is faster than that.
+        if (std::chrono::steady_clock::now() < next_page) continue;
+        write_page(page, shown);
+        written = true;
+        next_page = std::chrono::steady_clock::now() + kPagePeriod;
+    }
+    if (!written) write_page(page, shown);
+    if (number < settings.window) {
+        throw std::runtime_error("--live: " + std::to_string(number) +
+                                 " samples came, a window of --dynamic needs " +
+                                 std::to_string(settings.window));
+    }
+    return alarmed;
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,260 @@
+#include "daemon/tool/analysis/column_file.hpp"
+
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+constexpr std::size_t kChunk = 1 << 20;
+constexpr std::size_t kLongestLine = 1 << 16;
+constexpr std::size_t kNoColumn = std::numeric_limits<std::size_t>::max();
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+bool is_missing(std::string_view field) {
+    return field.empty() || field == "nan" || field == "NaN" || field == "NAN" || field == "NA";
+}
+
+bool parse(std::string_view field, double& value) {
+    if (is_missing(field)) {
+        value = kMissing;
+        return true;
+    }
+    field.remove_prefix(field.front() == '+' ? 1 : 0);
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+    return error == std::errc{} && end == field.data() + field.size() && std::isfinite(value);
+}
+
+std::string shown(std::string_view text) {
+    std::string out(text.substr(0, 40));
+    std::replace_if(
+        out.begin(), out.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, '?');
+    return "\"" + out + (text.size() > 40 ? "..." : "") + "\"";
+}
+
+class Parser {
+  public:
+    Parser(std::string path, const ColumnRequest& request)
+        : path_(std::move(path)), request_(request) {}
+
+    void line(std::string_view text) {
+        ++number_;
+        if (number_ == 1 && text.substr(0, 3) == "\xEF\xBB\xBF") {
+            text.remove_prefix(3);
+        }
+        const std::string_view content = proto::trimmed(text);
+        if (content.empty()) {
+            // The only field of the row is empty; at the end of the file it is no row.
+            blank_ += single_ && !file_.values.empty() ? 1U : 0U;
+            return;
+        }
+        if (content.front() == '#' || content.front() == '%') {
+            return;
+        }
+        if (!known_ && first(content)) {
+            return;
+        }
+        file_.values.insert(file_.values.end(), std::exchange(blank_, 0U), kMissing);
+        file_.values.push_back(field(text, value_, file_.column));
+        if (time_ != kNoColumn) {
+            file_.times.push_back(field(text, time_, request_.time));
+        }
+    }
+
+    ColumnFile take() {
+        if (!known_) {
+            throw std::runtime_error(path_ + ": no data found, expected lines of numbers");
+        }
+        return std::move(file_);
+    }
+
+    [[noreturn]] void fail(const std::string& what) const {
+        throw std::runtime_error(path_ + ":" + std::to_string(number_) + ": " + what);
+    }
+
+  private:
+    /// Next field of `rest`, which loses it.
+    std::string_view next(std::string_view& rest) const {
+        if (separator_ == ' ') {
+            rest = proto::trimmed(rest);
+        }
+        std::size_t end = separator_ == ' ' ? rest.find_first_of(" \t") : rest.find(separator_);
+        end = std::min(end, rest.size());
+        const std::string_view found = rest.substr(0, end);
+        // Nothing after the last field differs from an empty field after the last separator.
+        rest = end == rest.size() ? std::string_view() : rest.substr(end + 1);
+        return proto::trimmed(found);
+    }
+
+    double field(std::string_view text, std::size_t index, const std::string& name) const {
+        std::string_view found;
+        for (std::size_t i = 0; i <= index; ++i) {
+            if (i > 0 && text.data() == nullptr) {
+                fail(std::to_string(i) + " columns found, expected column " +
+                     std::to_string(index + 1) + " (" + name + ")");
+            }
+            found = next(text);
+        }
+        double value = 0;
+        if (!parse(found, value)) {
+            fail("column " + name + ": " + shown(found) + " found, expected a finite number");
+        }
+        return value;
+    }
+
+    /// Separator, header and columns from the first line; true if it was a header.
+    bool first(std::string_view content) {
+        known_ = true;
+        if (std::any_of(content.begin(), content.end(),
+                        [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; })) {
+            fail("binary data found, expected lines of numbers");
+        }
+        for (const char candidate : {',', ';', '\t'}) {
+            if (content.find(candidate) != std::string_view::npos) {
+                separator_ = candidate;
+                break;
+            }
+        }
+        std::vector<std::string> fields;
+        for (std::string_view rest = content; rest.data() != nullptr;) {
+            fields.emplace_back(next(rest));
+        }
+        const bool header = std::any_of(fields.begin(), fields.end(), [](const std::string& f) {
+            double ignored = 0;
+            return !parse(f, ignored);
+        });
+        // A single word that starts like a number is a broken number, not a name.
+        if (header && fields.size() == 1 && content.find_first_of("0123456789+-.") == 0) {
+            fail(shown(content) + " found, expected a number or a column's name");
+        }
+        if (!header) {
+            for (std::size_t i = 0; i < fields.size(); ++i) {
+                fields[i] = std::to_string(i + 1);
+            }
+        }
+        if (request_.column.empty() && fields.size() > 1) {
+            fail("the columns " + joined(fields) + " found; choose one with --column");
+        }
+        value_ = request_.column.empty() ? 0 : index_of(fields, request_.column);
+        time_ = request_.time.empty() ? kNoColumn : index_of(fields, request_.time);
+        single_ = fields.size() == 1;
+        file_.column = fields[value_];
+        return header;
+    }
+
+    std::size_t index_of(const std::vector<std::string>& fields, const std::string& name) const {
+        const auto at = std::find(fields.begin(), fields.end(), name);
+        if (at != fields.end()) {
+            return static_cast<std::size_t>(at - fields.begin());
+        }
+        std::size_t position = 0;
+        const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), position);
+        if (error == std::errc{} && end == name.data() + name.size() && position >= 1 &&
+            position <= fields.size()) {
+            return position - 1;
+        }
+        fail("no column \"" + name + "\", found " + joined(fields));
+    }
+
+    static std::string joined(const std::vector<std::string>& fields) {
+        std::string all;
+        for (const std::string& f : fields) {
+            all += (all.empty() ? "" : ", ") + f;
+        }
+        return all;
+    }
+
+    std::string path_;
+    ColumnRequest request_;
+    ColumnFile file_;
+    std::size_t number_ = 0;
+    std::size_t blank_ = 0;  ///< rows since the last number
+    std::size_t value_ = 0;
+    std::size_t time_ = kNoColumn;
+    char separator_ = ' ';
+    bool single_ = false;
+    bool known_ = false;
+};
+
+struct CloseGz {
+    void operator()(gzFile_s* file) const { gzclose(file); }
+};
+
+std::unique_ptr<gzFile_s, CloseGz> open(const std::string& path) {
+    errno = 0;
+    // zlib passes a file that is not gzip through unchanged.
+    std::unique_ptr<gzFile_s, CloseGz> file(path == "-" ? gzdopen(dup(STDIN_FILENO), "rb")
+                                                        : gzopen(path.c_str(), "rb"));
+    if (!file) {
+        throw std::runtime_error(path +
+                                 ": cannot be read: " + std::generic_category().message(errno));
+    }
+    gzbuffer(file.get(), kChunk);
+    return file;
+}
+
+}  // namespace
+
+ColumnFile read_columns(const std::string& path, const ColumnRequest& request,
+                        const std::function<void(std::size_t, std::size_t)>& progress) {
+    std::error_code no_size;
+    if (std::filesystem::is_directory(path, no_size)) {
+        throw std::runtime_error(path + ": is a folder, expected a file");
+    }
+    const std::uintmax_t bytes = path == "-" ? 0 : std::filesystem::file_size(path, no_size);
+    const auto file = open(path);
+    Parser parser(path, request);
+    std::vector<char> buffer(kChunk + kLongestLine);
+    std::size_t kept = 0;
+    for (;;) {
+        const int got = gzread(file.get(), buffer.data() + kept, static_cast<unsigned>(kChunk));
+        int code = 0;
+        const char* why = gzerror(file.get(), &code);
+        if (got < 0 || (got == 0 && code == Z_BUF_ERROR)) {
+            throw std::runtime_error(path + ": cannot be read: " +
+                                     (code == Z_BUF_ERROR ? "compressed data end too early"
+                                      : code == Z_ERRNO   ? std::generic_category().message(errno)
+                                                          : std::string(why)));
+        }
+        const std::string_view text(buffer.data(), kept + static_cast<std::size_t>(got));
+        std::size_t begin = 0;
+        for (std::size_t end = text.find('\n'); end != std::string_view::npos;
+             end = text.find('\n', begin)) {
+            parser.line(text.substr(begin, end - begin));
+            begin = end + 1;
+        }
+        if (got == 0) {
+            if (begin < text.size()) {
+                parser.line(text.substr(begin));
+            }
+            return parser.take();
+        }
+        kept = text.size() - begin;
+        if (kept > kLongestLine) {
+            parser.fail("a line of more than " + std::to_string(kLongestLine) +
+                        " characters follows, expected lines of numbers");
+        }
+        std::copy(text.begin() + static_cast<std::ptrdiff_t>(begin), text.end(), buffer.begin());
+        if (progress) {
+            progress(static_cast<std::size_t>(std::max<z_off_t>(0, gzoffset(file.get()))),
+                     no_size ? 0 : static_cast<std::size_t>(bytes));
+        }
+    }
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,466 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/record/in_order.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/report/result_charts.hpp"
+#include "daemon/rt/dwell_order.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/tool/recordings/identified.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/results/result_json.hpp"
+#include "daemon/results/result_table.hpp"
+#include "daemon/tool/analysis/rig_doubts.hpp"
+#include "daemon/tool/analysis/seen_plan.hpp"
+#include "daemon/tool/simulated.hpp"
+#include "daemon/tool/analysis/spectrum_dwells.hpp"
+#include "daemon/tool/analysis/spectrum_result.hpp"
+#include "estimator/identification/identification.hpp"
+#include "estimator/filter/instruction_set.hpp"
+#include "proto/recording_csv.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using proto::RecordingRow;
+
+estimator::Measurement measurement_of(const RecordingRow& row) {
+    estimator::Measurement measurement;
+    measurement.time_s = row.time_s;
+    for (std::size_t i = 0; i < 3; ++i) {
+        measurement.angle_rad[i] = row.angle_deg[i] * (std::numbers::pi / 180);
+        measurement.force_g[i] = row.force_g[i];
+    }
+    return measurement;
+}
+
+/// A result, and what of the recording contradicts the configuration.
+struct Found {
+    estimator::Result result;
+    std::string contradiction;  ///< the first; empty: none
+    std::vector<estimator::spectrum::SpectralDwell> spectral;
+    std::vector<estimator::spectrum::Kind> kinds;
+};
+
+Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
+    Found found{std::move(result), {}, {}, {}};
+    found.contradiction = doubts.tell(found.result);
+    return found;
+}
+
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
+class RowsIdentified {
+  public:
+    explicit RowsIdentified(const estimator::Settings& settings)
+        : identification_(settings, room_), doubts_(settings), plan_(settings) {}
+
+    void add(const RecordingRow& row) {
+        if (dwells_ == 0 || row.run != run_ || row.position != position_) begin_dwell(row);
+        last_s_ = row.time_s;
+        const auto measurement = measurement_of(row);
+        plan_.add(measurement);
+        static_cast<void>(identification_.add(measurement));
+        doubts_.add(measurement);
+    }
+    Found found() {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        plan_.tell();
+        auto result = identification_.result();
+        for (auto& row : result.rows) row.common_clock = common_clock_;
+        return with_doubts(std::move(result), doubts_);
+    }
+
+  private:
+    void begin_dwell(const RecordingRow& row) {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        // The times of the file may go on from dwell to dwell; that they do is known at its end.
+        if (dwells_ > 0 && !(row.time_s > last_s_)) common_clock_ = false;
+        if (++dwells_ > room_) identification_.reserve(room_ *= 2);
+        run_ = row.run;
+        position_ = row.position;
+        estimator::DwellInfo info{run_, position_};
+        info.begin_s = 0;
+        identification_.begin_dwell(info);
+        doubts_.begin_dwell();
+        plan_.begin_dwell(run_);
+    }
+
+    std::size_t room_ = 1024, dwells_ = 0;
+    estimator::Identification identification_;
+    RigDoubts doubts_;
+    SeenPlan plan_;
+    bool common_clock_ = true;
+    int run_ = 0, position_ = 0;
+    double last_s_ = 0;
+};
+
+/// A file of any length, in memory that does not grow with it: another thread reads ahead.
+Found identify(proto::RecordingReader& file, std::uint64_t size,
+               const estimator::Settings& settings, const std::string& path) {
+    struct Block {
+        std::vector<RecordingRow> rows;
+        std::uint64_t bytes = 0;  ///< of the file, up to its end
+    };
+    constexpr std::size_t kBlock = 4096;
+    record::InOrder<Block> blocks(
+        [&file]() -> std::optional<Block> {
+            Block block;
+            block.rows.resize(kBlock);
+            std::size_t count = 0;
+            while (count < kBlock && file.next(block.rows[count])) ++count;
+            block.rows.resize(count);
+            block.bytes = file.bytes();
+            return count > 0 ? std::optional(std::move(block)) : std::nullopt;
+        },
+        std::identity(), 1);
+    RowsIdentified identified(settings);
+    Progress progress("identifying");
+    while (const auto block = blocks.next()) {
+        for (const RecordingRow& row : block->rows) identified.add(row);
+        progress.show(block->bytes, std::max(size, block->bytes));
+    }
+    Found found = identified.found();
+    // All that shook did so at the frequency of the configuration.
+    const Spectra none;
+    DwellKinds kinds(settings.frequency_hz, none);
+    const RecordingRow any;
+    kinds.add({&any}, path);
+    found.kinds = kinds.kinds();
+    for (const estimator::DwellRow& row : found.result.rows)
+        found.spectral.push_back({row, row.vibration.kappa > 1 ? kinds.of(0) : std::nullopt, 0});
+    return found;
+}
+
+std::vector<RecordingRow> rows_of(proto::RecordingReader& file) {
+    std::vector<RecordingRow> rows(1);
+    while (file.next(rows.back())) rows.emplace_back();
+    rows.pop_back();
+    return rows;
+}
+
+struct Dwell {
+    int run = 0;
+    int position = 0;
+    std::vector<const RecordingRow*> rows;
+};
+
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
+std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
+    std::vector<Dwell> dwells;
+    for (const RecordingRow& row : rows) {
+        if (dwells.empty() || dwells.back().run != row.run ||
+            dwells.back().position != row.position)
+            dwells.push_back({row.run, row.position, {}});
+        dwells.back().rows.push_back(&row);
+    }
+    return dwells;
+}
+
+/// The times of the file go on from dwell to dwell.
+bool has_common_clock(const std::vector<Dwell>& dwells) {
+    for (std::size_t d = 1; d < dwells.size(); ++d) {
+        if (!(dwells[d].rows.front()->time_s > dwells[d - 1].rows.back()->time_s)) return false;
+    }
+    return true;
+}
+
+DwellKinds kinds_of(const std::vector<Dwell>& dwells, const estimator::Settings& settings,
+                    const SpectrumRequest& request, const std::string& file) {
+    DwellKinds kinds(settings.frequency_hz, request.spectra);
+    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, file);
+    return kinds;
+}
+
+/// What a dwell at another frequency than the filter's says: by a filter of its own, so that the
+/// coefficients at the reference frequency take nothing of it.
+void add_apart(estimator::Identification& apart, estimator::Result& to) {
+    estimator::Result one = apart.result();
+    to.samples += one.samples;
+    to.rejected += one.rejected;
+    std::move(one.dwells.begin(), one.dwells.end(), std::back_inserter(to.dwells));
+}
+
+/// A recording that says with which frequency each dwell shook: kept whole, since the frequency
+/// that the filter takes is known at its end.
+Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settings,
+               const SpectrumRequest& request, const std::string& file) {
+    const std::vector<Dwell> dwells = dwells_of(rows);
+    const DwellKinds kinds = kinds_of(dwells, settings, request, file);
+    const auto reference = kinds.reference();
+    if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
+    const bool common_clock = has_common_clock(dwells);
+    estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
+    SeenPlan plan(settings);
+    Progress progress("identifying");
+    std::size_t done = 0;
+    Found found;
+    found.kinds = kinds.kinds();
+    estimator::Result others;
+    for (std::size_t d = 0; d < dwells.size(); ++d) {
+        const Dwell& dwell = dwells[d];
+        const auto kind = kinds.of(d);
+        std::optional<estimator::Identification> apart;
+        if (kind && kind != reference) {
+            estimator::Settings own = settings;
+            own.frequency_hz = kinds.kinds()[*kind].hz();
+            apart.emplace(own, 1);
+        }
+        estimator::Identification& filter = apart ? *apart : identification;
+        const std::size_t before = filter.rows().size();
+        estimator::DwellInfo info{dwell.run, dwell.position};
+        if (common_clock) info.begin_s = 0;
+        filter.begin_dwell(info);
+        doubts.begin_dwell();
+        plan.begin_dwell(dwell.run);
+        for (const RecordingRow* row : dwell.rows) {
+            const auto measurement = measurement_of(*row);
+            static_cast<void>(filter.add(measurement));
+            doubts.add(measurement);
+            plan.add(measurement);
+            // Asking a clock costs more than a filter step.
+            if (++done % 1024 == 0) {
+                progress.show(done, rows.size());
+            }
+        }
+        static_cast<void>(filter.end_dwell());
+        if (filter.rows().size() > before) {
+            const estimator::DwellRow& row = filter.rows().back();
+            const bool shook = row.vibration.kappa > 1;
+            if (shook && !kind)
+                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
+                                         ": found a dwell at rest that vibrates by " +
+                                         std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
+                                         " g, expected its frequency");
+            found.spectral.push_back({row, shook ? kind : std::nullopt, 0});
+        }
+        if (apart) add_apart(*apart, others);
+    }
+    plan.tell();
+    Found whole = with_doubts(identification.result(), doubts);
+    found.result = std::move(whole.result);
+    found.contradiction = std::move(whole.contradiction);
+    found.result.samples += others.samples;
+    found.result.rejected += others.rejected;
+    std::move(others.dwells.begin(), others.dwells.end(), std::back_inserter(found.result.dwells));
+    return found;
+}
+
+/// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
+Found identify(const record::Campaign& campaign, const estimator::Settings& settings) {
+    const auto dwells = record::recorded_dwells(campaign);
+    SeenPlan plan(settings);
+    for (const auto& dwell : dwells) {
+        plan.begin_dwell(dwell.order->run);
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
+            plan.add(
+                rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
+    }
+    plan.tell();
+    std::optional<dwells::Anew> anew;
+    if (campaign.found) anew.emplace(settings, *campaign.found, dwells.size());
+    estimator::Identification as_recorded(settings, dwells.size());
+    auto& identification = anew ? anew->identification() : as_recorded;
+    RigDoubts doubts(settings);
+    Progress progress("identifying");
+    std::size_t done = 0;
+    for (const auto& dwell : dwells) {
+        doubts.begin_dwell();
+        record::feed(identification, campaign, dwell,
+                     [&](std::size_t sample, const estimator::StepResult&) {
+                         doubts.add(rt::measurement_of(campaign.samples[sample], dwell.order->from,
+                                                       dwell.order->zero_g));
+                         if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
+                     });
+    }
+    return with_doubts(anew ? anew->result() : identification.result(), doubts);
+}
+
+Found identify_campaign(const std::string& path, const std::string& config,
+                        estimator::Settings& settings, bool& simulated,
+                        std::optional<dwells::Live>& live) {
+    record::Campaign campaign = read_named_campaign(path);
+    if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
+    if (!config.empty()) record::forget_noise(campaign);
+    const auto loaded =
+        config.empty()
+            ? configuration::parse(record::identification_sections(campaign.head.configuration),
+                                   "configuration in " + campaign.path, false)
+            : configuration::load(config, false);
+    settings = loaded.configuration.estimator;
+    simulated = campaign.head.simulated;
+    if (campaign.found) {
+        live = {*campaign.found, record::live_result(campaign, settings), {}};
+        live->assessed = estimator::uncertainty::assess(settings, live->result);
+    }
+    settings = dwells::Anew::settings_of(settings, campaign.found);
+    return identify(campaign, settings);
+}
+
+/// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
+void contradict(estimator::uncertainty::Verdict& verdict, const std::string& contradiction) {
+    if (contradiction.empty()) return;
+    using estimator::uncertainty::Level;
+    const std::string text = "the configuration does not fit the recording: " + contradiction;
+    verdict.level = Level::not_valid;
+    verdict.reasons.insert(verdict.reasons.begin(), {"configuration", text, Level::not_valid});
+    verdict.sentence = "not valid, because " + text;
+}
+
+/// A folder, an HDF5 file, or the name of a campaign: then there is no such file.
+bool is_campaign(const std::string& argument) {
+    std::error_code error;
+    return !std::filesystem::is_regular_file(argument, error)
+               ? std::filesystem::is_directory(argument, error) ||
+                     argument.find_first_of("/.") == std::string::npos
+               : record::is_hdf5(argument);
+}
+
+struct IdentifyOptions {
+    std::string recording;
+    std::string config;
+    std::string plot;
+    std::string instruction_set = "auto";
+    bool json = false;
+    bool strict = false;
+    bool monte_carlo = false;
+    std::string spectra;
+    std::string spectrum = "auto";
+};
+
+/// What it throws names file, line, key and value already.
+int run(const IdentifyOptions& options) {
+    estimator::use_instruction_set(options.instruction_set);
+    SpectrumRequest request;
+    request.form = form_of(options.spectrum);
+    if (!options.spectra.empty()) request.spectra = read_spectra(options.spectra);
+    const Identified identified = identify_recording(options.recording, options.config, request);
+    const auto& assessed = identified.assessed;
+    const auto* spectrum = identified.spectrum ? &*identified.spectrum : nullptr;
+    if (options.monte_carlo && spectrum != nullptr && spectrum->several())
+        throw std::runtime_error(
+            "--monte-carlo: found dwells at several frequencies, expected one frequency");
+    if (!options.plot.empty()) report::plot_result(options.plot, identified.result, assessed);
+    std::optional<estimator::uncertainty::MonteCarlo> drawn;
+    if (options.monte_carlo) drawn = draw(identified);
+    const auto* check = drawn ? &*drawn : nullptr;
+    const auto* live = identified.live ? &*identified.live : nullptr;
+    std::cout << (options.json ? result_json(identified.result, assessed, identified.simulated,
+                                             check, live, spectrum) +
+                                     "\n"
+                               : simulated_line(identified.simulated) +
+                                     result_table(identified.result, assessed) +
+                                     (spectrum != nullptr ? spectrum_text(*spectrum) : "") +
+                                     (check != nullptr ? monte_carlo_text(*check) : ""))
+              << std::flush;
+    return exit_status(assessed.verdict.level, options.strict);
+}
+
+}  // namespace
+
+Identified identify_recording(const std::string& file, const std::string& config,
+                              const SpectrumRequest& request) {
+    Identified identified;
+    Found found;
+    if (is_campaign(file)) {
+        found = identify_campaign(file, config, identified.settings, identified.simulated,
+                                  identified.live);
+    } else {
+        const auto loaded = configuration::load(config, false);
+        identified.settings = loaded.configuration.estimator;
+        proto::RecordingReader reader(file);
+        identified.simulated = loaded.configuration.simulated() || reader.simulated();
+        std::error_code unknown;
+        const auto size = std::filesystem::file_size(file, unknown);
+        found = reader.has_frequency() || !request.spectra.empty()
+                    ? identify(rows_of(reader), identified.settings, request, file)
+                    : identify(reader, unknown ? 0 : size, identified.settings, file);
+    }
+    identified.result = std::move(found.result);
+    identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    if (identified.assessed.done && found.spectral.size() >= 2) {
+        identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
+                                          std::move(found.kinds), request.form);
+        adopt(*identified.spectrum, identified.settings, identified.assessed);
+    }
+    contradict(identified.assessed.verdict, found.contradiction);
+    return identified;
+}
+
+estimator::uncertainty::MonteCarlo draw(const Identified& of) {
+    Progress progress("drawing");
+    const estimator::uncertainty::MonteCarloSettings how;
+    return estimator::uncertainty::propagate_distributions(
+        of.settings, of.result, of.assessed, how,
+        [&](int blocks) { progress.show(static_cast<std::size_t>(blocks), 100); });
+}
+
+void add_identify(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<IdentifyOptions>();
+    CLI::App* command = app.add_subcommand(
+        "identify", "Gyro error coefficients from a recording (CSV, or HDF5 of vibrigd)");
+    command
+        ->add_option("FILE", options->recording,
+                     "CSV with a header row and the columns time_s, run, position, alpha_deg, "
+                     "beta_deg, gamma_deg, ax_g, ay_g, az_g in any order; or a recorded "
+                     "campaign: its folder, HDF5 file or name")
+        ->required();
+    command->add_option(
+        "--config", options->config,
+        "configuration file (TOML); without it all defaults apply, of an HDF5 file its "
+        "own");
+    command
+        ->add_option("--instruction-set", options->instruction_set,
+                     "of the filter: auto (the best), or one of this processor's")
+        ->envname("VIBRIG_INSTRUCTION_SET");
+    command->add_option("--plot", options->plot,
+                        "an SVG file: uncertainties of the coefficients; or a folder: their "
+                        "correlation and the dwells' residuals, too");
+    command->add_flag("--json", options->json, "print the result as JSON");
+    command
+        ->add_option("--spectrum", options->spectrum,
+                     "quadratic coefficients over frequency, where a recording has several "
+                     "(column frequency_hz): flat, groups, resonance, or auto, which weighs them")
+        ->check(CLI::IsMember({"auto", "flat", "groups", "resonance"}));
+    command->add_option("--spectra", options->spectra,
+                        "JSON list of {run, position, lines: [[hz, g_peak], ..]}, for a recording "
+                        "without the column");
+    command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
+    command->add_flag("--monte-carlo", options->monte_carlo,
+                      "draw the declared inputs (JCGM 101) to check the combined uncertainty");
+    command->footer(
+        "Example: vibrig identify recording.csv --config rig.toml --plot pictures --json > "
+        "result.json\n"
+        "Exit codes: 0 the result is valid or doubtful (the verdict says why), 1 it is not valid, "
+        "the configuration does not\nfit the recording (the warnings name what contradicts, and "
+        "the keys suspected), or\ncoefficients are not observable (the result names them and the "
+        "combinations that are "
+        "determined),\nwith --strict also when it is doubtful; 2 bad usage or input.");
+    command->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run(*options); }); });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,427 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <tuple>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/identified.hpp"
+#include "daemon/tool/analysis/spectrum_result.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/spectrum/prediction.hpp"
+#include "estimator/spectrum/profile.hpp"
+#include "proto/option_value.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using namespace estimator::spectrum;
+using Eigen::Index;
+using PredictionJson = nlohmann::ordered_json;
+
+constexpr double kPadsDamping = 0.2;
+
+struct PredictOptions {
+    std::string result, profile, config, at = "platform", recording;
+    std::vector<std::string> attitudes;
+    double seconds = 0, elastic_beyond = 1, tolerance = 0;
+    bool same_accelerometers = false, json = false, list = false, force = false;
+};
+
+template <class... Values>
+std::string row_text(const char* format, Values... values) {
+    std::array<char, 300> text{};
+    std::snprintf(text.data(), text.size(), format, values...);
+    return std::string(text.data()) + "\n";
+}
+
+nlohmann::json read_json(const std::string& path) {
+    std::ifstream file(path);
+    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
+    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
+    return root;
+}
+
+std::vector<std::pair<double, double>> read_pairs(const nlohmann::json& root, const char* key,
+                                                  const char* form, const std::string& path) {
+    std::vector<std::pair<double, double>> out;
+    const auto found = root.find(key);
+    if (found == root.end()) return out;
+    const std::string place = path + ": " + key;
+    if (!found->is_array())
+        throw std::runtime_error(place + ": found " + found->dump() + ", expected [" + form +
+                                 ", ..]");
+    for (const auto& one : *found) {
+        if (!one.is_array() || one.size() != 2 || !one[0].is_number() || !one[1].is_number())
+            throw std::runtime_error(place + "[" + std::to_string(out.size()) + "]: found " +
+                                     one.dump() + ", expected " + form);
+        out.emplace_back(one[0].get<double>(), one[1].get<double>());
+    }
+    return out;
+}
+
+void refuse_unknown(const nlohmann::json& root, const std::string& path) {
+    constexpr std::array<const char*, 6> kKnown{"name", "psd", "sines", "direction", "g_rms", "at"};
+    for (const auto& [key, value] : root.items()) {
+        if (std::find(kKnown.begin(), kKnown.end(), key) == kKnown.end())
+            throw std::runtime_error(path + ": " + key +
+                                     ": found an unknown key, expected name, psd, sines, "
+                                     "direction (along one line), g_rms or at");
+    }
+}
+
+/// A built-in profile by its name, or a file; `at` becomes what the file says.
+Profile read_profile(const std::string& name, std::string& at) {
+    for (const Profile& profile : built_in_profiles()) {
+        if (profile.name == name) return profile;
+    }
+    if (!std::ifstream(name))
+        throw std::runtime_error("--profile: found '" + name +
+                                 "', expected a JSON file or one of minimum-integrity, truck");
+    const nlohmann::json root = read_json(name);
+    if (!root.is_object())
+        throw std::runtime_error(name + ": expected a JSON object with psd or sines");
+    refuse_unknown(root, name);
+    Profile profile;
+    profile.name = root.value("name", name);
+    profile.psd = read_pairs(root, "psd", "[hz, g2_hz]", name);
+    profile.sines = read_pairs(root, "sines", "[hz, g_peak]", name);
+    if (const auto found = root.find("direction"); found != root.end()) {
+        if (!found->is_array() || found->size() != 3 ||
+            !std::all_of(found->begin(), found->end(), [](auto& x) { return x.is_number(); }))
+            throw std::runtime_error(name + ": direction: found " + found->dump() +
+                                     ", expected [north, up, east]");
+        profile.direction = {(*found)[0].get<double>(), (*found)[1].get<double>(),
+                             (*found)[2].get<double>()};
+        if (profile.direction.norm() > 0) profile.direction.normalize();
+    }
+    if (const auto found = root.find("g_rms"); found != root.end()) {
+        if (!found->is_number() || !(found->get<double>() > 0))
+            throw std::runtime_error(name + ": g_rms: found " + found->dump() +
+                                     ", expected a number above 0");
+        profile.g_rms = found->get<double>();
+    }
+    if (const auto found = root.find("at"); found != root.end()) {
+        if (*found != "platform" && *found != "table")
+            throw std::runtime_error(name + ": at: found " + found->dump() +
+                                     ", expected \"platform\" or \"table\"");
+        at = found->get<std::string>();
+    }
+    check(profile, name + ": ");
+    return profile;
+}
+
+std::array<double, 3> read_attitude(const std::string& text) {
+    std::array<double, 3> deg{};
+    int used = 0;
+    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &deg[0], &deg[1], &deg[2], &used) != 3 ||
+        static_cast<std::size_t>(used) != text.size() ||
+        !std::all_of(deg.begin(), deg.end(), [](double x) { return std::abs(x) <= 360; }))
+        throw std::runtime_error("--attitude: found '" + text +
+                                 "', expected ALPHA,BETA,GAMMA of the gimbals, deg, -360 to 360");
+    if (std::abs(std::remainder(deg[1], 360)) > 80)
+        throw std::runtime_error("--attitude: found " + text +
+                                 ", expected an inner angle of at most 80 deg");
+    return deg;
+}
+
+/// A profile as the platform has it.
+struct AtPlatform {
+    std::vector<Band> bands;
+    Eigen::Matrix3d moment;
+};
+
+AtPlatform at_platform(const Profile& profile, const std::string& at,
+                       const estimator::Settings& rig) {
+    std::vector<Band> bands = bands_of(profile);
+    double power = mean_square(profile);
+    if (at == "table") {
+        if (!(rig.transmission < 1))
+            throw std::runtime_error("vibration.transmission: found " +
+                                     std::to_string(rig.transmission) +
+                                     ", expected pads (below 1) for a profile at the table");
+        std::tie(bands, power) =
+            behind(bands, power, pads_with(rig.frequency_hz, rig.transmission, kPadsDamping));
+    }
+    return {bands, power * profile.direction * profile.direction.transpose()};
+}
+
+/// Dwells under the profile: what they showed, and where.
+struct Held {
+    std::vector<Situation> situations;
+    Eigen::MatrixXd rates;
+    std::vector<Eigen::Matrix3d> variances;
+    std::vector<double> relative_errors;
+    std::vector<std::array<double, 3>> deg;
+};
+
+Held held_out(const std::string& recording, const std::string& config, const Profile& profile,
+              const AtPlatform& vibration) {
+    if (!profile.psd.empty())
+        throw std::runtime_error(
+            "--verify: found a random profile, expected one of sines alone: a "
+            "recording of random dwells is not read");
+    const Identified found = identify_recording(recording, config);
+    const auto& rows = found.result.rows.empty() || !found.spectrum
+                           ? std::vector<estimator::DwellRow>(found.result.rows)
+                           : std::vector<estimator::DwellRow>(found.spectrum->table.rows().begin(),
+                                                              found.spectrum->table.rows().end());
+    if (rows.empty())
+        throw std::runtime_error(recording + ": found no dwell that can be used, expected one");
+    Held held;
+    held.rates.resize(static_cast<Index>(rows.size()), 3);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+        const estimator::DwellRow& row = rows[k];
+        // What happened, not what was asked for.
+        const estimator::LevelTensor& g = row.vibration.gamma;
+        Eigen::Matrix3d moment;
+        moment << g[0], g[3], g[4], g[3], g[1], g[5], g[4], g[5], g[2];
+        moment *= row.vibration.kappa - 1;
+        if (!(row.vibration.kappa > 1))
+            throw std::runtime_error(recording + ": run " + std::to_string(row.run) +
+                                     ", position " + std::to_string(row.position) +
+                                     ": found a dwell at rest, expected dwells under the profile");
+        held.situations.push_back({row.angles, moment, vibration.bands, row.duration_s, true});
+        held.rates.row(static_cast<Index>(k)) = row.rate;
+        held.variances.push_back(row.variance);
+        held.relative_errors.push_back(0);
+        std::array<double, 3> deg{};
+        for (std::size_t i = 0; i < 3; ++i)
+            deg[i] = row.angles[static_cast<Index>(i)] * 180 / std::numbers::pi;
+        held.deg.push_back(deg);
+    }
+    return held;
+}
+
+const char* word_of(const Verification& of) {
+    if (!of.confirmed) return "contradicted";
+    return of.tight ? "confirmed" : "confirmed, but the test is weak";
+}
+
+PredictionJson three(const Eigen::MatrixXd& of, Index row) {
+    PredictionJson list = PredictionJson::array();
+    for (Index j = 0; j < 3; ++j) list.push_back(number_or_null(of(row, j)));
+    return list;
+}
+
+PredictionJson attitudes_json(const Prediction& of, const std::vector<std::array<double, 3>>& deg) {
+    PredictionJson list = PredictionJson::array();
+    for (std::size_t k = 0; k < deg.size(); ++k) {
+        const auto row = static_cast<Index>(k);
+        PredictionJson u = PredictionJson::array();
+        for (Index j = 0; j < 3; ++j) u.push_back(number_or_null(of.u(row, j)));
+        list.push_back({{"angles", deg[k]},
+                        {"drift", three(of.drift, row)},
+                        {"u", std::move(u)},
+                        {"budget",
+                         {{"coefficients", three(of.coefficients, row)},
+                          {"resonance", three(of.resonance, row)},
+                          {"gain", three(of.gain, row)},
+                          {"realisation", three(of.realisation, row)},
+                          {"outside", three(of.outside, row)}}}});
+    }
+    return list;
+}
+
+/// "gyro y at (30, 10, -20)": the worst of a verification.
+std::string worst_text(const Verification& of, const Held& held) {
+    const auto& deg = held.deg[static_cast<std::size_t>(of.dwell)];
+    return row_text(
+        "largest z %.1f, gyro %c at (%.1f, %.1f, %.1f): \"%s\" would have to be %.1f "
+        "times as large",
+        of.largest_z, "xyz"[of.gyro], deg[0], deg[1], deg[2], of.part.c_str(), of.larger);
+}
+
+struct Predicted {
+    Profile profile;
+    Prediction prediction;
+    std::vector<std::array<double, 3>> deg;
+    std::optional<Verification> verification;
+    Held held;
+    std::string refusal;
+    [[nodiscard]] bool covered() const { return prediction.covered(); }
+};
+
+std::string predicted_json(const Predicted& of) {
+    PredictionJson verification = nullptr;
+    if (of.verification) {
+        const Verification& v = *of.verification;
+        PredictionJson dwells = PredictionJson::array();
+        for (Index k = 0; k < v.z.rows(); ++k)
+            dwells.push_back({{"angles", of.held.deg[static_cast<std::size_t>(k)]},
+                              {"rate", three(of.held.rates, k)},
+                              {"z", three(v.z, k)}});
+        verification = {
+            {"chi_square", v.chi_square}, {"dof", v.degrees},           {"p", v.p},
+            {"word", word_of(v)},         {"largest_z", v.largest_z},   {"part", v.part},
+            {"larger", v.larger},         {"dwells", std::move(dwells)}};
+    }
+    const PredictionJson root{
+        {"prediction",
+         {{"profile", of.profile.name},
+          {"g_rms", std::sqrt(mean_square(of.profile))},
+          {"power_outside", of.prediction.power_outside},
+          {"verdict", of.covered() ? "covered" : "not covered"},
+          {"refusal", of.refusal.empty() ? PredictionJson(nullptr) : PredictionJson(of.refusal)},
+          {"attitudes", attitudes_json(of.prediction, of.deg)},
+          {"verification", std::move(verification)}}}};
+    return root.dump() + "\n";
+}
+
+std::string predicted_text(const Predicted& of) {
+    std::string text =
+        row_text("%s: %.4g g rms", of.profile.name.c_str(), std::sqrt(mean_square(of.profile)));
+    if (!of.refusal.empty()) text += "FORCED: " + of.refusal + "\n";
+    text += row_text("%-24s %-4s %12s %10s   %s", "attitude, deg", "gyro", "drift deg/h", "u",
+                     "of it coefficients, resonance, gain, realisation, outside");
+    for (std::size_t k = 0; k < of.deg.size(); ++k) {
+        const auto row = static_cast<Index>(k);
+        const Prediction& p = of.prediction;
+        for (Index j = 0; j < 3; ++j)
+            text += row_text("(%6.1f, %6.1f, %6.1f) %-4c %12.6f %10.6f   %.6f %.6f %.6f %.6f %.6f",
+                             of.deg[k][0], of.deg[k][1], of.deg[k][2], "xyz"[j], p.drift(row, j),
+                             p.u(row, j), p.coefficients(row, j), p.resonance(row, j),
+                             p.gain(row, j), p.realisation(row, j), p.outside(row, j));
+    }
+    text += row_text("%.1f %% of the profile's power lies outside what was measured: %s",
+                     100 * of.prediction.power_outside, of.covered() ? "covered" : "NOT COVERED");
+    if (of.verification) {
+        const Verification& v = *of.verification;
+        text += row_text("held-out dwells: chi-square %.1f of %d, p = %.2g: %s", v.chi_square,
+                         v.degrees, v.p, word_of(v));
+        if (!v.confirmed) text += worst_text(v, of.held);
+    }
+    return text;
+}
+
+std::string profiles_text() {
+    std::string text;
+    for (const Profile& profile : built_in_profiles()) {
+        text += row_text("%s: %.2f g rms", profile.name.c_str(), std::sqrt(mean_square(profile)));
+        for (const auto& [hz, density] : profile.psd)
+            text += row_text("    %6g Hz %10g g^2/Hz", hz, density);
+    }
+    return text + "Examples of the types, not a standard's text.\n";
+}
+
+PredictionJson profiles_json() {
+    PredictionJson list = PredictionJson::array();
+    for (const Profile& profile : built_in_profiles())
+        list.push_back({{"name", profile.name},
+                        {"g_rms", std::sqrt(mean_square(profile))},
+                        {"psd", profile.psd}});
+    return {{"profiles", std::move(list)}};
+}
+
+Predicted predict_for(const PredictOptions& options) {
+    if (options.result.empty())
+        throw std::runtime_error("found no RESULT.json, expected that of vibrig identify --json");
+    if (options.profile.empty())
+        throw std::runtime_error("found no --profile, expected a JSON file or a name of --list");
+    if (options.attitudes.empty() && options.recording.empty())
+        throw std::runtime_error("found no --attitude, expected one or more, or --verify");
+    const Model model = read_model(read_json(options.result), options.result);
+    if (!model.refusal.empty() && !options.force)
+        throw std::runtime_error(options.result + ": spectrum.refusal: found \"" + model.refusal +
+                                 "\", expected a campaign that a model fits (or --force)");
+    Predicted out;
+    out.refusal = model.refusal;
+    std::string at;
+    out.profile = read_profile(options.profile, at);
+    if (at.empty()) at = options.at;
+    const auto rig = configuration::load(options.config, false).configuration.estimator;
+    const AtPlatform vibration = at_platform(out.profile, at, rig);
+    const PredictionOptions how{options.elastic_beyond, options.same_accelerometers};
+    std::vector<Situation> situations;
+    for (const std::string& text : options.attitudes) {
+        const auto deg = read_attitude(text);
+        out.deg.push_back(deg);
+        situations.push_back({Eigen::Vector3d(deg[0], deg[1], deg[2]) * (std::numbers::pi / 180),
+                              vibration.moment, vibration.bands, options.seconds});
+    }
+    if (!options.recording.empty()) {
+        out.held = held_out(options.recording, options.config, out.profile, vibration);
+        const Prediction of_held = predict(model, out.held.situations, how);
+        out.verification = verify(of_held, out.held.rates, out.held.variances,
+                                  out.held.relative_errors, options.tolerance);
+        if (situations.empty()) {
+            situations = out.held.situations;
+            out.deg = out.held.deg;
+        }
+    }
+    out.prediction = predict(model, situations, how);
+    return out;
+}
+
+int run_predict(const PredictOptions& options) {
+    if (options.list) {
+        std::cout << (options.json ? profiles_json().dump() + "\n" : profiles_text());
+        return 0;
+    }
+    const Predicted of = predict_for(options);
+    std::cout << (options.json ? predicted_json(of) : predicted_text(of)) << std::flush;
+    const bool good =
+        of.covered() && of.refusal.empty() && (!of.verification || of.verification->confirmed);
+    return good ? 0 : kNo;
+}
+
+}  // namespace
+
+void add_predict(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<PredictOptions>();
+    CLI::App* command = app.add_subcommand(
+        "predict", "Drift under a vibration profile, with its uncertainty, and held-out dwells");
+    command->add_option("RESULT", options->result, "JSON of vibrig identify --json");
+    command->add_option("--profile", options->profile,
+                        "JSON file {psd: [[hz, g2_hz], ..], sines: [[hz, g_peak], ..], direction, "
+                        "g_rms, at}, or a name of --list");
+    command
+        ->add_option("--attitude", options->attitudes,
+                     "ALPHA,BETA,GAMMA of the gimbals, deg; again for more")
+        ->allow_extra_args(false);
+    command->add_option("--at", options->at, "where the profile holds: platform, or table (pads)")
+        ->check(CLI::IsMember({"platform", "table"}));
+    command
+        ->add_option("--seconds", options->seconds,
+                     "mean over so long: what a random vibration's realisation varies is added")
+        ->check(proto::finite(proto::kAboveZero, 1e7));
+    command->add_option("--verify", options->recording,
+                        "recording of dwells under the profile (sines) that were not in the fit");
+    command
+        ->add_option("--tolerance", options->tolerance,
+                     "deg/h that two standard deviations stay below in a tight test")
+        ->check(proto::finite(proto::kAboveZero, 1e3));
+    command
+        ->add_option("--elastic-beyond", options->elastic_beyond,
+                     "elastic part allowed for beyond what was measured, of the static (1)")
+        ->check(proto::finite(0, 100));
+    command->add_flag("--same-accelerometers", options->same_accelerometers,
+                      "the profile was measured with the campaign's: their gain cancels");
+    command->add_option("--config", options->config, "configuration file (TOML) of the rig");
+    command->add_flag("--force", options->force, "print what is refused, marked");
+    command->add_flag("--json", options->json, "print the prediction as JSON");
+    command->add_flag("--list", options->list, "built-in profiles: examples of their types");
+    command->footer(
+        "Example: vibrig predict result.json --profile truck --attitude 45,0,90 --seconds 600\n"
+        "Exit codes: 0 covered, and confirmed where it was verified; 1 not covered by what was "
+        "measured,\nforced, or contradicted; 2 bad usage or input.");
+    command->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run_predict(*options); }); });
+}
+
+}  // namespace vibrig::tool

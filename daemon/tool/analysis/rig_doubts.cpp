@@ -1,0 +1,44 @@
+#include "daemon/tool/analysis/rig_doubts.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "estimator/filter/settings_check.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace commissioning = estimator::commissioning;
+
+/// As the filter: beyond it the level of a dwell is not known.
+constexpr double kMeanForce_g = 0.02;
+
+}  // namespace
+
+std::string RigDoubts::tell(estimator::Result& result) const {
+    for (const auto& doubt : estimator::doubtful_axes(settings_))
+        result.warnings.push_back(doubt.key + ": found " + doubt.found + ", expected " +
+                                  doubt.expected);
+    // A dwell that was never ended has no summary.
+    if (dwells_.size() != result.dwells.size()) return {};
+    std::vector<commissioning::DwellMean> means;
+    for (std::size_t i = 0; i < dwells_.size(); ++i) {
+        const auto& summary = result.dwells[i];
+        if (!dwells_[i].known()) continue;
+        const bool level = std::abs(summary.mean_force_g - 1) <= kMeanForce_g;
+        means.push_back(dwells_[i].mean(level ? summary.kappa : 1, level));
+    }
+    const auto found = commissioning::consistency(settings_, means);
+    for (const auto& contradiction : found.contradictions)
+        result.warnings.push_back("configuration and recording do not fit: " + contradiction);
+    if (found.contradictions.empty()) return {};
+    std::string suspects;
+    for (const auto& suspect : commissioning::suspects(settings_, means))
+        suspects += (suspects.empty() ? "" : "; ") + suspect.words;
+    result.warnings.push_back(suspects.empty() ? "no single key explains it"
+                                               : "suspects, best first: " + suspects);
+    return found.contradictions.front();
+}
+
+}  // namespace vibrig::tool

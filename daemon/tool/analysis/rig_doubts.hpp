@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimator/commissioning/consistency.hpp"
+#include "estimator/identification/identification.hpp"
+
+namespace vibrig::tool {
+
+/// Holds a recording against the configuration that it is identified with: gravity, Earth rate and
+/// what 30 coefficients cannot explain (docs/commissioning.md).
+class RigDoubts {
+  public:
+    explicit RigDoubts(const estimator::Settings& settings) : settings_(settings) {}
+
+    void begin_dwell() { dwells_.emplace_back(); }
+    void add(const estimator::Measurement& measurement) { dwells_.back().add(measurement); }
+    /// Adds to the result's warnings. The first contradiction; empty: the configuration fits.
+    [[nodiscard]] std::string tell(estimator::Result& result) const;
+
+  private:
+    estimator::Settings settings_;
+    std::vector<estimator::commissioning::DwellMeans> dwells_;
+};
+
+}  // namespace vibrig::tool

@@ -1,0 +1,414 @@
+#include "daemon/tool/analysis/spectrum_result.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <stdexcept>
+
+#include "daemon/results/assessment_json.hpp"
+#include "estimator/filter/parameters.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using estimator::kParameters;
+using namespace estimator::spectrum;
+namespace uncertainty = estimator::uncertainty;
+using Json = nlohmann::ordered_json;
+
+constexpr std::array<const char*, 3> kGyros{"x", "y", "z"};
+
+template <class... Values>
+std::string line(const char* format, Values... values) {
+    std::array<char, 300> text{};
+    std::snprintf(text.data(), text.size(), format, values...);
+    return std::string(text.data()) + "\n";
+}
+
+Json numbers_of(const VectorXd& values) {
+    Json list = Json::array();
+    for (const double value : values) list.push_back(number_or_null(value));
+    return list;
+}
+
+Json rows_of(const MatrixXd& matrix) {
+    Json rows = Json::array();
+    for (Index i = 0; i < matrix.rows(); ++i) rows.push_back(numbers_of(matrix.row(i)));
+    return rows;
+}
+
+std::string axis_text(const estimator::SignedAxis& axis) {
+    return std::string(axis.sign < 0 ? "-" : "+") + "xyz"[axis.axis];
+}
+
+/// What of a rig's frames the drift depends on.
+Json frame_json(const estimator::Settings& settings) {
+    Json gyros = Json::array();
+    for (const auto& gyro : settings.gyro_axes) {
+        Json axes = Json::array();
+        for (const auto& axis : gyro) axes.push_back(axis_text(axis));
+        gyros.push_back(std::move(axes));
+    }
+    return {{"up", axis_text(settings.up)},
+            {"gyro_axes", std::move(gyros)},
+            {"elevation_deg", settings.elevation_deg}};
+}
+
+Json groups_json(const SpectrumResult& of) {
+    Json list = Json::array();
+    for (std::size_t k = 0; k < of.table.kinds().size(); ++k) {
+        const Index begin = kBase - kElastic + kElastic * static_cast<Index>(k);
+        Json value = Json::array(), sigma = Json::array();
+        for (Index j = 0; j < 3; ++j) {
+            for (Index q = 0; q < kElastic; ++q) {
+                value.push_back(number_or_null(of.analysis.groups.value(begin + q, j)));
+                sigma.push_back(number_or_null(of.analysis.groups.sigma(begin + q, j)));
+            }
+        }
+        list.push_back({{"hz", of.table.kinds()[k].hz()},
+                        {"dwells", of.table.dwells_of(k)},
+                        {"coefficients", std::move(value)},
+                        {"sigma", std::move(sigma)}});
+    }
+    return list;
+}
+
+Json flat_json(const Flatness& flat) {
+    Json seen = Json::object();
+    for (const auto& [hz, share] : flat.smallest_seen)
+        seen[std::to_string(static_cast<int>(hz))] = number_or_null(share);
+    return {{"chi_square", number_or_null(flat.chi_square)},
+            {"dof", flat.degrees},
+            {"p", number_or_null(flat.p)},
+            {"alarm", flat.alarm},
+            {"smallest_share_seen", std::move(seen)}};
+}
+
+Json told_json(const Told& told) {
+    return {{"hz", told.hz.mean},
+            {"hz_interval", {told.hz.low, told.hz.high}},
+            {"damping", told.damping.mean},
+            {"damping_interval", {told.damping.low, told.damping.high}},
+            {"elastic", numbers_of(told.elastic)},
+            {"sigma", numbers_of(told.sigma)}};
+}
+
+/// One resonance as itself, two as a list, none as null.
+template <class List, class Each>
+Json one_or_list(const List& list, const Each& each) {
+    if (list.empty()) return nullptr;
+    if (list.size() == 1) return each(list.front());
+    Json out = Json::array();
+    for (const auto& one : list) out.push_back(each(one));
+    return out;
+}
+
+Json mixture_json(const std::vector<Hypothesis>& mixture) {
+    Json list = Json::array();
+    for (const Hypothesis& one : mixture)
+        list.push_back(
+            {{"w", one.weight},
+             {"hz", one_or_list(one.resonances, [](auto& r) { return Json(r.hz); })},
+             {"damping", one_or_list(one.resonances, [](auto& r) { return Json(r.damping); })},
+             {"x", numbers_of(one.x)},
+             {"p", rows_of(one.covariance)}});
+    return list;
+}
+
+Json effects_json(const std::vector<Effect>& effects) {
+    Json list = Json::array();
+    for (const Effect& effect : effects) {
+        Json change = Json::array();
+        for (const VectorXd& gyro : effect.change) change.push_back(numbers_of(gyro));
+        list.push_back({{"input", effect.input},
+                        {"element", effect.element.empty() ? Json(nullptr) : Json(effect.element)},
+                        {"change", std::move(change)}});
+    }
+    return list;
+}
+
+/// The rates of all dwells, with what is left of them.
+std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
+    std::vector<uncertainty::DwellRate> list;
+    std::array<VectorXd, 3> model;
+    for (std::size_t j = 0; j < 3; ++j) {
+        const Hypothesis& best = of.analysis.gyros[j].list.front();
+        model[j] = design(of.table, j, best.resonances) * best.x;
+    }
+    const auto times = uncertainty::dwell_table(of.table.rows());
+    for (std::size_t k = 0; k < of.table.list().size(); ++k) {
+        const estimator::DwellRow& row = of.table.list()[k].row;
+        uncertainty::DwellRate rate;
+        rate.run = row.run;
+        rate.position = row.position;
+        rate.level_g = std::sqrt(2 * std::max(0.0, row.vibration.kappa - 1));
+        rate.time_h = times.time_h[static_cast<Index>(k)];
+        for (std::size_t j = 0; j < 3; ++j) {
+            const auto g = static_cast<Index>(j);
+            rate.rate[j] = row.rate[g];
+            rate.sigma[j] = rate.residual_sigma[j] = std::sqrt(row.variance(g, g));
+            rate.residual[j] = row.rate[g] - model[j][static_cast<Index>(k)];
+        }
+        list.push_back(rate);
+    }
+    return list;
+}
+
+void tell_coefficients(const Analysis& of, uncertainty::Assessment& to) {
+    using uncertainty::Contribution;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        uncertainty::Coefficient& c = to.coefficients[i];
+        if (!std::isfinite(c.value)) continue;
+        const std::size_t internal = estimator::internal_of(i);
+        const auto a = static_cast<Index>(internal);
+        c.value = of.value[a];
+        c.u_a = std::sqrt(of.covariance_a(a, a));
+        c.u = std::sqrt(of.covariance(a, a));
+        c.u_b = std::sqrt(std::max(0.0, c.u * c.u - c.u_a * c.u_a));
+        c.expanded = c.k * c.u;
+        c.budget.clear();
+        const auto infinite = std::numeric_limits<double>::infinity();
+        c.budget.push_back({"noise and drift states", "", 1, c.u_a, c.u_a,
+                            uncertainty::Shape::normal, infinite, true});
+        for (const Effect& effect : of.model.effects) {
+            const double change = effect.change[internal % estimator::kGyros]
+                                               [static_cast<Index>(internal / estimator::kGyros)];
+            // Per standard uncertainty.
+            c.budget.push_back({effect.input, effect.element, change, 1, std::abs(change),
+                                uncertainty::Shape::normal, infinite, true});
+        }
+        std::stable_sort(c.budget.begin(), c.budget.end(), [](const auto& x, const auto& y) {
+            return x.contribution > y.contribution;
+        });
+        for (std::size_t k = 0; k < kParameters; ++k) {
+            const auto b = static_cast<Index>(estimator::internal_of(k));
+            if (!std::isfinite(to.coefficients[k].u)) continue;
+            to.covariance_combined(static_cast<Index>(i), static_cast<Index>(k)) =
+                of.covariance(a, b);
+        }
+    }
+}
+
+void doubt(uncertainty::Verdict& verdict, const std::string& text) {
+    using uncertainty::Level;
+    verdict.reasons.push_back({"spectrum", text, Level::doubtful});
+    if (verdict.level != Level::valid) return;
+    verdict.level = Level::doubtful;
+    verdict.sentence = "doubtful, because " + text;
+}
+
+const nlohmann::json& member(const nlohmann::json& in, const char* key, const std::string& place) {
+    const auto found = in.find(key);
+    if (found == in.end())
+        throw std::runtime_error(place + key +
+                                 ": found nothing, expected the result of vibrig identify --json");
+    return *found;
+}
+
+estimator::SignedAxis read_axis(const std::string& text) {
+    const auto at = text.size() == 2 ? std::string("xyz").find(text[1]) : std::string::npos;
+    if (at == std::string::npos)
+        throw std::runtime_error("found '" + text + "', expected an axis such as +y");
+    return {static_cast<int>(at), text[0] == '-' ? -1 : 1};
+}
+
+VectorXd read_vector(const nlohmann::json& list) {
+    const auto values = list.get<std::vector<double>>();
+    return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+}
+
+MatrixXd read_rows(const nlohmann::json& list) {
+    MatrixXd out(static_cast<Index>(list.size()), static_cast<Index>(list.at(0).size()));
+    for (std::size_t i = 0; i < list.size(); ++i)
+        out.row(static_cast<Index>(i)) = read_vector(list[i]);
+    return out;
+}
+
+Hypothesis read_hypothesis(const nlohmann::json& from) {
+    Hypothesis one;
+    one.weight = from.at("w").get<double>();
+    const auto& hz = from.at("hz");
+    const auto& damping = from.at("damping");
+    if (hz.is_array()) {
+        for (std::size_t r = 0; r < hz.size(); ++r)
+            one.resonances.push_back({hz[r].get<double>(), damping.at(r).get<double>()});
+    } else if (hz.is_number()) {
+        one.resonances = {{hz.get<double>(), damping.get<double>()}};
+    }
+    one.x = read_vector(from.at("x"));
+    one.covariance = read_rows(from.at("p"));
+    const Index columns = kBase + kElastic * static_cast<Index>(one.resonances.size());
+    if (one.x.size() != columns || one.covariance.rows() != one.covariance.cols())
+        throw std::runtime_error("found " + std::to_string(one.x.size()) +
+                                 " coefficients, expected " + std::to_string(columns));
+    one.linearised = one.covariance.rows() > one.x.size();
+    return one;
+}
+
+void read_frame(const nlohmann::json& frame, estimator::Settings& settings) {
+    settings.up = read_axis(frame.at("up").get<std::string>());
+    for (std::size_t j = 0; j < 3; ++j) {
+        for (std::size_t k = 0; k < 3; ++k)
+            settings.gyro_axes[j][k] =
+                read_axis(frame.at("gyro_axes").at(j).at(k).get<std::string>());
+    }
+    settings.elevation_deg = frame.at("elevation_deg").get<double>();
+}
+
+}  // namespace
+
+Form form_of(const std::string& name) {
+    for (const Form form : {Form::automatic, Form::flat, Form::groups, Form::resonance}) {
+        if (name == name_of(form)) return form;
+    }
+    throw std::runtime_error("found '" + name + "', expected auto, flat, groups or resonance");
+}
+
+SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<SpectralDwell> dwells,
+                           std::vector<Kind> kinds, Form form) {
+    SpectralTable table(settings, std::move(dwells), std::move(kinds));
+    Analysis analysis = analyse(settings, table, form);
+    const double hz = table.kinds().empty() ? 0 : table.kinds().front().hz();
+    return {std::move(analysis), std::move(table), hz};
+}
+
+void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
+           uncertainty::Assessment& assessed) {
+    if (!spectrum.several()) return;
+    const Analysis& of = spectrum.analysis;
+    tell_coefficients(of, assessed);
+    assessed.rates = rates_of(spectrum);
+    if (!of.model.refusal.empty() && of.form != Form::groups)
+        doubt(assessed.verdict, of.model.refusal);
+    if (of.flat.alarm && of.form != Form::resonance)
+        doubt(assessed.verdict, line("quadratic coefficients depend on the frequency (chi-square "
+                                     "%.0f of %d)",
+                                     of.flat.chi_square, of.flat.degrees));
+}
+
+void add_spectrum(const SpectrumResult& of, Json& root) {
+    const Analysis& a = of.analysis;
+    const bool still = a.form == Form::resonance;
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const std::size_t group = estimator::internal_of(i) / estimator::kGyros;
+        // Bias and linear terms know no frequency.
+        root["parameters"][i]["at_hz"] =
+            group < estimator::kDii || still ? Json(0.0) : number_or_null(of.reference_hz);
+    }
+    if (of.several()) {
+        for (std::size_t k = 0; k < of.table.list().size(); ++k) {
+            const SpectralDwell& dwell = of.table.list()[k];
+            Json lines = Json::array();
+            const double moment = dwell.row.vibration.kappa - 1;
+            if (dwell.kind) {
+                for (const Band& band : of.table.kinds()[*dwell.kind].bands)
+                    lines.push_back({band.hz, std::sqrt(2 * moment * band.share)});
+            }
+            root["dwell_rates"][k]["lines"] = std::move(lines);
+            root["dwell_rates"][k]["r_relative_error"] = dwell.relative_error;
+        }
+    }
+    Json odds = Json::array(), resonance = Json::array(), mixture = Json::array();
+    Json lack = Json::array();
+    for (std::size_t j = 0; j < 3; ++j) {
+        const Mixture& gyro = a.gyros[j];
+        odds.push_back(of.several() ? number_or_null(gyro.log_odds) : Json(nullptr));
+        resonance.push_back(one_or_list(tell(gyro), told_json));
+        mixture.push_back(mixture_json(gyro.list));
+        lack.push_back(of.several() ? number_or_null(a.lack_of_fit[j]) : Json(nullptr));
+    }
+    root["spectrum"] = {
+        {"model", name_of(a.form)},
+        {"frequencies", groups_json(of)},
+        {"flat", of.several() ? flat_json(a.flat) : Json(nullptr)},
+        {"log_odds", std::move(odds)},
+        {"resonance", std::move(resonance)},
+        {"mixture", std::move(mixture)},
+        {"lack_of_fit", std::move(lack)},
+        {"lowest_hz", a.model.lowest_hz},
+        {"highest_hz", a.model.highest_hz},
+        {"refusal", a.model.refusal.empty() ? Json(nullptr) : Json(a.model.refusal)},
+        {"effects", effects_json(a.model.effects)},
+        {"platform", frame_json(a.model.frame)}};
+}
+
+std::string spectrum_text(const SpectrumResult& of) {
+    if (!of.several()) return "";
+    const Analysis& a = of.analysis;
+    std::string text = "\nOver frequency: ";
+    for (std::size_t k = 0; k < of.table.kinds().size(); ++k)
+        text += (k > 0 ? ", " : "") + std::to_string(of.table.dwells_of(k)) + " dwells at " +
+                line("%.4g Hz", of.table.kinds()[k].hz()).substr(0, 20);
+    std::erase(text, '\n');
+    text = "\n" + text + "\n";
+    text += line("flat: chi-square %.1f of %d, p = %.2g%s", a.flat.chi_square, a.flat.degrees,
+                 a.flat.p, a.flat.alarm ? ": quadratic coefficients depend on the frequency" : "");
+    for (std::size_t j = 0; j < 3; ++j) {
+        if (a.form == Form::groups ||
+            (a.form == Form::flat && a.gyros[j].list.size() == 1 && a.gyros[j].log_odds == 0))
+            continue;
+        const Mixture& gyro = a.gyros[j];
+        if (!gyro.resonant()) {
+            text += line("gyro %s: no elastic part (log odds %.1f)", kGyros[j], gyro.log_odds);
+            continue;
+        }
+        for (const Told& told : tell(gyro))
+            text += line(
+                "gyro %s: elastic part%s, resonance at %.2f (%.2f, %.2f) Hz, damping "
+                "%.4f (%.4f, %.4f)",
+                kGyros[j], gyro.named() ? "" : " (not named)", told.hz.mean, told.hz.low,
+                told.hz.high, told.damping.mean, told.damping.low, told.damping.high);
+    }
+    if (!a.model.refusal.empty()) text += "no prediction: " + a.model.refusal + "\n";
+    text += line(
+        "An elastic part of 20 %% would have been seen up to %.4g Hz; beyond it nothing "
+        "is known.",
+        a.flat.highest_hz);
+    return text;
+}
+
+Model read_model(const nlohmann::json& root, const std::string& path) {
+    if (!root.is_object())
+        throw std::runtime_error(path + ": expected the JSON of vibrig identify --json");
+    const nlohmann::json& spectrum = member(root, "spectrum", path + ": ");
+    const std::string place = path + ": spectrum.";
+    Model model;
+    const auto& mixture = member(spectrum, "mixture", place);
+    const auto& effects = member(spectrum, "effects", place);
+    try {
+        read_frame(member(spectrum, "platform", place), model.frame);
+        for (std::size_t j = 0; j < 3; ++j) {
+            for (const auto& one : mixture.at(j)) model.mixture[j].push_back(read_hypothesis(one));
+            if (model.mixture[j].empty()) throw std::runtime_error("mixture: found it empty");
+        }
+        for (const auto& one : effects) {
+            Effect effect{one.at("input").get<std::string>(), "", {}};
+            for (std::size_t j = 0; j < 3; ++j) {
+                effect.change[j] = read_vector(one.at("change").at(j));
+                const auto& heaviest = model.mixture[j].front();
+                if (effect.change[j].size() != heaviest.x.size())
+                    throw std::runtime_error(
+                        "effects: found " + std::to_string(effect.change[j].size()) +
+                        " numbers, expected " + std::to_string(heaviest.x.size()));
+            }
+            model.effects.push_back(std::move(effect));
+        }
+        model.lowest_hz = member(spectrum, "lowest_hz", place).get<double>();
+        model.highest_hz = member(spectrum, "highest_hz", place).get<double>();
+        const auto& refusal = member(spectrum, "refusal", place);
+        if (refusal.is_string()) model.refusal = refusal.get<std::string>();
+    } catch (const nlohmann::json::exception& error) {
+        throw std::runtime_error(place + "mixture: " + error.what() +
+                                 ", expected the result of vibrig identify --json");
+    }
+    return model;
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,151 @@
+// vibrig uncertainty: the budget of a result, and what would shrink it.
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/tool/recordings/identified.hpp"
+#include "daemon/plot/chart.hpp"
+#include "daemon/results/result_table.hpp"
+#include "daemon/tool/analysis/uncertainty_text.hpp"
+
+namespace vibrig::tool {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace uncertainty = estimator::uncertainty;
+
+struct UncertaintyOptions {
+    std::string file, config, plot, coefficient;
+    bool json = false, strict = false, monte_carlo = false;
+};
+
+Json leverage_json(const uncertainty::Assessment& assessed) {
+    Json list = Json::array();
+    for (const uncertainty::Leverage& of : uncertainty::leverages(assessed)) {
+        Json without = Json::object();
+        for (std::size_t k = 0; k < uncertainty::kKinds; ++k)
+            without[uncertainty::kind_name(k)] = number_or_null(of.without[k]);
+        list.push_back({{"input", of.input},
+                        {"u", number_or_null(of.u)},
+                        {"declared", of.declared},
+                        {"u_ratio_without", std::move(without)},
+                        {"remedy", of.remedy()}});
+    }
+    return list;
+}
+
+std::string budget_json(const Identified& of, const uncertainty::MonteCarlo* drawn) {
+    Json root = assessment_json(of.assessed), list = Json::array();
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto& c = of.assessed.coefficients[i];
+        Json one{{"name", estimator::parameter_names()[i]},
+                 {"unit", estimator::parameter_unit(i)},
+                 {"value", number_or_null(c.value)},
+                 {"sigma", number_or_null(c.sigma)}};
+        one.update(coefficient_json(c));
+        if (drawn != nullptr)
+            one["interval"] = {number_or_null(drawn->coefficients[i].low),
+                               number_or_null(drawn->coefficients[i].high)};
+        list.push_back(std::move(one));
+    }
+    Json out{{"coefficients", std::move(list)}, {"leverage", leverage_json(of.assessed)}};
+    out.update(root);
+    if (drawn != nullptr) out["monte_carlo"] = monte_carlo_json(*drawn);
+    return out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::size_t coefficient_number(const std::string& name) {
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        if (name == estimator::parameter_names()[i]) return i;
+    }
+    throw std::runtime_error("--coefficient: found '" + name +
+                             "', expected a name such as D_Fx or D_IIz");
+}
+
+/// Of each kind the parts' rms over it, in units of u: stacked they are 1.
+void draw_budget(const uncertainty::Assessment& assessed, const std::string& path) {
+    plot::Chart chart;
+    chart.title = "Parts of the combined uncertainty";
+    chart.x.label = "coefficient, as listed";
+    chart.y = plot::Axis("part of u squared");
+    chart.y.include(0);
+    chart.y.include(1);
+    for (const uncertainty::Leverage& of : uncertainty::leverages(assessed)) {
+        plot::Curve curve;
+        curve.name = of.input;
+        curve.look = plot::Look::dots;
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+            const auto& c = assessed.coefficients[i];
+            double square = 0;
+            for (const auto& part : c.budget)
+                square += part.input == of.input ? part.contribution * part.contribution : 0;
+            curve.x.push_back(static_cast<double>(i + 1));
+            curve.y.push_back(c.u > 0 ? square / (c.u * c.u) : uncertainty::kNone);
+        }
+        chart.curves.push_back(std::move(curve));
+        if (chart.curves.size() == 6) break;
+    }
+    plot::write_file(path, chart.svg());
+}
+
+int run(const UncertaintyOptions& options) {
+    const std::optional<std::size_t> only =
+        options.coefficient.empty() ? std::nullopt
+                                    : std::optional(coefficient_number(options.coefficient));
+    const Identified identified = identify_recording(options.file, options.config);
+    const auto& assessed = identified.assessed;
+    if (!assessed.done)
+        throw std::runtime_error(options.file +
+                                 ": found no two dwells that can be used, or estimator.method = "
+                                 "\"two-step\"; expected what an uncertainty can be had from");
+    std::optional<uncertainty::MonteCarlo> drawn;
+    if (options.monte_carlo) drawn = draw(identified);
+    const auto* check = drawn ? &*drawn : nullptr;
+    if (!options.plot.empty()) draw_budget(assessed, options.plot);
+    std::cout << (options.json ? budget_json(identified, check)
+                               : budget_table(assessed, only) +
+                                     (check != nullptr ? monte_carlo_text(*check) : ""));
+    return exit_status(assessed.verdict.level, options.strict);
+}
+
+}  // namespace
+
+void add_uncertainty(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<UncertaintyOptions>();
+    CLI::App* command = app.add_subcommand(
+        "uncertainty", "The uncertainty budget of a result, and what would shrink it most");
+    command
+        ->add_option("FILE", options->file,
+                     "a recording (CSV), or a campaign: its folder, HDF5 file or name")
+        ->required();
+    command->add_option("--config", options->config,
+                        "configuration file (TOML) with [uncertainty] and [drift]; without it all "
+                        "defaults apply, of a campaign its own");
+    command->add_option("--coefficient", options->coefficient,
+                        "the whole budget of this one only, such as D_IIx");
+    command->add_option("--plot", options->plot, "draw the parts of the budget: an SVG file");
+    command->add_flag("--monte-carlo", options->monte_carlo,
+                      "check the combined uncertainty by drawing the inputs (JCGM 101)");
+    command->add_flag("--json", options->json, "print everything as JSON");
+    command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
+    command->footer(
+        "Example: vibrig uncertainty platform-17-20260301T080000Z --monte-carlo\n"
+        "Inputs are declared in [uncertainty]; what is not declared stands at its default and is "
+        "marked.\n"
+        "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
+        "doubtful),\n2 bad usage or input.");
+    command->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run(*options); }); });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,124 @@
+#include "daemon/tool/analysis/uncertainty_text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+namespace vibrig::tool {
+namespace {
+
+using namespace estimator::uncertainty;
+
+/// Parts told of each coefficient, and pieces of advice.
+constexpr std::size_t kPartsTold = 3, kAdviceTold = 3;
+
+template <class... Values>
+std::string filled_line(const char* format, Values... values) {
+    std::array<char, 400> text{};
+    std::snprintf(text.data(), text.size(), format, values...);
+    return std::string(text.data()) + "\n";
+}
+
+/// Elements of one input together.
+std::vector<Contribution> joined_parts(const std::vector<Contribution>& parts) {
+    std::vector<Contribution> list;
+    for (const Contribution& part : parts) {
+        const auto at = std::find_if(list.begin(), list.end(), [&](const Contribution& one) {
+            return one.input == part.input;
+        });
+        if (at == list.end()) {
+            list.push_back(part);
+        } else {
+            at->contribution = std::hypot(at->contribution, part.contribution);
+        }
+    }
+    std::stable_sort(list.begin(), list.end(),
+                     [](const auto& a, const auto& b) { return a.contribution > b.contribution; });
+    return list;
+}
+
+std::string of_all(const Assessment& assessed) {
+    std::string text = filled_line("%-12s %11s %10s %10s %6s  %s", "coefficient", "value", "u", "U",
+                                   "k", "largest parts of u");
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const Coefficient& c = assessed.coefficients[i];
+        if (!(c.u > 0)) {
+            text += filled_line("%-12s not determined", estimator::parameter_names()[i]);
+            continue;
+        }
+        std::string parts;
+        for (const Contribution& part : joined_parts(c.budget)) {
+            if (std::count(parts.begin(), parts.end(), ';') + 1 > static_cast<long>(kPartsTold))
+                break;
+            parts += part.input + (part.declared ? " " : " (not declared) ") +
+                     filled_line("%.2g;", part.contribution);
+            parts.back() = ' ';
+        }
+        text += filled_line("%-12s %11.6f %10.6f %10.6f %6.2f  %s", estimator::parameter_names()[i],
+                            c.value, c.u, c.expanded, c.k, parts.c_str());
+    }
+    return text;
+}
+
+std::string of_one(const Assessment& assessed, std::size_t i) {
+    const Coefficient& c = assessed.coefficients[i];
+    const char* unit = estimator::parameter_unit(i);
+    if (!(c.u > 0)) return filled_line("%s: not determined", estimator::parameter_names()[i]);
+    std::string text =
+        filled_line("%s = %.6f, u %.6f, U %.6f %s (k %.2f)", estimator::parameter_names()[i],
+                    c.value, c.u, c.expanded, unit, c.k);
+    text +=
+        filled_line("%-24s %-28s %11s %11s %12s  %s", "input", "", "u of it", "c", "part of u", "");
+    for (const Contribution& part : c.budget)
+        text += filled_line("%-24s %-28s %11.3g %11.3g %12.3g  %s", part.input.c_str(),
+                            part.element.c_str(), part.u, part.sensitivity, part.contribution,
+                            part.declared ? "" : "not declared");
+    return text;
+}
+
+std::string advices(const Assessment& assessed) {
+    std::string text;
+    std::size_t told = 0;
+    for (const Leverage& of : leverages(assessed)) {
+        if (told == kAdviceTold || of.without[of.strongest()] > 0.98) break;
+        text += (told++ == 0 ? "what shrinks it most: " : "then: ") + advice(of) + "\n";
+    }
+    return text;
+}
+
+double middle_of(std::vector<double> values) {
+    if (values.empty()) return kNone;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+}  // namespace
+
+std::string budget_table(const Assessment& assessed, std::optional<std::size_t> only) {
+    return (only ? of_one(assessed, *only) : of_all(assessed)) + "\n" + advices(assessed) +
+           "verdict: " + assessed.verdict.sentence + "\n";
+}
+
+std::string allowance_table(const Assessment& assessed) {
+    constexpr std::array<const char*, kKinds> kUnits{"deg/h", "deg/h/g", "deg/h/g^2", "deg/h/g^2"};
+    std::string text = filled_line("With the declared inputs, medians:\n%-14s %10s %10s %10s  %s",
+                                   "", "sigma", "u", "U", "unit");
+    for (std::size_t k = 0; k < kKinds; ++k) {
+        std::array<std::vector<double>, 3> values;
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+            const Coefficient& c = assessed.coefficients[i];
+            if (kind_of(i) != k || !(c.u > 0)) continue;
+            values[0].push_back(c.sigma);
+            values[1].push_back(c.u);
+            values[2].push_back(c.expanded);
+        }
+        text += filled_line("%-14s %10.5f %10.5f %10.5f  %s", kind_name(k), middle_of(values[0]),
+                            middle_of(values[1]), middle_of(values[2]), kUnits[k]);
+    }
+    return text + advices(assessed);
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,433 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "daemon/tool/analysis/column_file.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/plot/chart.hpp"
+#include "daemon/results/progress.hpp"
+#include "estimator/zeros/observability.hpp"
+#include "estimator/zeros/simulation.hpp"
+#include "proto/option_value.hpp"
+
+namespace vibrig::tool::zero_command {
+
+namespace {
+
+namespace zeros = estimator::zeros;
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kArcsec = kDegree / 3600;
+constexpr std::array kAxisLetters{"x", "y", "z"};
+
+struct Options {
+    zeros::CalibrationSettings calibration;
+    double latitude_deg = 45.75;
+    double scale_ppm = 100;
+    double misalignment_arcsec = 50;
+    std::vector<double> slews{0, 90, -90, 90};
+    std::vector<double> lever_arm{0, 0, 0};
+    bool json = false;
+    std::string plot;
+    std::string file;
+    std::string down;  ///< the same with z down
+    std::string azimuth = "azimuth_deg";
+    // simulate
+    std::vector<double> zero_mg{5, -5, 5};
+    std::vector<double> real_scale_ppm{0, 0, 0};
+    std::vector<double> real_misalignment_arcsec{0, 0};
+    double period_s = 0.01;
+    double vibration_g = 0;
+    std::uint64_t seed = 1;
+    bool both_ways = false;
+    std::string write;
+};
+
+template <typename... Values>
+std::string line(const char* format, Values... values) {
+    std::array<char, 320> out{};
+    std::snprintf(out.data(), out.size(), format, values...);
+    return out.data();
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+zeros::CalibrationSettings settings_of(const Options& options) {
+    zeros::CalibrationSettings s = options.calibration;
+    s.site.latitude_rad = options.latitude_deg * kDegree;
+    s.noise.scale_factor = options.scale_ppm * 1e-6;
+    s.noise.misalignment = options.misalignment_arcsec * kArcsec;
+    s.plan.targets_deg = options.slews;
+    for (std::size_t i = 0; i < 3; ++i) s.lever_arm_m[i] = options.lever_arm[i];
+    return s;
+}
+
+plot::Chart chart_of(const std::vector<zeros::CalibrationTrace>& trace) {
+    plot::Chart chart;
+    chart.title = "Accelerometer zeros while the azimuth turns";
+    chart.x = plot::Axis("time [s]");
+    chart.y = plot::Axis("zero [mg]");
+    for (std::size_t i = 0; i < 3; ++i) {
+        plot::Curve curve{kAxisLetters[i], {}, {}, {}, {}, plot::Look::line};
+        for (const zeros::CalibrationTrace& point : trace) {
+            if (point.sigma_mg[i] > 2) continue;  // the first guesses would stretch the axis
+            curve.x.push_back(point.time_s);
+            curve.y.push_back(point.zero_mg[i]);
+            curve.low.push_back(point.zero_mg[i] - point.sigma_mg[i]);
+            curve.high.push_back(point.zero_mg[i] + point.sigma_mg[i]);
+        }
+        chart.curves.push_back(curve);
+    }
+    chart.notes.emplace_back(
+        "Bands: 1 sigma of the filter. x, y: zero + 1 g x misalignment, z: zero + 1 g x scale "
+        "error.");
+    return chart;
+}
+
+constexpr std::array kWhat{"zero + 1 g x misalignment", "zero + 1 g x misalignment",
+                           "zero + 1 g x scale error"};
+
+Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& seen) {
+    Json axes = Json::array();
+    for (std::size_t i = 0; i < 3; ++i) {
+        const zeros::AxisResult& axis = r.axis[i];
+        axes.push_back(
+            {{"axis", kAxisLetters[i]},
+             {"what", kWhat[i]},
+             {"observable", false},
+             {"zero_mg", number(axis.zero_mg)},
+             {"sigma_mg", number(axis.sigma_mg)},
+             {"filter_sigma_mg", number(axis.filter_sigma_mg)},
+             {"level_arcmin", number(axis.zero_mg * 1e-3 / kDegree * 60)},
+             {"movement_mg", number(axis.movement_mg)},
+             {"converged_s", axis.converged_s ? Json(*axis.converged_s) : Json(nullptr)}});
+    }
+    Json degrees = Json::object();
+    for (std::size_t i = 0; i < seen.degree.size(); ++i) {
+        degrees[zeros::kStateNames[i]] = seen.degree[i];
+    }
+    return {{"valid", r.valid},
+            {"time_s", r.time_s},
+            {"zeros", axes},
+            {"covariance_mg2", r.covariance_mg2},
+            {"gyro_bias_deg_h", r.gyro_bias_deg_h},
+            {"gyro_sigma_deg_h", r.gyro_sigma_deg_h},
+            {"observability",
+             {{"rank", seen.rank},
+              {"singular", seen.singular},
+              {"degree", degrees},
+              {"unobservable", seen.unobservable()}}},
+            {"innovation",
+             {{"mean_nis", r.innovation.mean_nis},
+              {"low", r.innovation.low},
+              {"high", r.innovation.high},
+              {"blocks", r.innovation.blocks},
+              {"outside", r.innovation.outside}}},
+            {"updates", r.updates},
+            {"gaps", r.gaps},
+            {"problems", r.problems},
+            {"notes", r.notes}};
+}
+
+std::string result_table(const zeros::CalibrationResult& r, const zeros::Observability& seen) {
+    std::string out = "axis      zero [mg]   sigma [mg]   level [']   converged\n";
+    for (std::size_t i = 0; i < 3; ++i) {
+        const zeros::AxisResult& axis = r.axis[i];
+        out += line("%-4s %14.5f %12.5f %11.4f   %s\n", kAxisLetters[i], axis.zero_mg,
+                    axis.sigma_mg, axis.zero_mg * 1e-3 / kDegree * 60,
+                    axis.converged_s ? line("%.0f s", *axis.converged_s).c_str() : "no");
+    }
+    out += line(
+        "x and y are zero + 1 g x misalignment, z is zero + 1 g x scale error; of their "
+        "sigma the filter's share is %.5f, %.5f, %.5f mg\n",
+        r.axis[0].filter_sigma_mg, r.axis[1].filter_sigma_mg, r.axis[2].filter_sigma_mg);
+    if (r.gyro_gain) {
+        out += line("vertical gyro against the azimuth read-out: %+.1f ppm\n", *r.gyro_gain * 1e6);
+    }
+    out += line("gyro biases %.4f, %.4f, %.4f deg/h (1 sigma %.2g, %.2g, %.2g)\n",
+                r.gyro_bias_deg_h[0], r.gyro_bias_deg_h[1], r.gyro_bias_deg_h[2],
+                r.gyro_sigma_deg_h[0], r.gyro_sigma_deg_h[1], r.gyro_sigma_deg_h[2]);
+    out += line("observability: rank %d of 15, smallest singular values %.2g, %.2g, %.2g\n",
+                seen.rank, seen.singular[12], seen.singular[13], seen.singular[14]);
+    for (std::size_t i = 0; i < seen.degree.size(); ++i) {
+        out +=
+            line("  %-10s %-9.3g%s", zeros::kStateNames[i], seen.degree[i], i % 3 == 2 ? "\n" : "");
+    }
+    if (r.innovation.blocks > 0) {
+        out += line("innovations: mean normalised square %.3f, expected %.3f to %.3f\n",
+                    r.innovation.mean_nis, r.innovation.low, r.innovation.high);
+    }
+    for (const std::string& note : r.notes) out += "note: " + note + "\n";
+    for (const std::string& problem : r.problems) out += "not valid: " + problem + "\n";
+    return out;
+}
+
+Json apart_json(const zeros::ZerosApart& apart) {
+    Json json = Json::array();
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double unit = i == 2 ? 1e-6 : kArcsec;
+        const std::string share = i == 2 ? "scale_ppm" : "misalignment_arcsec";
+        json.push_back({{"axis", kAxisLetters[i]},
+                        {"what", "zero"},
+                        {"observable", true},
+                        {"zero_mg", apart.zero_mg[i]},
+                        {"sigma_mg", std::sqrt(apart.covariance_mg2[i][i])},
+                        {share, apart.share[i] / unit},
+                        {share + "_sigma", apart.share_sigma[i] / unit}});
+    }
+    return json;
+}
+
+std::string apart_table(const zeros::ZerosApart& apart) {
+    std::string out = "with z down as well\n";
+    for (std::size_t i = 0; i < 3; ++i) {
+        const double unit = i == 2 ? 1e-6 : kArcsec;
+        out += line("%-4s zero %.5f +- %.5f mg, %s %.3f +- %.3f %s\n", kAxisLetters[i],
+                    apart.zero_mg[i], std::sqrt(apart.covariance_mg2[i][i]),
+                    i == 2 ? "scale error" : "misalignment", apart.share[i] / unit,
+                    apart.share_sigma[i] / unit, i == 2 ? "ppm" : "arcsec");
+    }
+    return out;
+}
+
+int report(const Options& options, const zeros::Calibration& run,
+           const std::optional<zeros::Calibration>& down) {
+    const zeros::CalibrationSettings s = settings_of(options);
+    zeros::CalibrationResult result = run.result();
+    std::optional<zeros::ZerosApart> apart;
+    if (down) {
+        const zeros::CalibrationResult below = down->result();
+        apart = zeros::separate(result, below);
+        result.valid = result.valid && below.valid;
+        for (const std::string& problem : below.problems)
+            result.problems.push_back("z down: " + problem);
+    }
+    const zeros::Observability seen = zeros::observability(s.plan.segments_deg(), s.site);
+    if (!options.plot.empty()) {
+        plot::write_file(options.plot, chart_of(run.trace()).svg());
+    }
+    if (options.json) {
+        Json json = result_json(result, seen);
+        if (apart) {
+            json["apart"] = apart_json(*apart);
+        }
+        std::cout << json.dump() << '\n';
+    } else {
+        std::cout << result_table(result, seen);
+        if (apart) {
+            std::cout << apart_table(*apart);
+        }
+    }
+    return result.valid ? 0 : kNo;
+}
+
+zeros::Calibration calibration_of(const Options& options, const std::string& file, bool down) {
+    zeros::CalibrationSettings settings = settings_of(options);
+    settings.inverted = settings.inverted || down;
+    // Of a file the reference is zero: how still the unit may have stood, not a measured noise.
+    settings.noise.reference_is_bound = true;
+    zeros::Calibration calibration(settings);
+    Progress progress("reading " + file);
+    const auto show = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
+    std::array<ColumnFile, 6> columns;
+    for (std::size_t i = 0; i < 6; ++i) {
+        const std::string name = i < 3 ? std::string("turn_") + kAxisLetters[i] + "_arcsec"
+                                       : std::string("dv_") + kAxisLetters[i - 3] + "_mps";
+        columns[i] = read_columns(file, {name, "time_s"}, show);
+    }
+    ColumnFile azimuth;
+    if (options.azimuth != "none") {
+        azimuth = read_columns(file, {options.azimuth, "time_s"}, show);
+    }
+    for (std::size_t k = 0; k < columns[0].values.size(); ++k) {
+        zeros::Increment in;
+        in.time_s = columns[0].times[k];
+        for (std::size_t i = 0; i < 3; ++i) {
+            in.turn_rad[i] = columns[i].values[k] * kArcsec;
+            in.velocity_mps[i] = columns[i + 3].values[k];
+        }
+        in.azimuth_rad = azimuth.values.empty() ? std::nan("") : azimuth.values[k] * kDegree;
+        if (!calibration.add(in)) break;
+    }
+    return calibration;
+}
+
+int run_file(const Options& options) {
+    if (options.file.empty()) {
+        throw std::invalid_argument("zero: FILE or `simulate` expected");
+    }
+    const zeros::Calibration up = calibration_of(options, options.file, false);
+    std::optional<zeros::Calibration> down;
+    if (!options.down.empty()) down = calibration_of(options, options.down, true);
+    return report(options, up, down);
+}
+
+void write_increments(const Options& options, const zeros::CalibrationSettings& s,
+                      const zeros::UnitErrors& errors) {
+    std::ofstream out(options.write);
+    out << "time_s,turn_x_arcsec,turn_y_arcsec,turn_z_arcsec,dv_x_mps,dv_y_mps,dv_z_mps,azimuth_"
+           "deg\n"
+        << std::setprecision(15);
+    zeros::UnitSimulation unit(s, errors, options.period_s, options.seed);
+    const double steps = std::round(s.plan.duration_s / options.period_s);
+    for (double k = 0; k <= steps; ++k) {
+        const zeros::Increment in = unit.next();
+        out << in.time_s;
+        for (const double turn : in.turn_rad) out << ',' << turn / kArcsec;
+        for (const double dv : in.velocity_mps) out << ',' << dv;
+        out << ',' << in.azimuth_rad / kDegree << '\n';
+    }
+    out.close();
+    if (!out) {
+        throw std::runtime_error(options.write + ": cannot be written");
+    }
+}
+
+int run_simulate(const Options& options) {
+    zeros::CalibrationSettings s = settings_of(options);
+    if (s.plan.duration_s / options.period_s > 1e7) {
+        throw std::invalid_argument(line("--duration: %g s are %g increments, expected at most 1e7",
+                                         s.plan.duration_s, s.plan.duration_s / options.period_s));
+    }
+    zeros::UnitErrors errors;
+    for (std::size_t i = 0; i < 3; ++i) {
+        errors.zero_mg[i] = options.zero_mg[i];
+        errors.scale[i] = options.real_scale_ppm[i] * 1e-6;
+    }
+    for (std::size_t i = 0; i < 2; ++i)
+        errors.accelerometer_cross[i][2] = options.real_misalignment_arcsec[i] * kArcsec;
+    errors.vibration_g = options.vibration_g;
+    if (!options.write.empty()) {
+        (void)zeros::Calibration(s);  // refuses what cannot work
+        write_increments(options, s, errors);
+        return 0;
+    }
+    const zeros::Calibration up = zeros::simulate(s, errors, options.period_s, options.seed);
+    std::optional<zeros::Calibration> down;
+    if (options.both_ways) {
+        s.inverted = true;
+        down = zeros::simulate(s, errors, options.period_s, options.seed + 1);
+    }
+    return report(options, up, down);
+}
+
+void add_common(CLI::App& command, Options& o) {
+    zeros::CalibrationSettings& s = o.calibration;
+    command.add_option("--latitude", o.latitude_deg, "deg (45.75)")->check(proto::finite(-89, 89));
+    command.add_option("--gravity", s.site.gravity_mps2, "m/s^2 (9.80665)")
+        ->check(proto::finite(1, 30));
+    command.add_option("--slews", o.slews, "azimuths in deg (0,90,-90,90); the last two repeat")
+        ->delimiter(',')
+        ->check(proto::finite(-360, 360));
+    command.add_option("--rate", s.plan.rate_deg_s, "of the slews, deg/s (5)")
+        ->check(proto::finite(proto::kAboveZero, 100));
+    command.add_option("--duration", s.plan.duration_s, "s (180)")
+        ->check(proto::finite(proto::kAboveZero, 86400));
+    command.add_flag("--static", s.allow_unobservable,
+                     "go on with a plan that cannot tell zeros from tilt");
+    command.add_flag("--inverted", s.inverted, "platform z down");
+    command.add_option("--lever-arm", o.lever_arm, "from the azimuth axis, body axes, m (0,0,0)")
+        ->expected(3)
+        ->delimiter(',')
+        ->check(proto::finite(-10, 10));
+    command.add_option("--gyro-noise", s.noise.angle_random_walk, "deg/sqrt(h) (0.01)")
+        ->check(proto::finite(0, 100));
+    command.add_option("--accelerometer-noise", s.noise.velocity_random_walk, "g/sqrt(Hz) (2e-5)")
+        ->check(proto::finite(0, 1));
+    command
+        .add_option("--velocity-noise", s.noise.velocity_reference, "of the reference, m/s (0.005)")
+        ->check(proto::finite(proto::kAboveZero, 1000));
+    command
+        .add_option("--position-noise", s.noise.position_reference, "of the reference, m (0.01)")
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command
+        .add_option("--scale-uncertainty", o.scale_ppm, "of the vertical accelerometer, ppm (100)")
+        ->check(proto::finite(0, 1e6));
+    command
+        .add_option("--misalignment-uncertainty", o.misalignment_arcsec,
+                    "of x and y against the gyros, arcsec (50)")
+        ->check(proto::finite(0, 1e5));
+    command
+        .add_option("--vibration-limit", s.vibration_limit_g,
+                    "g, standard deviation within 1 s (0.01)")
+        ->check(proto::finite(proto::kAboveZero, 10));
+    command.add_flag("--json", o.json, "print the result as JSON");
+    command.add_option("--plot", o.plot, "an SVG file");
+}
+
+}  // namespace
+
+}  // namespace vibrig::tool::zero_command
+
+namespace vibrig::tool {
+
+void add_zero(CLI::App& app, int& exit_code) {
+    using namespace zero_command;
+    auto options = std::make_shared<zero_command::Options>();
+    CLI::App* command =
+        app.add_subcommand("zero", "Accelerometer zeros in place, from azimuth slews");
+    command->require_subcommand(0, 1);
+    command->add_option("FILE", options->file,
+                        "increments, CSV or gzip: time_s, turn_x_arcsec ..., dv_x_mps ..., "
+                        "azimuth_deg");
+    command->add_option("--azimuth", options->azimuth,
+                        "column of the azimuth read-out (azimuth_deg), or none");
+    add_common(*command, *options);
+    command
+        ->add_option("--down", options->down,
+                     "the same unit with platform z down, a second file: zeros apart from "
+                     "misalignment and scale error")
+        ->excludes("--inverted");
+    command->footer(
+        "Example: vibrig zero increments.csv --slews 0,90,-90,90 --rate 5 --plot zeros.svg\n"
+        "         vibrig zero up.csv --down down.csv\n"
+        "Exit codes: 0 valid, 1 not valid (says why), 2 bad usage or input.");
+    CLI::App* simulate = command->add_subcommand("simulate", "A simulated unit instead of a file");
+    add_common(*simulate, *options);
+    simulate->add_option("--zero", options->zero_mg, "mg (5,-5,5)")
+        ->expected(3)
+        ->delimiter(',')
+        ->check(proto::finite(-1000, 1000));
+    simulate->add_option("--scale", options->real_scale_ppm, "errors, ppm (0,0,0)")
+        ->expected(3)
+        ->delimiter(',')
+        ->check(proto::finite(-1e5, 1e5));
+    simulate
+        ->add_option("--misalignment", options->real_misalignment_arcsec,
+                     "of x and y towards z, arcsec (0,0)")
+        ->expected(2)
+        ->delimiter(',')
+        ->check(proto::finite(-1e4, 1e4));
+    simulate->add_option("--period", options->period_s, "of the increments, s (0.01)")
+        ->check(proto::finite(1e-4, 0.1));
+    simulate->add_option("--vibration", options->vibration_g, "peak at 15 Hz, g (0)")
+        ->check(proto::finite(0, 10));
+    simulate->add_option("--seed", options->seed, "of the noise (1)")->check(proto::whole());
+    simulate->add_flag("--both-ways", options->both_ways,
+                       "a second run with z down, for zeros apart from misalignment and scale");
+    simulate->add_option("--write", options->write,
+                         "write the increments to this CSV file instead");
+    simulate->footer("Example: vibrig zero simulate --scale 0,0,100 --both-ways");
+    simulate->callback(
+        [options, &exit_code] { exit_code = guarded([&] { return run_simulate(*options); }); });
+    command->callback([options, simulate, &exit_code] {
+        if (!simulate->parsed()) exit_code = guarded([&] { return run_file(*options); });
+    });
+}
+
+}  // namespace vibrig::tool

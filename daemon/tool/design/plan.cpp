@@ -1,0 +1,242 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/design/plan_study.hpp"
+#include "daemon/tool/design/plan_turntable.hpp"
+#include "daemon/plot/chart.hpp"
+#include "daemon/results/progress.hpp"
+#include "proto/option_value.hpp"
+
+namespace vibrig::tool::planner {
+
+namespace {
+
+struct Options {
+    PlanRequest request;
+    std::vector<double> outer, inner, azimuth;
+    double dwell = 0, settle = 0, ramp = 0;
+    std::string plot;
+    std::string output;
+    bool json = false;
+    TurntableRequest turntable;
+    bool on_turntable = false;
+};
+
+void require(bool good, const std::string& what, const std::string& expected) {
+    if (!good) throw std::runtime_error(what + ", expected " + expected);
+}
+
+void check(Options& options) {
+    PlanRequest& request = options.request;
+    for (const double level : request.levels_g) {
+        require(std::isfinite(level) && level >= 0 && level <= 1000,
+                "--levels: found " + std::to_string(level), "0 to 1000 g");
+    }
+    const std::array<const std::vector<double>*, 3> ranges{&options.outer, &options.inner,
+                                                           &options.azimuth};
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (ranges[k]->empty()) continue;
+        request.limited[k] = true;
+        request.limits.low[k] = ranges[k]->front();
+        request.limits.high[k] = ranges[k]->back();
+        require(std::isfinite(ranges[k]->front()) && std::isfinite(ranges[k]->back()) &&
+                    ranges[k]->front() <= ranges[k]->back(),
+                "gimbal limits: found " + std::to_string(ranges[k]->front()) + " to " +
+                    std::to_string(ranges[k]->back()),
+                "LOW,HIGH in deg");
+    }
+    for (const double target : request.targets) {
+        require(std::isfinite(target) && target >= 0, "--targets: found " + std::to_string(target),
+                "standard errors of bias, linear and quadratic terms, 0 for none");
+    }
+    if (options.dwell > 0) request.dwell_s = options.dwell;
+    if (options.settle > 0) request.settle_s = options.settle;
+    if (options.ramp > 0) request.ramp_s = options.ramp;
+    require(request.evaluate.empty() || (request.runs == 0 && request.targets.empty()),
+            "found --evaluate with --runs or --targets", "one of them");
+}
+
+int run(Options& options) {
+    PlanStudy result;
+    try {
+        check(options);
+        {
+            Progress progress("planning");
+            progress.show(0, 1);
+            result = study(options.request);
+        }
+        if (!options.output.empty()) plot::write_file(options.output, plan_json(result) + "\n");
+        if (!options.plot.empty()) {
+            std::filesystem::path path(options.plot);
+            if (path.extension() != ".svg") {
+                plot::make_folder(options.plot);
+                path /= "sphere.svg";
+            }
+            plot::write_file(path.string(), plan_picture(result, frame_of(options.request)));
+        }
+    } catch (const std::exception& error) {
+        std::cerr << error.what() << '\n';
+        return kBadInput;
+    }
+    std::cout << (options.json ? plan_json(result) + "\n" : plan_table(result)) << std::flush;
+    if (!std::cout) {
+        std::cerr << "standard output: cannot be written\n";
+        return kBadInput;
+    }
+    if (!result.refusal.empty()) {
+        std::cerr << "refused: " << result.refusal << '\n';
+        return kNo;
+    }
+    return result.beyond_limits ? kNo : 0;
+}
+
+int run_turntable(Options& options) {
+    if (!options.plot.empty())
+        throw std::runtime_error("found --plot with --turntable, expected -o");
+    TurntableRequest& request = options.turntable;
+    request.runs = options.request.runs;
+    request.without = options.request.without;
+    request.seed = options.request.seed;
+    const TurntablePlan plan = turntable_plan(request);
+    if (!options.output.empty()) plot::write_file(options.output, turntable_csv(plan));
+    std::cout << (options.json ? turntable_json(plan) + "\n" : turntable_table(plan));
+    if (plan.refusal.empty()) return 0;
+    std::cerr << "refused: " << plan.refusal << '\n';
+    return kNo;
+}
+
+void add_turntable(CLI::App& command, Options& options) {
+    CLI::Option* turntable = command.add_flag(
+        "--turntable", options.on_turntable,
+        "a plan for a turntable or centrifuge instead of the rig: inputs on spheres, for vibrig "
+        "calibrate (-o: CSV to be filled in)");
+    command
+        .add_option("--spheres", options.turntable.spheres,
+                    "with --turntable: radii, g or deg/s (1,2)")
+        ->delimiter(',')
+        ->needs(turntable)
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command
+        .add_option(
+            "--allocation", options.turntable.allocation,
+            "with --turntable: free (default, D-optimal), or [6]8 + [8]6 as both, split-68, "
+            "split-86")
+        ->needs(turntable)
+        ->check(CLI::IsMember({"free", "both", "split-68", "split-86"}));
+    for (const char* of_the_rig :
+         {"--positions", "--levels", "--grid", "--evaluate", "--done", "--targets", "--config"}) {
+        turntable->excludes(command.get_option(of_the_rig));
+    }
+}
+
+void add_candidates(CLI::App& command, Options& options) {
+    PlanRequest& request = options.request;
+    command.add_option("--positions", request.positions,
+                       "CSV with alpha_deg, beta_deg, gamma_deg: the candidates; without --runs "
+                       "the list itself is judged (default: the 26 directions of the cube)");
+    command
+        .add_option("--levels", request.levels_g,
+                    "peak acceleration at the platform, g (0,2,4,4.667,6)")
+        ->delimiter(',')
+        ->check(proto::finite(0, 1e3));
+    command.add_option("--grid", request.grid_deg, "candidates every so many deg of each gimbal")
+        ->check(proto::finite(5, 90));
+    for (const auto& [name, range] :
+         {std::pair{"--outer", &options.outer}, std::pair{"--inner", &options.inner},
+          std::pair{"--azimuth", &options.azimuth}}) {
+        command
+            .add_option(name, *range,
+                        "gimbal limits LOW,HIGH as the encoders count, deg (gimbal.travel_deg)")
+            ->delimiter(',')
+            ->expected(2)
+            ->check(proto::finite());
+    }
+    command.add_option("--forbidden", request.forbidden, "CSV of positions to keep away from");
+    command
+        .add_option("--forbidden-within", request.limits.forbidden_within,
+                    "largest difference of the three angles that counts as near, deg (10)")
+        ->check(proto::finite(0, 360));
+    command
+        .add_option("--noise-per-g", request.noise_per_g,
+                    "noise grows with the level as hypot(1, this x level) (0)")
+        ->check(proto::finite(0, 1e3));
+    command.add_option("--without", request.without, "terms the model has not, such as D12,D13")
+        ->delimiter(',');
+}
+
+void add_time(CLI::App& command, Options& options) {
+    PlanRequest& request = options.request;
+    command.add_flag("--time-costs", request.time_costs,
+                     "compare plans per time, ramps included, not per run");
+    command.add_option("--dwell", options.dwell, "s of one run (100)")
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command.add_option("--settle", options.settle, "s after the ramp (3)")
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command.add_option("--ramp", options.ramp, "s to the level, and back (2)")
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command.add_option("--slew", request.slew_deg_per_s, "deg/s of the gimbals (5)")
+        ->check(proto::finite(proto::kAboveZero, 1e6));
+    command
+        .add_option(
+            "--order", request.order,
+            "travel (default): little gimbal travel; balanced: no slow change of a bias looks "
+            "like a coefficient; random: in blocks; list")
+        ->check(CLI::IsMember({"travel", "balanced", "random", "list"}));
+    command.add_option("--block", request.block, "runs in a block of --order random (8)")
+        ->check(CLI::Range(std::size_t{1}, std::size_t{10000}));
+}
+
+}  // namespace
+
+}  // namespace vibrig::tool::planner
+
+namespace vibrig::tool {
+
+void add_plan(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<planner::Options>();
+    planner::PlanRequest& request = options->request;
+    CLI::App* command = app.add_subcommand("plan", "D-optimal test plans: positions and levels");
+    planner::add_candidates(*command, *options);
+    command
+        ->add_option("--runs", request.runs, "size of the exact plan (14); with --targets: at most")
+        ->check(CLI::Range(std::size_t{1}, std::size_t{1000}));
+    command->add_option("--evaluate", request.evaluate,
+                        "judge this plan: JSON as printed here, or CSV with alpha_deg, beta_deg, "
+                        "gamma_deg, level_g, count");
+    command->add_option("--done", request.done, "plan file of runs that are measured already");
+    command
+        ->add_option("--targets", request.targets,
+                     "as few runs as reach these standard errors: bias, linear, quadratic (deg/h, "
+                     "deg/h/g, deg/h/g^2; 0: any)")
+        ->delimiter(',')
+        ->expected(3)
+        ->check(proto::finite(0));
+    planner::add_time(*command, *options);
+    command->add_option("--seed", request.seed, "of the random starts (1)")->check(proto::whole());
+    command->add_option("--config", request.config, "configuration file (TOML) of the rig");
+    command->add_option("-o,--output", options->output, "plan file for vibrigd ([campaign] plan)");
+    command->add_option("--plot", options->plot, "an SVG file, or a folder: the directions");
+    command->add_flag("--json", options->json, "print the plan as JSON");
+    planner::add_turntable(*command, *options);
+    command->footer(
+        "Examples: vibrig plan --runs 20 --levels 0,6 -o plan.json --plot sphere.svg\n"
+        "          vibrig plan --turntable --spheres 1,8 --runs 40 -o turntable.csv\n"
+        "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
+        "asks for\nmore than the shaker's limits, 2 bad usage or input.");
+    command->callback([options, &exit_code] {
+        exit_code = options->on_turntable
+                        ? guarded([&] { return planner::run_turntable(*options); })
+                        : planner::run(*options);
+    });
+}
+
+}  // namespace vibrig::tool

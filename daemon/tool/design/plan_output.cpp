@@ -1,0 +1,163 @@
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tool/design/plan_study.hpp"
+#include "daemon/tool/analysis/uncertainty_text.hpp"
+
+namespace vibrig::tool::planner {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+std::size_t count_of(const PlanStudy& study) {
+    std::size_t sum = 0;
+    for (const PlanRun& run : study.runs) sum += run.count;
+    return sum;
+}
+
+Json correlation(const planning::Evaluation& evaluation) {
+    if (evaluation.correlation == 0) return nullptr;
+    return {{"between",
+             {planning::kTermNames[evaluation.first], planning::kTermNames[evaluation.second]}},
+            {"value", evaluation.correlation}};
+}
+
+}  // namespace
+
+std::string plan_json(const PlanStudy& study) {
+    Json runs = Json::array();
+    for (const PlanRun& run : study.runs) {
+        runs.push_back({{"position", to_attitude(study.rig, run.visit.position_deg)},
+                        {"level_g", run.visit.level_g},
+                        {"table_g", run.table_g},
+                        {"count", run.count}});
+    }
+    Json errors = Json::object();
+    for (std::size_t i = 0; i < estimator::kParameters; ++i)
+        errors[estimator::parameter_names()[i]] = finite(study.forecast.sigma[i]);
+    const planning::Evaluation& e = study.evaluation;
+    Json unit = Json::object();
+    for (std::size_t i = 0; i < planning::kTerms; ++i) {
+        unit[planning::kTermNames[i]] =
+            e.sigma[i] > 0 ? finite(e.sigma[i] * std::sqrt(e.effort)) : Json(nullptr);
+    }
+    Json shares = Json::array();
+    for (const auto& [level, share] : study.optimal_shares)
+        shares.push_back({{"level_g", level}, {"share", share}});
+    Json json{{"d_efficiency", study.d_efficiency},
+              {"bound", study.bound},
+              {"rank", e.rank},
+              {"runs", std::move(runs)},
+              {"standard_errors", std::move(errors)},
+              {"duration_s", study.duration.total_s},
+              {"slewing_s", study.duration.slewing_s},
+              {"vibrating_s", study.duration.vibrating_s},
+              {"dwell_s", study.dwell_s},
+              {"transmission", study.transmission},
+              {"frequency_hz", study.frequency_hz},
+              {"coefficients", e.coefficients},
+              {"run_count", count_of(study)},
+              {"a_efficiency", study.a_efficiency},
+              {"e_efficiency_at_least", study.e_efficiency},
+              {"condition", finite(e.condition)},
+              {"unit_standard_errors", std::move(unit)},
+              {"strongest_correlation", correlation(e)},
+              {"drift_imbalance", study.drift_imbalance},
+              {"optimal_shares", std::move(shares)},
+              {"optimum_gap", study.optimum_gap},
+              {"warnings", study.warnings}};
+    if (study.uncertainty) {
+        const auto& merit = study.uncertainty->merit;
+        json["order_inflation"] = {{"bias", finite(merit.bias)},
+                                   {"largest", finite(merit.largest)},
+                                   {"median", finite(merit.median)},
+                                   {"step", finite(merit.step)}};
+        Json combined = Json::object(), expanded = Json::object();
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+            const auto& c = study.uncertainty->assessed.coefficients[i];
+            combined[estimator::parameter_names()[i]] = finite(c.u);
+            expanded[estimator::parameter_names()[i]] = finite(c.expanded);
+        }
+        json["combined_uncertainty"] = std::move(combined);
+        json["expanded_uncertainty"] = std::move(expanded);
+    }
+    if (!study.refusal.empty()) {
+        json["refusal"] = study.refusal;
+        json["undetermined"] = Json::array();
+        for (std::size_t i = 0; i < planning::kTerms; ++i) {
+            for (const planning::Row& null : e.null_vectors) {
+                if (null[i] == 0) continue;
+                json["undetermined"].push_back(planning::kTermNames[i]);
+                break;
+            }
+        }
+    }
+    if (!study.vertical_axes.empty()) {
+        Json axes = Json::array();
+        for (const VerticalAxis& axis : study.vertical_axes) {
+            axes.push_back({{"vertical", std::string(1, axis.axis)},
+                            {"directions", axis.directions},
+                            {"rank_one_level", axis.rank_one_level},
+                            {"rank", axis.rank},
+                            {"d_efficiency", axis.d_efficiency}});
+        }
+        json["vertical_axes"] = std::move(axes);
+    }
+    return json.dump();
+}
+
+std::string plan_table(const PlanStudy& study) {
+    std::string text = "   run   outer  inner azimuth   platform     table  times\n";
+    std::size_t number = 1;
+    for (const PlanRun& run : study.runs) {
+        const auto p = to_attitude(study.rig, run.visit.position_deg);
+        text += format("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu\n", number++, p[0], p[1],
+                       p[2], run.visit.level_g, run.table_g, run.count);
+    }
+    const planning::Evaluation& e = study.evaluation;
+    text += format("\n%zu runs of %g s, %.4g h: vibrating %.4g h, slewing %.4g h\n",
+                   count_of(study), study.dwell_s, study.duration.total_s / 3600,
+                   study.duration.vibrating_s / 3600, study.duration.slewing_s / 3600);
+    text += format("rank %zu of %zu", e.rank, e.coefficients);
+    if (e.identifies_all()) {
+        text +=
+            format(", condition %.4g, strongest correlation %.2f (%s, %s)\n", e.condition,
+                   e.correlation, planning::kTermNames[e.first], planning::kTermNames[e.second]);
+        text += format(
+            "D-efficiency %.4f (at least %.4f by the equivalence bound), A %.4f, E >= "
+            "%.4f\n",
+            study.d_efficiency, study.bound, study.a_efficiency, study.e_efficiency);
+        text += "optimum over the same candidates and levels:";
+        for (const auto& [level, share] : study.optimal_shares)
+            text += format("  %.4g of the runs at %.4g g", share, level);
+        text += format("\ncorrelation of place in the order with a term, at most %.2f\n",
+                       study.drift_imbalance);
+    } else {
+        text += '\n';
+    }
+    if (!study.vertical_axes.empty()) {
+        text += "\nvertical at zero angles  directions  rank, one level / all  D-efficiency *\n";
+        for (const VerticalAxis& axis : study.vertical_axes) {
+            text += format("  %c %33zu %12zu / %-7zu %13.3f\n", axis.axis, axis.directions,
+                           axis.rank_one_level, axis.rank, axis.d_efficiency);
+        }
+        text += "  * against free directions at rest and at the highest level\n";
+    }
+    text += '\n' + plan::forecast_table(study.forecast);
+    if (study.uncertainty) {
+        const auto& merit = study.uncertainty->merit;
+        text += format(
+            "\norder: a bias that walks and drifts makes sigma of D_F %.2f, of the worst %.4g, of "
+            "most %.2f times as large; one that steps, %.4g\n\n",
+            merit.bias, merit.largest, merit.median, merit.step);
+        text += allowance_table(study.uncertainty->assessed);
+    }
+    for (const std::string& warning : study.warnings) text += "warning: " + warning + '\n';
+    return text;
+}
+
+}  // namespace vibrig::tool::planner

@@ -1,0 +1,472 @@
+#include "daemon/tool/design/plan_study.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/tool/design/plan_terms.hpp"
+#include "estimator/identification/crlb.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
+#include "estimator/plan/augmentation.hpp"
+#include "estimator/plan/exact.hpp"
+#include "estimator/plan/optimum.hpp"
+
+namespace vibrig::tool::planner {
+
+namespace {
+
+using planning::Vec3;
+
+constexpr std::size_t kMostCandidates = 20'000;
+constexpr double kSameLevel = 1e-9;
+constexpr double kSameDirection = 1e-6;
+
+std::string text(double value) {
+    std::array<char, 32> out{};
+    std::snprintf(out.data(), out.size(), "%.6g", value);
+    return out.data();
+}
+
+bool counts_as_gimbals(const estimator::Settings& rig) {
+    return rig.encoder_sign == std::array{1, 1, 1} &&
+           rig.encoder_zero_deg == std::array{0.0, 0.0, 0.0};
+}
+
+/// Candidate or listed runs, with what the design algorithms need of each.
+struct List {
+    planning::Problem problem;
+    std::vector<planning::Visit> visits;
+};
+
+class Study {
+  public:
+    explicit Study(const PlanRequest& request)
+        : request_(request), c_(configuration::load(request.config, false).configuration) {
+        timing_ = {request.dwell_s.value_or(c_.campaign.dwell_s),
+                   request.settle_s.value_or(c_.campaign.settle_s),
+                   request.ramp_s.value_or(c_.campaign.ramp_s), request.slew_deg_per_s};
+        limits_ = request.limits;
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (request.limited[k]) continue;
+            limits_.low[k] = c_.gimbal.travel_deg[k][0];
+            limits_.high[k] = c_.gimbal.travel_deg[k][1];
+        }
+        if (!request.forbidden.empty()) limits_.forbidden = positions_in(request.forbidden);
+        terms_ = terms_without(request.without);
+        out_.transmission = c_.estimator.transmission;
+        out_.frequency_hz = c_.estimator.frequency_hz;
+        out_.dwell_s = timing_.dwell_s;
+        out_.rig = c_.estimator;
+    }
+
+    PlanStudy run() {
+        if (!request_.positions.empty()) {
+            listed_ = positions_in(request_.positions);
+            for (const Vec3& p : listed_) {
+                if (!limits_.allow(p)) {
+                    throw std::runtime_error(request_.positions + ": found (" + text(p[0]) + ", " +
+                                             text(p[1]) + ", " + text(p[2]) +
+                                             ") deg, expected positions within the limits");
+                }
+            }
+        }
+        choose_levels();
+        make_candidates();
+        if (!listed_.empty()) out_.vertical_axes = vertical_axes(c_.estimator, listed_, levels_);
+        find_runs();
+        put_in_order();
+        judge();
+        return std::move(out_);
+    }
+
+  private:
+    [[nodiscard]] std::vector<Vec3> positions_in(const std::string& path) const {
+        auto positions = plan::read_positions(path);
+        for (Vec3& position : positions) position = to_readings(c_.estimator, position);
+        return positions;
+    }
+    [[nodiscard]] std::vector<plan::PlannedRun> plan_in(const std::string& path) const {
+        auto runs = plan::read_plan(path, c_.estimator.transmission);
+        for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
+        return runs;
+    }
+
+    [[nodiscard]] bool designs() const {
+        return request_.evaluate.empty() && (listed_.empty() || request_.runs > 0 || by_targets());
+    }
+    [[nodiscard]] bool by_targets() const { return !request_.targets.empty(); }
+
+    void choose_levels() {
+        levels_ = request_.levels_g;
+        if (!request_.evaluate.empty()) {
+            given_ = plan_in(request_.evaluate);
+            if (levels_.empty()) {
+                for (const auto& run : given_) levels_.push_back(run.level_g);
+            }
+        }
+        if (levels_.empty() && designs()) levels_ = {0, 2, 4, 4.667, 6};
+        if (levels_.empty()) {
+            for (const double g : c_.campaign.table_g)
+                levels_.push_back(g * c_.estimator.transmission);
+        }
+        std::sort(levels_.begin(), levels_.end());
+        levels_.erase(std::unique(levels_.begin(), levels_.end(),
+                                  [](double a, double b) { return std::abs(a - b) < kSameLevel; }),
+                      levels_.end());
+        for (const double level : levels_) check_level(level);
+    }
+
+    /// Against the shaker's limits at the table.
+    void check_level(double level) {
+        const double table = level / c_.estimator.transmission;
+        const double omega = 2 * std::numbers::pi * c_.estimator.frequency_hz;
+        const double mps2 = table * c_.estimator.gravity_mps2;
+        const auto check = [&](double value, double limit, const char* unit, const char* key) {
+            if (value <= limit * (1 + 1e-9)) return;
+            const std::string message = text(level) + " g at the platform is " + text(table) +
+                                        " g at the table, " + text(value) + " " + unit +
+                                        " peak: more than " + text(limit) + " " + unit + " (" +
+                                        key + ")";
+            if (!request_.config.empty()) throw std::runtime_error("levels: found " + message);
+            out_.warnings.push_back(message);
+            out_.beyond_limits = true;
+        };
+        check(table, c_.campaign.max_acceleration_g, "g", "shaker.limits.acceleration_g");
+        check(mps2 / omega, c_.campaign.max_velocity_mps, "m/s", "shaker.limits.velocity_mps");
+        check(1e3 * mps2 / (omega * omega), c_.campaign.max_displacement_mm, "mm",
+              "shaker.limits.displacement_mm");
+    }
+
+    [[nodiscard]] planning::Point point(const planning::Visit& visit) const {
+        planning::Point point;
+        point.f = planning::vibration_row(planning::up_at(c_.estimator, visit.position_deg),
+                                          visit.level_g);
+        point.noise = std::hypot(1.0, request_.noise_per_g * visit.level_g);
+        if (request_.time_costs) {
+            const double rest = timing_.dwell_s + timing_.settle_s;
+            point.cost = visit.level_g > 0 ? 1 + 2 * timing_.ramp_s / rest : 1;
+        }
+        return point;
+    }
+
+    void make_candidates() {
+        std::vector<Vec3> positions = listed_;
+        if (positions.empty() && request_.grid_deg > 0) {
+            positions = planning::position_grid(c_.estimator, request_.grid_deg, limits_);
+        } else if (positions.empty()) {
+            for (const Vec3& direction : planning::cube_directions()) {
+                if (const auto p = planning::position_for(c_.estimator, direction, limits_)) {
+                    positions.push_back(*p);
+                }
+            }
+        }
+        if (positions.empty()) {
+            throw std::runtime_error(
+                "the gimbal limits leave no position, expected some to choose from");
+        }
+        if (positions.size() * levels_.size() > kMostCandidates) {
+            throw std::runtime_error("found " + std::to_string(positions.size()) +
+                                     " positions at " + std::to_string(levels_.size()) +
+                                     " levels, expected " + std::to_string(kMostCandidates) +
+                                     " combinations at most: a wider grid");
+        }
+        candidates_.problem.terms = terms_;
+        for (const double level : levels_) {
+            for (const Vec3& position : positions) {
+                const planning::Visit visit{position, level};
+                candidates_.visits.push_back(visit);
+                candidates_.problem.points.push_back(point(visit));
+            }
+        }
+    }
+
+    void find_runs() {
+        if (!given_.empty()) {
+            for (const auto& run : given_)
+                take({run.position_deg, run.level_g}, run.table_g, run.count);
+            return;
+        }
+        const bool possible = planning::evaluate(candidates_.problem,
+                                                 planning::Effort(candidates_.problem.size(), 1.0))
+                                  .identifies_all();
+        planning::Counts counts(candidates_.visits.size(), 1);
+        if (designs() && possible) {
+            counts = by_targets()
+                         ? for_targets()
+                         : planning::exact_design(candidates_.problem,
+                                                  request_.runs > 0 ? request_.runs : kDefaultRuns,
+                                                  {0, request_.seed, done()});
+        }
+        for (std::size_t i = 0; i < counts.size(); ++i) {
+            if (counts[i] > 0)
+                take(candidates_.visits[i], table_of(candidates_.visits[i].level_g), counts[i]);
+        }
+    }
+
+    [[nodiscard]] double table_of(double level) const { return level / c_.estimator.transmission; }
+
+    void take(const planning::Visit& visit, double table_g, std::size_t count) {
+        out_.runs.push_back({visit, table_g, count});
+    }
+
+    /// What is measured already, as effort at candidates that are added for it.
+    planning::Effort done() {
+        if (request_.done.empty()) return {};
+        planning::Effort effort(candidates_.visits.size(), 0.0);
+        for (const auto& run : plan_in(request_.done)) {
+            const planning::Point wanted = point({run.position_deg, run.level_g});
+            std::size_t at = 0;
+            for (; at < candidates_.problem.size(); ++at) {
+                double away = 0;
+                for (std::size_t k = 0; k < planning::kTerms; ++k)
+                    away =
+                        std::max(away, std::abs(candidates_.problem.points[at].f[k] - wanted.f[k]));
+                if (away < kSameDirection) break;
+            }
+            if (at == candidates_.problem.size()) {
+                throw std::runtime_error(request_.done + ": found a run at (" +
+                                         text(run.position_deg[0]) + ", " +
+                                         text(run.position_deg[1]) + ", " +
+                                         text(run.position_deg[2]) + ") deg, " + text(run.level_g) +
+                                         " g, expected candidates of this plan (--positions, "
+                                         "--levels)");
+            }
+            effort[at] += static_cast<double>(run.count);
+        }
+        return effort;
+    }
+
+    planning::Counts for_targets() {
+        std::vector<double> target;
+        for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+            const std::string unit = estimator::parameter_unit(i);
+            target.push_back(request_.targets[unit == "deg/h" ? 0 : unit == "deg/h/g" ? 1 : 2]);
+        }
+        const auto experiment = [&](const planning::Visit& visit) {
+            planning::Experiment e;
+            e.rows = estimator::rate_rows(c_.estimator,
+                                          {estimator::gimbal_deg(c_.estimator, visit.position_deg),
+                                           planning::kappa_of(visit.level_g), timing_.dwell_s},
+                                          {}, period());
+            const double noise = std::hypot(1.0, request_.noise_per_g * visit.level_g);
+            for (double& x : e.rows) x /= noise;
+            e.cost = point(visit).cost;
+            return e;
+        };
+        std::vector<planning::Experiment> experiments;
+        for (const auto& visit : candidates_.visits) experiments.push_back(experiment(visit));
+        const std::vector<double> before = covariance_done(experiments);
+        const auto found = planning::augment(before, experiments, target,
+                                             request_.runs > 0 ? request_.runs : kMostForTargets);
+        if (!found.met) {
+            out_.refusal = "the targets are not met with " + std::to_string(found.runs.size()) +
+                           " runs, expected more runs or wider targets";
+        }
+        planning::Counts counts(candidates_.visits.size(), 0);
+        for (const std::size_t i : found.runs) ++counts[i];
+        return counts;
+    }
+
+    /// The prior, and what is measured already.
+    [[nodiscard]] std::vector<double> covariance_done(
+        const std::vector<planning::Experiment>& experiments) {
+        return planning::covariance_after(prior_of_all(), experiments, done());
+    }
+    [[nodiscard]] std::vector<double> prior_of_all() const {
+        const auto prior = estimator::prior_sigma(c_.estimator);
+        std::vector<double> sigma;
+        for (std::size_t i = 0; i < estimator::kParameters; ++i)
+            sigma.push_back(prior[estimator::internal_of(i)]);
+        return sigma;
+    }
+
+    [[nodiscard]] double period() const {
+        return static_cast<double>(c_.assembler.sample_period) * 1e-9;
+    }
+
+    void put_in_order() {
+        std::vector<planning::Visit> visits;
+        std::vector<planning::Row> regressors;
+        std::vector<PlanRun> single;
+        for (const PlanRun& run : out_.runs) {
+            for (std::size_t k = 0; k < run.count; ++k) {
+                visits.push_back(run.visit);
+                regressors.push_back(point(run.visit).f);
+                single.push_back({run.visit, run.table_g, 1});
+            }
+        }
+        planning::Order order(visits.size());
+        for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+        const bool as_listed = !designs() || request_.order == "list";
+        if (!as_listed && request_.order == "travel") {
+            order = planning::shortest_travel(visits, timing_);
+        } else if (!as_listed && request_.order == "balanced") {
+            order = estimator::uncertainty::balanced_order(
+                visits, regressors, timing_,
+                estimator::rate_variance(c_.estimator, timing_.dwell_s, period()));
+        } else if (!as_listed) {
+            order = planning::randomised(regressors, std::max<std::size_t>(request_.block, 1),
+                                         request_.seed);
+        }
+        out_.duration = planning::duration(visits, order, timing_);
+        out_.drift_imbalance = planning::drift_imbalance(regressors, order);
+        if (as_listed) return;
+        out_.runs.clear();
+        for (const std::size_t i : order) {
+            PlanRun& run = single[i];
+            const bool again = !out_.runs.empty() &&
+                               out_.runs.back().visit.position_deg == run.visit.position_deg &&
+                               out_.runs.back().visit.level_g == run.visit.level_g;
+            if (again) {
+                ++out_.runs.back().count;
+            } else {
+                out_.runs.push_back(run);
+            }
+        }
+    }
+
+    /// With what is declared, and of the order: a step that it cannot tell from the coefficients.
+    void judge_uncertainty() {
+        constexpr double kMostStep = 10;
+        std::vector<planning::Visit> visits;
+        for (const PlanRun& run : out_.runs) visits.insert(visits.end(), run.count, run.visit);
+        if (visits.size() < 2 || terms_ != planning::kAllTerms) return;
+        out_.uncertainty = plan_uncertainty(c_.estimator, visits, timing_, period());
+        if (out_.uncertainty->merit.step > kMostStep)
+            out_.warnings.push_back(
+                format("in this order one step of a bias makes a standard error %.3g times as "
+                       "large: --order balanced",
+                       out_.uncertainty->merit.step));
+    }
+
+    void judge() {
+        // Candidates and the plan's own runs in one problem, so that the bound covers both.
+        planning::Problem all = candidates_.problem;
+        planning::Effort effort(all.size(), 0.0);
+        std::vector<plan::PlannedRun> planned;
+        for (const PlanRun& run : out_.runs) {
+            all.points.push_back(point(run.visit));
+            effort.push_back(static_cast<double>(run.count));
+            planned.push_back({run.visit.position_deg, run.visit.level_g, run.table_g, run.count});
+        }
+        if (!request_.done.empty()) {
+            const planning::Effort before = done();
+            for (std::size_t i = 0; i < before.size(); ++i) {
+                effort[i] += before[i];
+                if (before[i] > 0)
+                    planned.push_back({candidates_.visits[i].position_deg,
+                                       candidates_.visits[i].level_g,
+                                       table_of(candidates_.visits[i].level_g),
+                                       static_cast<std::size_t>(before[i])});
+            }
+        }
+        out_.evaluation = planning::evaluate(all, effort);
+        out_.forecast = plan::forecast(c_.estimator, planned, timing_.dwell_s, period(), terms_);
+        if (request_.noise_per_g > 0) {
+            out_.warnings.emplace_back(
+                "the standard errors of the 30 coefficients are without --noise-per-g");
+        }
+        if (!out_.evaluation.identifies_all()) {
+            out_.refusal = out_.forecast.refusal;
+            return;
+        }
+        if (!out_.forecast.warning.empty()) out_.warnings.push_back(out_.forecast.warning);
+        judge_uncertainty();
+        out_.bound = planning::equivalence_bound(all, effort);
+        const planning::Problem& over = candidates_.problem;
+        if (!planning::evaluate(over, planning::Effort(over.size(), 1.0)).identifies_all()) {
+            out_.warnings.emplace_back(
+                "the candidates alone do not determine everything: efficiencies are against the "
+                "plan's own runs");
+            compare(all);
+        } else {
+            compare(over);
+        }
+    }
+
+    void compare(const planning::Problem& over) {
+        const planning::Optimum best = planning::d_optimum(over);
+        out_.d_efficiency = planning::d_efficiency(out_.evaluation, best.log_det);
+        out_.optimum_gap = best.gap;
+        out_.a_efficiency = planning::a_optimum(over).value / out_.evaluation.trace;
+        out_.e_efficiency = planning::e_optimum(over).lower_bound / out_.evaluation.largest;
+        std::map<double, double> shares;
+        for (std::size_t i = 0; i < candidates_.visits.size() && i < best.share.size(); ++i) {
+            shares[candidates_.visits[i].level_g] += best.share[i];
+        }
+        out_.optimal_shares.assign(shares.begin(), shares.end());
+    }
+
+    static constexpr std::size_t kMostForTargets = 200;
+
+    const PlanRequest& request_;
+    configuration::Configuration c_;
+    planning::Timing timing_;
+    planning::GimbalLimits limits_;
+    planning::Terms terms_ = planning::kAllTerms;
+    std::vector<Vec3> listed_;
+    std::vector<double> levels_;
+    std::vector<plan::PlannedRun> given_;
+    List candidates_;
+    PlanStudy out_;
+};
+
+}  // namespace
+
+Vec3 to_readings(const estimator::Settings& rig, const Vec3& at) {
+    return counts_as_gimbals(rig) ? at : planning::position_of(rig, at);
+}
+
+Vec3 to_attitude(const estimator::Settings& rig, const Vec3& at) {
+    return counts_as_gimbals(rig) ? at : planning::attitude_of(rig, at);
+}
+
+PlanStudy study(const PlanRequest& request) { return Study(request).run(); }
+
+estimator::Settings frame_of(const PlanRequest& request) {
+    return configuration::load(request.config, false).configuration.estimator;
+}
+
+std::vector<VerticalAxis> vertical_axes(estimator::Settings frame,
+                                        const std::vector<Vec3>& positions,
+                                        const std::vector<double>& levels_g) {
+    planning::Problem free;
+    const double highest = *std::max_element(levels_g.begin(), levels_g.end());
+    for (const double level : {0.0, highest > 0 ? highest : 1.0}) {
+        for (const Vec3& direction : planning::cube_directions())
+            free.points.push_back({planning::vibration_row(direction, level)});
+    }
+    const double optimum = planning::d_optimum(free).log_det;
+    std::vector<VerticalAxis> result;
+    for (int axis = 0; axis < 3; ++axis) {
+        VerticalAxis row;
+        row.axis = "xyz"[axis];
+        frame.up = {axis, 1};
+        std::set<std::array<long, 3>> directions;
+        planning::Problem one, all;
+        for (const double level : levels_g) {
+            for (const Vec3& position : positions) {
+                const Vec3 up = planning::up_at(frame, position);
+                directions.insert({std::lround(up[0] / kSameDirection),
+                                   std::lround(up[1] / kSameDirection),
+                                   std::lround(up[2] / kSameDirection)});
+                all.points.push_back({planning::vibration_row(up, level)});
+                if (level == levels_g.back()) one.points.push_back(all.points.back());
+            }
+        }
+        const auto whole = planning::evaluate(all, planning::Effort(all.size(), 1.0));
+        row.directions = directions.size();
+        row.rank_one_level = planning::evaluate(one, planning::Effort(one.size(), 1.0)).rank;
+        row.rank = whole.rank;
+        row.d_efficiency = planning::d_efficiency(whole, optimum);
+        result.push_back(row);
+    }
+    return result;
+}
+
+}  // namespace vibrig::tool::planner

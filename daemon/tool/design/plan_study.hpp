@@ -1,0 +1,104 @@
+#pragma once
+
+#include <array>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/plan/forecast.hpp"
+#include "daemon/plan/plan_file.hpp"
+#include "daemon/tool/design/plan_uncertainty.hpp"
+#include "estimator/plan/evaluation.hpp"
+#include "estimator/plan/order.hpp"
+#include "estimator/plan/positions.hpp"
+
+namespace vibrig::tool::planner {
+
+namespace planning = estimator::plan;
+
+template <typename... Values>
+std::string format(const char* pattern, Values... values) {
+    std::array<char, 400> out{};
+    std::snprintf(out.data(), out.size(), pattern, values...);
+    return out.data();
+}
+
+/// What `vibrig plan` is asked.
+struct PlanRequest {
+    std::string positions;             ///< file; empty: the 26 directions of the cube
+    std::vector<double> levels_g;      ///< at the platform; empty: see levels()
+    std::size_t runs = 0;              ///< 0: with `positions` that list, else kDefaultRuns
+    std::string evaluate;              ///< plan file; empty: make one
+    std::string done;                  ///< plan file of what is measured already
+    std::string config;                ///< empty: defaults
+    std::vector<double> targets;       ///< standard errors of bias, linear, quadratic terms
+    std::vector<std::string> without;  ///< terms the model has not
+    double grid_deg = 0;               ///< candidates every so many deg; 0: the 26 directions
+    planning::GimbalLimits limits;
+    std::array<bool, 3> limited{};  ///< by `limits`; else by the configuration's travel
+    std::string forbidden;          ///< file of positions
+    double noise_per_g = 0;         ///< noise is hypot(1, this times the level)
+    bool time_costs = false;        ///< compare per time instead of per run
+    std::optional<double> dwell_s, settle_s, ramp_s;
+    double slew_deg_per_s = 5;
+    std::string order = "travel";  ///< "travel", "balanced", "random", "list"
+    std::size_t block = 8;
+    std::uint64_t seed = 1;
+};
+
+inline constexpr std::size_t kDefaultRuns = 14;
+
+struct PlanRun {
+    planning::Visit visit;
+    double table_g = 0;
+    std::size_t count = 1;
+};
+
+/// A position list read for one choice of the platform axis that is vertical at zero gimbal angles.
+struct VerticalAxis {
+    char axis = 'x';
+    std::size_t directions = 0;
+    std::size_t rank_one_level = 0, rank = 0;
+    double d_efficiency = 0;  ///< against the free choice of directions at 0 and the highest level
+};
+
+struct PlanStudy {
+    std::vector<PlanRun> runs;        ///< in the order they are to be run
+    planning::Evaluation evaluation;  ///< unit noise
+    std::vector<std::string> undetermined_candidates;
+    double d_efficiency = 0, bound = 0, a_efficiency = 0;
+    double e_efficiency = 0;  ///< at least
+    double optimum_gap = 0;   ///< max d - p of the optimum compared with
+    std::vector<std::pair<double, double>> optimal_shares;  ///< of the levels
+    plan::Forecast forecast;
+    planning::Duration duration;
+    double drift_imbalance = 0;
+    std::optional<PlanUncertainty> uncertainty;  ///< of a plan that determines everything
+    std::vector<VerticalAxis> vertical_axes;     ///< if a position list was given
+    std::vector<std::string> warnings;
+    bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
+    std::string refusal;         ///< empty: the plan determines everything
+    double transmission = 0, frequency_hz = 0, dwell_s = 0;
+    estimator::Settings rig;
+};
+
+/// Files and people have gimbal angles, a visit has what the encoders show; deg.
+[[nodiscard]] planning::Vec3 to_readings(const estimator::Settings& rig, const planning::Vec3& at);
+[[nodiscard]] planning::Vec3 to_attitude(const estimator::Settings& rig, const planning::Vec3& at);
+
+/// Throws std::runtime_error for bad input.
+[[nodiscard]] PlanStudy study(const PlanRequest& request);
+
+[[nodiscard]] std::string plan_json(const PlanStudy& study);
+[[nodiscard]] std::string plan_table(const PlanStudy& study);
+/// The directions of the vertical on both hemispheres, SVG.
+[[nodiscard]] std::string plan_picture(const PlanStudy& study, const estimator::Settings& frame);
+/// The rig's, of a request's configuration.
+[[nodiscard]] estimator::Settings frame_of(const PlanRequest& request);
+
+[[nodiscard]] std::vector<VerticalAxis> vertical_axes(estimator::Settings frame,
+                                                      const std::vector<planning::Vec3>& positions,
+                                                      const std::vector<double>& levels_g);
+
+}  // namespace vibrig::tool::planner

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "daemon/study/run.hpp"
+#include "daemon/study/status.hpp"
+#include "daemon/results/progress.hpp"
+
+namespace vibrig::tool::studies {
+
+/// What `vibrig study` prints and writes.
+[[nodiscard]] std::string result_table(const nlohmann::ordered_json& result);
+/// One row for each coefficient of each point.
+[[nodiscard]] std::string result_csv(const nlohmann::ordered_json& result);
+void write_hdf5(const nlohmann::ordered_json& result, const std::string& path);
+/// SVG files, of every kind of study; what is left out, or empty. Where nothing can be drawn there
+/// is no folder, either. Throws std::runtime_error.
+[[nodiscard]] std::string write_charts(const nlohmann::ordered_json& result,
+                                       const std::string& folder);
+
+/// NaN if there is none.
+[[nodiscard]] double number_at(const nlohmann::ordered_json& json, const char* pointer);
+/// A point's place in the grid: "campaign.table_g = [9, 7], ...", or "all runs".
+[[nodiscard]] std::string grid_text(const nlohmann::ordered_json& point);
+
+[[nodiscard]] std::string status_text(const study::StudyStatus& status);
+[[nodiscard]] nlohmann::ordered_json status_json(const study::StudyStatus& status);
+
+/// "0 to 4, 7, 9 to 12 and 3 more"
+[[nodiscard]] std::string ranges_text(
+    const std::vector<std::pair<std::uint64_t, std::uint64_t>>& ranges, std::uint64_t count);
+
+/// How far a run is: a bar on a terminal, else a line now and then; on standard error.
+class RunDisplay {
+  public:
+    RunDisplay();
+    void show(const study::RunProgress& progress);
+
+  private:
+    Progress progress_;
+    std::chrono::steady_clock::time_point next_;
+};
+
+}  // namespace vibrig::tool::studies

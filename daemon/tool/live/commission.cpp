@@ -1,0 +1,564 @@
+// The dialogue of commissioning: shows what the daemon says, passes on what a person answers. What
+// moves is decided in the daemon, so that a tool that dies moves nothing.
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <string_view>
+#include <thread>
+
+#include "daemon/commission/acceptance.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/journal/latches.hpp"
+#include "daemon/tool/live/answers.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/live/key_by_key.hpp"
+#include "daemon/tool/live/remote.hpp"
+#include "daemon/tool/live/toml_edit.hpp"
+#include "google/protobuf/util/json_util.h"
+#include "proto/durable_file.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using CommissionJson = nlohmann::ordered_json;
+
+constexpr const char* kCommission = "vibrig commission: ";
+constexpr auto kCommissionPoll = std::chrono::milliseconds(250);
+constexpr std::size_t kColumns = 79;
+
+struct CommissionOptions {
+    serve::Address at;
+    std::string by, second, answers, configuration, ask;
+    std::vector<std::string> parts;
+    bool json = false, by_hand = false, yes = false, resume = false;
+};
+
+class CommissionRefused : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// Throws CommissionRefused when the daemon says no, ClientError when it cannot be asked.
+std::string commission_command(serve::Client& client, const std::string& by,
+                               const CommissionJson& what) {
+    v1::Command command;
+    command.set_kind(v1::Command::commission);
+    command.set_by(by);
+    command.set_argument(what.dump());
+    std::string json;
+    if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
+        throw serve::ClientError("--by: not UTF-8");
+    const serve::Reply reply = client.post("/api/v1/commands", json);
+    if (reply.status == 409 || reply.status == 403) {
+        v1::Problem problem;
+        google::protobuf::util::JsonParseOptions options;
+        options.ignore_unknown_fields = true;
+        static_cast<void>(
+            google::protobuf::util::JsonStringToMessage(reply.body, &problem, options));
+        throw CommissionRefused(problem.detail());
+    }
+    v1::CommandReply answer;
+    parse_answer(reply, answer);
+    return answer.message();
+}
+
+CommissionJson commission_state(serve::Client& client, const std::string& by, std::size_t after) {
+    return CommissionJson::parse(
+        commission_command(client, by, {{"do", "read"}, {"after", after}}));
+}
+
+/// At blanks, to fit into 80 columns; what follows is indented.
+void print_wrapped(std::ostream& out, const std::string& line) {
+    std::string rest = line;
+    const std::string indent = "   ";
+    while (rest.size() > kColumns) {
+        auto at = rest.rfind(' ', kColumns);
+        if (at == std::string::npos || at <= indent.size()) at = kColumns;
+        out << rest.substr(0, at) << '\n';
+        rest = indent + rest.substr(std::min(rest.size(), at + (rest[at] == ' ' ? 1 : 0)));
+    }
+    out << rest << std::endl;
+}
+
+class Dialogue {
+  public:
+    Dialogue(const CommissionOptions& options, std::ostream& out)
+        : options_(options), client_(options.at), out_(out) {
+        if (!options.answers.empty()) answers_.emplace(options.answers);
+    }
+
+    /// Returns what was found.
+    CommissionJson run() {
+        auto state = commission_state(client_, options_.by, 0);
+        if (answers_ && state["simulated"] != true)
+            throw std::runtime_error("--answers: persons answer on a real rig");
+        if (state["simulated"] == true)
+            out_ << "SIMULATED: what is found of this rig counts on no real one.\n";
+        const bool going_on = !state["procedure"].is_null() && state["procedure"]["active"] == true;
+        if (going_on) {
+            const std::string began = state["procedure"]["by"];
+            if (!journal::same_person(began, options_.by))
+                throw CommissionRefused("the rig is being commissioned by " + began +
+                                        ", who answers; vibrig abort ends it");
+            print_wrapped(out_, "Going on with what " + began + " began.");
+            if (answers_)
+                commission_command(client_, options_.by,
+                                   {{"do", "answers"}, {"answers", answers_->all()}});
+        } else {
+            CommissionJson begin{{"do", "begin"}, {"by_hand", options_.by_hand}};
+            if (options_.resume || !options_.ask.empty()) begin["resume"] = true;
+            if (!options_.ask.empty()) begin["ask"] = options_.ask;
+            if (answers_) begin["answers"] = answers_->all();
+            commission_command(client_, options_.by, begin);
+            out_ << "While a gimbal moves any key stops it.\n";
+        }
+        for (;;) {
+            state = commission_state(client_, options_.by, shown_);
+            const CommissionJson& procedure = state["procedure"];
+            for (const auto& line : procedure["lines"])
+                print_wrapped(out_, line.get<std::string>());
+            shown_ = procedure["next"];
+            if (procedure["active"] != true) {
+                CommissionJson result = procedure["result"];
+                result["parts"] = state["record"]["parts"];
+                result["simulated"] = state["simulated"];
+                return result;
+            }
+            const bool asked = !procedure["question"].is_null();
+            if (asked && !answers_)
+                ask(procedure["question"]);
+            else if (asked)
+                expect_answer(procedure["question"]);
+            else if (KeyByKey keys; keys.pressed(kCommissionPoll))
+                commission_command(client_, options_.by, {{"do", "stop"}});
+        }
+    }
+
+  private:
+    /// The daemon gives it, unless there is none.
+    void expect_answer(const CommissionJson& question) {
+        try {
+            answers_->expect_one_to(question);
+        } catch (const std::runtime_error&) {
+            commission_command(client_, options_.by, {{"do", "end"}});
+            throw;
+        }
+        std::this_thread::sleep_for(kCommissionPoll / 2);  // 10 commands a second
+    }
+
+    void ask(const CommissionJson& question) {
+        const std::string usual = question["usual"];
+        std::string text = question["text"].get<std::string>() + " [" +
+                           question["expected"].get<std::string>() +
+                           (usual.empty() ? "" : "; Enter: " + usual) + "]";
+        print_wrapped(out_, "? " + text);
+        const std::string answer = typed();
+        try {
+            commission_command(client_, options_.by,
+                               {{"do", "answer"}, {"id", question["id"]}, {"value", answer}});
+        } catch (const CommissionRefused& refused) {
+            print_wrapped(out_, std::string("  ") + refused.what());
+        }
+    }
+
+    /// A line; meanwhile the daemon is told that somebody is there.
+    std::string typed() {
+        out_ << "> " << std::flush;
+        for (;;) {
+            if (const auto end = waiting_.find('\n'); end != std::string::npos) {
+                const std::string line = waiting_.substr(0, end);
+                waiting_.erase(0, end + 1);
+                return line;
+            }
+            pollfd in{STDIN_FILENO, POLLIN, 0};
+            if (poll(&in, 1, static_cast<int>(kCommissionPoll.count())) > 0) {
+                std::array<char, 256> some{};
+                const auto got = read(STDIN_FILENO, some.data(), some.size());
+                if (got <= 0) {
+                    commission_command(client_, options_.by, {{"do", "end"}});
+                    throw CommissionRefused("nobody answers: ended");
+                }
+                waiting_.append(some.data(), static_cast<std::size_t>(got));
+            } else {
+                static_cast<void>(commission_state(client_, options_.by, shown_));
+            }
+        }
+    }
+
+    const CommissionOptions& options_;
+    serve::Client client_;
+    std::ostream& out_;
+    std::optional<Answers> answers_;
+    std::size_t shown_ = 0;
+    std::string waiting_;
+};
+
+/// `mark`: in front of each comment.
+std::vector<TomlValue> values_of(const CommissionJson& found, const CommissionJson& by,
+                                 const std::string& mark) {
+    std::vector<TomlValue> values;
+    for (const auto& [key, value] : found.items()) {
+        std::string text;
+        // One blank behind a comma, as --check prints it.
+        for (const char c : value.dump()) text += c == ',' ? std::string(", ") : std::string(1, c);
+        values.push_back({key, text, mark + by.value(key, std::string())});
+    }
+    return values;
+}
+
+std::string mark_of(const CommissionJson& of) {
+    return of.value("simulated", false) ? "SIMULATED: " : "";
+}
+
+void print_found(std::ostream& out, const CommissionJson& result) {
+    std::string table;
+    auto values = values_of(result["found"], result["found_by"], mark_of(result));
+    std::ranges::stable_sort(values, {},
+                             [](const TomlValue& v) { return v.key.substr(0, v.key.rfind('.')); });
+    for (const auto& value : values) {
+        const auto dot = value.key.rfind('.');
+        if (value.key.substr(0, dot) != table) {
+            table = value.key.substr(0, dot);
+            out << '[' << table << "]\n";
+        }
+        const std::string line = value.key.substr(dot + 1) + " = " + value.value;
+        if (line.size() + value.comment.size() + 4 <= kColumns)
+            out << line << "  # " << value.comment << '\n';
+        else
+            out << "# " << value.comment << '\n' << line << '\n';
+    }
+}
+
+int commission_rig(const CommissionOptions& options) {
+    std::ostream& out = options.json ? std::cerr : std::cout;
+    const CommissionJson result = Dialogue(options, out).run();
+    if (options.json) std::cout << result.dump(1) << '\n';
+    const bool decided = result["outcome"] == "decided";
+    std::string head = mark_of(result) + result["outcome"].get<std::string>();
+    std::ranges::transform(head, head.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    print_wrapped(out, head + (decided ? "" : ": " + result["why"].get<std::string>()));
+    if (!decided) return kNo;
+    print_found(out, result);
+    for (const auto& correction : result["corrections"])
+        print_wrapped(out, "The DBC first: " + correction.get<std::string>());
+    if (!result["corrections"].empty()) {
+        out << "Then commission anew.\n";
+        return kNo;
+    }
+    print_wrapped(out, "Nothing is recorded yet: vibrig commission accept --by '" + options.by +
+                           "' --second NAME");
+    return 0;
+}
+
+int show_commission(const CommissionOptions& options) {
+    serve::Client client(options.at);
+    const auto record = commission_state(client, options.by, 0)["record"];
+    if (options.json) std::cout << record.dump(1) << '\n';
+    bool all = true;
+    for (const auto& [name, part] : record["parts"].items()) {
+        const bool proven = part["proven"];
+        all = all && proven;
+        if (options.json) continue;
+        std::string text = name + std::string(16 - std::min<std::size_t>(15, name.size()), ' ');
+        if (proven) {
+            text += "proven " + part["utc"].get<std::string>().substr(0, 10) + " by ";
+            std::string by;
+            for (const auto& one : part["by"])
+                by += (by.empty() ? "" : ", ") + one.get<std::string>();
+            text += by;
+            if (const std::string told = part["told"]; !told.empty()) text += "; " + told;
+        } else {
+            text += "NOT: " + part["why"].get<std::string>();
+        }
+        print_wrapped(std::cout, text);
+    }
+    if (!options.json) {
+        std::cout << "The shaker is the safe-state proof's: vibrig selftest --by NAME\n";
+        if (const std::string trouble = record["trouble"]; !trouble.empty())
+            print_wrapped(std::cout, trouble);
+        if (record["simulated"] == true)
+            std::cout << "SIMULATED: "
+                      << (record["demanded"] == true ? "this record counts on no real rig\n"
+                                                     : "arming demands no record\n");
+    }
+    return all ? 0 : kNo;
+}
+
+std::string text_of_file(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error(path + ": cannot be read");
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+bool agreed(const CommissionOptions& options, const std::string& question) {
+    if (options.yes) return true;
+    std::cout << "? " << question << " [yes or no]\n> " << std::flush;
+    std::string line;
+    return std::getline(std::cin, line) && (line == "yes" || line == "y");
+}
+
+/// What was there is kept beside the file itself, not beside a link to it.
+void save_file(const std::string& path, const std::string& before, const std::string& text) {
+    const std::string real = std::filesystem::canonical(path).string();
+    std::string kept = real + ".1";
+    for (int n = 2; std::filesystem::exists(kept); ++n) kept = real + "." + std::to_string(n);
+    proto::write_durably(kept, before, 0600);
+    std::filesystem::permissions(kept, std::filesystem::status(real).permissions());
+    proto::write_durably(path, text);
+    print_wrapped(std::cout, path + " is written; as it was: " + kept);
+}
+
+/// Before anything is written or asked.
+void expect_two(const CommissionOptions& options) {
+    if (const auto why = commission::not_two(options.by, options.second); !why.empty())
+        throw CommissionRefused(why);
+}
+
+int accept_commission(const CommissionOptions& options) {
+    expect_two(options);
+    serve::Client client(options.at);
+    const auto state = commission_state(client, options.by, 0);
+    const auto& procedure = state["procedure"];
+    if (procedure.is_null() || procedure["active"] == true ||
+        procedure["result"]["outcome"] != "decided")
+        throw CommissionRefused("nothing is decided: vibrig commission --by NAME");
+    const auto& result = procedure["result"];
+    const std::string path = options.configuration.empty()
+                                 ? state["configuration"].get<std::string>()
+                                 : options.configuration;
+    if (path.empty()) throw std::runtime_error("the daemon has no configuration file");
+    if (!result["corrections"].empty())
+        throw CommissionRefused("the DBC first, then commission anew: " +
+                                result["corrections"][0].get<std::string>());
+    const std::string before = text_of_file(path);
+    std::vector<TomlValue> changed;
+    const auto now = configuration::load(path, true);
+    for (auto& value : values_of(result["found"], result["found_by"], mark_of(state))) {
+        const auto at =
+            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
+        std::string found = at == now.effective.end() ? "nothing" : at->value;
+        if (CommissionJson::parse(found, nullptr, false) ==
+            CommissionJson::parse(value.value, nullptr, false))
+            continue;
+        print_wrapped(std::cout, "- " + value.key + " = " + found);
+        print_wrapped(std::cout, "+ " + value.key + " = " + value.value);
+        changed.push_back(std::move(value));
+    }
+    if (!changed.empty()) {
+        const std::string after = with_values(before, path, changed);
+        // Before it takes the place of one that works.
+        static_cast<void>(configuration::parse(after, path, true));
+        if (!agreed(options, options.by + " and " + options.second + ": write " + path + "?"))
+            throw CommissionRefused("not accepted: nothing is written");
+        save_file(path, before, after);
+    } else if (!agreed(options, options.by + " and " + options.second + ": record it?")) {
+        throw CommissionRefused("not accepted");
+    }
+    print_wrapped(std::cout, commission_command(client, options.by,
+                                                {{"do", "accept"}, {"second", options.second}}));
+    return 0;
+}
+
+/// A line of a person, with blanks around it taken off.
+std::string line_of_person() {
+    std::string line;
+    std::cout << "> " << std::flush;
+    if (!std::getline(std::cin, line)) throw CommissionRefused("nobody answers: not stated");
+    const auto first = line.find_first_not_of(" \t"), last = line.find_last_not_of(" \t");
+    return first == std::string::npos ? "" : line.substr(first, last - first + 1);
+}
+
+/// Of one person alone; what was said before is out of sight.
+CommissionJson sign_said_by(const std::string& person) {
+    if (isatty(STDOUT_FILENO) != 0) std::cout << "\x1b[H\x1b[2J\x1b[3J";
+    print_wrapped(std::cout,
+                  "drift_sign cannot be measured. " + person +
+                      ", please, alone at the keyboard: a positive drift coefficient is");
+    std::cout << "  1  the gyro's output at zero input (IEEE Std 517)\n"
+                 "  2  the rate at which the platform turns\n"
+                 "  3  the torque that stops it\n";
+    std::string says;
+    while (says != "1" && says != "2" && says != "3") {
+        std::cout << "? Which? [1, 2 or 3]\n";
+        says = line_of_person();
+    }
+    std::string source;
+    while (source.empty()) {
+        std::cout << "? Where is that written? [name of the drawing or certificate]\n";
+        source = line_of_person();
+    }
+    if (isatty(STDOUT_FILENO) != 0) std::cout << "\x1b[H\x1b[2J\x1b[3J";
+    return {{"by", person}, {"says", says[0] - '0'}, {"source", source}};
+}
+
+/// What nothing measures, by two persons.
+int state_gyros(const CommissionOptions& options) {
+    expect_two(options);
+    serve::Client client(options.at);
+    const auto state = commission_state(client, options.by, 0);
+    if (options.yes && state["simulated"] != true)
+        throw std::runtime_error("--yes: persons answer on a real rig");
+    const auto now = configuration::load(state["configuration"].get<std::string>(), true);
+    auto said = CommissionJson::array();
+    if (!options.yes) said = {sign_said_by(options.by), sign_said_by(options.second)};
+    std::cout << "From the drawing; nothing measures signs, output and spin axes or drift_sign:\n";
+    for (const auto& value : now.effective)
+        if (value.key.starts_with("platform.gyro_") || value.key == "platform.drift_sign" ||
+            value.key.starts_with("levelling.torque_"))
+            std::cout << "  " << value.key << " = " << value.value << '\n';
+    if (!agreed(options, options.by + " and " + options.second + ": is that so?"))
+        throw CommissionRefused("not stated");
+    print_wrapped(std::cout, commission_command(client, options.by,
+                                                {{"do", "state"},
+                                                 {"part", "gyros"},
+                                                 {"second", options.second},
+                                                 {"statements", said}}));
+    return 0;
+}
+
+int commission(const CommissionOptions& options) {
+    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units",
+                                                      "excitation"};
+    constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
+                                                        "earth"};
+    bool gyros = false;
+    for (const auto& part : options.parts) {
+        if (std::ranges::find(kShaker, part) != kShaker.end())
+            throw std::runtime_error(part +
+                                     ": not commissioned by this version; arming demands the "
+                                     "safe-state proof: vibrig selftest --by NAME");
+        gyros = gyros || part == "gyros";
+        if (part != "gyros" && std::ranges::find(kMeasured, part) == kMeasured.end())
+            throw std::runtime_error("found \"" + part +
+                                     "\", expected bus, gimbals, accelerometers, earth or gyros");
+    }
+    if (gyros && options.parts.size() > 1)
+        throw std::runtime_error("gyros: found other parts beside it, expected it alone");
+    return gyros ? state_gyros(options) : commission_rig(options);
+}
+
+/// The daemon that says no is an answer, not bad input.
+template <class Run>
+int guarded_commission(Run run) {
+    return guarded(
+        [&] {
+            try {
+                return run();
+            } catch (const CommissionRefused& refused) {
+                std::cerr << kCommission << refused.what() << '\n';
+                return kNo;
+            }
+        },
+        kCommission);
+}
+
+template <class Run>
+void run_as(CLI::App& command, int& exit_code, std::shared_ptr<CommissionOptions> options,
+            Run run) {
+    command.callback([&exit_code, options, run] {
+        exit_code = guarded_commission([&] { return run(*options); });
+    });
+}
+
+void add_persons(CLI::App& command, CommissionOptions& options) {
+    options.at.socket = default_socket();
+    command.add_option("--socket", options.at.socket, "Unix socket of the daemon")
+        ->capture_default_str();
+    command.add_option("--by", options.by, "Who stands at the rig; goes into the record")
+        ->required();
+}
+
+}  // namespace
+
+void add_commission(CLI::App& app, int& exit_code) {
+    CLI::App& commissioning = *app.add_subcommand(
+        "commission",
+        "Find out how a rig is wired, by moving its gimbals one by one, and record it. A rig that "
+        "is not simulated is moved by hand only (--by-hand)");
+    auto options = std::make_shared<CommissionOptions>();
+    options->at.socket = default_socket();
+    commissioning
+        .add_option(
+            "parts", options->parts,
+            "gimbals accelerometers earth and the bus: measured together; gyros: stated by two "
+            "persons. Without: all that is measured")
+        ->expected(0, 5);
+    commissioning.add_option("--socket", options->at.socket, "Unix socket of the daemon")
+        ->capture_default_str();
+    commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record");
+    commissioning.add_option("--second", options->second, "Another person, for gyros");
+    commissioning.add_flag("--by-hand", options->by_hand,
+                           "Nothing is commanded: a person turns the gimbals. The only way with "
+                           "a rig that is not simulated");
+    commissioning.add_flag("--resume", options->resume,
+                           "Go on where the daemon ended, by a new permission; where there is "
+                           "nothing to go on with it begins anew");
+    commissioning
+        .add_option("--ask", options->ask,
+                    "Ask once more what was answered, or was not: latitude, compass, drawing or "
+                    "sense; nothing else is measured again")
+        ->check(CLI::IsMember({"latitude", "compass", "drawing", "sense"}));
+    commissioning.add_flag("--yes", options->yes, "gyros: do not ask; simulated rigs only");
+    commissioning.add_flag("--json", options->json,
+                           "The finding as JSON; the dialogue goes to standard error");
+    commissioning.add_option("--answers", options->answers,
+                             "JSON file, question to answer; simulated rigs only");
+    commissioning.footer(
+        "Example: vibrig commission --by-hand --by 'Ada Lovelace'\n"
+        "Exit code 0: decided; 1: undecided, refused or unfinished. A rig is commissioned at the\n"
+        "local socket only.");
+
+    auto shown = std::make_shared<CommissionOptions>();
+    CLI::App& status = *commissioning.add_subcommand(
+        "status", "Which parts are proven; exit code 1 unless all are");
+    shown->at.socket = default_socket();
+    shown->by = "status";
+    status.add_option("--socket", shown->at.socket, "Unix socket of the daemon")
+        ->capture_default_str();
+    status.add_flag("--json", shown->json, "As JSON");
+    status.footer("Example: vibrig commission status");
+    run_as(status, exit_code, shown, show_commission);
+
+    auto accepted = std::make_shared<CommissionOptions>();
+    CLI::App& accepting = *commissioning.add_subcommand(
+        "accept", "Write what was found into the configuration, and record it by two persons");
+    add_persons(accepting, *accepted);
+    accepting.add_option("--second", accepted->second, "Another person")->required();
+    accepting.add_option("--config", accepted->configuration,
+                         "The daemon's configuration file; default: as the daemon names it");
+    accepting.add_flag("--yes", accepted->yes, "Do not ask");
+    accepting.footer("Example: vibrig commission accept --by 'Ada Lovelace' --second 'Bo Ek'");
+    run_as(accepting, exit_code, accepted, accept_commission);
+
+    add_commission_bus(commissioning, exit_code);
+    add_commission_registers(commissioning, exit_code);
+
+    commissioning.callback([&commissioning, &exit_code, options] {
+        if (!commissioning.get_subcommands().empty()) return;  // it has done its own
+        exit_code = guarded_commission([&] {
+            if (options->by.empty())
+                throw std::runtime_error("--by: found nothing, expected a name");
+            return commission(*options);
+        });
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,203 @@
+#include "daemon/serve/pki.hpp"
+
+#include <sys/stat.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <set>
+#include <sstream>
+
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+
+namespace vibrig::tool {
+namespace {
+
+namespace fs = std::filesystem;
+using serve::CertificateSettings;
+using serve::Identity;
+using serve::PkiError;
+
+struct PkiOptions {
+    std::string folder = "vibrig-pki";
+    std::vector<std::string> hosts;
+    std::vector<std::string> viewers, operators, admins;
+    int days = 825;
+    std::string password;
+    std::vector<std::string> revoked;
+};
+
+constexpr const char* kAuthority = "authority";
+constexpr const char* kRevoked = "revoked.crl";
+
+/// Keys are for their owner only, from the moment they exist.
+void write(const fs::path& path, const std::string& text, bool secret) {
+    const mode_t before = ::umask(secret ? 0077 : 0022);
+    std::ofstream file(path, std::ios::binary);
+    ::umask(before);
+    file << text;
+    file.close();
+    if (!file) throw PkiError("cannot write " + path.string());
+}
+
+std::string read(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    if (!file) throw PkiError("cannot read " + path.string());
+    return text.str();
+}
+
+void save(const fs::path& folder, const std::string& name, const Identity& identity) {
+    write(folder / (name + ".crt"), identity.certificate, false);
+    write(folder / (name + ".key"), identity.key, true);
+}
+
+Identity authority_in(const fs::path& folder) {
+    return {read(folder / (std::string(kAuthority) + ".crt")),
+            read(folder / (std::string(kAuthority) + ".key"))};
+}
+
+/// Before anything is written.
+void check_people(const PkiOptions& options) {
+    std::set<std::string> seen{kAuthority, "server"};
+    for (const auto* const names : {&options.viewers, &options.operators, &options.admins}) {
+        for (const std::string& name : *names) {
+            const bool plain = !name.empty() && name.find_first_of("/\\") == std::string::npos &&
+                               name.front() != '.' && seen.insert(name).second;
+            if (!plain) throw PkiError("found '" + name + "', expected each person's name once");
+            const fs::path key = fs::path(options.folder) / (name + ".key");
+            if (fs::exists(key))
+                throw PkiError(key.string() + " is there already; nothing was changed");
+        }
+    }
+}
+
+int init(const PkiOptions& options) {
+    check_people(options);
+    const fs::path folder = options.folder;
+    fs::create_directories(folder);
+    const auto valid_for = std::chrono::hours(24 * options.days);
+    Identity authority;
+    // A second call adds people to the same authority.
+    if (fs::exists(folder / (std::string(kAuthority) + ".key"))) {
+        authority = authority_in(folder);
+        std::cout << "authority: the one in " << folder.string() << '\n';
+    } else {
+        authority = serve::make_identity({CertificateSettings::Use::authority,
+                                          "Vibrig authority",
+                                          "",
+                                          {},
+                                          std::chrono::hours(-1),
+                                          4 * valid_for});
+        save(folder, kAuthority, authority);
+        std::cout << "authority: " << (folder / kAuthority).string()
+                  << ".crt; keep its key off the rig\n";
+    }
+    const auto client = [&](const std::string& name, const std::string& role) {
+        const Identity made = serve::make_identity(
+            {CertificateSettings::Use::client, name, role, {}, std::chrono::hours(-1), valid_for},
+            &authority);
+        save(folder, name, made);
+        write(folder / (name + ".p12"),
+              serve::pkcs12_of(made, authority.certificate, name, options.password), true);
+        std::cout << role << ": " << (folder / name).string() << ".crt, .key; .p12 for a browser\n";
+    };
+    if (!options.hosts.empty()) {
+        save(folder, "server",
+             serve::make_identity({CertificateSettings::Use::server, options.hosts.front(), "",
+                                   options.hosts, std::chrono::hours(-1), valid_for},
+                                  &authority));
+        std::cout << "server: " << (folder / "server").string() << ".crt, .key\n";
+    }
+    for (const std::string& name : options.viewers) client(name, "viewer");
+    for (const std::string& name : options.operators) client(name, "operator");
+    for (const std::string& name : options.admins) client(name, "admin");
+    return 0;
+}
+
+int revoke(const PkiOptions& options) {
+    const fs::path folder = options.folder;
+    const fs::path list = folder / kRevoked;
+    const Identity authority = authority_in(folder);
+    for (const std::string& name : options.revoked) {
+        const fs::path certificate = folder / (name + ".crt");
+        if (name == kAuthority) throw PkiError("the authority cannot revoke itself");
+        std::string text;
+        try {
+            text = serve::revoke(read(certificate), authority,
+                                 fs::exists(list) ? read(list) : std::string{});
+        } catch (const PkiError& error) {
+            throw PkiError("found '" + name + "', expected somebody with a valid certificate in " +
+                           folder.string() + ": " + error.what());
+        }
+        // Never half a list: the daemon looks at it at any time.
+        const fs::path fresh = folder / (std::string(kRevoked) + ".new");
+        write(fresh, text, false);
+        fs::rename(fresh, list);
+        // Out of the way of a new certificate for the same name.
+        const fs::path aside = folder / "revoked";
+        fs::create_directories(aside);
+        for (const char* const kind : {".crt", ".key", ".p12"}) {
+            std::error_code none;
+            fs::rename(folder / (name + kind), aside / (name + kind), none);
+        }
+        std::cout << name << ": revoked; its files are in " << aside.string() << '\n';
+    }
+    std::cout << "the list for the rig: " << list.string() << '\n';
+    return 0;
+}
+
+}  // namespace
+
+void add_pki(CLI::App& app, int& exit_code) {
+    CLI::App& pki = *app.add_subcommand("pki", "Certificates for a daemon that is asked remotely");
+    pki.require_subcommand(1);
+    pki.footer(
+        "Example: vibrig pki init --host rig.lab --operator ada --viewer wall\n"
+        "More: vibrig pki init --help, vibrig pki revoke --help");
+    CLI::App& making =
+        *pki.add_subcommand("init", "Make an authority, a server's certificate and people's");
+    auto options = std::make_shared<PkiOptions>();
+    making.add_option("--folder", options->folder, "Where they go")->capture_default_str();
+    making.add_option("--host", options->hosts,
+                      "Name or address of the rig's machine, as people will type it");
+    making.add_option("--viewer", options->viewers, "Who may look");
+    making.add_option("--operator", options->operators, "Who may command");
+    making.add_option("--admin", options->admins, "Who may administer");
+    making.add_option("--days", options->days, "Validity; the authority's is four times as long")
+        ->check(CLI::Range(1, 3650))
+        ->capture_default_str();
+    making.add_option("--p12-password", options->password, "Of the files for browsers");
+    making.footer(
+        "Example: vibrig pki init --host rig.lab --host 10.0.0.5 --operator ada --viewer wall\n"
+        "Again, with other names, it adds them. On the rig:\n"
+        "  [server]\n"
+        "  remote = \"0.0.0.0:8443\"\n"
+        "  certificate = \"server.crt\"\n"
+        "  key = \"server.key\"\n"
+        "  clients_ca = \"authority.crt\"");
+    making.callback(
+        [options, &exit_code] { exit_code = guarded([&] { return init(*options); }, "vibrig: "); });
+    CLI::App& revoking =
+        *pki.add_subcommand("revoke", "Make people's certificates worthless before their time");
+    revoking.add_option("--folder", options->folder, "Where they are")->capture_default_str();
+    revoking.add_option("name", options->revoked, "Whose")->required();
+    revoking.footer(
+        "Example: vibrig pki revoke ada\n"
+        "On the rig, which takes a changed list over by itself and ends connections:\n"
+        "  [server]\n"
+        "  revoked = \"revoked.crl\"");
+    revoking.callback([options, &exit_code] {
+        exit_code = guarded([&] { return revoke(*options); }, "vibrig: ");
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,384 @@
+#include "daemon/tool/live/remote.hpp"
+
+#include <google/protobuf/util/json_util.h>
+#include <pwd.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <thread>
+
+#include "daemon/serve/render.hpp"
+#include "daemon/tool/colour.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "proto/option_value.hpp"
+
+namespace vibrig::tool {
+namespace {
+
+constexpr const char* kWho = "vibrig: ";  // before what a daemon has refused, too
+
+using Steady = std::chrono::steady_clock;
+
+struct StatusOptions {
+    serve::Address at;
+    bool json = false;
+};
+
+struct CommandOptions {
+    serve::Address at;
+    v1::Command::Kind kind = v1::Command::unspecified;
+    std::string by;
+    std::string argument;
+    bool json = false;
+};
+
+struct TestOptions {
+    serve::Address at;
+    std::string by;
+    bool json = false, emergency_stop = false;
+};
+
+/// The daemon understands and says no: not now, not you, not so often. Remotely as locally.
+bool is_no(int status) { return status == 403 || status == 409 || status == 429; }
+
+std::string json_of(const v1::Command& command) {
+    std::string json;
+    if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
+        throw serve::ClientError("--by: not UTF-8");
+    return json;
+}
+
+std::string login_name() {
+    const passwd* const entry = getpwuid(getuid());
+    return entry != nullptr ? entry->pw_name : "uid " + std::to_string(getuid());
+}
+
+/// What the daemon says about an answer other than 200.
+std::string problem_of(const serve::Reply& reply) {
+    v1::Problem problem;
+    google::protobuf::util::JsonParseOptions options;
+    options.ignore_unknown_fields = true;
+    if (google::protobuf::util::JsonStringToMessage(reply.body, &problem, options).ok() &&
+        !problem.detail().empty()) {
+        return problem.detail();
+    }
+    return "HTTP status " + std::to_string(reply.status);
+}
+
+int width_of_output() {
+    constexpr int kUsual = 100;
+    winsize size{};
+    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsual;
+}
+
+/// What somebody has to see first.
+std::string painted(const std::string& line, bool head, v1::Campaign::State state) {
+    if (head)
+        return state == v1::Campaign::tripped || state == v1::Campaign::aborted
+                   ? colour::bad(line)
+                   : colour::strong(line);
+    const auto has = [&line](const char* words) { return line.find(words) != std::string::npos; };
+    if (line.starts_with("latched") || has("FAULT") || has("MISFIT") || has("NOT HEARD"))
+        return colour::bad(line);
+    if (line.starts_with("why: ") || has("SILENT") || has(": DOWN, ")) return colour::warning(line);
+    return line;
+}
+
+int show_status(const StatusOptions& options) {
+    serve::Client client(options.at);
+    if (options.json) {
+        const serve::Reply reply = client.get("/api/v1/status");
+        if (reply.status != 200) throw serve::ClientError(problem_of(reply));
+        std::cout << reply.body << '\n';
+        return 0;
+    }
+    // Two looks a moment apart give the rates.
+    constexpr auto kBetween = std::chrono::milliseconds(300);
+    const v1::Status before = ask_status(client);
+    const auto began = Steady::now();
+    std::this_thread::sleep_for(kBetween);
+    const v1::Status status = ask_status(client);
+    const double wall_s = std::chrono::duration<double>(Steady::now() - began).count();
+    const serve::Rates rates = serve::rates_between(before, status, wall_s);
+    const auto lines = serve::render_table(status, rates, width_of_output());
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        std::cout << painted(lines[i], i == 0, status.campaign().state()) << '\n';
+    return 0;
+}
+
+std::string mark_of(bool passed) {
+    return passed ? colour::good("  ok    ") : colour::bad("  NOT   ");
+}
+
+void show_rows(const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& rows) {
+    for (const auto& row : rows) {
+        std::cout << mark_of(row.passed()) << row.name() << ": " << row.value()
+                  << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low()
+                  << " to " << row.high() << '\n';
+    }
+}
+
+/// The proof's entry in the journal, once it is on disk. `before`: that of the proof that there
+/// was.
+void show_signed_record(serve::Client& client, const std::string& before) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    constexpr int kLongestLine = 1000;
+    for (int looks = 0; looks < 30; ++looks) {
+        const auto journal = ask_status(client).journal();
+        if (journal.path().empty()) return;
+        if (!journal.proof_head().empty() && journal.proof_head() != before) {
+            std::cout << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine)
+                      << '\n';
+            return;
+        }
+        std::this_thread::sleep_for(kLook);
+    }
+}
+
+/// Waits for the end of loop check and safe-state proof; their rows. `then`: the status before.
+void show_loop_check(serve::Client& client, const v1::Status& then) {
+    const std::int64_t before = then.proof().utc_ns();
+    constexpr auto kLook = std::chrono::milliseconds(300);
+    constexpr int kLooks = 100;  // after the check, for the proof's last rows
+    v1::Status status;
+    std::string asked;
+    int looks = 0;
+    do {
+        std::this_thread::sleep_for(kLook);
+        status = ask_status(client);
+        if (status.proof().asks() != asked) {
+            asked = status.proof().asks();
+            if (!asked.empty()) std::cout << ">>> " << asked << std::endl;
+        }
+        if (status.loop_check().verdict() != "running" && asked.empty()) ++looks;
+    } while (looks == 0 || (status.proof().utc_ns() == before && looks < kLooks));
+    show_rows(status.loop_check().rows());
+    show_rows(status.proof().rows());
+    if (!status.proof().passed()) std::cout << "not proved: " << status.proof().message() << '\n';
+    if (status.proof().utc_ns() != before) show_signed_record(client, then.journal().proof_head());
+}
+
+/// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
+/// rest is measured, which takes a window. What lasts longer is the daemon's to explain.
+void wait_for_rest(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
+        std::this_thread::sleep_for(kLook);
+}
+
+int self_test(const TestOptions& options) {
+    serve::Client client(options.at);
+    if (!options.by.empty()) {
+        v1::Command command;
+        command.set_kind(v1::Command::selftest);
+        command.set_by(options.by);
+        if (options.emergency_stop) command.set_argument("emergency_stop");
+        wait_for_rest(client);
+        const auto before = ask_status(client);
+        const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
+        if (begun.status != 200) {
+            std::cerr << kWho << problem_of(begun) << '\n';
+            return is_no(begun.status) ? kNo : kBadInput;
+        }
+        show_loop_check(client, before);
+    }
+    const serve::Reply reply = client.get("/api/v1/selftest");
+    v1::Readiness found;
+    parse_answer(reply, found);
+    if (options.json) {
+        std::cout << reply.body << '\n';
+    } else {
+        for (const v1::Readiness::Check& check : found.checks()) {
+            std::cout << mark_of(check.passed())
+                      << serve::clipped(check.name() + ": " + check.text(), 200) << '\n';
+        }
+        std::cout << (found.ready() ? colour::good("ready for a campaign")
+                                    : colour::bad("not ready for a campaign"))
+                  << '\n';
+    }
+    return found.ready() ? 0 : kNo;
+}
+
+/// After an acknowledgement, until the controller has forgotten its fault: who arms next is not
+/// refused because of what is only on its way.
+void wait_for_shaker(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30; ++looks) {
+        const v1::Status status = ask_status(client);
+        const auto& shaker = status.shaker();
+        if (!shaker.stop_pending() && shaker.fault() == 0) return;
+        std::this_thread::sleep_for(kLook);
+    }
+    std::cerr << kWho << "the shaker has not confirmed it yet: vibrig status\n";
+}
+
+int send_command(const CommandOptions& options) {
+    v1::Command command;
+    command.set_kind(options.kind);
+    command.set_by(options.by);
+    command.set_argument(options.argument);
+    serve::Client client(options.at);
+    if (options.kind == v1::Command::arm) wait_for_rest(client);
+    const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
+    if (options.json) std::cout << reply.body << '\n';
+    if (reply.status == 200) {
+        v1::CommandReply answer;
+        parse_answer(reply, answer);
+        if (!options.json) {
+            std::cout << (answer.message().empty() ? "accepted" : answer.message()) << '\n';
+        }
+        if (options.kind == v1::Command::acknowledge) wait_for_shaker(client);
+        return 0;
+    }
+    std::cerr << kWho << problem_of(reply) << '\n';
+    return is_no(reply.status) ? kNo : kBadInput;
+}
+
+void add_socket(CLI::App& command, serve::Address& at) {
+    at.socket = default_socket();
+    command
+        .add_option("--socket", at.socket,
+                    "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
+        ->capture_default_str();
+    command.add_option("--host", at.host, "Another machine, HOST[:8443], over TLS")
+        ->envname("VIBRIG_HOST");
+    command
+        .add_option("--identity", at.identity,
+                    "Who you are there: FOLDER/NAME of `vibrig pki init`")
+        ->envname("VIBRIG_IDENTITY");
+}
+
+void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char* name,
+                 const char* help) {
+    CLI::App& command = *app.add_subcommand(name, help);
+    auto options = std::make_shared<CommandOptions>();
+    options->kind = kind;
+    options->at.expired_too = kind == v1::Command::abort;
+    options->by = login_name();
+    add_socket(command, options->at);
+    command.add_option("--by", options->by, "Who commands; goes into the event log")
+        ->capture_default_str();
+    command.add_flag("--json", options->json, "Print the daemon's answer as JSON");
+    std::string example = std::string("Example: vibrig ") + name;
+    if (kind == v1::Command::acknowledge) {
+        command
+            .add_option("what", options->argument,
+                        "What is acknowledged, as `vibrig status` names it")
+            ->required();
+        example += " trip";
+    }
+    command.footer(example + " --by 'Ada Lovelace'");
+    command.callback([options, &exit_code] {
+        exit_code = guarded([&] { return send_command(*options); }, kWho);
+    });
+}
+
+}  // namespace
+
+std::string default_socket() {
+    const char* const other = std::getenv("VIBRIG_SOCKET");
+    if (other != nullptr && *other != '\0') return other;
+    constexpr const char* kControl = "/run/vibrig/vibrigd.sock";
+    constexpr const char* kStatus = "/run/vibrig/status.sock";
+    // Who may not command may look.
+    const bool only_looks = access(kControl, W_OK) != 0 && access(kStatus, W_OK) == 0;
+    return only_looks ? kStatus : kControl;
+}
+
+void parse_answer(const serve::Reply& reply, google::protobuf::Message& message) {
+    if (reply.status != 200) throw serve::ClientError("vibrigd: " + problem_of(reply));
+    google::protobuf::util::JsonParseOptions options;
+    options.ignore_unknown_fields = true;  // a newer daemon may say more
+    const auto parsed = google::protobuf::util::JsonStringToMessage(reply.body, &message, options);
+    if (!parsed.ok()) {
+        throw serve::ClientError("the daemon's answer is not as expected: " +
+                                 std::string(parsed.message()));
+    }
+}
+
+v1::Status ask_status(serve::Client& client) {
+    v1::Status status;
+    parse_answer(client.get("/api/v1/status"), status);
+    return status;
+}
+
+void add_remote(CLI::App& app, int& exit_code) {
+    CLI::App& status = *app.add_subcommand("status", "What a running vibrigd does");
+    auto status_options = std::make_shared<StatusOptions>();
+    add_socket(status, status_options->at);
+    status.add_flag("--json", status_options->json, "As JSON (vibrig.v1.Status)");
+    status.footer(
+        "Example: vibrig status --json\n"
+        "Remotely: vibrig status --host rig.lab --identity vibrig-pki/ada");
+    status.callback([status_options, &exit_code] {
+        exit_code = guarded([&] { return show_status(*status_options); }, kWho);
+    });
+
+    CLI::App& testing = *app.add_subcommand(
+        "selftest", "What is looked at before a campaign; exit code 1 unless all is well");
+    auto test_options = std::make_shared<TestOptions>();
+    testing.add_option(
+        "--by", test_options->by,
+        "Who orders a loop check and a proof of the safe state first, about a minute "
+        "at selftest.table_g: the bands of [selftest], then whether the table stops "
+        "by order and when nobody feeds its watchdog");
+    testing
+        .add_flag("--emergency-stop", test_options->emergency_stop,
+                  "Ask for the emergency stop at the end, too; it trips as ever")
+        ->needs("--by");
+    add_socket(testing, test_options->at);
+    testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
+    testing.footer(
+        "Example: vibrig selftest\n"
+        "With loop check and proof, which vibrig abort ends at any moment: vibrig selftest --by "
+        "'Ada "
+        "Lovelace' && vibrig arm --by 'Ada Lovelace'");
+    testing.callback([test_options, &exit_code] {
+        exit_code = guarded([&] { return self_test(*test_options); }, kWho);
+    });
+
+    CLI::App& watching = *app.add_subcommand("watch", "The status as a live table");
+    auto watch_options = std::make_shared<WatchOptions>();
+    add_socket(watching, watch_options->at);
+    watching.add_flag(
+        "--until-finished", watch_options->until_finished,
+        "End with the campaign: exit code 0 when it finished and its result is valid or doubtful, "
+        "1 when that is not valid, or when it was aborted or tripped");
+    watching.add_flag("--strict", watch_options->strict,
+                      "With --until-finished: a doubtful result is a no as well");
+    watching.add_option("--interval", watch_options->interval_s, "Time between two looks, s")
+        ->check(proto::finite(0.05, 3600))
+        ->capture_default_str();
+    watching.footer("Example: vibrig watch --until-finished\nInto a pipe: one line per change.");
+    watching.callback([watch_options, &exit_code] {
+        exit_code = guarded([&] { return watch(*watch_options); }, kWho);
+    });
+
+    CLI::App& events = *app.add_subcommand("events", "What happened, oldest first");
+    auto event_options = std::make_shared<EventOptions>();
+    add_socket(events, event_options->at);
+    events.add_flag("--follow", event_options->follow, "Go on with what comes");
+    events.add_flag("--json", event_options->json, "One JSON object per line (vibrig.v1.Event)");
+    events.footer("Example: vibrig events --follow");
+    events.callback([event_options, &exit_code] {
+        exit_code = guarded([&] { return show_events(*event_options); }, kWho);
+    });
+
+    add_command(app, exit_code, v1::Command::arm, "arm", "Arm the shaker for one campaign");
+    add_command(app, exit_code, v1::Command::start, "start", "Start the armed campaign");
+    add_command(app, exit_code, v1::Command::pause, "pause",
+                "Pause at rest before the next position");
+    add_command(app, exit_code, v1::Command::resume, "resume", "Go on after a pause");
+    add_command(app, exit_code, v1::Command::abort, "abort",
+                "Stop the shaker and end the campaign");
+    add_command(app, exit_code, v1::Command::acknowledge, "ack", "Acknowledge a trip or an alarm");
+}
+
+}  // namespace vibrig::tool

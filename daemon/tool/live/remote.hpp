@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/serve/client.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "proto/vibrig.pb.h"
+
+/// What the commands that talk to a running daemon share.
+namespace vibrig::tool {
+
+/// VIBRIG_SOCKET, else the socket of the installed daemon.
+[[nodiscard]] std::string default_socket();
+/// Parses an answer; throws serve::ClientError with the daemon's own words when it is a problem.
+void parse_answer(const serve::Reply& reply, google::protobuf::Message& message);
+[[nodiscard]] v1::Status ask_status(serve::Client& client);
+
+struct WatchOptions {
+    serve::Address at;
+    bool until_finished = false;
+    bool strict = false;  ///< a doubtful result is a no, too
+    double interval_s = 1.0;
+};
+/// Returns the exit code.
+int watch(const WatchOptions& options);
+
+struct EventOptions {
+    serve::Address at;
+    bool follow = false;
+    bool json = false;
+};
+int show_events(const EventOptions& options);
+
+}  // namespace vibrig::tool

@@ -1,0 +1,194 @@
+// vibrig archive add and verify.
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "daemon/archive/trend.hpp"
+#include "daemon/archive/verify.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
+#include "daemon/tool/recordings/archive_serve.hpp"
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/progress.hpp"
+#include "estimator/identification/identification.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json moved_json(const std::vector<archive::Moved>& moved) {
+    Json list = Json::array();
+    for (const auto& one : moved)
+        list.push_back({{"coefficient", estimator::parameter_names()[one.position]},
+                        {"unit", estimator::parameter_unit(one.position)},
+                        {"value", one.value},
+                        {"expected", one.by.expected},
+                        {"sigma", number_or_null(one.by.sigma)},
+                        {"t", number_or_null(one.by.t)},
+                        {"dof", one.by.dof},
+                        {"p", number_or_null(one.by.p)}});
+    return list;
+}
+
+/// What a delivery did, one line of JSON for vibrigd, one of text for people.
+void tell_delivery(const archive::Delivery& delivery, const std::string& folder,
+                   const std::vector<archive::Moved>& moved, std::size_t history, bool json) {
+    const auto& entry = delivery.entry;
+    constexpr std::array<const char*, 3> kDone{"copied", "was there", "mended"};
+    const char* const done = kDone[static_cast<std::size_t>(delivery.kind)];
+    if (json) {
+        std::cout << Json{{"folder", folder},          {"done", done},
+                          {"campaign", entry.key},     {"hash", entry.hash},
+                          {"unit", entry.unit_serial}, {"verdict", entry.verdict},
+                          {"earlier", history},        {"moved", moved_json(moved)}}
+                         .dump(-1, ' ', false, Json::error_handler_t::replace)
+                  << '\n';
+    } else {
+        std::cout << folder << ": " << done << ", " << entry.key << '\n';
+        for (const auto& one : moved)
+            std::cout << "  " << estimator::parameter_names()[one.position] << " is " << one.value
+                      << ", " << one.by.expected << " +- " << one.by.sigma << " by this unit's "
+                      << history << " earlier campaigns\n";
+    }
+    std::cout << std::flush;
+}
+
+int add(const std::vector<std::string>& folders, const ArchiveOptions& options, bool json) {
+    Whereabouts at = whereabouts_of(options);
+    if (at.place.folder.empty()) {
+        if (at.named)
+            throw std::runtime_error(
+                "--archive: found an index alone, expected the archive's "
+                "folder too: --archive FOLDER --index " +
+                archive::shown(at.place.index));
+        at.place = {".", archive::index_in(".")};
+    }
+    int code = 0;
+    for (const auto& given : folders) {
+        const auto found = archive::campaign_folders(given);
+        if (found.empty())
+            throw std::runtime_error(given +
+                                     ": found no campaign.h5 in it or in folders below, "
+                                     "expected a campaign's folder or one of campaigns");
+        Progress progress(given);
+        for (const auto& folder : found) {
+            try {
+                const auto delivery = archive::deliver(
+                    folder, at.place, at.rig,
+                    [&](std::size_t done, std::size_t all) { progress.show(done, all); });
+                std::vector<archive::Entry> history;
+                if (!delivery.entry.unit_serial.empty()) {
+                    archive::Filter filter;
+                    filter.serial = delivery.entry.unit_serial;
+                    filter.until_utc_ns = delivery.entry.started_utc_ns;
+                    history = archive::Index(at.place.index, archive::Database::Mode::read)
+                                  .results(filter);
+                }
+                tell_delivery(delivery, folder, archive::moved(delivery.entry, history),
+                              history.size(), json);
+            } catch (const std::exception& error) {
+                if (found.size() == 1) throw;
+                std::cerr << error.what() << '\n';
+                code = kNo;
+            }
+        }
+    }
+    return code;
+}
+
+struct VerifyOptions {
+    std::string recordings;
+    bool quick = false, json = false;
+};
+
+int verify(const VerifyOptions& o, const ArchiveOptions& options) {
+    const Whereabouts at = whereabouts_of(options);
+    if (at.place.folder.empty())
+        throw std::runtime_error(
+            "found no archive here, in $VIBRIG_ARCHIVE or in a configuration, expected --archive "
+            "FOLDER");
+    Progress progress("verifying");
+    const auto found = archive::verify(
+        at.place, o.recordings.empty() ? at.recordings : o.recordings, at.rig, o.quick,
+        [&](std::size_t done, std::size_t all) { progress.show(done, all); });
+    if (o.json) {
+        Json findings = Json::array();
+        for (const auto& one : found.findings)
+            findings.push_back(
+                {{"what", one.what}, {"campaign", one.campaign}, {"text", one.text}});
+        std::cout << Json{{"campaigns", found.campaigns},
+                          {"files", found.files},
+                          {"bytes", found.bytes},
+                          {"findings", std::move(findings)}}
+                         .dump(-1, ' ', false, Json::error_handler_t::replace)
+                  << '\n';
+    } else {
+        for (const auto& one : found.findings) std::cout << one.what << ": " << one.text << '\n';
+        std::cout << found.campaigns << " campaigns, " << found.files << " files, " << found.bytes
+                  << " bytes" << (o.quick ? " (lengths alone)" : "") << ": "
+                  << (found.findings.empty() ? "all there"
+                                             : std::to_string(found.findings.size()) + " findings")
+                  << '\n';
+    }
+    return found.findings.empty() ? 0 : kNo;
+}
+
+}  // namespace
+
+void add_archive(CLI::App& app, int& exit_code) {
+    CLI::App* group = app.add_subcommand("archive", "Campaigns of all rigs in one place");
+    group->require_subcommand(1);
+    auto where = std::make_shared<ArchiveOptions>();
+
+    struct AddOptions {
+        std::vector<std::string> folders;
+        bool json = false;
+    };
+    auto to_add = std::make_shared<AddOptions>();
+    CLI::App* adding = group->add_subcommand(
+        "add", "Copies campaigns into an archive, verifies the copies and registers them");
+    adding->add_option("FOLDER", to_add->folders, "of a campaign, or of campaigns")->required();
+    adding->add_flag("--json", to_add->json, "print what was done as JSON, a line each");
+    adding->add_option("--rig", where->rig,
+                       "whose they are (default: of --config, else this machine's name)");
+    add_archive_options(*adding, where);
+    adding->footer(
+        "Example: vibrig archive add /var/lib/vibrig/demo-20260301T080000Z --archive /lab/archive\n"
+        "Again it changes nothing; what was damaged in the archive is mended. A folder that lies "
+        "in\n"
+        "the archive is registered where it is; the archive is the current folder if none is "
+        "named.\n"
+        "Exit codes: 0, 1 one of several could not be added, 2 bad usage or input.");
+    adding->callback([to_add, where, &exit_code] {
+        exit_code = guarded([&] { return add(to_add->folders, *where, to_add->json); });
+    });
+
+    add_archive_serve(*group, where, exit_code);
+
+    auto to_verify = std::make_shared<VerifyOptions>();
+    CLI::App* verifying = group->add_subcommand(
+        "verify",
+        "Compares every campaign of an archive with its index, and with a rig's recordings");
+    verifying->add_option("--recordings", to_verify->recordings,
+                          "a rig's recordings, to be compared too (default: of --config)");
+    verifying->add_option("--rig", where->rig,
+                          "whose they are (default: of --config, else this machine's name)");
+    verifying->add_flag("--quick", to_verify->quick, "look at the files' lengths alone");
+    verifying->add_flag("--json", to_verify->json, "print the findings as JSON");
+    add_archive_options(*verifying, where);
+    verifying->footer(
+        "Example: vibrig archive verify --config /etc/vibrig/vibrigd.toml\n"
+        "Exit codes: 0, 1 something is missing, short, different or not in the index, 2 bad usage "
+        "or input.");
+    verifying->callback([to_verify, where, &exit_code] {
+        exit_code = guarded([&] { return verify(*to_verify, *where); });
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,137 @@
+#include "daemon/tool/recordings/archive_place.hpp"
+
+#include <unistd.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <iostream>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/results/progress.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string environment(const char* name) {
+    const char* const value = std::getenv(name);
+    return value == nullptr ? "" : value;
+}
+
+/// Where recordings.sqlite3 is, as for CAMPAIGN elsewhere; empty: nowhere.
+std::string folder_here() {
+    std::error_code error;
+    for (const std::string& folder :
+         {std::string("."), environment("VIBRIG_RECORDINGS"), std::string("/var/lib/vibrig")})
+        if (!folder.empty() && fs::exists(archive::index_in(folder), error)) return folder;
+    return "";
+}
+
+std::string date_text(std::int64_t utc_ns, const char* format) {
+    const std::time_t seconds = utc_ns / 1'000'000'000;
+    std::tm parts{};
+    ::gmtime_r(&seconds, &parts);
+    std::array<char, 32> text{};
+    std::strftime(text.data(), text.size(), format, &parts);
+    return text.data();
+}
+
+}  // namespace
+
+void add_archive_options(CLI::App& command, const std::shared_ptr<ArchiveOptions>& options) {
+    command.add_option("--archive", options->archive,
+                       "the archive's folder, or its index on a server, postgresql://... (default: "
+                       "$VIBRIG_ARCHIVE, else recordings.sqlite3 here, in $VIBRIG_RECORDINGS or in "
+                       "/var/lib/vibrig)");
+    command.add_option("--index", options->index,
+                       "its index, postgresql://... (default: $VIBRIG_ARCHIVE_INDEX, else "
+                       "recordings.sqlite3 in the folder)");
+    command.add_option("--config", options->config, "vibrigd's configuration, which has [archive]");
+}
+
+Whereabouts whereabouts_of(const ArchiveOptions& options) {
+    Whereabouts found;
+    std::string folder = options.archive, index = options.index;
+    found.rig = options.rig;
+    if (!options.config.empty()) {
+        const auto c = configuration::load(options.config, false).configuration;
+        if (folder.empty() && c.archive.folder.empty())
+            throw std::runtime_error(options.config +
+                                     ": archive.folder: found nothing, expected "
+                                     "the archive's folder");
+        if (folder.empty()) folder = c.archive.folder;
+        if (index.empty()) index = c.archive.index;
+        if (found.rig.empty()) found.rig = c.archive.rig;
+        found.recordings = c.record.folder.empty() ? c.results : c.record.folder;
+    }
+    if (folder.empty() && index.empty()) {
+        folder = environment("VIBRIG_ARCHIVE");
+        index = environment("VIBRIG_ARCHIVE_INDEX");
+    }
+    if (archive::is_server(folder)) {
+        index = folder;
+        folder.clear();
+    }
+    found.named = !folder.empty() || !index.empty();
+    if (folder.empty() && index.empty()) folder = folder_here();
+    if (!index.empty() && !archive::is_server(index))
+        throw std::runtime_error("--index: found '" + proto::printable(index) +
+                                 "', expected postgresql://...");
+    if (index.empty() && !folder.empty()) index = archive::index_in(folder);
+    if (found.rig.empty()) found.rig = archive::host_name();
+    found.place = {folder, index};
+    return found;
+}
+
+std::unique_ptr<archive::Index> open_index(const ArchiveOptions& options) {
+    const Whereabouts at = whereabouts_of(options);
+    if (at.place.index.empty())
+        throw std::runtime_error(
+            "found no recordings.sqlite3 here, in $VIBRIG_RECORDINGS or in /var/lib/vibrig, "
+            "expected --archive FOLDER");
+    using Mode = archive::Database::Mode;
+    if (archive::is_server(at.place.index) || ::access(at.place.index.c_str(), W_OK) != 0)
+        return std::make_unique<archive::Index>(at.place.index, Mode::read);
+    auto index = std::make_unique<archive::Index>(at.place.index, Mode::write);
+    Progress progress("reading results");
+    archive::read_results(
+        *index, at.place.folder, at.rig,
+        [](const std::string& words) { std::cerr << words << '\n'; },
+        [&](std::size_t done, std::size_t all) { progress.show(done, all); });
+    return index;
+}
+
+std::int64_t utc_of(const std::string& option, const std::string& text) {
+    int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0, end = 0;
+    const auto whole = [&] { return static_cast<std::size_t>(end) == text.size() && end > 0; };
+    bool good =
+        std::sscanf(text.c_str(), "%4d-%2d-%2d%n", &year, &month, &day, &end) == 3 && whole();
+    if (!good)
+        good = std::sscanf(text.c_str(), "%4d-%2d-%2d%*1[T ]%2d:%2d:%2dZ%n", &year, &month, &day,
+                           &hour, &minute, &second, &end) == 6 &&
+               whole();
+    const std::chrono::year_month_day date{std::chrono::year(year),
+                                           std::chrono::month(static_cast<unsigned>(month)),
+                                           std::chrono::day(static_cast<unsigned>(day))};
+    if (!good || !date.ok() || hour > 23 || minute > 59 || second > 60)
+        throw std::runtime_error(option + ": found '" + proto::printable(text) +
+                                 "', expected a date as 2026-03-01 or 2026-03-01T08:00:00Z");
+    const auto days = std::chrono::sys_days(date).time_since_epoch();
+    return (std::chrono::duration_cast<std::chrono::seconds>(days).count() + 3600 * hour +
+            60 * minute + second) *
+           1'000'000'000;
+}
+
+std::string minute_text(std::int64_t utc_ns) { return date_text(utc_ns, "%Y-%m-%d %H:%M"); }
+std::string iso_text(std::int64_t utc_ns) { return date_text(utc_ns, "%Y-%m-%dT%H:%M:%SZ"); }
+
+}  // namespace vibrig::tool

@@ -1,0 +1,118 @@
+#include "daemon/tool/recordings/archive_serve.hpp"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "daemon/tool/recordings/archive_pages.hpp"
+#include "daemon/results/exit_status.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+/// An archive moves nothing and is asked nothing but its pages.
+class NoRig final : public StatusSource {
+  public:
+    [[nodiscard]] StatusData status() const override { return {}; }
+    [[nodiscard]] std::vector<EventRecord> events(std::uint64_t /*after*/,
+                                                  std::size_t /*most*/) const override {
+        return {};
+    }
+    [[nodiscard]] estimator::Result result() const override { return {}; }
+    [[nodiscard]] std::string effective_configuration() const override { return {}; }
+    CommandReply command(const CommandRequest& /*request*/) override {
+        return {false, "an archive takes no commands"};
+    }
+    void told(Severity /*severity*/, const std::string& text) override {
+        std::cerr << text << '\n';
+    }
+    void refused(const std::string& who, const std::string& what, const std::string& why) override {
+        std::cerr << who << ": " << what << " refused: " << why << '\n';
+    }
+};
+
+struct ServeOptions {
+    std::string page, remote, certificate, key, clients_ca, revoked;
+};
+
+int serve_archive(ServeOptions o, const ArchiveOptions& where) {
+    const Whereabouts at = whereabouts_of(where);
+    if (at.place.folder.empty() || !std::filesystem::is_directory(at.place.folder))
+        throw std::runtime_error("--archive: found '" + at.place.folder +
+                                 "', expected the archive's folder");
+    // It would be seen with the first page only.
+    archive::Index(at.place.index, archive::Database::Mode::read);
+    if (!where.config.empty()) {
+        const auto server = configuration::load(where.config, false).configuration.server;
+        for (auto [to, from] : {std::pair{&o.certificate, &server.certificate},
+                                {&o.key, &server.key},
+                                {&o.clients_ca, &server.clients_ca},
+                                {&o.revoked, &server.revoked}})
+            if (to->empty()) *to = *from;
+    }
+    if (o.page.empty() && o.remote.empty()) o.page = "127.0.0.1:8091";
+    sigset_t signals;
+    ::sigemptyset(&signals);
+    for (const int signal : {SIGINT, SIGTERM}) ::sigaddset(&signals, signal);
+    ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    const ArchivePages pages(at.place);
+    NoRig source;
+    serve::ServerSettings settings;
+    settings.page = o.page;
+    settings.remote = o.remote;
+    settings.certificate = o.certificate;
+    settings.key = o.key;
+    settings.clients_ca = o.clients_ca;
+    settings.revoked = o.revoked;
+    // A recording takes its time on a slow line.
+    settings.limits.idle_timeout = std::chrono::minutes(10);
+    settings.documents = [&pages](std::string_view path, std::string_view query) {
+        return pages.answer(path, query);
+    };
+    serve::StatusServer server(source, settings);
+    server.answer();
+    if (const auto page = server.page_address(); !page.empty())
+        std::cout << "archive: " << page << '\n';
+    if (const auto remote = server.remote_address(); !remote.empty())
+        std::cout << "archive, with certificates: " << remote << '\n';
+    std::cout << std::flush;
+    int signal = 0;
+    ::sigwait(&signals, &signal);
+    return 0;
+}
+
+}  // namespace
+
+void add_archive_serve(CLI::App& group, const std::shared_ptr<ArchiveOptions>& where,
+                       int& exit_code) {
+    auto options = std::make_shared<ServeOptions>();
+    CLI::App* command = group.add_subcommand(
+        "serve", "Shows an archive in a browser; nothing can be changed there");
+    command->add_option("--page", options->page,
+                        "plain HTTP on this machine, \"127.0.0.1:PORT\" (default: port 8091, "
+                        "without --remote)");
+    command->add_option("--remote", options->remote,
+                        "\"ADDRESS:PORT\": TLS with certificates on both sides, as server.remote");
+    command->add_option("--certificate", options->certificate,
+                        "of --remote, PEM (default: of --config)");
+    command->add_option("--key", options->key, "of the certificate, PEM (default: of --config)");
+    command->add_option("--clients-ca", options->clients_ca,
+                        "authority of the clients' certificates, PEM (default: of --config)");
+    command->add_option("--revoked", options->revoked,
+                        "certificates that no longer count, PEM (default: of --config)");
+    add_archive_options(*command, where);
+    command->footer(
+        "Example: vibrig archive serve --archive /lab/archive\n"
+        "Ends with SIGINT or SIGTERM.\n"
+        "Exit codes: 0 ended by a signal, 2 bad usage or input.");
+    command->callback([options, where, &exit_code] {
+        exit_code = guarded([&] { return serve_archive(*options, *where); });
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,235 @@
+// vibrig certificate.
+#include <toml++/toml.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "daemon/journal/certificates.hpp"
+#include "daemon/record/digest.hpp"
+#include "daemon/report/analysis.hpp"
+#include "daemon/report/certificate.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/plot/chart.hpp"
+#include "daemon/tool/recordings/print_pdf.hpp"
+#include "daemon/results/progress.hpp"
+#include "estimator/filter/parameters.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+using report::Issue;
+
+struct CertificateArguments {
+    std::string campaign, paper, output = "certificate", by, entered_in;
+    bool no_register = false;
+};
+
+[[noreturn]] void refuse(const std::string& file, const toml::node& node, const std::string& what) {
+    throw std::runtime_error(file + ":" + std::to_string(node.source().begin.line) + ": " + what);
+}
+
+/// The table's keys, each of them known and of its type.
+class PaperTable {
+  public:
+    PaperTable(std::string file, const toml::table& table, std::set<std::string> known)
+        : file_(std::move(file)), table_(table) {
+        for (const auto& [name, node] : table) {
+            if (known.contains(std::string(name.str()))) continue;
+            std::string all;
+            for (const auto& key : known) all += (all.empty() ? "" : ", ") + key;
+            refuse(file_, node,
+                   "found an unknown key " + std::string(name.str()) + ", expected one of " + all);
+        }
+    }
+    [[nodiscard]] std::string text(const char* name) const {
+        const auto* node = table_.get(name);
+        if (node == nullptr) return {};
+        if (const auto* date = node->as_date()) {
+            std::ostringstream out;
+            out << date->get();
+            return out.str();
+        }
+        if (const auto value = node->value<std::string>()) return *value;
+        refuse(file_, *node, std::string(name) + ": expected a text");
+    }
+    [[nodiscard]] std::optional<double> number(const char* name) const {
+        const auto* node = table_.get(name);
+        if (node == nullptr) return {};
+        const auto value = node->value<double>();
+        if (!value || !std::isfinite(*value))
+            refuse(file_, *node, std::string(name) + ": expected a number");
+        return value;
+    }
+
+  private:
+    std::string file_;
+    const toml::table& table_;
+};
+
+report::Limit limit_of(const std::string& file, const toml::node& node) {
+    const auto* table = node.as_table();
+    if (table == nullptr) refuse(file, node, "limit: expected [[limit]] tables");
+    const PaperTable row(file, *table, {"coefficient", "low", "high"});
+    report::Limit limit{row.text("coefficient"), row.number("low"), row.number("high")};
+    const auto& names = estimator::parameter_names();
+    if (std::ranges::find(names, limit.coefficient) == names.end())
+        refuse(file, node,
+               "limit: found coefficient \"" + limit.coefficient + "\", expected one such as D_Fx");
+    if (!limit.low && !limit.high) refuse(file, node, "limit: found neither low nor high");
+    if (limit.low && limit.high && !(*limit.low < *limit.high))
+        refuse(file, node, "limit: found low not below high");
+    return limit;
+}
+
+Issue read_paper(const std::string& file) {
+    std::ifstream in(file);
+    if (!in || std::filesystem::is_directory(file))
+        throw std::runtime_error(file + ": cannot be read");
+    std::ostringstream text;
+    text << in.rdbuf();
+    toml::table root;
+    try {
+        root = toml::parse(text.str(), file);
+    } catch (const toml::parse_error& error) {
+        throw std::runtime_error(file + ":" + std::to_string(error.source().begin.line) + ": " +
+                                 std::string(error.description()));
+    }
+    const PaperTable top(file, root,
+                         {"number", "guard_band", "laboratory", "customer", "item", "limit"});
+    Issue issue;
+    issue.number = top.text("number");
+    if (issue.number.empty())
+        throw std::runtime_error(file + ": number: found nothing, expected the certificate's");
+    issue.guard_band = top.number("guard_band").value_or(1);
+    if (!(issue.guard_band >= 0 && issue.guard_band <= 10))
+        throw std::runtime_error(file + ": guard_band: expected 0 to 10 times U");
+    const auto section = [&](const char* name, std::set<std::string> known, const auto& take) {
+        const auto* node = root.get(name);
+        if (node == nullptr) return;
+        if (node->as_table() == nullptr) refuse(file, *node, std::string(name) + ": not a table");
+        take(PaperTable(file, *node->as_table(), std::move(known)));
+    };
+    section("laboratory", {"name", "address", "accreditation", "location"},
+            [&](const PaperTable& t) {
+                issue.laboratory = t.text("name");
+                issue.laboratory_address = t.text("address");
+                issue.accreditation = t.text("accreditation");
+                issue.location = t.text("location");
+            });
+    section("customer", {"name", "address"}, [&](const PaperTable& t) {
+        issue.customer = t.text("name");
+        issue.customer_address = t.text("address");
+    });
+    section("item", {"received", "condition"}, [&](const PaperTable& t) {
+        issue.received = t.text("received");
+        issue.condition = t.text("condition");
+    });
+    for (const auto& [name, what] : {std::pair{&issue.laboratory, "[laboratory] name"},
+                                     {&issue.customer, "[customer] name"}}) {
+        if (name->empty())
+            throw std::runtime_error(file + ": " + what + ": found nothing, expected it");
+    }
+    if (const auto* limits = root.get("limit")) {
+        if (limits->as_array() == nullptr)
+            refuse(file, *limits, "limit: expected [[limit]] tables");
+        for (const auto& node : *limits->as_array()) issue.limits.push_back(limit_of(file, node));
+    }
+    return issue;
+}
+
+/// Beside the campaigns' folders. Not the daemon's journal: that one is signed, and whoever else
+/// writes into it breaks its chain.
+std::string register_of(const CertificateArguments& arguments, const record::Campaign& campaign) {
+    if (arguments.no_register) return {};
+    if (!arguments.entered_in.empty()) return arguments.entered_in;
+    return (fs::absolute(campaign.folder).lexically_normal().parent_path() / "certificates.sqlite3")
+        .string();
+}
+
+int certify(const CertificateArguments& arguments) {
+    Issue issue = read_paper(arguments.paper);
+    issue.by = arguments.by;
+    issue.utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                       std::chrono::system_clock::now().time_since_epoch())
+                       .count();
+    keep_recordings(arguments.output + ".html");
+    const auto campaign = read_named_campaign(arguments.campaign);
+    const std::string entered_in = register_of(arguments, campaign);
+    if (!entered_in.empty() && journal::certificate_issued(entered_in, issue.number))
+        throw std::runtime_error(entered_in + ": found certificate " + issue.number +
+                                 " issued already, expected a new number");
+    const auto result = nlohmann::ordered_json::parse(campaign.result_json, nullptr, false);
+    record::ReplayResult replayed;
+    {
+        Progress progress("replaying " + campaign.head.name);
+        record::ReplayOptions options;
+        options.progress = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
+        replayed = record::replay(campaign, report::settings_of(campaign), options);
+    }
+    nlohmann::ordered_json certificate;
+    try {
+        certificate = report::certificate_of(
+            campaign, result.is_object() ? result : nlohmann::ordered_json::object(), replayed,
+            issue);
+    } catch (const report::Refused& why) {
+        std::cerr << "refused: " << why.what() << '\n';
+        return kNo;
+    }
+    const std::string json = arguments.output + ".json", html = arguments.output + ".html",
+                      pdf = arguments.output + ".pdf";
+    plot::write_file(json, certificate.dump(2) + "\n");
+    plot::write_file(html, report::certificate_page(certificate));
+    print_pdf(html, pdf);
+    if (!entered_in.empty())
+        journal::note_certificate(entered_in,
+                                  {issue.utc_ns, issue.number, campaign.head.campaign, issue.by,
+                                   record::sha256_of_file(pdf), record::sha256_of_file(json)});
+    const std::string word = certificate["verdict"]["word"];
+    std::cout << pdf << ": certificate " << issue.number << ", " << word << ", SHA-256 "
+              << record::sha256_of_file(pdf) << (entered_in.empty() ? ", in no register" : "")
+              << '\n';
+    return 0;
+}
+
+}  // namespace
+
+void add_certificate(CLI::App& app, int& exit_code) {
+    auto arguments = std::make_shared<CertificateArguments>();
+    CLI::App* command = app.add_subcommand(
+        "certificate", "Calibration certificate for a customer: HTML, PDF, JSON");
+    command->add_option("CAMPAIGN", arguments->campaign, kCampaignHelp)->required();
+    command
+        ->add_option("--paper", arguments->paper,
+                     "TOML: number, [laboratory], [customer], [item], [[limit]]")
+        ->required();
+    command->add_option("--by", arguments->by, "named person who issues it")->required();
+    command->add_option("-o,--output", arguments->output,
+                        "files to write, without .html, .pdf, .json (default certificate)");
+    command->add_option("--register", arguments->entered_in,
+                        "the register of certificates, where the number and the PDF's hash go "
+                        "(default: certificates.sqlite3 beside the campaign's folder)");
+    command->add_flag("--no-register", arguments->no_register, "enter it nowhere");
+    command->footer(
+        "Example: vibrig certificate demo-20260301T080000Z --paper C-17.toml --by \"A. Person\"\n"
+        "A result that is not valid is refused, a doubtful one marked.\n"
+        "Exit codes: 0 issued, 1 refused, 2 bad usage or input.");
+    command->callback(
+        [arguments, &exit_code] { exit_code = guarded([&] { return certify(*arguments); }); });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/dwells/anew.hpp"
+#include "daemon/tool/analysis/spectrum_dwells.hpp"
+#include "daemon/tool/analysis/spectrum_result.hpp"
+#include "estimator/uncertainty/monte_carlo.hpp"
+
+namespace vibrig::tool {
+
+/// What a recording gives: coefficients, and what can be believed of them.
+struct Identified {
+    estimator::Settings settings;
+    estimator::Result result;
+    estimator::uncertainty::Assessment assessed;
+    bool simulated = false;                  ///< the rig was a program
+    std::optional<dwells::Live> live;        ///< of a campaign that was identified anew at its end
+    std::optional<SpectrumResult> spectrum;  ///< of a CSV recording with rows enough
+};
+
+/// How a recording's frequencies are to be taken.
+struct SpectrumRequest {
+    Spectra spectra;  ///< of dwells, where the recording does not say
+    estimator::spectrum::Form form = estimator::spectrum::Form::automatic;
+};
+
+/// Identifies FILE: a CSV recording, or a campaign (folder, HDF5 file or name). `config`: a TOML
+/// file; empty: all defaults, or the campaign's own. Throws with file, line, key and value.
+[[nodiscard]] Identified identify_recording(const std::string& file, const std::string& config,
+                                            const SpectrumRequest& request = {});
+
+/// JCGM 101 over it, with progress; throws when there is nothing to draw from.
+[[nodiscard]] estimator::uncertainty::MonteCarlo draw(const Identified& of);
+
+}  // namespace vibrig::tool

@@ -1,0 +1,329 @@
+// vibrig export and vibrig recover.
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/raw_log.hpp"
+#include "daemon/report/report.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/tool/recordings/mat_file.hpp"
+#include "daemon/results/progress.hpp"
+#include "proto/recording_csv.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
+
+void export_csv(const record::Campaign& campaign, const std::string& path) {
+    std::vector<proto::RecordingRow> rows;
+    std::size_t left_out = 0;
+    for (const auto& dwell : record::recorded_dwells(campaign)) {
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
+            const auto& sample = campaign.samples[i];
+            if (!sample.angles_good() || !sample.force_good()) {
+                ++left_out;
+                continue;
+            }
+            proto::RecordingRow row;
+            row.time_s = drivers::to_seconds(sample.time - dwell.order->from);
+            row.run = dwell.order->run;
+            row.position = dwell.order->position;
+            for (std::size_t k = 0; k < 3; ++k) {
+                row.angle_deg[k] = sample.angle[k] * kDegreesPerRadian;
+                row.force_g[k] = sample.force[k] - dwell.order->zero_g[k];
+            }
+            rows.push_back(row);
+        }
+    }
+    if (rows.empty())
+        throw std::runtime_error(campaign.path +
+                                 ": found no good sample in a dwell, expected some");
+    proto::write_recording(path, rows, campaign.head.simulated);
+    std::cerr << path << ": " << rows.size() << " samples of "
+              << record::recorded_dwells(campaign).size() << " dwells";
+    if (left_out > 0) std::cerr << "; " << left_out << " without good quality are left out";
+    std::cerr << '\n';
+}
+
+void export_mat(const record::Campaign& campaign, const std::string& path) {
+    std::vector<double> time, sequence, angle, force, table, quality, run, position;
+    const auto dwells = record::recorded_dwells(campaign);
+    std::vector<std::array<int, 2>> of(campaign.samples.size());
+    for (const auto& dwell : dwells) {
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
+            of[i] = {dwell.order->run, dwell.order->position};
+    }
+    const drivers::Time origin = campaign.samples.empty() ? 0 : campaign.samples.front().time;
+    for (std::size_t i = 0; i < campaign.samples.size(); ++i) {
+        const auto& s = campaign.samples[i];
+        time.push_back(drivers::to_seconds(s.time - origin));
+        sequence.push_back(s.sequence);
+        for (const double a : s.angle) angle.push_back(a * kDegreesPerRadian);
+        force.insert(force.end(), s.force.begin(), s.force.end());
+        table.push_back(s.table_accel);
+        for (std::size_t k = 0; k < drivers::kChannels; ++k)
+            quality.push_back(static_cast<double>(s.quality[k]));
+        run.push_back(of[i][0]);
+        position.push_back(of[i][1]);
+    }
+    MatFile file(path);
+    file.add("name", campaign.head.name);
+    file.add("configuration", campaign.head.configuration);
+    file.add("result_json", campaign.result_json);
+    file.add("simulated", std::vector<double>{campaign.head.simulated ? 1.0 : 0.0});
+    file.add("start_utc_s",
+             std::vector<double>{drivers::to_seconds(origin + campaign.head.utc_offset_ns)});
+    file.add("time_s", time);
+    file.add("sequence", sequence);
+    file.add("angle_deg", angle, 3);
+    file.add("force_g", force, 3);
+    file.add("table_accel_g", table);
+    file.add("quality", quality, drivers::kChannels);
+    file.add("run", run);
+    file.add("position", position);
+    std::vector<double> d_run, d_position, d_table, d_from, d_to, value, sigma, covariance, kappa,
+        nis;
+    for (const auto& dwell : dwells) {
+        d_run.push_back(dwell.order->run);
+        d_position.push_back(dwell.order->position);
+        d_table.push_back(dwell.order->table_g);
+        d_from.push_back(drivers::to_seconds(dwell.order->from - origin));
+        d_to.push_back(drivers::to_seconds(dwell.order->to - origin));
+    }
+    for (const auto& dwell : campaign.dwells) {
+        kappa.push_back(dwell.summary.kappa);
+        nis.push_back(dwell.summary.nis_per_dof);
+        value.insert(value.end(), dwell.value.begin(), dwell.value.end());
+        sigma.insert(sigma.end(), dwell.sigma.begin(), dwell.sigma.end());
+    }
+    if (!campaign.dwells.empty()) covariance = campaign.dwells.back().covariance;
+    std::string names;
+    for (const char* name : estimator::parameter_names())
+        names += (names.empty() ? "" : " ") + std::string(name);
+    file.add("coefficients", names);
+    file.add("dwell_run", d_run);
+    file.add("dwell_position", d_position);
+    file.add("dwell_table_g", d_table);
+    file.add("dwell_from_s", d_from);
+    file.add("dwell_to_s", d_to);
+    file.add("dwell_kappa", kappa);
+    file.add("dwell_nis_per_dof", nis);
+    file.add("dwell_value", value, estimator::kParameters);
+    file.add("dwell_sigma", sigma, estimator::kParameters);
+    file.add("covariance", covariance, estimator::kParameters);
+    file.finish();
+    std::cerr << path << ": " << campaign.samples.size() << " samples\n";
+}
+
+/// Whole lines of a candump log without what Wireshark does not take: directions, comments.
+class PlainLines {
+  public:
+    std::string_view of(std::string_view piece) {
+        rest_ += piece;
+        plain_.clear();
+        std::size_t begin = 0;
+        for (std::size_t end = rest_.find('\n'); end != std::string::npos;
+             begin = end + 1, end = rest_.find('\n', begin)) {
+            std::string_view line(rest_.data() + begin, end - begin);
+            if (!line.starts_with('(')) continue;
+            if (line.ends_with(" R") || line.ends_with(" T")) line.remove_suffix(2);
+            plain_ += std::string(line) + "\n";
+        }
+        rest_.erase(0, begin);
+        return plain_;
+    }
+
+  private:
+    std::string rest_, plain_;
+};
+
+/// False: a segment is missing.
+bool export_candump(const record::Campaign& campaign, const std::string& path, bool plain) {
+    const auto files = record::raw_files(campaign.folder);
+    if (files.empty())
+        throw std::runtime_error(campaign.folder +
+                                 ": found no raw-*.log, expected the campaign's raw log");
+    std::FILE* to = path == "-" ? stdout : std::fopen(path.c_str(), "wb");
+    if (to == nullptr) throw std::runtime_error(path + ": cannot be written");
+    std::size_t bytes = 0;
+    bool good = true;
+    for (const auto& file : files) {
+        PlainLines lines;
+        record::read_raw(file, [&](std::string_view piece) {
+            if (plain) piece = lines.of(piece);
+            good = good && std::fwrite(piece.data(), 1, piece.size(), to) == piece.size();
+            bytes += piece.size();
+            return good;
+        });
+    }
+    good = (to == stdout ? std::fflush(to) : std::fclose(to)) == 0 && good;
+    if (!good) throw std::runtime_error(path + ": cannot be written");
+    if (to != stdout)
+        std::cerr << path << ": " << bytes << " bytes of " << files.size() << " segments\n";
+    return tell_missing_raw(campaign.folder, files);
+}
+
+int export_campaign(const std::string& argument, const std::string& format, std::string path) {
+    record::Campaign campaign;
+    {
+        Progress progress("reading " + argument);
+        progress.show(0, 1);
+        campaign = read_named_campaign(argument);
+    }
+    if (path.empty())
+        path = campaign.head.name +
+               (format == "candump" || format == "wireshark" ? ".log" : "." + format);
+    keep_recordings(path);
+    if (format == "csv") {
+        export_csv(campaign, path);
+    } else if (format == "mat") {
+        export_mat(campaign, path);
+    } else if (!export_candump(campaign, path, format == "wireshark")) {
+        return kNo;
+    }
+    return 0;
+}
+
+std::vector<std::string> lost(const record::Recovery& found) {
+    std::vector<std::string> lost;
+    if (found.recovered && found.ends_utc_ns > 0)
+        lost.push_back("everything after " + report::utc_text(found.ends_utc_ns));
+    if (!found.cut_dwell.empty()) lost.push_back("the end of " + found.cut_dwell);
+    if (found.missing > 0)
+        lost.push_back(std::to_string(found.missing) + " sync counts within what is there");
+    lost.insert(lost.end(), found.words.begin(), found.words.end());
+    return lost;
+}
+
+nlohmann::ordered_json recovery_json(const record::Recovery& found) {
+    nlohmann::ordered_json root;
+    root["campaign"] = found.path;
+    if (!found.failed.empty()) {
+        root["error"] = found.failed;
+        return root;
+    }
+    root["was_closed"] = found.was_closed;
+    root["recovered"] = found.recovered;
+    root["parts"] = found.parts;
+    root["samples"] = found.samples;
+    root["samples_from_raw"] = found.samples_from_raw;
+    root["samples_missing"] = found.missing;
+    root["recorded_s"] = found.recorded_s;
+    root["ends"] = nullptr;
+    if (found.ends_utc_ns > 0) root["ends"] = report::utc_text(found.ends_utc_ns);
+    root["dwells"] = found.dwells;
+    root["dwell_in_progress"] = nullptr;
+    if (!found.cut_dwell.empty()) root["dwell_in_progress"] = found.cut_dwell;
+    root["raw_beyond_s"] = found.raw_until_s;
+    root["missing_raw"] = found.missing_raw;
+    root["lost"] = lost(found);
+    return root;
+}
+
+std::string recovery_text(const record::Recovery& found) {
+    std::array<char, 200> line{};
+    std::string text = !found.was_closed ? "mended\n"
+                       : found.recovered ? "mended before: nothing to mend\n"
+                                         : "closed in order: nothing to mend\n";
+    std::snprintf(line.data(), line.size(), "%zu samples over %.3f s, %zu dwells done, %zu %s\n",
+                  found.samples, found.recorded_s, found.dwells, found.parts,
+                  found.parts == 1 ? "file" : "files");
+    text += line.data();
+    if (found.recovered) {
+        std::snprintf(line.data(), line.size(),
+                      "%zu samples more from the raw log, which goes on %.3f s longer\n",
+                      found.samples_from_raw, found.raw_until_s);
+        text += line.data();
+        if (found.cut_dwell.empty()) text += "no dwell was in progress\n";
+    }
+    for (const auto& words : lost(found)) text += "lost: " + words + "\n";
+    for (const auto& words : found.missing_raw) text += "missing " + words + "\n";
+    return text;
+}
+
+int recover(const std::string& argument, bool json) {
+    const auto found = record::recover(
+        named_campaign(argument), [](const std::string& words) { std::cerr << words << '\n'; });
+    int code = 0;
+    for (const auto& campaign : found) {
+        if (!campaign.missing_raw.empty() || !campaign.failed.empty()) code = kNo;
+        if (json) {
+            std::cout << recovery_json(campaign).dump() << '\n';
+        } else if (campaign.failed.empty()) {
+            if (found.size() > 1) std::cout << campaign.path << ": ";
+            std::cout << recovery_text(campaign);
+        }
+    }
+    std::cout << std::flush;
+    for (const auto& campaign : found)
+        if (!campaign.failed.empty()) std::cerr << campaign.failed << '\n';
+    return code;
+}
+
+}  // namespace
+
+void add_recordings(CLI::App& app, int& exit_code) {
+    struct Options {
+        std::string campaign, format, output;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* exporting = app.add_subcommand("export", "A recorded campaign for other programs");
+    exporting->add_option("CAMPAIGN", options->campaign, kCampaignHelp)->required();
+    exporting
+        ->add_option(
+            "--to", options->format,
+            "csv (as `vibrig identify` reads it: samples of good quality, zeros that were taken "
+            "in place subtracted), mat (MATLAB, Octave), candump (both directions; "
+            "canplayer, log2asc) or wireshark (the same without directions)")
+        ->required()
+        ->check(CLI::IsMember({"csv", "mat", "candump", "wireshark"}));
+    exporting->add_option("-o,--output", options->output,
+                          "file to write (default: the campaign's name here; candump: - is "
+                          "standard output)");
+    exporting->footer(
+        "Example: vibrig export demo-20260301T080000Z --to csv -o demo.csv\n"
+        "A sample takes 79 bytes in the recording's HDF5 file (93 with estimates and covariances), "
+        "59 as\n"
+        "frames in its compressed raw log (470 as text).\n"
+        "Exit codes: 0, 1 a segment of the raw log is missing (candump, wireshark), 2 bad usage or "
+        "input.");
+    exporting->callback([options, &exit_code] {
+        exit_code = guarded(
+            [&] { return export_campaign(options->campaign, options->format, options->output); });
+    });
+
+    CLI::App* recovering = app.add_subcommand(
+        "recover", "Mends a campaign's files after a crash and says what was lost");
+    recovering
+        ->add_option("CAMPAIGN", options->campaign,
+                     std::string(kCampaignHelp) +
+                         "; or the folder of all recordings: then its index is made anew, too")
+        ->required();
+    recovering->add_flag("--json", options->json, "print what was found as JSON");
+    recovering->footer(
+        "Example: vibrig recover /var/lib/vibrig/platform-17-20260301T080000Z\n"
+        "A file that was closed in order is left as it is.\n"
+        "Exit codes: 0, 1 a segment of the raw log is missing or one of several campaigns cannot "
+        "be\nrecovered, 2 bad usage or input.");
+    recovering->callback([options, &exit_code] {
+        exit_code = guarded([&] { return recover(options->campaign, options->json); });
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,221 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/report/result_charts.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/results/result_json.hpp"
+#include "daemon/results/result_table.hpp"
+#include "daemon/tool/simulated.hpp"
+#include "estimator/filter/instruction_set.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReplayArguments {
+    std::vector<std::string> files;
+    std::string config, dwells, plot, speed = "max";
+    std::string instruction_set = "auto";
+    bool json = false;
+    bool strict = false;
+};
+
+double replay_speed(const std::string& text) {
+    double speed = 0;
+    if (text == "max") return 0;
+    std::string_view number = text;
+    if (number.ends_with('x')) number.remove_suffix(1);
+    if (!proto::read_number(number, speed) || !(speed >= 1e-3) || !(speed <= 1e6))
+        throw std::runtime_error("--speed: found '" + proto::printable(text) +
+                                 "', expected max or a number from 0.001 to 1000000");
+    return speed;
+}
+
+/// With --config its settings, else those of the recording.
+estimator::Settings replay_settings(const ReplayArguments& arguments,
+                                    const record::Campaign& campaign) {
+    if (!arguments.config.empty())
+        return configuration::load(arguments.config, false).configuration.estimator;
+    return configuration::parse(record::identification_sections(campaign.head.configuration),
+                                "configuration in " + campaign.path, false)
+        .configuration.estimator;
+}
+
+bool is_log(const std::string& path) { return path.ends_with(".log") || path.ends_with(".zst"); }
+
+record::Campaign replayed_campaign(const ReplayArguments& arguments) {
+    const std::string& first = arguments.files.front();
+    if (!std::ranges::any_of(arguments.files, is_log)) {
+        if (arguments.files.size() > 1)
+            throw std::runtime_error(arguments.files[1] +
+                                     ": found a second campaign, expected one (or candump logs)");
+        return read_named_campaign(first);
+    }
+    // Without words about it, what the recorder left beside the logs.
+    const fs::path folder = fs::path(first).parent_path();
+    std::string configuration, dbc, mark;
+    const auto parts = record::part_files(folder.empty() ? "." : folder.string());
+    if (!parts.empty()) {
+        try {
+            const auto beside = record::read_part_head(parts.rbegin()->second);
+            configuration = beside.head.configuration;
+            dbc = beside.head.dbc;
+            mark = beside.mark;
+        } catch (const std::exception& error) {
+            if (arguments.config.empty())
+                throw std::runtime_error(std::string(error.what()) +
+                                         "; expected it, or --config FILE in its place");
+            std::cerr << error.what() << "; whether the campaign is marked is not known\n";
+        }
+    }
+    if (!arguments.config.empty()) {
+        const auto loaded = configuration::load(arguments.config, false);
+        configuration = configuration::format_effective(loaded);
+        if (!loaded.configuration.dbc.empty())
+            dbc = proto::read_whole_file(loaded.configuration.dbc, 16 << 20);
+    }
+    const std::string dwells =
+        arguments.dwells.empty() ? (folder / "dwells.csv").string() : arguments.dwells;
+    auto campaign = record::campaign_from_candump(arguments.files, dwells, configuration, dbc);
+    campaign.mark = mark;
+    return campaign;
+}
+
+/// The result; where it is not the recording's, with a word about that.
+std::string replayed_json(const record::ReplayResult& replayed,
+                          const estimator::uncertainty::Assessment& assessed,
+                          const estimator::Settings& settings, bool simulated, bool same_build) {
+    std::optional<dwells::Live> live;
+    if (replayed.found)
+        live = {*replayed.found, replayed.live,
+                estimator::uncertainty::assess(settings, replayed.live)};
+    std::string text =
+        result_json(replayed.result, assessed, simulated, nullptr, live ? &*live : nullptr);
+    if (replayed.different == 0) return text;
+    const nlohmann::ordered_json replay{{"dwells", replayed.compared},
+                                        {"not_as_recorded", replayed.different},
+                                        {"first", replayed.first_difference},
+                                        {"same_build", same_build}};
+    text.back() = ',';
+    return text + "\"replay\":" + replay.dump() + "}";
+}
+
+int replay(const ReplayArguments& arguments) {
+    estimator::use_instruction_set(arguments.instruction_set);
+    record::ReplayOptions options;
+    options.speed = replay_speed(arguments.speed);
+    record::Campaign campaign;
+    {
+        Progress reading("reading " + arguments.files.front());
+        reading.show(0, 1);
+        campaign = replayed_campaign(arguments);
+        if (!arguments.config.empty()) record::forget_noise(campaign);
+    }
+    const estimator::Settings settings = replay_settings(arguments, campaign);
+    record::ReplayResult replayed;
+    {
+        Progress progress("replaying");
+        options.progress = [&](std::size_t done, std::size_t all) { progress.show(done, all); };
+        replayed = record::replay(campaign, settings, options);
+    }
+    // Logs of other names are anybody's.
+    const auto& files = arguments.files;
+    const bool whole = !std::ranges::all_of(files, record::raw_number) ||
+                       tell_missing_raw(record::folder_of(files.front()), files);
+    if (!arguments.config.empty()) replayed.different = replayed.compared = 0;
+    const bool same_build = campaign.head.version == VIBRIG_VERSION &&
+                            campaign.head.compiler == estimator::compiler() &&
+                            campaign.head.instruction_set == estimator::instruction_set();
+    const auto assessed = estimator::uncertainty::assess(
+        dwells::Anew::settings_of(settings, replayed.found), replayed.result);
+    const bool simulated = campaign.head.simulated;
+    if (!arguments.plot.empty()) report::plot_result(arguments.plot, replayed.result, assessed);
+    std::cout << (arguments.json
+                      ? replayed_json(replayed, assessed, settings, simulated, same_build) + "\n"
+                      : simulated_line(simulated) + result_table(replayed.result, assessed))
+              << std::flush;
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(),
+                  "%zu samples, %zu dwells: %.1f s recorded, replayed in %.2f s (%.0f times)",
+                  replayed.samples, replayed.dwells.size(), replayed.recorded_s, replayed.took_s,
+                  replayed.took_s > 0 ? replayed.recorded_s / replayed.took_s : 0.0);
+    std::cerr << text.data() << '\n';
+    if (replayed.compared > 0) {
+        if (replayed.different == 0) {
+            std::cerr << "estimates after each of " << replayed.compared
+                      << " dwells: as recorded, to the last bit\n";
+        } else {
+            std::cerr << "estimates after " << replayed.different << " of " << replayed.compared
+                      << " dwells are not as recorded (" << replayed.first_difference
+                      << "); recorded by " << campaign.head.version << ", "
+                      << campaign.head.compiler << ", " << campaign.head.instruction_set
+                      << "; this is " << VIBRIG_VERSION << ", " << estimator::compiler() << ", "
+                      << estimator::instruction_set()
+                      << (same_build ? ": expected the same\n" : "\n");
+        }
+    }
+    if (!std::cout) throw std::runtime_error("standard output: cannot be written");
+    const bool as_recorded = replayed.different == 0 || !same_build;
+    return whole && as_recorded ? exit_status(assessed.verdict.level, arguments.strict) : kNo;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+    auto arguments = std::make_shared<ReplayArguments>();
+    CLI::App* command = app.add_subcommand(
+        "replay", "A recording through the daemon's own path, on a virtual clock");
+    command
+        ->add_option("FILE", arguments->files,
+                     "a campaign: its folder, HDF5 file or name in the index; or candump logs in "
+                     "order (.log, .log.zst)")
+        ->required();
+    command->add_option("--speed", arguments->speed, "times the recording's own, or max (default)");
+    command->add_option("--config", arguments->config,
+                        "identify anew with these settings (TOML) instead of the recorded ones");
+    command->add_option("--dwells", arguments->dwells,
+                        "with candump logs: which times are which dwell (default: dwells.csv "
+                        "beside the first log)");
+    command
+        ->add_option("--instruction-set", arguments->instruction_set,
+                     "of the filter: auto (the best), or one of this processor's")
+        ->envname("VIBRIG_INSTRUCTION_SET");
+    command->add_option("--plot", arguments->plot,
+                        "an SVG file: uncertainties of the coefficients; or a folder: their "
+                        "correlation and the dwells' residuals, too");
+    command->add_flag("--json", arguments->json, "print the result as JSON");
+    command->add_flag("--strict", arguments->strict, "a doubtful result is a no as well");
+    command->footer(
+        "Example: vibrig replay /var/lib/vibrig/platform-17-20260301T080000Z --speed max\n"
+        "On the build and instruction set of the recording the estimates come out as they were to\n"
+        "the last bit; standard error says whether they did. 28 dwells of 100 s at 40 samples/s "
+        "(142 000\n"
+        "samples) take about a second.\n"
+        "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
+        "doubtful), a segment of the raw log is\nmissing, or the recording's build and instruction "
+        "set give other estimates (then "
+        "\"replay\" in\nthe JSON), 2 bad usage or input.");
+    command->callback(
+        [arguments, &exit_code] { exit_code = guarded([&] { return replay(*arguments); }); });
+}
+
+}  // namespace vibrig::tool

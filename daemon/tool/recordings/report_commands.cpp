@@ -1,0 +1,370 @@
+// vibrig report and vibrig compensate.
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/report/journal_section.hpp"
+#include "daemon/report/report.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/plot/chart.hpp"
+#include "daemon/tool/recordings/print_pdf.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/results/result_table.hpp"
+#include "daemon/tool/simulated.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using estimator::kParameters;
+
+struct ReportArguments {
+    std::string campaign, output = "report.html", config, compare, pdf, journal;
+    bool strict = false;
+    bool same_unit = false;
+};
+
+struct CompensateArguments {
+    std::string campaign, format = "text", output, config;
+    std::optional<std::string> platform_g, table_g;  ///< as given
+    std::vector<double> attitude;
+};
+
+std::string filled_in(const char* format, auto... values) {
+    std::array<char, 256> text{};
+    std::snprintf(text.data(), text.size(), format, values...);
+    return text.data();
+}
+
+estimator::Settings report_settings(const record::Campaign& campaign, const std::string& config) {
+    return config.empty() ? report::settings_of(campaign)
+                          : configuration::load(config, false).configuration.estimator;
+}
+
+int make_report(const ReportArguments& arguments) {
+    keep_recordings(arguments.output);
+    keep_recordings(arguments.pdf);
+    auto campaign = read_named_campaign(arguments.campaign);
+    if (!arguments.config.empty()) record::forget_noise(campaign);
+    const auto settings = report_settings(campaign, arguments.config);
+    std::optional<report::Earlier> earlier;
+    if (!arguments.compare.empty()) {
+        earlier = report::earlier_of(read_named_campaign(arguments.compare), campaign,
+                                     arguments.same_unit);
+        std::cerr << "compared with " << earlier->path << " of " << earlier->when << '\n';
+    }
+    report::Analysis analysis;
+    {
+        Progress progress("analysing " + campaign.head.name);
+        analysis = report::analyse(campaign, settings, [&](double fraction) {
+            progress.show(static_cast<std::size_t>(100 * fraction), 100);
+        });
+    }
+    analysis.journal = report::journal_verdict(campaign, arguments.journal);
+    if (analysis.journal.starts_with('!'))
+        std::cerr << "journal: " << analysis.journal.substr(1) << '\n';
+    plot::write_file(arguments.output, report::make_page(campaign, analysis, earlier));
+    std::cerr << arguments.output << ": " << fs::file_size(arguments.output) / 1000 << " kB\n";
+    if (!arguments.pdf.empty()) {
+        print_pdf(arguments.output, arguments.pdf);
+        std::cerr << arguments.pdf << ": " << fs::file_size(arguments.pdf) / 1000 << " kB\n";
+    }
+    const auto& verdict = analysis.assessed.verdict;
+    std::cerr << "verdict: " << verdict.sentence << '\n';
+    return exit_status(verdict.level, arguments.strict);
+}
+
+Json prediction_json(const report::Prediction& predicted, const CompensateArguments& arguments,
+                     double kappa) {
+    Json root;
+    root["attitude_deg"] = arguments.attitude;
+    root["platform_g"] = std::sqrt(2 * (kappa - 1));
+    root["kappa"] = kappa;
+    Json gyros = Json::array();
+    for (std::size_t k = 0; k < 3; ++k) {
+        gyros.push_back({{"gyro", std::string(1, "xyz"[k])},
+                         {"drift_dph", predicted.drift_dph[k]},
+                         {"residual_sigma_dph", predicted.residual_dph[k]},
+                         {"determined", predicted.determined[k]}});
+    }
+    root["gyros"] = std::move(gyros);
+    return root;
+}
+
+std::string coefficients_json(const record::Campaign& campaign, const report::Coefficients& c,
+                              const estimator::Settings& settings, const Json& prediction) {
+    Json root;
+    root["simulated"] = campaign.head.simulated;
+    if (campaign.head.simulated) root["note"] = kSimulatedRig;
+    root["campaign"] = campaign.head.name;
+    root["started"] = report::utc_text(campaign.head.utc_ns);
+    root["file"] = campaign.path;
+    root["model"] =
+        "D = F + I aI + O aO + S aS + II aI^2 + OO aO^2 + SS aS^2 + IO aI aO + IS aI aS "
+        "+ OS aO aS; a: specific force along input, output, spin axis, g";
+    Json list = Json::array();
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const bool known = c.observable[i];
+        list.push_back({{"name", estimator::parameter_names()[i]},
+                        {"value", known ? Json(c.value[i]) : Json(nullptr)},
+                        {"sigma", known ? Json(c.sigma[i]) : Json(nullptr)},
+                        {"unit", estimator::parameter_unit(i)}});
+    }
+    root["coefficients"] = std::move(list);
+    for (std::size_t g = 0; g < 3; ++g) {
+        Json axes = Json::array();
+        for (const auto& axis : settings.gyro_axes[g])
+            axes.push_back(filled_in("%c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]));
+        root["axes"][filled_in("gyro_%c", "xyz"[g])] = std::move(axes);
+    }
+    root["drift_sign"] = settings.drift_sign;
+    root["prediction"] = prediction;
+    return root.dump(2) + "\n";
+}
+
+std::string axes_line(const estimator::Settings& settings) {
+    std::string text = "input, output, spin axis (I, O, S) in platform axes:";
+    for (std::size_t g = 0; g < 3; ++g) {
+        text += filled_in("%s gyro %c", g == 0 ? "" : ",", "xyz"[g]);
+        for (const auto& axis : settings.gyro_axes[g])
+            text += filled_in(" %c%c", axis.sign < 0 ? '-' : '+', "xyz"[axis.axis]);
+    }
+    return text + filled_in("; drift sign %+d", settings.drift_sign);
+}
+
+/// For comments: what the numbers refer to, and what they predict.
+std::vector<std::string> comment_lines(const estimator::Settings& settings,
+                                       const report::Prediction& predicted,
+                                       const CompensateArguments& arguments, double kappa) {
+    std::vector<std::string> lines{
+        axes_line(settings),
+        filled_in("predicted at %g, %g, %g deg with %.4g g peak at the platform, deg/h:",
+                  arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                  std::sqrt(2 * (kappa - 1)))};
+    for (std::size_t k = 0; k < 3; ++k)
+        lines.push_back(
+            filled_in("gyro %c: drift %.6f, left after compensation 0 +- %.6f (1 sigma)%s",
+                      "xyz"[k], predicted.drift_dph[k], predicted.residual_dph[k],
+                      predicted.determined[k] ? "" : ", rests on what is not determined"));
+    return lines;
+}
+
+std::string coefficients_csv(const report::Coefficients& c,
+                             const std::vector<std::string>& comments) {
+    std::string text;
+    for (const auto& line : comments) text += "# " + line + "\n";
+    text += "name,value,sigma,unit\n";
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        text += estimator::parameter_names()[i];
+        text += c.observable[i] ? filled_in(",%.17g,%.17g,", c.value[i], c.sigma[i])
+                                : std::string(",,,");
+        text += std::string(estimator::parameter_unit(i)) + "\n";
+    }
+    return text;
+}
+
+std::string coefficients_header(const record::Campaign& campaign, const report::Coefficients& c,
+                                const std::vector<std::string>& comments) {
+    // A name in a comment must not end it.
+    std::string name;
+    for (const char ch : campaign.head.name)
+        name += std::isalnum(static_cast<unsigned char>(ch)) != 0 ? ch : '_';
+    std::string text;
+    if (campaign.head.simulated) text = std::string("/* ") + kSimulatedRig + " */\n";
+    text += "/* Gyro error coefficients of campaign " + name + ", " +
+            report::utc_text(campaign.head.utc_ns) +
+            ".\n * deg/h, deg/h/g, deg/h/g^2. Drift about the input axis of a gyro:\n"
+            " *   D = c[0] + c[1] aI + c[2] aO + c[3] aS + c[4] aI^2 + c[5] aO^2 + c[6] "
+            "aS^2\n *       + c[7] aI aO + c[8] aI aS + c[9] aO aS\n"
+            " * with a the specific force along input, output and spin axis, g.\n";
+    for (const auto& line : comments) text += " * " + line + "\n";
+    text += " */\n#ifndef VIBRIG_COEFFICIENTS_H\n#define VIBRIG_COEFFICIENTS_H\n\n";
+    for (const bool sigma : {false, true}) {
+        text += std::string("static const double vibrig_coefficient") + (sigma ? "_sigma" : "") +
+                "[3][10] = {\n";
+        for (std::size_t g = 0; g < 3; ++g) {
+            text += "    {";
+            for (std::size_t k = 0; k < 10; ++k)
+                text += filled_in("%s%.17g", k == 0 ? "" : ", ",
+                                  sigma ? c.sigma[g * 10 + k] : c.value[g * 10 + k]);
+            text += g == 2 ? "} /* z */\n" : g == 1 ? "}, /* y */\n" : "}, /* x */\n";
+        }
+        text += "};\n";
+    }
+    return text + "\n#endif\n";
+}
+
+std::string coefficients_text(const report::Coefficients& c, const std::string& axes,
+                              const report::Prediction& predicted,
+                              const CompensateArguments& arguments, double kappa) {
+    std::string text = filled_in("%-12s %12s %11s  %s\n", "coefficient", "value", "sigma", "unit");
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        text += c.observable[i]
+                    ? filled_in("%-12s %12.6f %11.6f  %s\n", estimator::parameter_names()[i],
+                                c.value[i], c.sigma[i], estimator::parameter_unit(i))
+                    : filled_in("%-12s %12s %11s  %s\n", estimator::parameter_names()[i],
+                                "not determined", "-", estimator::parameter_unit(i));
+    }
+    text += "\n" + axes + "\n";
+    text += filled_in("\nat %g, %g, %g deg with %.4g g peak at the platform (deg/h)\n",
+                      arguments.attitude[0], arguments.attitude[1], arguments.attitude[2],
+                      std::sqrt(2 * (kappa - 1)));
+    text += filled_in("%-6s %14s %26s\n", "gyro", "drift", "left after compensation");
+    for (std::size_t k = 0; k < 3; ++k)
+        text += filled_in("%-6c %14.6f         0 +- %.6f (1 sigma)%s\n", "xyz"[k],
+                          predicted.drift_dph[k], predicted.residual_dph[k],
+                          predicted.determined[k] ? "" : "  rests on what is not determined");
+    return text;
+}
+
+/// Peak acceleration of an option, g.
+double level_of(const char* option, const std::string& text) {
+    double level = 0;
+    if (!proto::read_number(std::string_view(text), level) || !(level >= 0) || !(level <= 1000))
+        throw std::runtime_error(std::string(option) + ": found '" + proto::printable(text) +
+                                 "', expected 0 to 1000 g");
+    return level;
+}
+
+void check_finite(const std::string& path, const report::Coefficients& c) {
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (const double number : {c.value[i], c.sigma[i]}) {
+            if (c.observable[i] && !std::isfinite(number))
+                throw std::runtime_error(path + ": " + estimator::parameter_names()[i] +
+                                         ": found " + filled_in("%g", number) +
+                                         ", expected a finite number");
+        }
+    }
+}
+
+int compensate(CompensateArguments arguments) {
+    if (arguments.platform_g && arguments.table_g)
+        throw std::runtime_error("--table-g: found it beside --platform-g, expected one of them");
+    if (arguments.attitude.empty()) arguments.attitude = {0, 0, 0};
+    for (const double angle : arguments.attitude) {
+        if (!std::isfinite(angle) || std::abs(angle) > 360)
+            throw std::runtime_error("--attitude: found " + filled_in("%g", angle) +
+                                     ", expected -360 to 360 deg");
+    }
+    double level = 0;
+    if (arguments.platform_g) level = level_of("--platform-g", *arguments.platform_g);
+    if (arguments.table_g) level = level_of("--table-g", *arguments.table_g);
+    keep_recordings(arguments.output);
+    auto campaign = read_named_campaign(arguments.campaign);
+    if (!arguments.config.empty()) record::forget_noise(campaign);
+    report::Coefficients coefficients;
+    estimator::Settings settings = report_settings(campaign, arguments.config);
+    const auto replayed = record::replay(campaign, settings, {});
+    coefficients =
+        report::combined(estimator::uncertainty::assess(
+                             dwells::Anew::settings_of(settings, replayed.found), replayed.result),
+                         report::final_coefficients(campaign.path, replayed));
+    check_finite(campaign.path, coefficients);
+    if (arguments.table_g) level *= settings.transmission;
+    const double kappa = 1 + level * level / 2;
+    const auto predicted = report::predict(
+        settings, coefficients,
+        {arguments.attitude[0], arguments.attitude[1], arguments.attitude[2]}, {.kappa = kappa});
+    const bool all = std::ranges::all_of(coefficients.observable, [](bool b) { return b; });
+    if (arguments.format == "c" && !all)
+        throw std::runtime_error(
+            campaign.path +
+            ": found coefficients that are not determined, expected all 30 for "
+            "a C header");
+    auto comments = comment_lines(settings, predicted, arguments, kappa);
+    const bool simulated = campaign.head.simulated;
+    // In the header it has a comment of its own.
+    if (simulated && arguments.format == "csv") comments.insert(comments.begin(), kSimulatedRig);
+    const std::string text =
+        arguments.format == "json"  ? coefficients_json(campaign, coefficients, settings,
+                                                        prediction_json(predicted, arguments, kappa))
+        : arguments.format == "csv" ? coefficients_csv(coefficients, comments)
+        : arguments.format == "c"
+            ? coefficients_header(campaign, coefficients, comments)
+            : simulated_line(simulated) +
+                  coefficients_text(coefficients, axes_line(settings), predicted, arguments, kappa);
+    if (arguments.output.empty()) {
+        std::cout << text << std::flush;
+    } else {
+        plot::write_file(arguments.output, text);
+    }
+    return all ? 0 : kNo;
+}
+
+}  // namespace
+
+void add_reports(CLI::App& app, int& exit_code) {
+    auto report = std::make_shared<ReportArguments>();
+    CLI::App* reporting =
+        app.add_subcommand("report", "One page of a recorded campaign, to be signed and filed");
+    reporting->add_option("CAMPAIGN", report->campaign, kCampaignHelp)->required();
+    reporting->add_option("-o,--output", report->output,
+                          "HTML file to write (default report.html)");
+    reporting->add_option("--compare", report->compare,
+                          "an earlier campaign of the same unit: repeatability and E_n");
+    reporting
+        ->add_flag("--same-unit", report->same_unit,
+                   "compare though a campaign states no serial number")
+        ->needs("--compare");
+    reporting->add_option("--config", report->config,
+                          "identify anew with these settings instead of the recorded ones");
+    reporting->add_option("--journal", report->journal,
+                          "the daemon's journal, to be verified (default: journal.sqlite3 beside "
+                          "the campaign's folder)");
+    reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");
+    reporting->add_flag("--strict", report->strict, "a doubtful result is a no as well");
+    reporting->footer(
+        "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
+        "doubtful), 2 bad\nusage or input.\n"
+        "Example: vibrig report demo-20260301T080000Z -o report.html --pdf report.pdf");
+    reporting->callback(
+        [report, &exit_code] { exit_code = guarded([&] { return make_report(*report); }); });
+
+    auto compensation = std::make_shared<CompensateArguments>();
+    CLI::App* compensating = app.add_subcommand(
+        "compensate", "Coefficients for a navigation computer, and what drift they leave");
+    compensating->add_option("CAMPAIGN", compensation->campaign, kCampaignHelp)->required();
+    compensating
+        ->add_option("--to", compensation->format, "text (default), json, csv or c (a header)")
+        ->check(CLI::IsMember({"text", "json", "csv", "c"}));
+    compensating->add_flag_callback(
+        "--json", [compensation] { compensation->format = "json"; }, "as --to json");
+    compensating->add_option("-o,--output", compensation->output,
+                             "file to write (default: standard output)");
+    compensating
+        ->add_option("--attitude", compensation->attitude,
+                     "outer, inner, azimuth in deg at which the drift is predicted (default 0,0,0)")
+        ->delimiter(',')
+        ->expected(3);
+    // As text: CLI11 takes an empty one for 0.
+    compensating->add_option("--platform-g", compensation->platform_g,
+                             "vibration, peak at the platform, g (default 0)");
+    compensating->add_option("--table-g", compensation->table_g, "or peak at the table, g");
+    compensating->add_option("--config", compensation->config,
+                             "identify anew with these settings instead of the recorded ones");
+    compensating->footer(
+        "Example: vibrig compensate demo-20260301T080000Z --attitude 45,0,90 --platform-g 6\n"
+        "Exit codes: 0 all 30 coefficients are determined, 1 some are not, 2 bad usage or input.");
+    compensating->callback([compensation, &exit_code] {
+        exit_code = guarded([&] { return compensate(*compensation); });
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,93 @@
+// vibrig trend: a unit's coefficients over its campaigns.
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "daemon/archive/trend.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/trend_output.hpp"
+#include "estimator/identification/identification.hpp"
+#include "proto/text.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+struct TrendOptions {
+    std::string serial, since, plot;
+    double shutdown_after_h = archive::kShutdownAfterH;
+    bool json = false;
+};
+
+constexpr std::size_t kMostNamed = 12;
+
+void unknown_unit(archive::Index& index, const std::string& serial) {
+    std::string known;
+    std::size_t count = 0;
+    for (const auto& unit : index.units())
+        if (!unit.serial.empty() && ++count <= kMostNamed) known += " " + unit.serial;
+    throw std::runtime_error(
+        index.name() + ": found no campaign of a unit with the serial number '" +
+        proto::printable(serial) + "', " +
+        (count == 0 ? "nor of any other"
+                    : "expected one of" + known + (count > kMostNamed ? " ..." : "")));
+}
+
+int trend(const TrendOptions& o, const ArchiveOptions& where) {
+    const auto index = open_index(where);
+    archive::Filter filter;
+    filter.serial = o.serial;
+    if (!o.since.empty()) filter.since_utc_ns = utc_of("--since", o.since);
+    auto campaigns = index->results(filter);
+    if (campaigns.empty()) unknown_unit(*index, o.serial);
+    const auto found = archive::trend_of(std::move(campaigns), o.shutdown_after_h);
+    if (o.json) {
+        std::cout << trend_json(o.serial, found, o.shutdown_after_h).dump() << '\n';
+    } else {
+        std::cout << trend_table(o.serial, found, o.shutdown_after_h);
+    }
+    if (!o.plot.empty()) {
+        if (found.coefficients.empty())
+            throw std::runtime_error("--plot: nothing to draw, no chart was written");
+        plot_trend(o.serial, found, o.plot);
+    }
+    return 0;
+}
+
+}  // namespace
+
+void add_trend(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<TrendOptions>();
+    auto where = std::make_shared<ArchiveOptions>();
+    CLI::App* command = app.add_subcommand("trend", "A unit's coefficients over its campaigns");
+    command->add_option("SERIAL", options->serial, "the unit's serial number")->required();
+    command->add_option("--since", options->since, "campaigns of this day and later, UTC");
+    command
+        ->add_option("--shutdown-after", options->shutdown_after_h,
+                     "a longer pause between two campaigns counts as a shutdown, h")
+        ->check(CLI::Range(0.0, 1e6))
+        ->capture_default_str();
+    command->add_flag("--json", options->json, "print it as JSON");
+    command->add_option("--plot", options->plot,
+                        "an SVG file for all, or a folder for a chart of each coefficient");
+    add_archive_options(*command, where);
+    command->footer(
+        "Example: vibrig trend 0017 --archive /lab/archive --plot trend/\n"
+        "Operating instability: scatter between campaigns without a shutdown, beyond what their\n"
+        "uncertainty explains (F against it); shutdown instability: between turn-ons (F against "
+        "the\n"
+        "scatter within). Outliers: what the other campaigns allow once in 1000 such histories.\n"
+        "Exit codes: 0, 2 bad usage or input.");
+    command->callback([options, where, &exit_code] {
+        exit_code = guarded([&] { return trend(*options, *where); });
+    });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,203 @@
+#include "daemon/tool/recordings/trend_output.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tool/recordings/archive_place.hpp"
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/plot/chart.hpp"
+#include "estimator/identification/identification.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kSurely = 0.01;  // p of an instability that is starred
+constexpr double kDay_ns = 86'400e9;
+
+Json instability_json(const archive::Instability& of) {
+    if (!of.tested) return nullptr;
+    return {{"value", of.value},
+            {"f", number_or_null(of.f)},
+            {"dof", of.dof},
+            {"dof_of_error", number_or_null(of.dof_of_error)},
+            {"p", number_or_null(of.p)}};
+}
+
+std::string instability_text(const archive::Instability& of) {
+    if (!of.tested) return "          -";
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "%9.4f %c", of.value, of.p < kSurely ? '*' : ' ');
+    return text.data();
+}
+
+double days_of(const archive::Trend& trend, const archive::TrendPoint& point) {
+    return static_cast<double>(trend.campaigns[point.campaign].started_utc_ns -
+                               trend.campaigns.front().started_utc_ns) /
+           kDay_ns;
+}
+
+plot::Curve level(const std::string& name, double first, double last, double y) {
+    plot::Curve curve;
+    curve.name = name;
+    curve.x = {first, last};
+    curve.y = {y, y};
+    curve.look = plot::Look::dashed;
+    return curve;
+}
+
+std::string time_axis(const archive::Trend& trend) {
+    return "days since " + iso_text(trend.campaigns.front().started_utc_ns);
+}
+
+}  // namespace
+
+Json trend_json(const std::string& serial, const archive::Trend& trend, double shutdown_after_h) {
+    Json campaigns = Json::array(), coefficients = Json::array(), outliers = Json::array();
+    for (std::size_t i = 0; i < trend.campaigns.size(); ++i) {
+        const auto& one = trend.campaigns[i];
+        campaigns.push_back({{"campaign", one.key},
+                             {"name", one.name},
+                             {"started", iso_text(one.started_utc_ns)},
+                             {"rig", one.rig},
+                             {"verdict", one.verdict.empty() ? Json(nullptr) : Json(one.verdict)},
+                             {"simulated", one.simulated},
+                             {"turn_on", trend.turn[i] + 1}});
+    }
+    for (const auto& of : trend.coefficients) {
+        const char* const name = estimator::parameter_names()[of.position];
+        Json points = Json::array();
+        for (const auto& point : of.points) {
+            const std::string& campaign = trend.campaigns[point.campaign].key;
+            points.push_back({{"campaign", campaign},
+                              {"value", point.of.value},
+                              {"u", point.of.u},
+                              {"u_repeat", point.u},
+                              {"expanded", point.of.expanded},
+                              {"low", point.of.value - point.of.expanded},
+                              {"high", point.of.value + point.of.expanded},
+                              {"t", number_or_null(point.t)},
+                              {"p", number_or_null(point.p)},
+                              {"outlier", point.outlier}});
+            if (point.outlier)
+                outliers.push_back({{"campaign", campaign},
+                                    {"coefficient", name},
+                                    {"value", point.of.value},
+                                    {"t", number_or_null(point.t)},
+                                    {"p", number_or_null(point.p)}});
+        }
+        coefficients.push_back({{"name", name},
+                                {"unit", estimator::parameter_unit(of.position)},
+                                {"mean", of.mean},
+                                {"interval", {of.mean_low, of.mean_high}},
+                                {"operating_instability", instability_json(of.operating)},
+                                {"shutdown_instability", instability_json(of.shutdown)},
+                                {"points", std::move(points)}});
+    }
+    const std::string type = trend.campaigns.empty() ? "" : trend.campaigns.back().unit_type;
+    return {{"unit", {{"type", type}, {"serial", serial}}},
+            {"shutdown_after_h", shutdown_after_h},
+            {"campaigns", std::move(campaigns)},
+            {"left_out", trend.left_out},
+            {"coefficients", std::move(coefficients)},
+            {"outliers", std::move(outliers)}};
+}
+
+std::string trend_table(const std::string& serial, const archive::Trend& trend,
+                        double shutdown_after_h) {
+    std::array<char, 256> line{};
+    const std::size_t turns = trend.turn.empty() ? 0 : trend.turn.back() + 1;
+    std::snprintf(
+        line.data(), line.size(),
+        "unit %s: %zu campaigns in %zu turn-ons (a pause of more than %g h is a shutdown)",
+        serial.c_str(), trend.campaigns.size(), turns, shutdown_after_h);
+    std::string text = line.data();
+    if (trend.left_out > 0)
+        text += "; " + std::to_string(trend.left_out) + " not valid or without a result left out";
+    text +=
+        "\n\ncoefficient        mean   95 % interval             operating     shutdown       "
+        "newest"
+        "    +- U\n";
+    for (const auto& of : trend.coefficients) {
+        const auto& newest = of.points.back();
+        std::snprintf(line.data(), line.size(),
+                      "%-7s %15.5f   %10.5f .. %-10.5f  %s  %s  %11.5f  %8.5f  %s%s\n",
+                      estimator::parameter_names()[of.position], of.mean, of.mean_low, of.mean_high,
+                      instability_text(of.operating).c_str(), instability_text(of.shutdown).c_str(),
+                      newest.of.value, newest.of.expanded, estimator::parameter_unit(of.position),
+                      newest.outlier ? "  outlier" : "");
+        text += line.data();
+    }
+    text += "\n* F test: p below 0.01 without the instability\n";
+    for (const auto& of : trend.coefficients)
+        for (const auto& point : of.points) {
+            if (!point.outlier) continue;
+            std::snprintf(line.data(), line.size(),
+                          "outlier: %s of %s, %s: %.5f, t = %.1f against the others, p = %.2g\n",
+                          estimator::parameter_names()[of.position],
+                          trend.campaigns[point.campaign].key.c_str(),
+                          minute_text(trend.campaigns[point.campaign].started_utc_ns).c_str(),
+                          point.of.value, point.t, point.p);
+            text += line.data();
+        }
+    return text;
+}
+
+std::string trend_chart(const archive::Trend& trend, const archive::CoefficientTrend& of) {
+    plot::Chart chart;
+    const char* const name = estimator::parameter_names()[of.position];
+    chart.title = std::string(name) + " over the campaigns";
+    chart.x = plot::Axis(time_axis(trend));
+    chart.y = plot::Axis(std::string(name) + ", " + estimator::parameter_unit(of.position));
+    plot::Curve usual, outlying;
+    usual.name = "value with U";
+    usual.look = outlying.look = plot::Look::dots;
+    outlying.name = "outlier";
+    for (const auto& point : of.points) {
+        plot::Curve& to = point.outlier ? outlying : usual;
+        to.x.push_back(days_of(trend, point));
+        to.y.push_back(point.of.value);
+        to.low.push_back(point.of.value - point.of.expanded);
+        to.high.push_back(point.of.value + point.of.expanded);
+    }
+    const double last = days_of(trend, of.points.back());
+    chart.curves.push_back(usual);
+    if (!outlying.x.empty()) chart.curves.push_back(outlying);
+    chart.curves.push_back(level("mean", 0, last, of.mean));
+    chart.curves.push_back(level("its 95 % interval", 0, last, of.mean_low));
+    chart.curves.push_back(level("", 0, last, of.mean_high));
+    return chart.svg();
+}
+
+void plot_trend(const std::string& serial, const archive::Trend& trend, const std::string& path) {
+    plot::Chart chart;
+    chart.title = "unit " + serial + ": all coefficients";
+    chart.x = plot::Axis(time_axis(trend));
+    chart.y = plot::Axis("(value - mean) / u");
+    for (const auto& of : trend.coefficients) {
+        plot::Curve curve;
+        for (const auto& point : of.points) {
+            curve.x.push_back(days_of(trend, point));
+            curve.y.push_back((point.of.value - of.mean) / point.u);
+        }
+        chart.curves.push_back(std::move(curve));
+    }
+    if (path.ends_with(".svg")) {
+        plot::write_file(path, chart.svg());
+        return;
+    }
+    plot::make_folder(path);
+    plot::write_file((std::filesystem::path(path) / "all.svg").string(), chart.svg());
+    for (const auto& of : trend.coefficients)
+        plot::write_file((std::filesystem::path(path) /
+                          (std::string(estimator::parameter_names()[of.position]) + ".svg"))
+                             .string(),
+                         trend_chart(trend, of));
+}
+
+}  // namespace vibrig::tool

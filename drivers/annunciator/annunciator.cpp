@@ -1,0 +1,203 @@
+#include "drivers/annunciator/annunciator.hpp"
+
+#include <pthread.h>
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+
+namespace vibrig::drivers {
+
+namespace {
+
+constexpr std::size_t kMostWaiting = 16;
+// Two looks in a row: between write and read-back another master may have had its turn.
+constexpr int kLooksToBelieve = 2;
+constexpr auto kLookAtRuns = std::chrono::milliseconds(50);
+constexpr auto kLookAtCommand = std::chrono::seconds(2);
+
+[[nodiscard]] Time steady_now() noexcept {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+[[nodiscard]] std::string utc_text() {
+    const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    tm fields{};
+    ::gmtime_r(&now, &fields);
+    std::array<char, 32> text{};
+    const auto size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &fields);
+    return {text.data(), size};
+}
+
+/// The inside of a JSON string. What is not ASCII is taken to be UTF-8.
+[[nodiscard]] std::string json_text(const std::string& text) {
+    constexpr std::string_view kHex = "0123456789abcdef";
+    std::string escaped;
+    for (const char ch : text) {
+        const auto code = static_cast<unsigned char>(ch);
+        if (ch == '"' || ch == '\\') {
+            escaped += {'\\', ch};
+        } else if (code < 0x20) {
+            escaped += "\\u00";
+            escaped += {kHex[code >> 4U], kHex[code & 15U]};
+        } else {
+            escaped += ch;
+        }
+    }
+    return escaped;
+}
+
+}  // namespace
+
+Annunciator::Annunciator(const AnnunciatorSettings& settings, Say said)
+    : settings_(settings), said_(std::move(said)) {
+    if (!settings_.horn.host.empty()) horn_ = std::make_unique<Horn>(settings_.horn);
+    if (!settings_.command.empty())
+        command_ = std::make_unique<PageCommand>(settings_.command, settings_.command_limit);
+    status_.horn = horn_ != nullptr;
+    status_.command = command_ != nullptr;
+    if (!horn_ && !command_) return;
+    thread_ = std::thread([this] { run(); });
+    ::pthread_setname_np(thread_.native_handle(), "annunciator");
+}
+
+Annunciator::~Annunciator() {
+    {
+        const std::lock_guard lock(mutex_);
+        quit_ = true;
+    }
+    changed_.notify_one();
+    if (thread_.joinable()) thread_.join();
+}
+
+void Annunciator::show(HornPattern pattern) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (pattern_ == pattern) return;
+        pattern_ = pattern;
+        status_.pattern = pattern;
+    }
+    changed_.notify_one();
+}
+
+void Annunciator::announce(HornPattern kind, const std::string& text) {
+    if (!command_) return;
+    auto json = to_json(kind, text);
+    {
+        const std::lock_guard lock(mutex_);
+        if (waiting_.size() == kMostWaiting) {
+            waiting_.pop_front();
+            ++status_.left_out;
+        }
+        waiting_.push_back(std::move(json));
+    }
+    changed_.notify_one();
+}
+
+AnnunciatorStatus Annunciator::status() const {
+    const std::lock_guard lock(mutex_);
+    return status_;
+}
+
+std::string Annunciator::to_json(HornPattern kind, const std::string& text) const {
+    // Escaped six times as long at most: the whole stays below PageCommand::kLongestText.
+    constexpr std::size_t kLongest = 600;
+    return R"({"source":")" + json_text(settings_.source) + R"(","kind":")" + name_of(kind) +
+           R"(","time":")" + utc_text() + R"(","text":")" + json_text(text.substr(0, kLongest)) +
+           "\"}\n";
+}
+
+void Annunciator::sound(Time now) {
+    {
+        const std::lock_guard lock(mutex_);
+        shown_ = pattern_;
+    }
+    const bool good = horn_->show(shown_, now);
+    bad_looks_ = good ? 0 : std::min(bad_looks_ + 1, kLooksToBelieve);
+    const bool confirms = bad_looks_ < kLooksToBelieve;
+    bool changed = false;
+    {
+        const std::lock_guard lock(mutex_);
+        changed = status_.confirms != confirms;
+        status_.confirms = confirms;
+        status_.horn_note = confirms ? std::string() : horn_->note();
+    }
+    if (changed && said_)
+        said_(confirms, confirms ? "horn and lamp confirm again"
+                                 : "horn or lamp do not confirm: " + horn_->note());
+}
+
+/// Whether it is there has to be known before it is needed.
+void Annunciator::look_at_command(Time now) {
+    if (now < look_due_) return;
+    look_due_ = now + std::chrono::nanoseconds(kLookAtCommand).count();
+    const std::string trouble = command_->trouble();
+    if (trouble == trouble_) return;
+    trouble_ = trouble;
+    {
+        const std::lock_guard lock(mutex_);
+        status_.command_note = trouble;
+    }
+    if (said_) said_(trouble.empty(), trouble.empty() ? "the command can be run again" : trouble);
+}
+
+void Annunciator::page(Time now) {
+    look_at_command(now);
+    const std::uint64_t done = command_->counters().done;
+    std::string wrong = command_->attend(now);
+    while (command_->has_room()) {
+        std::string text;
+        {
+            const std::lock_guard lock(mutex_);
+            if (waiting_.empty()) break;
+            text = std::move(waiting_.front());
+            waiting_.pop_front();
+        }
+        if (const auto why = command_->start(text, now); !why.empty()) wrong = why;
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        const auto& counters = command_->counters();
+        status_.started = counters.started;
+        status_.failed = counters.failed;
+        status_.timed_out = counters.timed_out;
+        if (!wrong.empty() || counters.done > done) status_.command_note = wrong;
+    }
+    if (!wrong.empty() && said_) said_(false, wrong);
+}
+
+void Annunciator::run() {
+    Time horn_due = 0;
+    for (;;) {
+        const Time now = steady_now();
+        if (horn_ && now >= horn_due) {
+            sound(now);
+            horn_due = horn_->next(steady_now());
+        }
+        if (command_) page(steady_now());
+        std::unique_lock lock(mutex_);
+        const auto woken = [&] {
+            return quit_ || (horn_ && pattern_ != shown_) ||
+                   (!waiting_.empty() && command_ && command_->has_room());
+        };
+        if (command_ && !command_->idle()) {
+            changed_.wait_for(lock, kLookAtRuns, woken);
+        } else if (!horn_) {
+            changed_.wait_for(lock, kLookAtCommand, woken);
+        } else {
+            changed_.wait_for(
+                lock,
+                std::chrono::nanoseconds(std::max<Time>(horn_due - steady_now(), kMillisecond)),
+                woken);
+        }
+        if (quit_) break;
+        if (pattern_ != shown_) horn_due = 0;
+    }
+    // Nobody would end it; only a table that obeys no stop is left sounding.
+    if (horn_ && shown_ != HornPattern::disobeyed) horn_->show(HornPattern::none, steady_now());
+}
+
+}  // namespace vibrig::drivers

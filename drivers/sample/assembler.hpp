@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "drivers/can/can_port.hpp"
+#include "drivers/sample/sample.hpp"
+#include "proto/dbc.hpp"
+
+namespace vibrig::drivers {
+
+/// A binding the DBC cannot honour: the configuration key ("can.signals.outer"), the value found
+/// and what the DBC offers.
+class BindingError : public std::runtime_error {
+  public:
+    BindingError(std::string key, std::string value, const std::string& offer);
+    /// Several at once, a line each; at least one.
+    explicit BindingError(std::vector<BindingError> all);
+    /// Each of several; of one alone empty.
+    [[nodiscard]] const std::vector<BindingError>& all() const noexcept { return all_; }
+    [[nodiscard]] const std::string& key() const noexcept { return key_; }
+    [[nodiscard]] const std::string& value() const noexcept { return value_; }
+
+  private:
+    std::string key_;
+    std::string value_;
+    std::vector<BindingError> all_;
+};
+
+/// Which DBC signal carries what, as "Message.Signal"; empty: not bound. The defaults are those of
+/// proto/rig.dbc.
+struct SignalBindings {
+    /// Full counter; wraps at the signal's width. Without one, frames within half a period form a
+    /// sample.
+    std::string sync_count = "Sync.SyncCount";
+    std::string outer = "Resolvers.Outer", inner = "Resolvers.Inner",
+                azimuth = "ResolverAzimuth.Azimuth";  ///< deg
+    std::string outer_valid = "Resolvers.OuterValid", inner_valid = "Resolvers.InnerValid",
+                azimuth_valid = "ResolverAzimuth.AzimuthValid";
+    std::string accel_x = "AccelerometersXY.X", accel_y = "AccelerometersXY.Y",
+                accel_z = "AccelerometerZ.Z";  ///< g
+    std::string accel_x_valid = "AccelerometersXY.XValid",
+                accel_y_valid = "AccelerometersXY.YValid", accel_z_valid = "AccelerometerZ.ZValid";
+    std::string table_accel = "TableAccelerometer.Axial";  ///< g
+    /// In any message with a channel: the low bits of the sync count it belongs to.
+    std::string message_sync_signal = "SyncLow";
+    std::string loop_closed = "PlatformStatus.LoopClosed",
+                gyros_at_speed = "PlatformStatus.GyrosAtSpeed", ready = "PlatformStatus.Ready",
+                fault = "PlatformStatus.Fault", temperature = "PlatformStatus.Temperature";
+    std::string in_position = "GimbalStatus.InPosition", slewing = "GimbalStatus.Slewing",
+                command_echo = "GimbalStatus.CommandEcho";
+    /// degC. Left as they are they may be missing in the DBC: they are recorded, nothing depends
+    /// on them.
+    std::string temperature_case = "PlatformTemperatures.Case",
+                temperature_gyro_x = "PlatformTemperatures.GyroX",
+                temperature_gyro_y = "PlatformTemperatures.GyroY",
+                temperature_gyro_z = "PlatformTemperatures.GyroZ";
+};
+
+struct AssemblerSettings {
+    SignalBindings bindings;
+    Time sample_period = 25 * kMillisecond;  ///< nominal, of one sync count
+    Time join_deadline =
+        20 *
+        kMillisecond;  ///< a sample is given out, complete or not, this long after its first frame
+    Time stale_deadline = 100 * kMillisecond;  ///< a channel without a value for longer is stale
+    std::uint32_t open_samples = 8;            ///< sync counts joined at a time (reordering depth)
+};
+
+/// received = used + unknown + duplicate + late + wrong_length
+/// unknown: bound to nothing, remote, or of a sync count that no second one confirmed. late: its
+/// sample is already out.
+struct AssemblerCounters {
+    std::uint64_t received = 0, used = 0, unknown = 0, duplicate = 0, late = 0, wrong_length = 0;
+    std::uint64_t samples = 0, incomplete = 0;  ///< given out; of them with a missing channel
+    std::uint64_t gaps = 0;                     ///< sync counts that never showed
+    std::uint64_t resyncs = 0;                  ///< jumps of the counter (device restart)
+};
+
+/// Joins frames of one sync count into Samples. One thread; no allocation after construction; no
+/// clock of its own.
+class SampleAssembler {
+  public:
+    using SampleHandler = std::function<void(const Sample&)>;
+
+    /// Throws BindingError naming the configuration key, the signal, and what the DBC offers.
+    SampleAssembler(const proto::Dbc& dbc, const AssemblerSettings& settings,
+                    SampleHandler on_sample);
+    ~SampleAssembler();
+
+    /// Takes one frame; may give out samples.
+    void feed(const ReceivedFrame& frame) noexcept;
+    /// Gives out samples whose deadline has come. To be called at next_deadline() at the latest.
+    void advance(Time now) noexcept;
+    [[nodiscard]] Time next_deadline() const noexcept;
+    [[nodiscard]] const PlatformStatus& platform() const noexcept;
+    /// Newest time a good value of the channel came; 0: never.
+    [[nodiscard]] Time last_good(Channel channel) const noexcept;
+    [[nodiscard]] bool stale(Channel channel, Time now) const noexcept;
+    [[nodiscard]] const AssemblerCounters& counters() const noexcept;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vibrig::drivers

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "drivers/sample/assembler.hpp"
+#include "proto/dbc.hpp"
+
+namespace vibrig::drivers {
+
+/// What one message means to the assembler, worked out beforehand from the bindings.
+struct MessagePlan {
+    struct ChannelSignal {
+        std::size_t channel;
+        const proto::Signal* signal;
+        bool validity;  ///< it says whether the channel is valid, and carries no value
+    };
+    enum class StatusField : std::uint8_t {
+        loop_closed,
+        gyros_at_speed,
+        ready,
+        fault,
+        temperature,
+        in_position,
+        slewing,
+        command_echo,
+        temperature_case,  ///< and the others of kTemperatureSensors, in their order
+        temperature_gyro_x,
+        temperature_gyro_y,
+        temperature_gyro_z
+    };
+    struct StatusSignal {
+        StatusField field;
+        const proto::Signal* signal;
+    };
+
+    const proto::Message* message = nullptr;
+    const proto::Signal* count = nullptr;  ///< the full sync count
+    const proto::Signal* low = nullptr;    ///< low bits of it
+    std::vector<ChannelSignal> channels;
+    std::vector<StatusSignal> status;
+    std::uint64_t bit = 0;  ///< of this message in a sample's set; 0: not part of samples
+};
+
+/// All plans, found by CAN id in constant time (standard ids) or by bisection (extended).
+class FramePlan {
+  public:
+    FramePlan(const proto::Dbc& dbc, const SignalBindings& bindings);
+
+    /// Null: nothing of this message is bound.
+    [[nodiscard]] const MessagePlan* find(std::uint32_t id, bool extended) const noexcept;
+    [[nodiscard]] bool bound(std::size_t channel) const noexcept { return bound_[channel]; }
+    [[nodiscard]] bool has_validity(std::size_t channel) const noexcept {
+        return has_validity_[channel];
+    }
+    /// The set of messages that make a sample complete.
+    [[nodiscard]] std::uint64_t complete() const noexcept { return complete_; }
+    [[nodiscard]] bool has_count() const noexcept { return has_count_; }
+
+  private:
+    MessagePlan& plan_for(const proto::Message& message);
+
+    proto::Dbc dbc_;  // the plans point into it
+    std::vector<MessagePlan> plans_;
+    std::array<std::uint16_t, 2048> standard_{};                     // index + 1 by id
+    std::vector<std::pair<std::uint32_t, std::uint16_t>> extended_;  // sorted by id
+    std::array<bool, kChannels> bound_{};
+    std::array<bool, kChannels> has_validity_{};
+    std::uint64_t complete_ = 0;
+    bool has_count_ = false;
+};
+
+}  // namespace vibrig::drivers

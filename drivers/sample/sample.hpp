@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "drivers/base/clock.hpp"
+
+namespace vibrig::drivers {
+
+/// Measured channels of one Sample, in the order of Sample::quality.
+enum class Channel : std::uint8_t { outer, inner, azimuth, accel_x, accel_y, accel_z, table_accel };
+inline constexpr std::size_t kChannels = 7;
+[[nodiscard]] const char* name_of(Channel channel) noexcept;
+
+/// Quality of one channel of one sample. Anything but good is never used as good.
+enum class Quality : std::uint8_t {
+    good,
+    missing,       ///< the frame with this sync count never came
+    stale,         ///< no value for longer than the channel's deadline
+    flagged,       ///< the device said invalid
+    out_of_range,  ///< outside the DBC's range, or not finite
+    unbound,       ///< no signal is bound to this channel
+};
+[[nodiscard]] const char* name_of(Quality quality) noexcept;
+
+/// One instant of the rig, joined from all frames that carry one sync count. Raw: encoder angles as
+/// they come (sign and zero not applied), specific force as it comes (zero and matrix not applied).
+struct alignas(64) Sample {
+    Time time = 0;                     ///< device time fitted to kernel stamps, ns, whole us
+    std::uint32_t sequence = 0;        ///< sync count, extended; wraps at 2^32
+    std::uint32_t dropped_before = 0;  ///< records lost in the ring since the previous record
+    std::array<double, 3> angle{};     ///< outer, inner, azimuth, rad, [0, 2 pi)
+    std::array<double, 3> force{};     ///< specific force, accelerometer axes, g
+    double table_accel = 0;            ///< table accelerometer along its axis, g
+    std::array<Quality, 8> quality{};  ///< by Channel; the eighth is padding
+    std::array<std::uint8_t, 32> spare{};
+
+    [[nodiscard]] Quality of(Channel c) const { return quality[static_cast<std::size_t>(c)]; }
+    [[nodiscard]] bool angles_good() const {
+        return quality[0] == Quality::good && quality[1] == Quality::good &&
+               quality[2] == Quality::good;
+    }
+    [[nodiscard]] bool force_good() const {
+        return quality[3] == Quality::good && quality[4] == Quality::good &&
+               quality[5] == Quality::good;
+    }
+};
+static_assert(std::is_trivially_copyable_v<Sample>);
+static_assert(sizeof(Sample) == 128, "two cache lines per sample");
+
+/// Temperatures beside the inner element's, in the order of PlatformStatus::sensor_c.
+inline constexpr std::array<const char*, 4> kTemperatureSensors{"case", "gyro x", "gyro y",
+                                                                "gyro z"};
+/// What the platform says of itself; slower than samples. Latest value wins.
+struct PlatformStatus {
+    Time time = 0;             ///< of the newest status frame; 0: none yet
+    bool ready = false;        ///< the platform's own ready flag
+    bool loop_closed = false;  ///< stabilisation loop closed
+    bool gyros_at_speed = false;
+    double temperature_c = 0;  ///< platform temperature, deg C
+    bool fault = false;
+    Time gimbal_time = 0;  ///< of the newest gimbal status frame; 0: none yet
+    bool in_position = false;
+    bool slewing = false;
+    std::uint8_t gimbal_command_echo = 0;  ///< counter of the last gimbal command accepted
+    /// deg C; each with the time of its newest frame, 0: none yet.
+    std::array<double, kTemperatureSensors.size()> sensor_c{};
+    std::array<Time, kTemperatureSensors.size()> sensor_time{};
+};
+static_assert(std::is_trivially_copyable_v<PlatformStatus>);
+
+}  // namespace vibrig::drivers

@@ -1,0 +1,96 @@
+#include "drivers/sample/signal_binding.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "drivers/sample/assembler.hpp"
+
+namespace vibrig::drivers {
+namespace {
+
+constexpr std::size_t kOffers = 4;
+
+char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
+
+/// The names nearest to `wanted`, nearest first.
+std::string nearest(const std::vector<std::string>& names, std::string_view wanted) {
+    std::vector<std::pair<std::size_t, std::string>> ranked;
+    ranked.reserve(names.size());
+    for (const std::string& name : names) ranked.emplace_back(edit_distance(name, wanted), name);
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::string list;
+    for (std::size_t i = 0; i < std::min(kOffers, ranked.size()); ++i) {
+        list += (i == 0 ? "" : ", ") + ranked[i].second;
+    }
+    return list.empty() ? "nothing" : list + (ranked.size() > kOffers ? ", ..." : "");
+}
+
+}  // namespace
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        std::size_t diagonal = std::exchange(row[0], i + 1);
+        for (std::size_t j = 0; j < b.size(); ++j) {
+            const std::size_t changed = diagonal + (lower(a[i]) == lower(b[j]) ? 0 : 1);
+            diagonal = row[j + 1];
+            row[j + 1] = std::min({changed, diagonal + 1, row[j] + 1});
+        }
+    }
+    return row.back();
+}
+
+BindingError::BindingError(std::string key, std::string value, const std::string& offer)
+    : std::runtime_error(key + ": found \"" + value + "\", expected " + offer),
+      key_(std::move(key)),
+      value_(std::move(value)) {}
+
+namespace {
+
+std::string lines_of(const std::vector<BindingError>& all) {
+    std::string text;
+    for (const BindingError& one : all)
+        text += (text.empty() ? "" : "\n") + std::string(one.what());
+    return text;
+}
+
+}  // namespace
+
+BindingError::BindingError(std::vector<BindingError> all)
+    : std::runtime_error(lines_of(all)), key_(all.front().key()), value_(all.front().value()) {
+    if (all.size() > 1) all_ = std::move(all);
+}
+
+BoundSignal bind_signal(const proto::Dbc& dbc, const std::string& key, const std::string& name) {
+    if (name.empty()) return {};
+    const std::size_t dot = name.find('.');
+    const std::string_view message_name = std::string_view(name).substr(0, dot);
+    if (dot != std::string::npos) {
+        if (const proto::Message* message = dbc.find(message_name)) {
+            if (const proto::Signal* signal =
+                    message->find(std::string_view(name).substr(dot + 1))) {
+                return {message, signal};
+            }
+            std::vector<std::string> signals;
+            for (const proto::Signal& signal : message->signals)
+                signals.push_back(message->name + "." + signal.name);
+            throw BindingError(key, name,
+                               "a signal of message " + message->name + "; the DBC offers " +
+                                   nearest(signals, name));
+        }
+    }
+    std::vector<std::string> all;
+    for (const proto::Message& message : dbc.messages) {
+        for (const proto::Signal& signal : message.signals)
+            all.push_back(message.name + "." + signal.name);
+    }
+    throw BindingError(key, name, "Message.Signal of the DBC, which offers " + nearest(all, name));
+}
+
+}  // namespace vibrig::drivers

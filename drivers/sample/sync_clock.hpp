@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "drivers/base/clock.hpp"
+
+namespace vibrig::drivers {
+
+/// The device's time: offset and rate of its sync count, fitted to the stamps of its frames by
+/// least squares over the last 64 counts. Stamps that a bus or a busy machine delayed stand out of
+/// the fit and do not move it. One thread, no allocation.
+class SyncClock {
+  public:
+    explicit SyncClock(Time nominal_period) noexcept;
+
+    /// Counts come in ascending order; one that does not is ignored.
+    void observe(std::int64_t count, Time stamp) noexcept;
+    /// Whole microseconds; before the first observation 0.
+    [[nodiscard]] Time time_of(std::int64_t count) const noexcept;
+    [[nodiscard]] double period_ns() const noexcept { return nominal_ + slope_; }
+    /// Forgets everything but the nominal period: the device has started anew.
+    void reset() noexcept;
+    /// Times the stamps stepped away for good (two in a row by more than 5 periods) and the fit
+    /// began anew.
+    [[nodiscard]] std::uint64_t steps() const noexcept { return steps_; }
+
+  private:
+    static constexpr std::size_t kWindow = 64;
+    static constexpr double kStepPeriods = 5;
+    struct Point {
+        std::int64_t count = 0;
+        Time stamp = 0;
+    };
+
+    void insert(Point point) noexcept;
+    void fit() noexcept;
+    void clear() noexcept;
+
+    double nominal_;  ///< ns
+    std::array<Point, kWindow> points_{};
+    std::size_t size_ = 0;
+    std::size_t next_ = 0;
+    Point anchor_;       ///< origin of the fit: the newest point
+    double offset_ = 0;  ///< of the line at the anchor's count, ns after the anchor's stamp
+    double slope_ = 0;   ///< period minus nominal, ns
+    Point suspect_;      ///< the last stamp far off
+    bool has_suspect_ = false;
+    std::uint64_t steps_ = 0;
+};
+
+}  // namespace vibrig::drivers

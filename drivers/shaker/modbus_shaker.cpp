@@ -1,0 +1,544 @@
+#include "drivers/shaker/modbus_shaker.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace vibrig::drivers {
+namespace {
+
+// A register resolves 1 mHz.
+constexpr double kSameFrequency_hz = 0.01;
+
+// The first time on a new link that is the stop's alone. A device that was cut off for long has
+// tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
+// left shaking is to see it told one thing. 100 ms, and as much again for the way there.
+constexpr Time kStopAlone = 200 * kMillisecond;
+// Between two looks at the watchdog's timeout; a second at most, with the request itself.
+constexpr Time kTimeoutLook = 500 * kMillisecond;
+
+/// A period after `due` if this round was in time; one that came early, or so late that a period
+/// was missed, starts anew.
+[[nodiscard]] Time following(Time due, Time period, Time now) noexcept {
+    return due <= now && now < due + period ? due + period : now + period;
+}
+
+[[nodiscard]] bool encodable(const proto::Register& reg, double value) noexcept {
+    std::array<std::uint16_t, 2> words{};
+    return std::isfinite(value) && value >= 0 &&
+           proto::encode(reg, value, std::span(words).first(reg.words()));
+}
+
+[[nodiscard]] bool nonzero(std::span<const std::uint16_t> words) noexcept {
+    return std::any_of(words.begin(), words.end(), [](std::uint16_t word) { return word != 0; });
+}
+
+}  // namespace
+
+ModbusShaker::ModbusShaker(Clock& clock, const ShakerSettings& settings)
+    : clock_(clock),
+      settings_(settings),
+      link_(settings),
+      image_(settings.registers),
+      backoff_(settings.backoff_min) {}
+
+ModbusShaker::~ModbusShaker() { shut_down(); }
+
+void ModbusShaker::start(std::function<bool()> may_feed, StateHandler on_state) {
+    may_feed_ = std::move(may_feed);
+    on_state_ = std::move(on_state);
+    waiter_ =
+        clock_.make_waiter();  // busy from here on: a simulated clock waits for the first round
+    wakeable_ = waiter_.get();
+    thread_ = std::thread([this] { run(); });
+    ::pthread_setname_np(thread_.native_handle(), "shaker");
+}
+
+bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops) noexcept {
+    const proto::ShakerRegisters& map = settings_.registers;
+    if (!encodable(map.frequency, set_point.frequency_hz) ||
+        !encodable(map.amplitude, set_point.amplitude_g) ||
+        !encodable(map.ramp_time, set_point.ramp_s)) {
+        return false;
+    }
+    // Whatever the caller thinks: the frequency changes at rest only, or it passes the resonance.
+    const auto now = reading();
+    if (set_point.amplitude_g > 0 && now.valid && (now.running || !now.still()) &&
+        std::abs(set_point.frequency_hz - now.frequency_hz) > kSameFrequency_hz)
+        return false;
+    const auto ticket = orders_.ticket();
+    if (ticket.stop_pending() || ticket.stops() != stops || state() != LinkState::running)
+        return false;
+    if (orders_.put(set_point, ticket)) ++counts_.set_points_discarded;
+    wake();
+    return true;
+}
+
+void ModbusShaker::stop_now() noexcept {
+    // Either the thread sees the stop before it sends, or this sees the request in flight: both are
+    // sequentially consistent. While a stop is pending already, what is in flight is that stop and
+    // is not cut off.
+    if (orders_.stop() && in_flight_.load()) link_.cut();
+    wake();
+}
+
+ShakerReading ModbusShaker::reading() const noexcept {
+    ShakerReading reading = latest_.load();
+    // One lost reply and the reconnect after it are lived through; the watchdog waits longer still.
+    const Time lifetime = std::max(3 * settings_.poll_period, 2 * settings_.watchdog_period);
+    if (clock_.now() - reading.time > lifetime) reading.valid = false;
+    return reading;
+}
+
+ShakerCounters ModbusShaker::counters() const noexcept {
+    ShakerCounters c;
+    c.replies = counts_.replies;
+    c.timeouts = counts_.timeouts;
+    c.exceptions = counts_.exceptions;
+    c.reconnects = counts_.reconnects;
+    c.set_points_discarded = counts_.set_points_discarded;
+    c.feeds = counts_.feeds;
+    c.stops_written = counts_.stops_written;
+    c.read_back_mismatches = counts_.read_back_mismatches;
+    c.wrong_replies = counts_.wrong_replies;
+    c.lost = counts_.lost;
+    c.set_points_written = counts_.set_points_written;
+    c.requests = counts_.requests;  // last: never fewer requests than ways they ended
+    return c;
+}
+
+void ModbusShaker::wake() noexcept {
+    wakers_.fetch_add(1);
+    if (Waiter* const waiter = wakeable_.load()) waiter->notify();
+    if (wakers_.fetch_sub(1) == 1) wakers_.notify_all();
+}
+
+void ModbusShaker::shut_down() noexcept {
+    quit_ = true;
+    link_.abort();
+    wake();
+    if (thread_.joinable()) thread_.join();
+    wakeable_ = nullptr;
+    for (int waking = wakers_.load(); waking != 0; waking = wakers_.load()) wakers_.wait(waking);
+    waiter_.reset();
+    link_.close();
+    state_ = LinkState::absent;
+}
+
+void ModbusShaker::run() noexcept {
+    while (!quit_.load()) {
+        ++beats_;
+        work(clock_.now());
+    }
+}
+
+/// One round: the most urgent thing, or sleep until the next is due.
+void ModbusShaker::work(Time now) {
+    drop_void_set_point();
+    const bool stop = stop_pending();
+    if (!stop) stop_tried_ = connect_tried_for_stop_ = ramp_tried_ = joint_in_vain_ = false;
+    if (!link_.connected()) {
+        if (now >= next_attempt_ || (stop && !connect_tried_for_stop_)) return try_connect(now);
+        return sleep_until(next_attempt_);
+    }
+    if (stop && (!stop_tried_ || now >= next_stop_)) return write_stop(now);
+    if (watchdog_due(now)) return serve_watchdog(now);
+    if (now >= next_look_ && !timeout_due_) return look_at_timeout(now);
+    // Before the poll, which a slow line may have due all the time; it ends with one of its own.
+    if (!stop && orders_.waiting() && now >= stop_alone_until_) return write_set_point();
+    if (now >= next_poll_) return poll(now);
+    Time next = std::min(next_poll_, stop ? next_stop_ : next_feed_);
+    if (!timeout_due_) next = std::min(next, next_look_);
+    sleep_until(next);
+}
+
+void ModbusShaker::try_connect(Time now) {
+    connect_tried_for_stop_ = stop_pending();
+    std::string why;
+    const auto result = link_.connect(why);
+    now = clock_.now();
+    if (result != ModbusLink::Connection::open) {
+        // A stop does not back off.
+        next_attempt_ = now + (stop_pending() ? settings_.backoff_min : backoff_);
+        backoff_ = std::min(2 * backoff_, settings_.backoff_max);
+        set_state(
+            result == ModbusLink::Connection::failed ? LinkState::connecting : LinkState::fault,
+            why + "; trying again");
+        return;
+    }
+    const bool again = std::exchange(was_connected_, true);
+    if (again) ++counts_.reconnects;
+    polled_ = poll_refused_ = feed_refused_ = false;
+    stop_tried_ = false;
+    if (!stop_pending()) joint_refused_ = false;
+    timeout_seen_ = WatchdogTimeout::unread;
+    timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
+    // A lost reply must not cost the device a feed that it still waits for.
+    const bool starved = again && now - last_feed_ > watchdog_timeout();
+    stop_alone_until_ = stop_pending() || starved ? now + kStopAlone : now;
+    next_stop_ = next_poll_ = next_look_ = now;
+    next_feed_ = stop_alone_until_;
+}
+
+void ModbusShaker::lose_link(const std::string& why) {
+    link_.close();
+    orders_.link_lost();
+    drop_void_set_point();
+    polled_ = false;
+    next_attempt_ = clock_.now() + (stop_pending() ? settings_.backoff_min : backoff_);
+    backoff_ = std::min(2 * backoff_, settings_.backoff_max);
+    set_state(LinkState::connecting, why + "; connecting again");
+}
+
+/// Something more urgent than the work at hand: the end, or a stop that has not been tried yet.
+bool ModbusShaker::outranked() const noexcept {
+    return quit_.load() || (stop_pending() && !stop_tried_);
+}
+
+template <typename Request>
+Reply ModbusShaker::transact(Request&& request) {
+    in_flight_ = true;
+    if (outranked()) {
+        in_flight_ = false;
+        return {ReplyKind::overtaken, 0};
+    }
+    ++counts_.requests;
+    const Reply reply = request();
+    in_flight_ = false;
+    switch (reply.kind) {
+        case ReplyKind::ok:
+            ++counts_.replies;
+            return reply;
+        case ReplyKind::exception:
+            ++counts_.exceptions;
+            return reply;
+        case ReplyKind::timeout:
+            ++counts_.timeouts;
+            break;
+        case ReplyKind::wrong:
+            ++counts_.wrong_replies;
+            break;
+        case ReplyKind::lost:
+            ++counts_.lost;
+            break;
+        case ReplyKind::overtaken:
+            break;
+    }
+    lose_link(outranked() ? "request cut off by a stop" : reply.text());
+    return reply;
+}
+
+Reply ModbusShaker::write(const proto::Register& reg, std::span<const std::uint16_t> words) {
+    return transact([&] { return link_.write(reg.address, words); });
+}
+
+Reply ModbusShaker::read(const proto::Register& reg, std::span<std::uint16_t> words) {
+    return transact([&] { return link_.read(reg.table, reg.address, words); });
+}
+
+/// The register as last read: a bits register shares its word with bits that are not ours.
+ModbusShaker::Words ModbusShaker::present(const proto::Register& reg) noexcept {
+    Words words{};
+    std::ranges::copy(image_.words_of(reg), words.begin());
+    return words;
+}
+
+ModbusShaker::Written ModbusShaker::write_and_verify(const char* role, const proto::Register& reg,
+                                                     double value) {
+    Words words = present(reg);
+    const auto raw = std::span(words).first(reg.words());
+    if (!proto::encode(reg, value, raw)) return Written::otherwise;
+    const Reply reply = write(reg, raw);
+    if (reply.ok()) return verify(role, reg, raw);
+    if (reply.kind != ReplyKind::exception) return Written::not_written;
+    write_failed_ = true;
+    settle(std::string(role) + " refused: " + reply.text());
+    return Written::otherwise;
+}
+
+ModbusShaker::Written ModbusShaker::verify(const char* role, const proto::Register& reg,
+                                           std::span<const std::uint16_t> words) {
+    Words back{};
+    const auto raw = std::span(back).first(words.size());
+    const Reply reply = read(reg, raw);
+    if (!reply.ok() && reply.kind != ReplyKind::exception) return Written::not_written;
+    if (reply.ok()) std::copy(raw.begin(), raw.end(), image_.words_of(reg).begin());
+    if (reply.ok() && same_raw(reg, words, raw)) return Written::as_told;
+    write_failed_ = true;
+    if (reply.ok()) {
+        ++counts_.read_back_mismatches;
+        settle(std::string(role) + " reads back as " + std::to_string(proto::decode(reg, raw)) +
+               ", expected " + std::to_string(proto::decode(reg, words)));
+    } else {
+        settle(std::string(role) + " cannot be read back: " + reply.text());
+    }
+    return Written::otherwise;
+}
+
+/// Ramp 0 and run 0: down as fast as the controller's own soft stop. In one request where they lie
+/// side by side; else the ramp gets one short try, and then run 0 goes out whatever came back.
+/// After one request for both that did not end in run 0 read back they go as if they lay apart: a
+/// controller may take its ramp when run changes.
+Reply ModbusShaker::order_stop(std::span<const std::uint16_t> run) {
+    const proto::ShakerRegisters& map = settings_.registers;
+    Words ramp_words = present(map.ramp_time);
+    const auto ramp = std::span(ramp_words).first(map.ramp_time.words());
+    static_cast<void>(proto::encode(map.ramp_time, 0, ramp));  // fits every type
+    const bool ramp_first = map.ramp_time.address + ramp.size() == map.run.address;
+    const bool run_first = map.run.address + run.size() == map.ramp_time.address;
+    if ((ramp_first || run_first) && !joint_refused_ && !joint_in_vain_) {
+        joint_in_vain_ = true;  // until the stop is done
+        std::array<std::uint16_t, 4> words{};
+        const auto second = std::ranges::copy(ramp_first ? ramp : run, words.begin()).out;
+        std::ranges::copy(ramp_first ? run : ramp, second);
+        const Reply reply = transact([&] {
+            return link_.write(ramp_first ? map.ramp_time.address : map.run.address,
+                               std::span(words).first(ramp.size() + run.size()));
+        });
+        if (reply.kind != ReplyKind::exception) return reply;
+        // It is there and takes one register at a time.
+        joint_refused_ = true;
+        joint_in_vain_ = false;
+    }
+    const Reply reply = try_ramp(ramp);
+    return link_.connected() ? write(map.run, run) : reply;
+}
+
+/// Once a stop. Without a link after it, run 0 is next on another, where no late reply is.
+Reply ModbusShaker::try_ramp(std::span<const std::uint16_t> ramp) {
+    if (std::exchange(ramp_tried_, true)) return {};
+    link_.respond_within(std::min(settings_.stop_ramp_timeout, settings_.response_timeout));
+    const Reply reply = write(settings_.registers.ramp_time, ramp);
+    link_.respond_within(settings_.response_timeout);
+    if (!link_.connected()) next_attempt_ = clock_.now();
+    return reply;
+}
+
+void ModbusShaker::write_stop(Time now) {
+    stop_tried_ = true;
+    told_.reset();
+    next_stop_ = now + settings_.backoff_min;
+    // A stop at rest may make the device forget the fault that it holds. What a process finds at
+    // its first connection is looked at before; one look, whatever comes of it.
+    if (!std::exchange(looked_, true)) {
+        poll(now);
+        if (!link_.connected()) return;
+    }
+    const proto::Register& run = settings_.registers.run;
+    Words words = present(run);
+    const auto raw = std::span(words).first(run.words());
+    static_cast<void>(proto::encode(run, 0, raw));
+    const bool alone = joint_in_vain_;
+    const Reply reply = order_stop(raw);
+    if (reply.kind == ReplyKind::exception) {
+        write_failed_ = true;
+        settle("stop refused: " + reply.text());
+    }
+    if (reply.ok()) {
+        ++counts_.stops_written;
+        if (on_stop_written_) on_stop_written_();
+    }
+    const bool done =
+        reply.ok() && link_.connected() && verify("run", run, raw) == Written::as_told;
+    // What one request for both did not do waits for no turn.
+    if (!done && joint_in_vain_ && !alone) next_stop_ = next_attempt_ = clock_.now();
+    if (!done) return;
+    orders_.stop_done();
+    drop_void_set_point();
+    write_failed_ = false;
+    // Whoever changed the watchdog's timeout: after a stop it is what we say.
+    timeout_due_ = settings_.registers.watchdog_timeout.access != proto::Access::read;
+    next_poll_ = clock_.now();
+    next_feed_ = std::max(next_poll_, stop_alone_until_);
+    settle("stopped");
+}
+
+void ModbusShaker::drop_void_set_point() noexcept {
+    if (orders_.waiting() && orders_.drop_void()) ++counts_.set_points_discarded;
+}
+
+void ModbusShaker::write_set_point() {
+    const auto set_point = orders_.take();
+    if (!set_point) return;
+    told_.reset();
+    if (!write_steps(*set_point)) {
+        if (outranked() || !link_.connected()) ++counts_.set_points_discarded;
+    } else {
+        ++counts_.set_points_written;
+        if (set_point->amplitude_g > 0) told_ = set_point;
+    }
+    if (link_.connected() && !outranked())
+        poll(clock_.now());  // a reading newer than the set-point, then not busy
+    orders_.finished();
+}
+
+bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
+    struct Step {
+        const char* role;
+        const proto::Register& reg;
+        double value;
+    };
+    const proto::ShakerRegisters& map = settings_.registers;
+    Words words{};
+    const auto encoded = [&](const proto::Register& reg, double value) {
+        words = present(reg);
+        const auto raw = std::span(words).first(reg.words());
+        static_cast<void>(proto::encode(reg, value, raw));
+        return raw;
+    };
+    const bool running = image_.value_of(map.run) != 0;
+    const bool excite = nonzero(encoded(map.amplitude, set_point.amplitude_g));
+    std::vector<Step> steps;
+    // On the way to zero the frequency does not matter: nothing may keep the shaker from coming
+    // down.
+    const auto frequency = encoded(map.frequency, set_point.frequency_hz);
+    if ((excite || (!running && nonzero(frequency))) &&
+        !same_raw(map.frequency, frequency, image_.words_of(map.frequency))) {
+        // Frequency changes only at zero amplitude; at rest the register may still hold the last
+        // one.
+        if (!running && nonzero(image_.words_of(map.amplitude)))
+            steps.push_back({"amplitude", map.amplitude, 0});
+        steps.push_back({"frequency", map.frequency, set_point.frequency_hz});
+    }
+    steps.push_back({"ramp time", map.ramp_time, set_point.ramp_s});
+    steps.push_back({"amplitude", map.amplitude, set_point.amplitude_g});
+    // A device that is thought to run and does not has tripped: it is told nothing, and the
+    // read-back differs.
+    if (!excite || !running) steps.push_back({"run", map.run, excite ? 1.0 : 0.0});
+    for (const Step& step : steps) {
+        if (watchdog_due(clock_.now())) serve_watchdog(clock_.now());
+        if (!link_.connected()) return false;
+        if (write_and_verify(step.role, step.reg, step.value) != Written::as_told) return false;
+    }
+    if (excite && running) return verify("run", map.run, encoded(map.run, 1)) == Written::as_told;
+    return true;
+}
+
+bool ModbusShaker::watchdog_due(Time now) const noexcept {
+    return now >= next_feed_ && !stop_pending();
+}
+
+void ModbusShaker::serve_watchdog(Time now) {
+    next_feed_ = following(next_feed_, settings_.watchdog_period, now);
+    if (timeout_due_) write_timeout();
+    if (timeout_due_ || !link_.connected()) return;
+    const proto::ShakerRegisters& map = settings_.registers;
+    Words words{};
+    if (!may_feed_ || !may_feed_()) return;
+    feed_ = static_cast<std::uint16_t>((feed_ + 1) & 0x7fff);
+    const auto raw = std::span(words).first(map.watchdog->words());
+    if (!proto::encode(*map.watchdog, feed_ * map.watchdog->scale, raw)) return;
+    const Reply reply = write(*map.watchdog, raw);
+    feed_refused_ = reply.kind == ReplyKind::exception;
+    if (reply.ok()) {
+        ++counts_.feeds;
+        last_feed_ = now;
+    }
+    if (link_.connected()) settle("watchdog feed " + reply.text());
+}
+
+void ModbusShaker::write_timeout() {
+    const proto::Register& reg = settings_.registers.watchdog_timeout;
+    Words words{};
+    const auto raw = std::span(words).first(reg.words());
+    static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), raw));
+    const Reply reply = write(reg, raw);
+    feed_refused_ = reply.kind == ReplyKind::exception;
+    if (feed_refused_) settle("watchdog timeout refused: " + reply.text());
+    if (!reply.ok()) return;
+    timeout_due_ = false;
+    next_look_ = clock_.now();
+}
+
+void ModbusShaker::look_at_timeout(Time now) {
+    next_look_ = now + kTimeoutLook;
+    const proto::Register& reg = settings_.registers.watchdog_timeout;
+    Words words{}, written{};
+    const auto raw = std::span(words).first(reg.words());
+    const auto ours = std::span(written).first(reg.words());
+    const Reply reply = read(reg, raw);
+    if (!reply.ok() && reply.kind != ReplyKind::exception) return;
+    static_cast<void>(proto::encode(reg, to_seconds(watchdog_timeout()), ours));
+    timeout_read_s_ = reply.ok() ? proto::decode(reg, raw) : 0;
+    const bool good =
+        reg.access == proto::Access::read
+            ? timeout_read_s_ > 0 && timeout_read_s_ <= to_seconds(kLongestWatchdogTimeout)
+            : reply.ok() && same_raw(reg, ours, raw);
+    const auto seen = good ? WatchdogTimeout::kept : WatchdogTimeout::changed;
+    if (std::exchange(timeout_seen_, seen) != seen) next_poll_ = now;  // to be told at once
+    settle(good ? "read back"
+           : reply.ok()
+               ? "watchdog timeout reads back as " + std::to_string(timeout_read_s_) +
+                     " s, expected " + std::to_string(to_seconds(watchdog_timeout())) + " s"
+               : "watchdog timeout cannot be read back: " + reply.text());
+}
+
+void ModbusShaker::poll(Time now) {
+    next_poll_ = following(next_poll_, settings_.poll_period, now);
+    for (RegisterRange& range : image_.ranges()) {
+        const Reply reply =
+            transact([&] { return link_.read(range.table, range.address, range.words); });
+        if (reply.ok()) continue;
+        if (reply.kind != ReplyKind::exception) return;
+        poll_refused_ = true;
+        return settle("reading " + std::to_string(range.words.size()) + " registers from " +
+                      std::to_string(range.address) + ": " + reply.text());
+    }
+    polled_ = looked_ = true;
+    poll_refused_ = false;
+    backoff_ = settings_.backoff_min;
+    ShakerReading reading = image_.reading(now);
+    reading.watchdog = timeout_seen_;
+    reading.watchdog_timeout_s = timeout_read_s_;
+    if (const auto changed = changed_by_others(reading); !changed.empty()) {
+        ++counts_.read_back_mismatches;
+        write_failed_ = true;
+        told_.reset();  // told once
+        latest_.store(reading);
+        settle(changed);
+    } else {
+        latest_.store(reading);
+        settle("read back");
+    }
+    if (on_reading_) on_reading_();
+}
+
+std::string ModbusShaker::changed_by_others(const ShakerReading& reading) {
+    // A device that has stopped by itself and says so has a trip of its own.
+    if (!told_ || stop_pending() || reading.fault != 0 || reading.state == kShakerFault ||
+        reading.emergency_stop_open)
+        return {};
+    const proto::ShakerRegisters& map = settings_.registers;
+    const auto differs = [&](const char* role, const proto::Register& reg, double told) {
+        Words words = present(reg);
+        const auto ours = std::span(words).first(reg.words());
+        static_cast<void>(proto::encode(reg, told, ours));
+        const auto read = image_.words_of(reg);
+        return same_raw(reg, ours, read)
+                   ? std::string()
+                   : std::string(role) + " was changed by another: reads back as " +
+                         std::to_string(proto::decode(reg, read)) + ", was told " +
+                         std::to_string(proto::decode(reg, ours));
+    };
+    std::string found = differs("frequency", map.frequency, told_->frequency_hz);
+    if (found.empty()) found = differs("amplitude", map.amplitude, told_->amplitude_g);
+    if (found.empty()) found = differs("ramp time", map.ramp_time, told_->ramp_s);
+    if (found.empty()) found = differs("run", map.run, 1);
+    return found;
+}
+
+void ModbusShaker::settle(const std::string& why) {
+    if (poll_refused_ || feed_refused_ || write_failed_ ||
+        timeout_seen_ == WatchdogTimeout::changed)
+        return set_state(LinkState::degraded, why);
+    if (polled_) set_state(LinkState::running, why);
+}
+
+void ModbusShaker::set_state(LinkState state, const std::string& text) {
+    if (quit_.load() || state_.exchange(state) == state || !on_state_) return;
+    on_state_(state, ("shaker " + link_.name() + ": " + text).c_str());
+}
+
+}  // namespace vibrig::drivers

@@ -1,0 +1,95 @@
+#include "estimator/filter/drift_model.hpp"
+
+#include <Eigen/Geometry>
+
+#include "estimator/filter/product.hpp"
+
+namespace vibrig::estimator {
+
+DriftModel::DriftModel(const Settings& settings) : axes_{}, sign_(settings.drift_sign) {
+    for (std::size_t j = 0; j < kGyros; ++j) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            axes_[j].axis[k] = settings.gyro_axes[j][k].axis;
+            axes_[j].sign[k] = settings.gyro_axes[j][k].sign;
+        }
+    }
+}
+
+Regressors DriftModel::regressors(const Eigen::Vector3d& up,
+                                  const Eigen::Matrix3d& moment) const noexcept {
+    Regressors h{};
+    for (std::size_t j = 0; j < kGyros; ++j) {
+        const GyroAxes& g = axes_[j];
+        const auto product = [&](std::size_t p, std::size_t q) {
+            return g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
+        };
+        constexpr std::size_t kInput = 0, kOutput = 1, kSpin = 2;
+        h[kDt][j] = 1.0;
+        h[kDi][j] = g.sign[kInput] * up[g.axis[kInput]];
+        h[kDs][j] = g.sign[kSpin] * up[g.axis[kSpin]];
+        h[kDo][j] = g.sign[kOutput] * up[g.axis[kOutput]];
+        h[kDii][j] = product(kInput, kInput);
+        h[kDss][j] = product(kSpin, kSpin);
+        h[kDoo][j] = product(kOutput, kOutput);
+        h[kDis][j] = product(kInput, kSpin);
+        h[kDio][j] = product(kInput, kOutput);
+        h[kDos][j] = product(kSpin, kOutput);
+    }
+    return h;
+}
+
+Eigen::Vector3d DriftModel::platform_rate(const Pose& pose, const Regressors& h,
+                                          const double* parameters) const noexcept {
+    Eigen::Vector3d drift = Eigen::Vector3d::Zero();
+    for (std::size_t group = 0; group < kGroups; ++group) {
+        for (std::size_t j = 0; j < kGyros; ++j) {
+            drift[static_cast<Eigen::Index>(j)] +=
+                h[group][j] * parameters[internal_index(group, j)];
+        }
+    }
+    return sign_ * drift - pose.earth_rate;
+}
+
+Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, const Eigen::Matrix3d& moment,
+                                     const double* parameters,
+                                     const Eigen::Vector3d& platform_rate) const noexcept {
+    // A turn of the platform by e changes u by e x u and S by E S - S E, E = [e x]; what that does
+    // to a gyro's drift, l . u + tr(Q S), is e . (u x l + 2 axial(S Q)).
+    Eigen::Matrix3d turning;  // one gyro a row
+    for (std::size_t j = 0; j < kGyros; ++j) {
+        const GyroAxes& g = axes_[j];
+        const auto d = [&](std::size_t group) { return parameters[internal_index(group, j)]; };
+        const auto [i, o, s] = g.axis;
+        const auto [si, so, ss] = g.sign;
+        Eigen::Vector3d linear;
+        linear[i] = si * d(kDi);
+        linear[o] = so * d(kDo);
+        linear[s] = ss * d(kDs);
+        Eigen::Matrix3d q;
+        q(i, i) = d(kDii);
+        q(o, o) = d(kDoo);
+        q(s, s) = d(kDss);
+        q(i, s) = q(s, i) = 0.5 * si * ss * d(kDis);
+        q(i, o) = q(o, i) = 0.5 * si * so * d(kDio);
+        q(o, s) = q(s, o) = 0.5 * so * ss * d(kDos);
+        const Eigen::Matrix3d a = product(moment, q);
+        turning.row(static_cast<Eigen::Index>(j)) =
+            pose.up.cross(linear) +
+            2.0 * Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0));
+    }
+    Eigen::Matrix3d j;
+    for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d& e = pose.axis[static_cast<std::size_t>(k)];
+        const Eigen::Vector3d dw = sign_ * (turning * e) - e.cross(pose.earth_rate);
+        j.col(k) = pose.m * dw;
+    }
+    // d m / d angle, applied to the rate.
+    const double cb = pose.cos_beta, sb = pose.sin_beta, cg = pose.cos_gamma, sg = pose.sin_gamma;
+    const double p = cg * platform_rate[0] + sg * platform_rate[1];
+    const double r = sg * platform_rate[0] - cg * platform_rate[1];
+    j.col(1) += Eigen::Vector3d(-p * sb / (cb * cb), 0.0, -p / (cb * cb));
+    j.col(2) += Eigen::Vector3d(r / cb, p, r * sb / cb);
+    return j;
+}
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,127 @@
+#include "estimator/filter/kinematics.hpp"
+
+#include <cmath>
+
+#include "estimator/filter/product.hpp"
+
+namespace vibrig::estimator {
+namespace {
+constexpr double kRadPerDeg = kPi / 180.0;
+}
+
+double wrap(double angle_rad) noexcept {
+    // std::remainder gives the same, slowly: up to one and a half turns the difference is exact.
+    if (std::abs(angle_rad) <= kPi) return angle_rad;
+    if (std::abs(angle_rad) < 9.4) return angle_rad - std::copysign(2.0 * kPi, angle_rad);
+    return std::remainder(angle_rad, 2.0 * kPi);
+}
+
+double wrap_next_to(double angle_rad, double reference_rad) noexcept {
+    return reference_rad + wrap(angle_rad - reference_rad);
+}
+
+Eigen::Matrix3d level_reference(const SignedAxis& up, double elevation_rad) noexcept {
+    const int north = (up.axis + 2) % 3, east = (up.axis + 1) % 3;
+    // The base leans: the north axis points up by the elevation, the rig's own up axis leans back
+    // as much.
+    const double cosine = std::cos(elevation_rad), sine = std::sin(elevation_rad);
+    Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
+    level(north, 0) = cosine;
+    level(up.axis, 0) = -up.sign * sine;
+    level(north, 1) = sine;
+    level(up.axis, 1) = up.sign * cosine;
+    level(east, 2) = up.sign;
+    return level;
+}
+
+Eigen::Vector3d earth_rate_reference(const Eigen::Matrix3d& level, double latitude_rad,
+                                     double azimuth_rad) noexcept {
+    return kEarthRateDegPerHour *
+           (level * Eigen::Vector3d(std::cos(latitude_rad) * std::cos(azimuth_rad),
+                                    std::sin(latitude_rad),
+                                    -std::cos(latitude_rad) * std::sin(azimuth_rad)));
+}
+
+Kinematics::Kinematics(const Settings& settings)
+    : level_(level_reference(settings.up, settings.elevation_deg * kRadPerDeg)),
+      up_(level_.col(1)),
+      earth_rate_(estimator::earth_rate_reference(level_, settings.latitude_deg * kRadPerDeg,
+                                                  settings.azimuth_deg * kRadPerDeg)),
+      encoder_sign_(settings.encoder_sign[0], settings.encoder_sign[1], settings.encoder_sign[2]),
+      encoder_zero_(settings.encoder_zero_deg[0], settings.encoder_zero_deg[1],
+                    settings.encoder_zero_deg[2]) {
+    encoder_zero_ *= kRadPerDeg;
+}
+
+Eigen::Vector3d Kinematics::gimbal_angles(const std::array<double, 3>& encoder_rad) const noexcept {
+    Eigen::Vector3d angles;
+    for (int k = 0; k < 3; ++k) {
+        angles[k] =
+            wrap(encoder_sign_[k] * (encoder_rad[static_cast<std::size_t>(k)] - encoder_zero_[k]));
+    }
+    return angles;
+}
+
+std::array<double, 3> gimbal_deg(const Settings& settings,
+                                 const std::array<double, 3>& encoder_deg) noexcept {
+    std::array<double, 3> angles{};
+    for (std::size_t k = 0; k < 3; ++k)
+        angles[k] = settings.encoder_sign[k] * (encoder_deg[k] - settings.encoder_zero_deg[k]);
+    return angles;
+}
+
+std::array<double, 3> encoder_deg(const Settings& settings,
+                                  const std::array<double, 3>& gimbal_deg) noexcept {
+    std::array<double, 3> angles{};
+    for (std::size_t k = 0; k < 3; ++k)
+        angles[k] = settings.encoder_sign[k] * gimbal_deg[k] + settings.encoder_zero_deg[k];
+    return angles;
+}
+
+std::array<double, 3> azimuth_upright_deg(const Settings& settings, double azimuth_deg, bool down) {
+    // The outer gimbal turns about x: it takes y to z, never x.
+    if (settings.up.axis == 0) {
+        throw SettingsError(
+            "platform.up: x, expected y or z for zeroing: the azimuth axis cannot be vertical "
+            "without the inner gimbal beyond 80 deg");
+    }
+    double outer = settings.up.axis == 1 ? 90 * settings.up.sign : 90 - 90 * settings.up.sign;
+    if (down) outer += 180;
+    // Where the base leans along the north axis: x with up along y, y with up along z.
+    double inner = 0;
+    if (settings.up.axis == 1) {
+        inner = down ? settings.elevation_deg : -settings.elevation_deg;
+    } else {
+        outer += settings.up.sign * settings.elevation_deg;
+    }
+    std::array<double, 3> encoder = encoder_deg(settings, {outer, inner, azimuth_deg});
+    for (double& angle : encoder) angle = std::remainder(angle, 360.0);
+    return encoder;
+}
+
+Pose Kinematics::pose(const Eigen::Vector3d& angles_rad) const noexcept {
+    const double ca = std::cos(angles_rad[0]), sa = std::sin(angles_rad[0]);
+    const double cb = std::cos(angles_rad[1]), sb = std::sin(angles_rad[1]);
+    const double cg = std::cos(angles_rad[2]), sg = std::sin(angles_rad[2]);
+    Pose pose;
+    pose.cos_beta = cb;
+    pose.sin_beta = sb;
+    pose.cos_gamma = cg;
+    pose.sin_gamma = sg;
+    // Rz(g)^T Ry(b)^T Rx(a)^T, multiplied out.
+    pose.c << cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa,  //
+        sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa,        //
+        -sb, cb * sa, cb * ca;
+    pose.m << -cg / cb, -sg / cb, 0.0,  //
+        sg, -cg, 0.0,                   //
+        -cg * sb / cb, -sg * sb / cb, -1.0;
+    pose.axis[0] = {cg * cb, sg * cb, -sb};
+    pose.axis[1] = {-sg, cg, 0.0};
+    pose.axis[2] = {0.0, 0.0, 1.0};
+    pose.level = product(pose.c, level_);
+    pose.up = pose.level.col(1);
+    pose.earth_rate = pose.c * earth_rate_;
+    return pose;
+}
+
+}  // namespace vibrig::estimator

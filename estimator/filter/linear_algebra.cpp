@@ -1,0 +1,69 @@
+#include "estimator/filter/linear_algebra.hpp"
+
+#include <Eigen/Dense>
+#include <limits>
+
+namespace vibrig::estimator::linear_algebra {
+
+SymmetricEigen symmetric_eigen(MatrixIn a) {
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(a);
+    return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Vector symmetric_eigenvalues(MatrixIn a) {
+    return Eigen::SelfAdjointEigenSolver<Matrix>(a, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+RightSingular right_singular(MatrixIn a) {
+    // A P = Q R: the triangle has A's singular values, and P turns its right vectors into A's.
+    const Eigen::ColPivHouseholderQR<Matrix> qr(a);
+    const Matrix r = qr.matrixQR().topRows(a.cols()).triangularView<Eigen::Upper>();
+    const Eigen::JacobiSVD<Matrix, Eigen::NoQRPreconditioner> svd(r, Eigen::ComputeFullV);
+    return {svd.singularValues(), qr.colsPermutation() * svd.matrixV()};
+}
+
+std::optional<Cholesky> Cholesky::of(MatrixIn a) {
+    const Eigen::LLT<Matrix> factor(a);
+    if (factor.info() != Eigen::Success || !a.allFinite()) return std::nullopt;
+    return Cholesky(factor.matrixL());
+}
+
+double Cholesky::log_det() const { return 2 * lower_.diagonal().array().log().sum(); }
+
+double Cholesky::least_pivot() const { return lower_.diagonal().minCoeff(); }
+
+Matrix Cholesky::solve(MatrixIn b) const {
+    Matrix x = b;
+    lower_.triangularView<Eigen::Lower>().solveInPlace(x);
+    lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+    return x;
+}
+
+Matrix Cholesky::inverse() const { return solve(Matrix::Identity(lower_.rows(), lower_.cols())); }
+
+Matrix orthogonal_factor(MatrixIn a) {
+    return Eigen::ColPivHouseholderQR<Matrix>(a).householderQ();
+}
+
+Matrix least_squares(MatrixIn a, MatrixIn b) {
+    return Eigen::ColPivHouseholderQR<Matrix>(a).solve(b);
+}
+
+Matrix product(MatrixIn a, MatrixIn b) { return a * b; }
+
+Matrix gram(MatrixIn a) { return a.transpose() * a; }
+
+CovarianceEigen covariance_eigen(const Covariance& a) noexcept {
+    const Eigen::SelfAdjointEigenSolver<Covariance> solver(a);
+    return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Covariance covariance_inverse(const Covariance& a) noexcept {
+    const Eigen::LLT<Covariance> factor(a);
+    if (factor.info() != Eigen::Success) {
+        return Covariance::Constant(std::numeric_limits<double>::quiet_NaN());
+    }
+    return factor.solve(Covariance::Identity());
+}
+
+}  // namespace vibrig::estimator::linear_algebra

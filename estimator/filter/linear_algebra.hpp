@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "estimator/filter/parameters.hpp"
+
+namespace vibrig::estimator {
+/// Of all coefficients, filter order, deg/h units.
+using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
+}  // namespace vibrig::estimator
+
+/// Factorisations of dense matrices of any size, compiled once: Eigen's templates take seconds in
+/// every file that instantiates them. They allocate; not for the path of a sample, but for the two
+/// of fixed size. Nothing is thrown; what cannot be factorised is reported as said.
+namespace vibrig::estimator::linear_algebra {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+using MatrixIn = const Eigen::Ref<const Matrix>&;
+
+/// Of a symmetric matrix; its lower triangle is read.
+struct SymmetricEigen {
+    Vector values;   ///< ascending
+    Matrix vectors;  ///< one a column
+};
+[[nodiscard]] SymmetricEigen symmetric_eigen(MatrixIn a);
+[[nodiscard]] Vector symmetric_eigenvalues(MatrixIn a);
+
+/// A = U diag(values) V'.
+struct RightSingular {
+    Vector values;  ///< descending, as many as columns
+    Matrix v;       ///< columns x columns
+};
+/// At least as many rows as columns.
+[[nodiscard]] RightSingular right_singular(MatrixIn a);
+
+/// Cholesky's factor A = L L' of a symmetric positive definite matrix.
+class Cholesky {
+  public:
+    /// Empty if `a` is not positive definite.
+    [[nodiscard]] static std::optional<Cholesky> of(MatrixIn a);
+    [[nodiscard]] double log_det() const;
+    /// Smallest element on L's diagonal.
+    [[nodiscard]] double least_pivot() const;
+    [[nodiscard]] Matrix solve(MatrixIn b) const;
+    [[nodiscard]] Matrix inverse() const;
+
+  private:
+    explicit Cholesky(Matrix lower) : lower_(std::move(lower)) {}
+    Matrix lower_;
+};
+
+/// Orthogonal matrix Q, rows x rows: its first columns span those of `a`, the others are normal to
+/// them.
+[[nodiscard]] Matrix orthogonal_factor(MatrixIn a);
+/// X that minimises |A X - B|; columns pivoted by size, so that nearly dependent ones do no harm.
+[[nodiscard]] Matrix least_squares(MatrixIn a, MatrixIn b);
+[[nodiscard]] Matrix product(MatrixIn a, MatrixIn b);
+/// A' A.
+[[nodiscard]] Matrix gram(MatrixIn a);
+
+/// Of all 30 coefficients, without allocation: the estimator's thread asks for these.
+struct CovarianceEigen {
+    Eigen::Matrix<double, kParameters, 1> values;  ///< ascending
+    Covariance vectors;
+};
+[[nodiscard]] CovarianceEigen covariance_eigen(const Covariance& a) noexcept;
+/// Of a symmetric positive definite matrix; NaN if it is none.
+[[nodiscard]] Covariance covariance_inverse(const Covariance& a) noexcept;
+
+}  // namespace vibrig::estimator::linear_algebra

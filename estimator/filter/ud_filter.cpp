@@ -1,0 +1,65 @@
+#include "estimator/filter/ud_filter.hpp"
+
+#include <cmath>
+
+#include "estimator/filter/instruction_set.hpp"
+
+namespace vibrig::estimator {
+
+UdFilter::UdFilter(const std::array<double, kConstants>& sigma) noexcept : kernel_(&ud_kernel()) {
+    for (std::size_t c = 0; c < kConstants; ++c) {
+        memory_.column[c][c] = 1.0;
+        memory_.d_constant[c] = sigma[c] * sigma[c];
+    }
+    for (std::size_t k = 0; k < kAngles; ++k) memory_.angle_block[k][k] = 1.0;
+}
+
+void UdFilter::start_angles(const Vector3& angles, double variance) noexcept {
+    for (std::size_t r = 0; r < kAngles; ++r) {
+        for (double& u : memory_.angle_row[r]) u = 0.0;
+        for (std::size_t c = 0; c < kAngles; ++c) memory_.angle_block[c][r] = c == r ? 1.0 : 0.0;
+        memory_.d_angle[r] = variance;
+        memory_.x_angle[r] = angles[r];
+    }
+}
+
+UdFilter::Matrix3 UdFilter::angle_covariance() const noexcept {
+    Matrix3 p{};
+    for (std::size_t i = 0; i < kAngles; ++i) {
+        for (std::size_t j = 0; j < kAngles; ++j) {
+            for (std::size_t c = 0; c < kAngles; ++c) {
+                p[i][j] +=
+                    memory_.angle_block[c][i] * memory_.angle_block[c][j] * memory_.d_angle[c];
+            }
+            for (std::size_t c = 0; c < kConstants; ++c) {
+                p[i][j] +=
+                    memory_.angle_row[i][c] * memory_.angle_row[j][c] * memory_.d_constant[c];
+            }
+        }
+    }
+    return p;
+}
+
+void UdFilter::sigma(std::array<double, kConstants>& out) const noexcept {
+    out = {};
+    for (std::size_t c = 0; c < kConstants; ++c) {
+        for (std::size_t i = 0; i <= c; ++i) {
+            out[i] += memory_.column[c][i] * memory_.column[c][i] * memory_.d_constant[c];
+        }
+    }
+    for (double& s : out) s = std::sqrt(s);
+}
+
+void UdFilter::covariance(double* out) const noexcept {
+    for (std::size_t i = 0; i < kConstants; ++i) {
+        for (std::size_t j = i; j < kConstants; ++j) {
+            double p = 0;
+            for (std::size_t c = j; c < kConstants; ++c) {
+                p += memory_.column[c][i] * memory_.column[c][j] * memory_.d_constant[c];
+            }
+            out[i * kConstants + j] = out[j * kConstants + i] = p;
+        }
+    }
+}
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,148 @@
+#include "estimator/identification/dwell_record.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/level/vibration_level.hpp"
+
+namespace vibrig::estimator {
+namespace {
+
+constexpr double kForceTolerance = 0.02;     ///< of 1 g, spec section 6.3 of the method
+constexpr double kRejectedTolerance = 0.01;  ///< of the samples
+constexpr double kLevelTolerance = 0.1;      ///< change of kappa within a dwell
+/// The same, followed but told: above what an amplitude held within 0.3 % does, below one that
+/// drifts by 2 %. With more readings missing than this share the level itself is not so sure.
+constexpr double kLevelDrift = 0.025;
+constexpr double kMostFilled = 0.05;
+constexpr double kLeastReadings = 0.5;  ///< of those that a steady rate would give
+/// Intervals that are part of a period, of the readings: where most are lost, the median interval
+/// is that of two or more periods. Not those of nothing: stamps may come in pairs.
+constexpr double kCrowdedTolerance = 0.25;
+constexpr double kCrowdedFrom = 0.1, kCrowdedTo = 0.6;
+constexpr double kShaken = 1.001;  ///< kappa; below, its error does no harm
+
+constexpr const char* kSaturated[3] = {"accelerometer x is saturated: dwell rejected",
+                                       "accelerometer y is saturated: dwell rejected",
+                                       "accelerometer z is saturated: dwell rejected"};
+
+}  // namespace
+
+void DwellRecord::count(const StepResult& step) noexcept {
+    switch (step.outcome) {
+        case StepOutcome::used:
+            for (std::size_t k = 0; k < 3; ++k) {
+                const double innovation = step.innovation_arcsec[k];
+                innovation_square += innovation * innovation;
+                if (last_used) innovation_product += innovation * last_innovation[k];
+            }
+            nis_sum += step.nis;
+            ++nis_count;
+            ++used;
+            break;
+        case StepOutcome::initialised:
+        case StepOutcome::bad_force:
+            ++used;
+            break;
+        case StepOutcome::reinitialised:
+            ++reinitialised;
+            ++rejected;
+            break;
+        case StepOutcome::gated:
+        case StepOutcome::bad_angles:
+        case StepOutcome::bad_time:
+            ++rejected;
+            break;
+        case StepOutcome::buffered:
+            break;
+    }
+    last_used = step.outcome == StepOutcome::used;
+    last_innovation = step.innovation_arcsec;
+}
+
+void DwellRecord::note_level(double kappa) noexcept {
+    least_kappa = least_kappa > 0 ? std::min(least_kappa, kappa) : kappa;
+    largest_kappa = std::max(largest_kappa, kappa);
+}
+
+void DwellRecord::note_interval(double periods) noexcept {
+    slots += std::max(1.0, std::round(periods));
+    if (periods >= kCrowdedFrom && periods < kCrowdedTo) ++crowded;
+}
+
+DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
+    DwellVerdict verdict;
+    DwellSummary& s = verdict.summary;
+    s.run = r.info.run;
+    s.position = r.info.position;
+    s.samples = r.samples;
+    s.used = r.used;
+    s.rejected = r.rejected;
+    s.reinitialised = r.reinitialised;
+    const bool sparse = r.forces < kLeastReadings * r.slots ||
+                        (r.largest_kappa > kShaken && r.crowded > kCrowdedTolerance * r.samples);
+    if (r.level_samples > 0 && !sparse) {
+        s.kappa = r.kappa_sum / r.level_samples;
+        s.mean_force_g = r.mean_force_sum / r.level_samples;
+        if (r.shape_weight > 0) {
+            for (std::size_t k = 0; k < s.gamma.size(); ++k)
+                s.gamma[k] = r.shape_sum[k] / r.shape_weight;
+        }
+    }
+    s.amplitude_g = std::sqrt(2.0 * std::max(0.0, s.kappa - 1.0));
+    s.frequency_hz = r.frequency_samples > 0 ? r.frequency_sum / r.frequency_samples : 0.0;
+    s.nis_per_dof = r.nis_count > 0 ? r.nis_sum / (3.0 * r.nis_count) : 0.0;
+    s.innovation_correlation =
+        r.innovation_square > 0 ? r.innovation_product / r.innovation_square : 0.0;
+
+    const auto flag = [&](const char* reason, bool reject) {
+        s.flagged = true;
+        s.reason = reason;
+        verdict.rejected = reject;
+    };
+    const double window_s =
+        std::clamp(r.span_s, VibrationLevel::kFirstWindow_s, settings.level_window_s);
+    // As measured, where that is known: the nominal one may be off.
+    const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : settings.frequency_hz;
+    if (r.samples == 0) {
+        flag("no samples", true);
+    } else if (r.level_samples <= 0) {
+        flag("no usable specific force", true);
+    } else if (sparse) {
+        flag("too many readings are missing to know the vibration level: dwell rejected", true);
+    } else if (r.saturated_axis >= 0) {
+        flag(kSaturated[r.saturated_axis], true);
+    } else if (!(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
+        flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
+    } else if (r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
+        // The level lags behind by its window: second-order terms would take up the difference.
+        flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
+    } else if (s.kappa > 1.0 && r.period_s > 0 &&
+               VibrationLevel::excluded(settings.frequency_hz, r.period_s, window_s)) {
+        flag(
+            "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
+            "rejected",
+            true);
+    } else if (const char* alias =
+                   s.kappa > 1.0 && r.period_s > 0
+                       ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s)
+                       : "";
+               *alias != '\0') {
+        flag(alias, false);
+    } else if (r.stuck > 0) {
+        flag("a resolver stood still", false);
+    } else if (s.rejected > kRejectedTolerance * s.samples) {
+        flag("more than 1 % of the samples rejected", false);
+    } else if (r.largest_kappa > (1.0 + kLevelDrift) * r.least_kappa &&
+               r.forces > (1.0 - kMostFilled) * r.slots) {
+        flag("the vibration level drifted by more than 2.5 % of kappa: followed", false);
+        s.followed = true;
+    }
+    if (verdict.rejected) {
+        s.used = 0;
+        s.rejected = s.samples;
+    }
+    return verdict;
+}
+
+}  // namespace vibrig::estimator

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "estimator/filter/vibration_moment.hpp"
+
+namespace vibrig::estimator {
+
+/// All that one dwell says of the coefficients and of what the model leaves out: the mean drift of
+/// each gyro about its input axis, Earth rate taken out, and how it changes along the dwell.
+struct DwellRow {
+    using Regression = Eigen::Matrix<double, 3, 10>;  ///< [gyro][group], filter order of the groups
+
+    int run = 0, position = 0;
+    double table_g = -1;  ///< commanded; negative: not known
+    double middle_s = 0;  ///< on the clock of DwellInfo::begin_s, or of the dwell without one
+    bool common_clock = false;
+    double duration_s = 0;
+    Eigen::Vector3d angles = Eigen::Vector3d::Zero();  ///< gimbals, mean over the dwell, rad
+    VibrationMoment vibration;
+    double frequency_hz = 0;                         ///< 0 at rest
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< y, deg/h
+    Eigen::Matrix3d variance = Eigen::Matrix3d::Zero();
+    Regression regressors = Regression::Zero();  ///< h as it weighs in `rate`
+    /// Of the drift within the dwell, deg/h per 100 s, the mean left free.
+    Eigen::Vector3d ramp = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d ramp_variance = Eigen::Matrix3d::Zero();
+    Regression ramp_regressors = Regression::Zero();
+    double nis_per_dof = 0, innovation_correlation = 0;
+    std::uint32_t used = 0;
+    double sync_arcsec = 0;  ///< motion of the angles in step with the vibration
+    bool flagged = false;    ///< and not merely followed
+};
+
+}  // namespace vibrig::estimator

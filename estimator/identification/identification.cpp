@@ -1,0 +1,451 @@
+#include "estimator/identification/identification.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/identification/identification_impl.hpp"
+#include "estimator/filter/settings_check.hpp"
+
+namespace vibrig::estimator {
+namespace {
+
+/// A longer gap is treated as a change of position: the angles start afresh.
+constexpr double kLongestPause_s = 1.0;
+/// So many stamps in a row before the newest accepted one mean that that one was wrong.
+constexpr int kBadTimesBeforeRestart = 5;
+constexpr auto kBufferCapacity =
+    static_cast<std::size_t>(VibrationLevel::kFirstWindow_s * VibrationLevel::kHighestRate_hz) + 1;
+
+const Settings& checked(const Settings& settings) {
+    check(settings);
+    return settings;
+}
+
+template <class Container>
+bool finite(const Container& values) noexcept {
+    return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+}  // namespace
+
+Identification::Impl::Impl(const Settings& s, std::size_t max_dwells)
+    : settings(checked(s)),
+      prior(prior_sigma(s)),
+      filters{
+          RunFilter(s, s.method == Method::joint || s.all_at_once ? prior : two_step_prior(prior)),
+          RunFilter(s, two_step_prior(prior))},
+      noise(noise_levels(s)),
+      kinematics_(s),
+      accelerometer_zero_(s.accelerometer_zero_g[0], s.accelerometer_zero_g[1],
+                          s.accelerometer_zero_g[2]),
+      stuck_(s),
+      saturation_(s.accelerometer_g, s.accelerometer_range_g),
+      buffer_(VibrationLevel::kFirstWindow_s, kBufferCapacity),
+      level_(s.level_window_s, s.accelerometer_g, s.frequency_hz),
+      sync_(s.frequency_hz),
+      paper_(s.frequency_hz, s.forgetting) {
+    for (std::size_t r = 0; r < 3; ++r) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            accelerometer_matrix_(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
+                s.accelerometer_matrix[r][c];
+        }
+    }
+    reserve(max_dwells);
+    solve(solution);
+}
+
+void Identification::Impl::reserve(std::size_t max_dwells) {
+    dwells.reserve(max_dwells);
+    rows.reserve(settings.method == Method::joint ? max_dwells : 0);
+    paper_starts_.reserve(max_dwells);
+}
+
+Reading Identification::Impl::prepare(const Measurement& m) const noexcept {
+    Reading reading;
+    reading.time_s = m.time_s;
+    if (m.angles_good && finite(m.angle_rad)) {
+        reading.angles = kinematics_.gimbal_angles(m.angle_rad);
+        reading.angles_good = std::abs(reading.angles[1]) <= kMaxInnerAngleRad;
+    }
+    if (m.force_good && finite(m.force_g)) {
+        reading.force =
+            accelerometer_matrix_ *
+            (Eigen::Vector3d(m.force_g[0], m.force_g[1], m.force_g[2]) - accelerometer_zero_);
+        reading.force_good = true;
+    }
+    return reading;
+}
+
+RunFilter* Identification::Impl::filter_of(int run) noexcept {
+    if (settings.method == Method::joint) return &filters[0];
+    for (RunFilter& candidate : filters) {
+        if (candidate.run == 0) candidate.run = run;
+        if (candidate.run == run) return &candidate;
+    }
+    return nullptr;
+}
+
+void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
+    if (in_dwell_) end_dwell();
+    in_dwell_ = true;
+    record_ = {};
+    record_.info = dwell;
+    buffer_.clear();
+    primed_ = false;
+    stuck_.clear();
+    sync_.clear();
+    saturation_.clear();
+    bad_times_in_a_row_ = 0;
+    active_ = filter_of(dwell.run);
+    if (active_ == nullptr) {
+        refused_run = true;
+        return;
+    }
+    active_->saved = active_->filter.state();
+    active_->batch.begin_dwell();
+    active_->filter.begin_dwell();
+    begin_paper_level();
+}
+
+void Identification::Impl::begin_paper_level() noexcept {
+    paper_.begin();
+    if (active_ != &filters[1] || !(record_.info.table_g >= 0)) return;
+    for (const PaperStart& start : paper_starts_) {
+        if (start.position != record_.info.position) continue;
+        // eq. 17; at a(1) = 0 it divides by zero and is not used.
+        if (start.table_g > 0)
+            paper_.begin(start.amplitude_g * record_.info.table_g / start.table_g);
+        return;
+    }
+}
+
+StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
+    if (!in_dwell_) begin_dwell({});
+    ++record_.samples;
+    StepResult step;
+    if (active_ == nullptr) {
+        ++record_.rejected;
+        step.outcome = StepOutcome::gated;
+        return step;
+    }
+    const bool first = record_.samples == 1 || (buffer_.empty() && !primed_);
+    if (record_.samples == 1) dwell_begin_s_ = measurement.time_s;
+    const double dt = measurement.time_s - last_time_s_;
+    bool restart = false;
+    if (!std::isfinite(measurement.time_s) || (!first && !(dt > 0))) {
+        restart =
+            std::isfinite(measurement.time_s) && ++bad_times_in_a_row_ >= kBadTimesBeforeRestart;
+        if (!restart) {
+            ++record_.rejected;
+            step.outcome = StepOutcome::bad_time;
+            return step;
+        }
+    }
+    bad_times_in_a_row_ = 0;
+    if (!first && (restart || dt > kLongestPause_s)) {
+        end_stretch();
+        active_->filter.begin_dwell();
+    }
+    Reading reading = prepare(measurement);
+    if (reading.angles_good && stuck_.stuck(measurement.angle_rad)) {
+        reading.angles_good = false;
+        ++record_.stuck;
+    }
+    if (reading.force_good) {
+        ++record_.forces;
+        saturation_.add(measurement.force_g);
+    }
+    return accept(reading);
+}
+
+StepResult Identification::Impl::accept(const Reading& reading) noexcept {
+    if (primed_) {
+        to_level(reading);
+        last_time_s_ = reading.time_s;
+        return through_filter(reading);
+    }
+    if (buffer_.empty()) stretch_begin_s_ = reading.time_s;
+    last_time_s_ = reading.time_s;
+    buffer_.push(reading);
+    if (buffer_.full()) return replay();
+    StepResult step;
+    step.outcome = !reading.angles_good  ? StepOutcome::bad_angles
+                   : !reading.force_good ? StepOutcome::bad_force
+                                         : StepOutcome::buffered;
+    return step;
+}
+
+/// The level of the buffered readings first, then the filter over all of them.
+StepResult Identification::Impl::replay() noexcept {
+    period_s_ = buffer_.period(period_s_);
+    if (!(period_s_ > 0)) {  // a single reading, before any other: no level to be had from it
+        record_.rejected += static_cast<std::uint32_t>(buffer_.readings().size());
+        buffer_.clear();
+        primed_ = false;
+        StepResult nothing;
+        nothing.outcome = StepOutcome::bad_force;
+        return nothing;
+    }
+    level_.begin(period_s_);
+    tensor_.clear();
+    vibration_ = {};
+    Eigen::Vector3d angles = Eigen::Vector3d::Zero();
+    const bool vertical_known = buffer_.median_angles(angles);
+    const Eigen::Matrix3d level = kinematics_.pose(angles).level;
+    double previous = buffer_.readings().front().time_s - period_s_;
+    std::size_t good = 0;
+    for (const Reading& reading : buffer_.readings()) {
+        const double slots =
+            std::min(std::round((reading.time_s - previous) / period_s_), 1.0 / period_s_);
+        for (double k = 1; k < slots; ++k) {
+            level_.add_first_missing();
+            tensor_.add_missing();
+        }
+        record_.note_interval((reading.time_s - previous) / period_s_);
+        previous = reading.time_s;
+        if (reading.force_good && vertical_known) {
+            const Eigen::Vector3d force = level.transpose() * reading.force;
+            level_.add_first(force[1]);
+            tensor_.add(force);
+            ++good;
+        } else {
+            level_.add_first_missing();
+            tensor_.add_missing();
+        }
+    }
+    // With fewer than half of the readings the fit that fills the gaps stands on nothing.
+    level_.prime();
+    refresh_vibration();
+    primed_ = 2 * good >= buffer_.readings().size();
+    StepResult step;
+    if (primed_) {
+        // A few samples tell no level that could be compared with another.
+        if (buffer_.full()) record_.note_level(level_.kappa());
+        for (const Reading& reading : buffer_.readings()) step = through_filter(reading);
+    } else {
+        step.outcome = StepOutcome::bad_force;
+        record_.rejected += static_cast<std::uint32_t>(buffer_.readings().size());
+    }
+    buffer_.clear();
+    return step;
+}
+
+void Identification::Impl::to_level(const Reading& reading) noexcept {
+    const double slots = std::round((reading.time_s - last_time_s_) / period_s_);
+    record_.note_interval((reading.time_s - last_time_s_) / period_s_);
+    for (double k = 1; k < slots; ++k) {
+        level_.add_missing();
+        tensor_.add_missing();
+    }
+    // The filter's angles, not the encoders': a spike must not tilt the vertical.
+    if (reading.force_good) {
+        const Eigen::Vector3d force = active_->filter.level().transpose() * reading.force;
+        level_.add(force[1]);
+        tensor_.add(force);
+    } else {
+        level_.add_missing();
+        tensor_.add_missing();
+    }
+    refresh_vibration();
+    record_.note_level(level_.kappa());
+}
+
+/// The shape follows the level; the two-step route has none.
+void Identification::Impl::refresh_vibration() noexcept {
+    if (vibration_.kappa == level_.kappa()) return;
+    vibration_.kappa = level_.kappa();
+    if (settings.second_moment == SecondMoment::vertical || settings.method != Method::joint ||
+        !(vibration_.kappa > 1.0) || !tensor_.due())
+        return;
+    static_cast<void>(tensor_.shape(settings.accelerometer_g, vibration_.gamma));
+}
+
+StepResult Identification::Impl::through_filter(const Reading& reading) noexcept {
+    StepResult step;
+    if (reading.force_good && settings.method == Method::two_step)
+        paper_.add(reading.time_s, reading.force.squaredNorm());
+    if (!reading.angles_good) {
+        step.outcome = StepOutcome::bad_angles;
+    } else {
+        const VibrationMoment vibration = settings.method == Method::joint
+                                              ? vibration_
+                                              : VibrationMoment{paper_.kappa(), kVertical};
+        step = active_->filter.step(reading.time_s, reading.angles, vibration);
+        innovation_arcsec_ = step.innovation_arcsec;
+        if (step.outcome == StepOutcome::used && vibration.kappa > 1.0)
+            sync_.add(reading.time_s - dwell_begin_s_, step.innovation_arcsec);
+        if (step.outcome == StepOutcome::initialised ||
+            step.outcome == StepOutcome::reinitialised) {
+            active_->batch.start(reading.time_s, reading.angles);
+        } else {
+            active_->batch.step(reading.time_s, reading.angles, vibration,
+                                step.outcome == StepOutcome::used);
+        }
+    }
+    record_.count(step);
+    if (step.outcome == StepOutcome::used && !reading.force_good)
+        step.outcome = StepOutcome::bad_force;
+    return step;
+}
+
+void Identification::Impl::note_shape(double weight) noexcept {
+    LevelTensor whole = kVertical;
+    if (settings.second_moment == SecondMoment::measured && weight > 0)
+        static_cast<void>(tensor_.shape(settings.accelerometer_g, whole));
+    record_.shape_weight += weight;
+    for (std::size_t k = 0; k < whole.size(); ++k) record_.shape_sum[k] += weight * whole[k];
+}
+
+void Identification::Impl::end_stretch() noexcept {
+    if (!primed_ && !buffer_.empty()) replay();
+    if (primed_) {
+        const auto weight = static_cast<double>(level_.count());
+        const VibrationLevel::Whole whole = level_.whole();
+        record_.level_samples += weight;
+        record_.kappa_sum += weight * whole.kappa;
+        record_.mean_force_sum += weight * whole.mean_force_g;
+        note_shape(weight * (whole.kappa - 1.0));
+        if (level_.frequency_hz() > 0) {
+            record_.frequency_samples += weight;
+            record_.frequency_sum += weight * level_.frequency_hz();
+        }
+        record_.period_s = period_s_;
+        record_.span_s = std::max(record_.span_s, last_time_s_ - stretch_begin_s_ + period_s_);
+    }
+    primed_ = false;
+}
+
+void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
+    DwellRow row;
+    if (rows.size() == rows.capacity() || !active_->batch.row(row)) return;
+    row.run = summary.run;
+    row.position = summary.position;
+    row.table_g = record_.info.table_g;
+    row.common_clock = std::isfinite(record_.info.begin_s);
+    if (row.common_clock) row.middle_s += record_.info.begin_s;
+    row.vibration = summary.vibration();
+    row.frequency_hz = summary.frequency_hz;
+    row.nis_per_dof = summary.nis_per_dof;
+    row.innovation_correlation = summary.innovation_correlation;
+    row.flagged = summary.flagged && !summary.followed;
+    if (row.frequency_hz > 0)
+        row.sync_arcsec =
+            sync_.amplitude_arcsec(row.frequency_hz, noise.angle_arcsec * noise.angle_arcsec);
+    rows.push_back(row);
+}
+
+DwellSummary Identification::Impl::end_dwell() noexcept {
+    if (!in_dwell_) return {};
+    if (active_ != nullptr) end_stretch();
+    record_.saturated_axis = saturation_.axis();
+    DwellVerdict verdict = judge(record_, settings);
+    if (active_ == nullptr) {
+        verdict.rejected = verdict.summary.flagged = true;
+        verdict.summary.reason = "the two-step route takes two runs only: dwell rejected";
+    } else {
+        if (settings.method == Method::two_step) {
+            verdict.summary.kappa = paper_.kappa();
+            verdict.summary.amplitude_g = paper_.amplitude_g();
+        }
+        if (!verdict.rejected) keep_row(verdict.summary);
+        active_->batch.end_dwell(!verdict.rejected);
+        if (verdict.rejected) {
+            active_->filter.restore(active_->saved);
+        } else {
+            active_->kappa.add(verdict.summary.kappa);
+            nis_sum += record_.nis_sum;
+            nis_count += record_.nis_count;
+            if (active_ == &filters[0] && settings.method == Method::two_step &&
+                paper_starts_.size() < paper_starts_.capacity()) {
+                paper_starts_.push_back(
+                    {record_.info.position, paper_.amplitude_g(), record_.info.table_g});
+            }
+        }
+    }
+    verdict.summary.noise = noise;
+    verdict.summary.left_out = verdict.rejected;
+    samples += verdict.summary.samples;
+    used += verdict.summary.used;
+    rejected += verdict.summary.rejected;
+    ++dwells_ended;
+    if (dwells.size() < dwells.capacity()) {
+        dwells.push_back(verdict.summary);
+    } else {
+        ++dwells_not_kept;
+    }
+    in_dwell_ = false;
+    buffer_.clear();
+    record_ = {};
+    solve(solution);
+    return verdict.summary;
+}
+
+void Identification::Impl::estimate(Estimate& out) const noexcept {
+    ParameterArray value{}, sigma{};
+    if (settings.method == Method::joint || !two_runs()) {
+        const UdFilter& state = (active_ != nullptr ? active_ : &filters[0])->filter.state();
+        std::copy_n(state.constants(), kParameters, value.begin());
+        state.sigma(sigma);
+    } else {
+        value = solution.value;
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            const auto k = static_cast<Eigen::Index>(i);
+            sigma[i] = std::sqrt(std::max(0.0, solution.covariance(k, k)));
+        }
+    }
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        out.value[i] = value[internal_of(i)];
+        out.sigma[i] = sigma[internal_of(i)];
+        out.observable[i] = solution.found.observable[internal_of(i)];
+    }
+    const bool paper = settings.method == Method::two_step && in_dwell_;
+    out.kappa = paper ? paper_.kappa() : level_.kappa();
+    out.amplitude_g = paper ? paper_.amplitude_g() : level_.amplitude_g();
+    out.frequency_hz = level_.frequency_hz();
+    out.samples = samples + record_.samples;
+    out.used = used + record_.used;
+    out.rejected = rejected + record_.rejected;
+    const double count = static_cast<double>(nis_count + record_.nis_count);
+    out.nis_per_dof = count > 0 ? (nis_sum + record_.nis_sum) / (3.0 * count) : 0.0;
+    out.innovation_arcsec = innovation_arcsec_;
+    out.dwells = dwells_ended;
+}
+
+Identification::Identification(const Settings& settings, std::size_t max_dwells)
+    : impl_(std::make_unique<Impl>(settings, max_dwells)) {}
+void Identification::reserve(std::size_t max_dwells) { impl_->reserve(max_dwells); }
+Identification::~Identification() = default;
+Identification::Identification(Identification&&) noexcept = default;
+Identification& Identification::operator=(Identification&&) noexcept = default;
+
+void Identification::begin_dwell(const DwellInfo& dwell) noexcept { impl_->begin_dwell(dwell); }
+StepResult Identification::add(const Measurement& measurement) noexcept {
+    return impl_->add(measurement);
+}
+DwellSummary Identification::end_dwell() noexcept { return impl_->end_dwell(); }
+void Identification::estimate(Estimate& out) const noexcept { impl_->estimate(out); }
+void Identification::set_noise(const NoiseLevels& levels) noexcept {
+    impl_->noise = levels;
+    for (RunFilter& run : impl_->filters) {
+        run.filter.set_noise(FilterNoise::of(levels));
+        run.batch.set_noise(FilterNoise::of(levels));
+    }
+}
+const NoiseLevels& Identification::noise() const noexcept { return impl_->noise; }
+Result Identification::result() const { return impl_->result(); }
+
+const std::vector<DwellRow>& Identification::rows() const noexcept { return impl_->rows; }
+
+std::vector<double> Identification::covariance() const {
+    std::vector<double> rows;
+    rows.reserve(kParameters * kParameters);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            rows.push_back(impl_->solution.covariance(static_cast<Eigen::Index>(internal_of(i)),
+                                                      static_cast<Eigen::Index>(internal_of(j))));
+        }
+    }
+    return rows;
+}
+
+}  // namespace vibrig::estimator

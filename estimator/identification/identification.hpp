@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "estimator/filter/measurement.hpp"
+#include "estimator/filter/parameters.hpp"
+#include "estimator/filter/settings.hpp"
+#include "estimator/filter/vibration_moment.hpp"
+
+namespace vibrig::estimator {
+
+struct DwellRow;
+struct Result;
+
+struct DwellSummary {
+    int run = 0, position = 0;
+    std::uint32_t samples = 0;  ///< offered
+    std::uint32_t used = 0;     ///< of them in the filter
+    std::uint32_t rejected = 0;
+    std::uint32_t reinitialised = 0;
+    double kappa = 1;               ///< whole dwell, spec section 6.3
+    LevelTensor gamma = kVertical;  ///< whole dwell
+    [[nodiscard]] VibrationMoment vibration() const noexcept { return {kappa, gamma}; }
+    double amplitude_g = 0;   ///< sqrt(2 (kappa - 1)), platform
+    double frequency_hz = 0;  ///< lock-in; 0 at rest
+    double mean_force_g = 0;  ///< W{fu}; 1 within 2 % or the dwell is rejected
+    double nis_per_dof = 0;
+    double innovation_correlation = 0;  ///< from one sample to the next; 0 when noise is white
+    bool flagged = false;     ///< something is to be known of this dwell, or it is rejected:
+    const char* reason = "";  ///< static text; empty when not flagged
+    NoiseLevels noise;        ///< that the filter took in this dwell
+    bool followed = false;    ///< flagged, but the estimate loses nothing by it
+    bool left_out = false;    ///< rejected as a whole: the estimate takes nothing of it
+};
+
+/// Fixed-size state of the identification for displays; copied without allocation.
+struct Estimate {
+    std::array<double, kParameters> value{};  ///< in the order of parameter_names()
+    std::array<double, kParameters> sigma{};
+    std::array<bool, kParameters> observable{};
+    double amplitude_g = 0;  ///< platform, present dwell
+    double frequency_hz = 0;
+    double kappa = 1;
+    std::uint64_t samples = 0, used = 0, rejected = 0;
+    double nis_per_dof = 0;
+    std::array<double, 3> innovation_arcsec{};
+    std::uint32_t dwells = 0;
+};
+
+/// The whole identification of one campaign: level, filter, recovery, observability (spec sections
+/// 2-9). begin_dwell, add, end_dwell and estimate neither allocate nor throw; one thread.
+class Identification {
+  public:
+    /// Throws SettingsError. Room for `max_dwells` dwell summaries is taken here.
+    explicit Identification(const Settings& settings, std::size_t max_dwells = 4096);
+    /// Room for so many in all; between dwells only. Allocates.
+    void reserve(std::size_t max_dwells);
+    ~Identification();
+    Identification(Identification&&) noexcept;
+    Identification& operator=(Identification&&) noexcept;
+
+    void begin_dwell(const DwellInfo& dwell) noexcept;
+    StepResult add(const Measurement& measurement) noexcept;
+    DwellSummary end_dwell() noexcept;
+    void estimate(Estimate& out) const noexcept;
+    /// In place of the settings' noise, from the next dwell on; between dwells only.
+    void set_noise(const NoiseLevels& levels) noexcept;
+    [[nodiscard]] const NoiseLevels& noise() const noexcept;
+    /// Final result over all ended dwells. Allocates; does not change the filter.
+    [[nodiscard]] Result result() const;
+    /// Those of result(), without a copy.
+    [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
+    /// Of the coefficients after the last ended dwell, 30 x 30 row-major in the order of
+    /// parameter_names(), whether or not they are observable. Allocates.
+    [[nodiscard]] std::vector<double> covariance() const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vibrig::estimator

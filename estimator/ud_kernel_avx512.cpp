@@ -1,3 +1,0 @@
-#define VIBRIG_UD_KERNEL kUdKernelAvx512
-#define VIBRIG_UD_LANES 8
-#include "estimator/ud_kernel.inc"

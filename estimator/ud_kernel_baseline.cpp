@@ -1,3 +1,0 @@
-#define VIBRIG_UD_KERNEL kUdKernelBaseline
-#define VIBRIG_UD_LANES 2
-#include "estimator/ud_kernel.inc"

@@ -1,0 +1,169 @@
+#include "daemon/archive/trend.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/unit/daemon/archive/entries.hpp"
+
+namespace vibrig::archive {
+namespace {
+
+constexpr unsigned kSeed = 22;
+constexpr double kU = 0.1;
+
+/// Campaigns in groups of a turn-on each.
+struct Drawn {
+    std::vector<double> value, u;
+    std::vector<std::size_t> group;
+};
+Drawn draw(std::mt19937& random, std::size_t groups, std::size_t each, double operating,
+           double shutdown) {
+    std::normal_distribution<double> normal;
+    Drawn out;
+    for (std::size_t g = 0; g < groups; ++g) {
+        const double turn = shutdown * normal(random);
+        for (std::size_t i = 0; i < each; ++i) {
+            // Uncertainties that differ, as those of long and short campaigns do.
+            const double u = kU * (i % 2 == 0 ? 1 : 1.5);
+            out.value.push_back(3 + turn + operating * normal(random) + u * normal(random));
+            out.u.push_back(u);
+            out.group.push_back(g);
+        }
+    }
+    return out;
+}
+
+/// Half width of the 4 sigma interval of a share.
+double four_sigma(double share, int trials) { return 4 * std::sqrt(share * (1 - share) / trials); }
+
+TEST(Trend, FTestsSayNoAsOftenAsTheyClaim) {
+    constexpr int kTrials = 4000;
+    constexpr double kLevel = 0.05;
+    std::mt19937 random(kSeed);
+    int operating = 0, shutdown = 0;
+    for (int i = 0; i < kTrials; ++i) {
+        const Drawn of = draw(random, 5, 4, 0, 0);
+        const auto found = analyse_variance(of.value, of.u, of.group);
+        operating += found.within.p < kLevel;
+        shutdown += found.between.p < kLevel;
+    }
+    EXPECT_NEAR(static_cast<double>(operating) / kTrials, kLevel, four_sigma(kLevel, kTrials))
+        << "seed " << kSeed;
+    // Against whichever is larger, the scatter within or what it should be: at most the level.
+    EXPECT_LT(static_cast<double>(shutdown) / kTrials, kLevel + four_sigma(kLevel, kTrials))
+        << "seed " << kSeed;
+    EXPECT_GT(static_cast<double>(shutdown) / kTrials, kLevel / 3) << "seed " << kSeed;
+}
+
+TEST(Trend, FindsTheInstabilitiesThatAreThere) {
+    constexpr int kTrials = 400;
+    constexpr double kOperating = 0.2, kShutdown = 0.5;
+    std::mt19937 random(kSeed);
+    double operating = 0, shutdown = 0, found_shutdown = 0;
+    for (int i = 0; i < kTrials; ++i) {
+        const Drawn of = draw(random, 12, 6, kOperating, kShutdown);
+        const auto found = analyse_variance(of.value, of.u, of.group);
+        operating += found.within.value * found.within.value / kTrials;
+        shutdown += found.between.value * found.between.value / kTrials;
+        found_shutdown += (found.between.p < 0.01 ? 1.0 / kTrials : 0);
+    }
+    // Variances of chi-square with 60 and 11 degrees of freedom: 4 sigma of the mean of 400.
+    EXPECT_NEAR(operating, kOperating * kOperating, 4 * 0.04 * 1.7 * std::sqrt(2 / 60. / kTrials));
+    EXPECT_NEAR(shutdown, kShutdown * kShutdown, 4 * 0.25 * 1.3 * std::sqrt(2 / 11. / kTrials));
+    EXPECT_GT(found_shutdown, 0.9);
+}
+
+TEST(Trend, PausesAreShutdowns) {
+    std::vector<Entry> campaigns{entry_of("1", 0), entry_of("1", 0), entry_of("1", 1)};
+    campaigns[1].started_utc_ns = campaigns[0].ended_utc_ns + kHour_ns;
+    campaigns[1].ended_utc_ns = campaigns[1].started_utc_ns + kHour_ns;
+    const auto found = trend_of(campaigns, kShutdownAfterH);
+    EXPECT_THAT(found.turn, ::testing::ElementsAre(0, 0, 1));
+    EXPECT_THAT(trend_of(campaigns, 0.5).turn, ::testing::ElementsAre(0, 1, 2));
+}
+
+TEST(Trend, NamesTheCampaignThatDoesNotFit) {
+    std::mt19937 random(kSeed);
+    std::normal_distribution<double> normal(0, kU);
+    std::vector<Entry> campaigns;
+    for (int i = 0; i < 12; ++i) {
+        campaigns.push_back(entry_of("1", i, 0, kU));
+        for (auto& c : campaigns.back().coefficients) c->value = 1 + normal(random);
+    }
+    campaigns[7].coefficients[13]->value += 30 * kU;
+    campaigns.push_back(entry_of("1", 12));
+    campaigns.back().verdict = "not valid";
+    const auto found = trend_of(campaigns, kShutdownAfterH);
+    EXPECT_EQ(found.left_out, 1U);
+    for (const auto& of : found.coefficients)
+        for (const auto& point : of.points)
+            EXPECT_EQ(point.outlier, of.position == 13 && point.campaign == 7)
+                << of.position << " " << point.campaign << ", seed " << kSeed;
+}
+
+/// A unit's life: a campaign a day, its coefficients scattered by `instability`.
+std::vector<Entry> life(std::mt19937& random, int campaigns, double instability) {
+    std::normal_distribution<double> normal;
+    std::vector<Entry> made;
+    for (int i = 0; i < campaigns; ++i) {
+        made.push_back(entry_of("1", i, 0, kU));
+        for (auto& c : made.back().coefficients)
+            c->value = 5 + std::hypot(kU, instability) * normal(random);
+    }
+    return made;
+}
+
+TEST(Moved, OneCampaignIn1000IsCalledSoWithoutReason) {
+    constexpr int kTrials = 4000;
+    std::mt19937 random(kSeed);
+    for (const double instability : {0.0, 3 * kU}) {
+        int alarms = 0;
+        for (int i = 0; i < kTrials; ++i) {
+            auto history = life(random, 7, instability);
+            const Entry now = history.back();
+            history.pop_back();
+            alarms += !moved(now, history).empty();
+        }
+        // Poisson with a mean of 4: 14 or more are one in 7000.
+        EXPECT_LE(alarms, 13) << "instability " << instability << ", seed " << kSeed;
+    }
+}
+
+TEST(Moved, AStepIsFoundAndInstabilityOfTheHistoryIsAllowed) {
+    std::mt19937 random(kSeed);
+    int found = 0, allowed = 0;
+    constexpr int kTrials = 100;
+    for (int i = 0; i < kTrials; ++i) {
+        for (const double instability : {0.0, 10 * kU}) {
+            auto history = life(random, 13, instability);
+            Entry now = history.back();
+            history.pop_back();
+            now.coefficients[2]->value = 5 + 15 * kU;
+            const auto what = moved(now, history);
+            if (instability > 0) {
+                allowed += what.empty();
+            } else {
+                found += what.size() == 1 && what[0].position == 2;
+            }
+        }
+    }
+    EXPECT_GE(found, 99) << "seed " << kSeed;
+    EXPECT_GE(allowed, 95) << "seed " << kSeed;
+}
+
+TEST(Moved, SaysNothingWithoutAHistory) {
+    Entry now = entry_of("1", 2, 1000);
+    EXPECT_TRUE(moved(now, {}).empty());
+    EXPECT_TRUE(moved(now, {entry_of("1", 0)}).empty());
+    // Later ones, those of a program, and bad ones are none.
+    auto later = entry_of("1", 3), other = entry_of("1", 0), bad = entry_of("1", 1);
+    other.simulated = true;
+    bad.verdict = "not valid";
+    EXPECT_TRUE(moved(now, {later, other, bad, entry_of("1", 1)}).empty());
+}
+
+}  // namespace
+}  // namespace vibrig::archive

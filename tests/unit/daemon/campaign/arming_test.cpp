@@ -1,0 +1,127 @@
+#include "tests/unit/daemon/campaign/campaign_fixture.hpp"
+
+namespace vibrig::campaign {
+namespace {
+
+using testing::HasSubstr;
+
+/// At rest, ready to be armed; people's time is the test's.
+struct ArmingTest : CampaignTest {
+    Time wall = 77 * kSecond;
+
+    ArmingTest() {
+        settings.name = "night";
+        settings.table_g = {7, 9};
+        settings.dwell_s = 100;
+        settings.stop = {};
+        remake();
+    }
+    void remake() {
+        this->wall_clock = [this] { return wall; };
+        make();
+        run_for(3);
+    }
+    CommandReply order(Kind kind, const char* by = "Ada") {
+        return campaign->command({kind, by, ""}, now);
+    }
+    void pass(double seconds) {
+        wall += drivers::from_seconds(seconds);
+        run_for(0.2);
+    }
+};
+
+TEST_F(ArmingTest, NamesUnitPlanHighestLevelAndDuration) {
+    settings.unit = "IMU-7 0042";
+    remake();
+    const auto reply = order(Kind::arm);
+    ASSERT_TRUE(reply.accepted) << reply.message;
+    // 4 positions of 100 s, 3 s of settling and 2 ramps of 2 s each
+    const char* const expected =
+        "IMU-7 0042, plan \"night\" (4 positions), up to 9 g at the table, about 8 min; to be "
+        "started within 10 min";
+    EXPECT_EQ(reply.message, std::string("armed for ") + expected);
+    EXPECT_EQ(status().armed_for, expected);
+    EXPECT_EQ(status().arming_left_s, 600);
+    ASSERT_FALSE(events.empty());
+    EXPECT_EQ(events.back(), std::string("armed for ") + expected + " by Ada");
+}
+
+TEST_F(ArmingTest, SaysThatNoUnitIsStated) {
+    EXPECT_THAT(order(Kind::arm).message, HasSubstr("armed for a unit that is not stated, plan"));
+}
+
+TEST_F(ArmingTest, EndsAfterItsTimeWithoutAStart) {
+    settings.arming_valid_s = 30;
+    remake();
+    ASSERT_TRUE(order(Kind::arm).accepted);
+    pass(29.9);
+    EXPECT_EQ(status().state, CampaignState::armed);
+    EXPECT_NEAR(status().arming_left_s, 0.1, 1e-9);
+    pass(0.1);
+    EXPECT_EQ(status().state, CampaignState::idle);
+    EXPECT_EQ(campaign->armed_by(), "");
+    EXPECT_EQ(status().armed_for, "");
+    EXPECT_EQ(events.back(), "the arming by Ada has expired: not started within 30 s");
+    EXPECT_FALSE(order(Kind::start).accepted);
+    // and can be had again
+    EXPECT_TRUE(order(Kind::arm).accepted);
+}
+
+TEST_F(ArmingTest, OfARunningCampaignDoesNotExpire) {
+    settings.arming_valid_s = 30;
+    remake();
+    ASSERT_TRUE(order(Kind::arm).accepted);
+    ASSERT_TRUE(order(Kind::start).accepted);
+    pass(3600);
+    EXPECT_EQ(campaign->armed_by(), "Ada");
+    EXPECT_EQ(status().arming_left_s, 0);
+}
+
+TEST_F(ArmingTest, IsNamedWhenAnotherPersonStarts) {
+    ASSERT_TRUE(order(Kind::arm).accepted);
+    EXPECT_EQ(order(Kind::start, "Grace").message, "campaign started, armed by Ada");
+    EXPECT_EQ(status().started_by, "Grace");
+    // AND a second start is told what is going on
+    const auto again = order(Kind::start, "Ada");
+    EXPECT_FALSE(again.accepted);
+    EXPECT_EQ(again.message, "a campaign is running, started by Grace");
+}
+
+TEST_F(ArmingTest, OfAnEarlierLifesTripSilenceIsNoRest) {
+    // GIVEN a trip that an earlier life left, and a rig of which nobody hears anything
+    campaign->take_over_trip("the daemon ended while armed by Ada", 5);
+    shaker.stop_now();
+    shaker.now.valid = false;
+    const auto pass_silently = [this](double seconds) {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += 100 * kMillisecond;
+            campaign->step(now);
+        }
+    };
+    pass_silently(1);
+    EXPECT_FALSE(disobeyed);
+    EXPECT_FALSE(campaign->done(now));
+    pass_silently(30);
+    // THEN that is a stop which was not obeyed, and whoever ends it leaves it undone
+    EXPECT_TRUE(disobeyed);
+    campaign->shut_down(now);
+    pass_silently(30);
+    EXPECT_FALSE(campaign->done(now));
+}
+
+TEST_F(ArmingTest, IsRefusedWhileAnEarlierLifesLatchIsNotAcknowledged) {
+    campaign->take_over_trip("the daemon ended while armed by Ada");
+    EXPECT_EQ(status().state, CampaignState::tripped);
+    pass(10);
+    const auto refused = order(Kind::arm);
+    EXPECT_FALSE(refused.accepted);
+    EXPECT_THAT(refused.message, HasSubstr("ended while armed by Ada"));
+    EXPECT_EQ(campaign->refusal({Kind::arm, "Grace", ""}, now), refused.message);
+    EXPECT_TRUE(shaker.requests.empty());
+    EXPECT_TRUE(order(Kind::acknowledge, "Grace").accepted);
+    EXPECT_EQ(campaign->refusal({Kind::arm, "Grace", ""}, now), "");
+    EXPECT_TRUE(order(Kind::arm).accepted);
+}
+
+}  // namespace
+}  // namespace vibrig::campaign

@@ -1,0 +1,181 @@
+#pragma once
+
+#include "daemon/campaign/campaign.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
+#include "tests/unit/daemon/rt/fake_shaker.hpp"
+
+namespace vibrig::campaign {
+using drivers::kMillisecond;
+using drivers::kSecond;
+using drivers::Time;
+using Kind = CommandRequest::Kind;
+
+/// Takes gimbal commands as the platform would: echoes the counter, then is in position after two
+/// seconds.
+class FakePlatformPort final : public drivers::CanPort {
+  public:
+    void start(FrameHandler, StateHandler, ErrorHandler) override {}
+    void stop() noexcept override {}
+    [[nodiscard]] bool send(const canfd_frame& frame, bool) noexcept override {
+        frames.push_back(frame);
+        return true;
+    }
+    [[nodiscard]] drivers::CanPortCounters counters() const noexcept override { return {}; }
+    [[nodiscard]] drivers::PortState state() const noexcept override {
+        return drivers::PortState::running;
+    }
+    std::vector<canfd_frame> frames;
+};
+
+struct CampaignTest : testing::Test {
+    Settings settings;
+    proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    FakePlatformPort port;
+    drivers::Gimbal gimbal{dbc, {}, port};
+    FakeShaker shaker;
+    drivers::PlatformStatus platform;
+    std::vector<rt::DwellOrder> orders;
+    std::vector<std::string> events;
+    rt::Guard guard = rt::Guard::idle;
+    int ends = 0;
+    int positions_done = 0;
+    std::string gate;
+    bool complete = false;
+    bool slewed_while_moving = false;
+    FakeAccelerometers accelerometers;
+    bool disobeyed = false;
+    std::int64_t utc_ns = 0;
+    std::function<Time()> wall_clock;        ///< people's; none: the machine's
+    std::function<rt::MeanMotion()> second;  ///< of force and angles; none: nobody asks
+    double slew_started_at = -1;
+    std::size_t frames_seen = 0;
+    Time now = kSecond;
+    std::unique_ptr<Campaign> campaign;
+
+    void make() {
+        Ports ports{gimbal,
+                    shaker,
+                    [this] { return platform; },
+                    [this](const rt::DwellOrder& o) {
+                        orders.push_back(o);
+                        return true;
+                    },
+                    [this](rt::Guard g) { guard = g; },
+                    [] { return true; },
+                    [] {},
+                    [this](bool c) {
+                        ++ends;
+                        complete = c;
+                    },
+                    [this](Severity, const std::string& text) { events.push_back(text); },
+                    [this](const std::array<double, 3>& here, double elapsed_s) {
+                        return think(here, elapsed_s);
+                    },
+                    {},
+                    [this](const estimator::DwellInfo&, const estimator::DwellSummary&,
+                           const StopDone& stop) {
+                        ++positions_done;
+                        stops_done.push_back(stop);
+                    },
+                    [this] { return gate; },
+                    {}};
+        ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
+        ports.utc_ns = [this] { return utc_ns; };
+        if (wall_clock) ports.wall = wall_clock;
+        if (second) ports.second = second;
+        ports.disobeyed = [this](bool now_so) { disobeyed = disobeyed || now_so; };
+        campaign = std::make_unique<Campaign>(settings, ports);
+    }
+
+    CampaignTest() {
+        settings.sample_s = 0.025;
+        settings.proof.demanded = false;
+        settings.positions_deg = {{0, 0, 0}, {0, 0, 90}};
+        settings.table_g = {9, 0};
+        settings.dwell_s = 10;
+        settings.temperature_window_s = 5;
+        platform.ready = platform.loop_closed = platform.gyros_at_speed = true;
+        platform.temperature_c = 40;
+        shaker.now.valid = true;
+        make();
+    }
+
+    std::optional<Next> think(const std::array<double, 3>& here, double elapsed_s) {
+        if (thinking_steps > 0) {
+            --thinking_steps;
+            return {};
+        }
+        asked_from.push_back(here);
+        elapsed.push_back(elapsed_s);
+        if (asked_from.size() > stops_to_choose.size())
+            return Next{false, {}, 0, "every target is met"};
+        return Next{true, stops_to_choose[asked_from.size() - 1], 1, "more"};
+    }
+
+    CommandReply command(Kind kind) { return campaign->command({kind, "Ada", ""}, now); }
+
+    StatusData status() const {
+        StatusData s;
+        campaign->fill(s, now);
+        return s;
+    }
+
+    /// The rest of the rig for one step of 100 ms.
+    void run_rig() {
+        now += 100 * kMillisecond;
+        platform.time = platform.gimbal_time = now;
+        for (; frames_seen < port.frames.size(); ++frames_seen) {
+            const auto& frame = port.frames[frames_seen];
+            platform.gimbal_command_echo = frame.data[7];
+            const bool slews = (frame.data[6] & 0x0f) == 1;
+            platform.slewing = slews;
+            platform.in_position = false;
+            slew_started_at = slews ? drivers::to_seconds(now) : -1;
+            if (slews && !shaker.now.at_rest()) slewed_while_moving = true;
+        }
+        if (slew_started_at >= 0 && drivers::to_seconds(now) > slew_started_at + 2) {
+            platform.slewing = false;
+            platform.in_position = true;
+        }
+        if (shaker_obeys) shaker.obey(now);
+        shaker.now.time = now;
+        accelerometers.run_to(now, shaker.now.measured_g);
+        if (!orders.empty() && !orders.back().cancel && now > orders.back().to &&
+            reported != orders.size()) {
+            reported = orders.size();
+            estimator::DwellSummary summary;
+            summary.run = orders.back().dwell.run;
+            summary.position = orders.back().dwell.position;
+            summary.flagged = orders.size() == flagged_order;
+            campaign->on_dwell_done(summary);
+        }
+        campaign->step(now);
+    }
+    bool shaker_obeys = true;
+    std::size_t reported = 0;
+    std::size_t flagged_order = 0;
+    std::vector<Stop> stops_to_choose;
+    std::vector<std::array<double, 3>> asked_from;
+    std::vector<double> elapsed;
+    std::vector<StopDone> stops_done;
+    int thinking_steps = 0;
+
+    void run_for(double seconds) {
+        for (int i = 0; i < static_cast<int>(seconds * 10); ++i) run_rig();
+    }
+    bool run_until(CampaignState state, double seconds) {
+        for (int i = 0; i < static_cast<int>(seconds * 10); ++i) {
+            run_rig();
+            if (status().state == state) return true;
+        }
+        return false;
+    }
+};
+
+}  // namespace vibrig::campaign

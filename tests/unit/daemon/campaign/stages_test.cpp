@@ -1,0 +1,564 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
+#include "estimator/zeros/simulation.hpp"
+#include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
+#include "tests/unit/daemon/rt/fake_shaker.hpp"
+
+namespace vibrig::campaign {
+namespace {
+
+using drivers::kMillisecond;
+using drivers::kSecond;
+using drivers::Time;
+using Kind = CommandRequest::Kind;
+using testing::HasSubstr;
+
+constexpr double kRadPerDeg = std::numbers::pi / 180;
+constexpr double kRadPerSecond = kRadPerDeg / 3600;  // of 1 deg/h
+
+double signal(const proto::Dbc& dbc, const char* message, const char* name,
+              const canfd_frame& frame) {
+    return *proto::decode(*dbc.find(std::string_view(message))->find(name),
+                          std::span(frame.data, frame.len));
+}
+
+drivers::ReceivedFrame frame_of(const proto::Dbc& dbc, const char* message,
+                                std::initializer_list<std::pair<const char*, double>> values,
+                                Time time) {
+    const proto::Message* m = dbc.find(std::string_view(message));
+    drivers::ReceivedFrame received;
+    received.time = time;
+    received.frame.can_id = m->id;
+    received.frame.len = m->size;
+    for (const auto& [name, value] : values) {
+        static_cast<void>(proto::encode(*m->find(name), value,
+                                        std::span(received.frame.data, received.frame.len)));
+    }
+    return received;
+}
+
+constexpr double kSample_s = 0.025;
+
+/// A platform in position (0, 0, 0) that obeys gimbal and torque commands: the vertical in its axes
+/// goes round against it, u' = u x w.
+struct StagesTest : testing::Test, drivers::CanPort {
+    Settings settings;
+    proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    drivers::Gimbal gimbal{dbc, {}, *this};
+    drivers::Torquer torquer{dbc, {}, *this};
+    FakeShaker shaker;
+    drivers::PlatformStatus platform;
+    std::unique_ptr<rt::StageFeed> feed;
+    std::unique_ptr<Campaign> campaign;
+    std::vector<rt::DwellOrder> orders;
+    std::vector<LevelDrift> drifts;
+    std::vector<std::string> events;
+    std::size_t reported = 0;
+    rt::Guard guard = rt::Guard::idle;
+    FakeAccelerometers accelerometers;
+    Time now = kSecond;
+
+    StagesTest() {
+        settings.sample_s = kSample_s;
+        settings.proof.demanded = false;
+    }
+
+    std::array<double, 3> up{0.005, 1, -0.003}, torque{}, drift{10, 3, -6};  // deg/h
+    std::array<double, 3> encoder_deg{}, target_deg{};                       // last commanded
+    double torquer_sign = 1;
+    bool silent = false, says_torquing = false, slews = false;
+    std::uint8_t torque_echo = 0;
+    double slewed_s = 0;
+    double tilt_when_ordered = -1;
+    bool torqued_in_dwell = false, shook_while_levelling = false;
+
+    void start(FrameHandler, StateHandler, ErrorHandler) override {}
+    void stop() noexcept override {}
+    [[nodiscard]] drivers::CanPortCounters counters() const noexcept override { return {}; }
+    [[nodiscard]] drivers::PortState state() const noexcept override {
+        return drivers::PortState::running;
+    }
+    [[nodiscard]] bool send(const canfd_frame& frame, bool) noexcept override {
+        if (frame.can_id == dbc.find("TorqueCommand")->id) {
+            for (std::size_t i = 0; i < 3; ++i)
+                torque[i] = signal(dbc, "TorqueCommand", std::array{"X", "Y", "Z"}[i], frame);
+            torque_echo = static_cast<std::uint8_t>(signal(dbc, "TorqueCommand", "Counter", frame));
+        } else {
+            platform.gimbal_command_echo = frame.data[7];
+            for (std::size_t i = 0; i < 3; ++i)
+                target_deg[i] =
+                    signal(dbc, "GimbalCommand", std::array{"Outer", "Inner", "Azimuth"}[i], frame);
+            slews = (frame.data[6] & 0x0f) != 0;
+            slewed_s = 0;
+        }
+        return true;
+    }
+
+    void begin() {
+        for (int i = 0; campaign && i < 40; ++i) tick();  // the last one's shaker comes to rest
+        settings.positions_deg = {{0, 0, 0}, {0, 0, 0}};
+        settings.table_g = {9};
+        settings.dwell_s = 10;
+        settings.temperature_window_s = 0;
+        platform.ready = platform.loop_closed = platform.gyros_at_speed = true;
+        shaker.now.valid = true;
+        feed = std::make_unique<rt::StageFeed>(dbc, stage_feed_settings(settings), nullptr);
+        Ports ports{gimbal,
+                    shaker,
+                    [this] { return platform; },
+                    [this](const rt::DwellOrder& o) {
+                        orders.push_back(o);
+                        tilt_when_ordered = std::hypot(up[0], up[2]);
+                        return true;
+                    },
+                    [this](rt::Guard g) { guard = g; },
+                    [] { return true; },
+                    [] {},
+                    [](bool) {},
+                    [this](Severity, const std::string& text) { events.push_back(text); }};
+        ports.torquer = &torquer;
+        ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
+        ports.feed = feed.get();
+        ports.levelled = [this](const LevelDrift& found) { drifts.push_back(found); };
+        campaign = std::make_unique<Campaign>(settings, ports);
+        for (int i = 0; campaign->stopping() && i < 40; ++i) tick();
+        ASSERT_TRUE(campaign->command({Kind::arm, "Ada", ""}, now).accepted);
+        ASSERT_TRUE(campaign->command({Kind::start, "Ada", ""}, now).accepted);
+    }
+
+    StatusData status() const {
+        StatusData s;
+        campaign->fill(s, now);
+        return s;
+    }
+
+    void tick() {
+        constexpr double kTick = kSample_s;
+        now += 25 * kMillisecond;
+        slewed_s += kTick;
+        if (!slews) {
+            std::array<double, 3> w{};
+            for (std::size_t i = 0; i < 3; ++i)
+                w[i] = kRadPerSecond * (drift[i] + torquer_sign * torque[i]);
+            const auto u = up;
+            const auto change = cross(u, w);
+            for (std::size_t i = 0; i < 3; ++i) up[i] = u[i] + kTick * change[i];
+        }
+        platform.time = platform.gimbal_time = now;
+        platform.slewing = slews && slewed_s < 2;
+        platform.in_position = slews && slewed_s >= 2;
+        const bool torquing = says_torquing || torque != std::array<double, 3>{};
+        static_cast<void>(feed->take(
+            frame_of(dbc, "GimbalStatus",
+                     {{"Torquing", torquing ? 1 : 0}, {"TorqueEcho", torque_echo}}, now)));
+        drivers::Sample sample;
+        sample.time = now;
+        sample.force = up;
+        for (std::size_t i = 0; i < 3; ++i) sample.angle[i] = kRadPerDeg * encoder_deg[i];
+        if (!silent) feed->take(sample);
+        shaker.obey(now);
+        accelerometers.run_to(now, shaker.now.measured_g);
+        if (orders.size() > reported && !orders.back().cancel && now > orders.back().to) {
+            reported = orders.size();
+            estimator::DwellSummary summary;
+            summary.run = orders.back().dwell.run;
+            summary.position = orders.back().dwell.position;
+            campaign->on_dwell_done(summary);
+        }
+        campaign->step(now);
+        const auto state = status().state;
+        if (state == CampaignState::recording && torque != std::array<double, 3>{})
+            torqued_in_dwell = true;
+        if (state == CampaignState::levelling && !shaker.now.at_rest())
+            shook_while_levelling = true;
+    }
+    bool run_until(CampaignState wanted, double seconds) {
+        for (int i = 0; i < static_cast<int>(seconds * 40); ++i) {
+            tick();
+            if (status().state == wanted) return true;
+        }
+        return false;
+    }
+};
+
+TEST_F(StagesTest, LevelsBeforeEachPositionAndLetsThePlatformDriftFreelyDuringTheDwell) {
+    // GIVEN a platform 20' off level that drifts by 10 deg/h
+    settings.levelling = true;
+    begin();
+    // WHEN the campaign runs
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    EXPECT_EQ(guard, rt::Guard::armed);
+    ASSERT_TRUE(run_until(CampaignState::finished, 600)) << testing::PrintToString(events);
+    // THEN each dwell began level but for its free drift since, nothing torqued, nothing shook
+    EXPECT_EQ(orders.size(), 2U);
+    // 0.2' of tolerance and 12 deg/h for the 3 s until the order goes out
+    EXPECT_LT(tilt_when_ordered, (0.2 / 60 + 12.0 * 3 / 3600) * kRadPerDeg);
+    EXPECT_FALSE(torqued_in_dwell);
+    EXPECT_FALSE(shook_while_levelling);
+    EXPECT_EQ(status().levelling.done, 2U);
+    // AND the drift was found: first and second channel lie across the vertical
+    const auto found = status().levelling.drift_deg_h;
+    EXPECT_NEAR(std::hypot(found[0], found[1]), std::hypot(drift[0], drift[2]), 0.2);
+    // AND told as what the platform does along either direction, within what it says of itself
+    ASSERT_EQ(drifts.size(), 2U);
+    EXPECT_EQ(drifts[1].position, 2);
+    EXPECT_LT(drifts[1].sigma_deg_h, 0.5);
+    for (std::size_t a = 0; a < 2; ++a) {
+        EXPECT_NEAR(drifts[1].rate_deg_h[a], dot(drifts[1].direction[a], drift),
+                    4 * drifts[1].sigma_deg_h);
+    }
+}
+
+TEST_F(StagesTest, WhatCannotWorkIsRefusedBeforehandWithKeyValueAndWhatIsExpected) {
+    const auto check = [this] { return check_stages(settings, dbc, *this); };
+    settings.levelling = settings.zeroing = true;
+    EXPECT_EQ(check(), "");
+    // GIVEN a tolerance that the mean of ten blocks cannot hold: 1e-4 g / sqrt(40) is 0.054'
+    settings.level.tolerance_arcmin = 0.05;
+    settings.level.window_s = 1;
+    const std::string narrow = check();
+    for (const char* word : {"levelling.tolerance_arcmin: found 0.05, expected at least 0.22",
+                             "levelling.window_s = 1", "noise.accelerometer_g = 0.0001"}) {
+        EXPECT_THAT(narrow, HasSubstr(word));
+    }
+    settings.level.tolerance_arcmin = 0.001;
+    EXPECT_THAT(check(), HasSubstr("levelling.tolerance_arcmin: found 0.001, expected at least"));
+    settings.level = {};
+    // GIVEN a velocity's noise without the velocity
+    settings.level.velocity_noise_mps = 0.01;
+    EXPECT_THAT(check(), HasSubstr("levelling.velocity_noise_mps: found 0.01, expected 0"));
+    settings.level = {};
+    // GIVEN zeroings of less than what one sweep and the first fixes take; 90 s do
+    settings.zero.duration_s = 60;
+    EXPECT_THAT(check(),
+                HasSubstr("zeroing.duration_s: found 60, expected more than 70.4, one sweep"
+                          " there and back with zeroing.slew_deg_per_s = 5"));
+    settings.zero.duration_s = 75;
+    EXPECT_THAT(check(), HasSubstr("zeroing.duration_s: found 75, expected at least "));
+    settings.zero.duration_s = 90;
+    EXPECT_EQ(check(), "");
+    settings.zero.duration_s = 60;
+    settings.zero.slew_deg_per_s = 0.1;
+    EXPECT_THAT(check(), HasSubstr("expected more than 3520, one sweep there and back with "
+                                   "zeroing.slew_deg_per_s = 0.1"));
+    // GIVEN a target that no zeroing reaches
+    settings.zero = {};
+    settings.zero.target_mg = {0.15, 1e-6, 0.01};
+    EXPECT_THAT(check(), HasSubstr("zeroing.target_mg: found 1e-06 for y, expected more than"));
+}
+
+TEST_F(StagesTest, GoesOverToQuieterGainsOnceSettledAndOnlyThenBeginsTheDwell) {
+    // GIVEN gains of 300 s to go over to within 20 s
+    settings.levelling = true;
+    settings.level.slow_settling_s = 300;
+    settings.level.slow_ramp_s = 20;
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    // WHEN it has settled
+    while (status().levelling.verdict != std::string("settled") && now < 400 * kSecond) tick();
+    const Time settled = now;
+    EXPECT_EQ(status().levelling.phase, std::string("ramp"));
+    // THEN the table shakes 20 s later at the earliest, the platform still level
+    ASSERT_TRUE(run_until(CampaignState::ramping, 60)) << testing::PrintToString(events);
+    EXPECT_GE(now - settled, 20 * kSecond);
+    EXPECT_LT(now - settled, 23 * kSecond);
+    EXPECT_LT(std::hypot(up[0], up[2]), 2 * 0.2 / 60 * kRadPerDeg);
+}
+
+TEST_F(StagesTest, TorquersTheWrongWayRoundCannotSettleAndNoDataAreTaken) {
+    settings.levelling = true;
+    torquer_sign = -1;
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::aborted, 400));
+    EXPECT_THAT(status().reason, HasSubstr("cannot settle"));
+    EXPECT_THAT(status().reason, HasSubstr("sign or axes of the torquers"));
+    EXPECT_TRUE(orders.empty());
+    // AND the torquers are let go
+    tick();
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    EXPECT_EQ(
+        std::ranges::count_if(
+            events, [](const auto& e) { return e.find("cannot settle") != std::string::npos; }),
+        1);
+}
+
+TEST_F(StagesTest, AbortsWithOneClearReasonWhenAStageCannotGoOn) {
+    settings.levelling = true;
+    begin();
+    // Silence while levelling
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    silent = true;
+    ASSERT_TRUE(run_until(CampaignState::aborted, 5));
+    EXPECT_THAT(status().reason, HasSubstr("no specific force"));
+    // A platform that goes on torquing after the zero command
+    silent = false;
+    up = {0.001, 1, 0};
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    says_torquing = true;
+    ASSERT_TRUE(run_until(CampaignState::aborted, 300));
+    EXPECT_THAT(status().reason, HasSubstr("not confirmed"));
+    // One that begins to torque during a dwell
+    says_torquing = false;
+    up = {0.001, 1, 0};
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::recording, 300));
+    says_torquing = true;
+    ASSERT_TRUE(run_until(CampaignState::aborted, 5));
+    EXPECT_THAT(status().reason, HasSubstr("torqued during a dwell"));
+    // A zeroing without increments
+    says_torquing = false;
+    settings.levelling = false;
+    settings.zeroing = true;
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::zeroing, 60));
+    ASSERT_TRUE(run_until(CampaignState::aborted, 60));
+    EXPECT_THAT(status().reason, HasSubstr("no increments"));
+}
+
+TEST_F(StagesTest, LevelsBeforeTheZeroingAndThenTurnsTheAzimuthOnly) {
+    // GIVEN platform z nearly up, the outer gimbal 0.3 deg beside its target
+    settings.levelling = settings.zeroing = true;
+    up = {0.004, -0.003, 1};
+    encoder_deg = {90.3, -0.2, 0};
+    begin();
+    // WHEN the campaign begins with the zeros
+    ASSERT_TRUE(run_until(CampaignState::zeroing, 60));
+    EXPECT_EQ(target_deg[0], 90);
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    ASSERT_TRUE(run_until(CampaignState::zeroing, 300)) << testing::PrintToString(events);
+    // THEN the platform is level and let go before the first slew of the azimuth
+    EXPECT_LT(std::hypot(up[0], up[1]), 2 * 0.2 / 60 * kRadPerDeg);
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+    EXPECT_EQ(status().levelling.done, 1U);
+    // AND outer and inner gimbal are held where that was
+    for (int i = 0; i < 120; ++i) tick();
+    EXPECT_THAT(target_deg, testing::ElementsAre(testing::DoubleNear(90.3, 0.005),
+                                                 testing::DoubleNear(-0.2, 0.005),
+                                                 testing::DoubleNear(88, 0.005)));
+    // WHEN it cannot be levelled, THEN no zeros are taken
+    torquer_sign = -1;
+    up = {0.004, -0.003, 1};
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::aborted, 400));
+    EXPECT_THAT(status().reason, HasSubstr("levelling: cannot settle"));
+    EXPECT_THAT(status().reason, HasSubstr("zeroing"));
+}
+
+TEST_F(StagesTest, AnAbortWhileLevellingLetsTheTorquersGo) {
+    settings.levelling = true;
+    begin();
+    ASSERT_TRUE(run_until(CampaignState::levelling, 60));
+    for (int i = 0; i < 200; ++i) tick();
+    ASSERT_NE(torque, (std::array<double, 3>{}));
+    EXPECT_TRUE(campaign->command({Kind::abort, "Ada", ""}, now).accepted);
+    EXPECT_EQ(torque, (std::array<double, 3>{}));
+}
+
+/// Feeds one run, begun before, from the strapdown simulation of a unit.
+void feed_run(ZeroingStage& stage, const RigFrame& frame,
+              const estimator::zeros::UnitErrors& errors, bool down, std::uint64_t seed) {
+    estimator::zeros::CalibrationSettings unit;
+    unit.site.latitude_rad = 45.75 * kRadPerDeg;
+    unit.plan.targets_deg = {0, 88, -88, 88};
+    unit.inverted = down;
+    const Vector start = frame.azimuth_vertical_deg(0, down);
+    Vector encoder{start[0] * kRadPerDeg, start[1] * kRadPerDeg, start[2] * kRadPerDeg};
+    const double azimuth = frame.azimuth(encoder);
+    estimator::zeros::UnitSimulation simulation(unit, errors, 0.01, seed);
+    const double turn0 = encoder[2];
+    for (int i = 0; i <= 18000 && !stage.over(); ++i) {
+        const auto in = simulation.next();
+        // The simulated unit's azimuth counts from east, the gimbal's from where the frame says.
+        encoder[2] = turn0 + in.azimuth_rad;
+        const double there = frame.azimuth(encoder);
+        if (std::abs(std::remainder(there - azimuth - in.azimuth_rad, 2 * std::numbers::pi)) > 1e-9)
+            encoder[2] = turn0 - in.azimuth_rad;
+        rt::Motion motion;
+        motion.time = kSecond + i * 10 * kMillisecond;
+        motion.turn = in.turn_rad;
+        motion.force = in.velocity_mps;
+        motion.angle = encoder;
+        motion.good = motion.increment = true;
+        stage.add(motion);
+    }
+}
+
+void feed_unit(ZeroingStage& stage, const RigFrame& frame, double zero_x_mg, std::uint64_t seed) {
+    estimator::zeros::UnitErrors errors;
+    errors.zero_mg = {zero_x_mg, -3, 2};
+    errors.azimuth_deg = 0;
+    stage.begin();
+    feed_run(stage, frame, errors, false, seed);
+}
+
+/// One whose north axis is such that the gimbal's azimuth is the simulated unit's.
+estimator::Settings rig_of_the_unit() {
+    estimator::Settings rig;
+    const RigFrame frame(rig);
+    const Vector start = frame.azimuth_vertical_deg(0, false);
+    rig.azimuth_deg = frame.azimuth({start[0] * kRadPerDeg, 0, 0}) / kRadPerDeg;
+    return rig;
+}
+
+TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
+    // GIVEN scale errors of 200 ppm, twice what they are said to be, and misalignments of 100 and
+    // -50 arcsec
+    const estimator::Settings rig = rig_of_the_unit();
+    const RigFrame frame(rig);
+    estimator::zeros::UnitErrors errors;
+    errors.zero_mg = {5, -3, 2};
+    errors.scale = {2e-4, 2e-4, 2e-4};
+    constexpr double kArcsec = kRadPerDeg / 3600;
+    errors.accelerometer_cross = {{{0, 0, 100 * kArcsec}, {0, 0, -50 * kArcsec}, {0, 0, 0}}};
+    errors.azimuth_deg = 0;
+    ZeroingSettings settings;
+    settings.both_ways = false;
+    ZeroingStage one_way(settings, rig, kSample_s);
+    one_way.begin();
+    EXPECT_FALSE(one_way.another());
+    feed_run(one_way, frame, errors, false, 11);
+    ASSERT_EQ(one_way.finish(false), "");
+    // THEN one run has 1 g of scale error within z, and its sigma says that it may
+    EXPECT_NEAR(one_way.status().zero_mg[2], 2.2, 0.01);
+    EXPECT_GT(one_way.status().sigma_mg[2], 0.1);
+    EXPECT_EQ(one_way.status().scale_z, 0);
+    EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x scale error"));
+    // AND 1 g of misalignment within x and y, which is declared as 50 arcsec
+    EXPECT_NEAR(one_way.status().zero_mg[0], 5 + 0.485, 0.02);
+    EXPECT_NEAR(one_way.status().sigma_mg[0], 0.24, 0.01);
+    EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x misalignment"));
+    // WHEN both runs are made
+    settings.both_ways = true;
+    ZeroingStage stage(settings, rig, kSample_s);
+    EXPECT_EQ(stage.expected_s(), 2 * one_way.expected_s());
+    stage.begin();
+    ASSERT_TRUE(stage.another());
+    EXPECT_EQ(stage.target_deg()[0], 90);
+    feed_run(stage, frame, errors, false, 11);
+    stage.begin_other_way();
+    EXPECT_FALSE(stage.another());
+    EXPECT_EQ(stage.target_deg()[0], -90);
+    feed_run(stage, frame, errors, true, 12);
+    ASSERT_EQ(stage.finish(false), "");
+    // THEN they are apart, each within its own sigma
+    const ZeroStatus found = stage.status();
+    EXPECT_LT(found.sigma_mg[2], 0.01);
+    EXPECT_NEAR(found.zero_mg[2], 2, 5 * found.sigma_mg[2]);
+    EXPECT_NEAR(found.scale_z, 2e-4, 5 * found.scale_z_sigma);
+    EXPECT_NEAR(found.zero_mg[0], 5, 5 * found.sigma_mg[0]);
+    EXPECT_NEAR(found.zero_mg[1], -3, 5 * found.sigma_mg[1]);
+    EXPECT_LT(found.sigma_mg[0], 0.01);
+    EXPECT_NEAR(found.misalignment[0], 100 * kArcsec, 5 * found.misalignment_sigma[0]);
+    EXPECT_NEAR(found.misalignment[1], -50 * kArcsec, 5 * found.misalignment_sigma[1]);
+    EXPECT_DOUBLE_EQ(found.covariance_mg2[2][2], found.sigma_mg[2] * found.sigma_mg[2]);
+    EXPECT_THAT(stage.words(), HasSubstr("misalignment +"));
+    EXPECT_THAT(stage.words(), HasSubstr("scale of z +"));
+    // AND the level of a dwell is then as sure as that
+    EXPECT_NEAR(stage.level_sigma({90, 0, 0}), 1e-3 * found.sigma_mg[2], 1e-9);
+    EXPECT_GT(one_way.level_sigma({90, 0, 0}), 1e-4);
+    // WHEN the second run fails, THEN nothing is taken over
+    ZeroingStage spoilt(settings, rig, kSample_s);
+    spoilt.begin();
+    feed_run(spoilt, frame, errors, false, 11);
+    spoilt.begin_other_way();
+    EXPECT_THAT(spoilt.finish(false), HasSubstr("no increments"));
+    EXPECT_FALSE(spoilt.status().known);
+}
+
+TEST(ZeroingStage, TakesTheNoiseOfOneSampleAsADensityAtItsOwnRate) {
+    estimator::Settings rig = rig_of_the_unit();
+    rig.accelerometer_g = 1e-3;
+    for (const double rate_hz : {40.0, 100.0, 1000.0}) {
+        // white noise of sigma per sample has the density sigma sqrt(period)
+        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan(false).noise.velocity_random_walk,
+                         1e-3 / std::sqrt(rate_hz));
+    }
+}
+
+TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
+    // GIVEN the zeros of a unit at the start
+    estimator::Settings rig = rig_of_the_unit();
+    const RigFrame frame(rig);
+    EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, false))[2], 1, 1e-12);
+    EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, true))[2], -1, 1e-12);
+    ZeroingSettings one_way;
+    one_way.both_ways = false;
+    ZeroingStage stage(one_way, rig, kSample_s);
+    feed_unit(stage, frame, 5, 1);
+    ASSERT_EQ(stage.finish(false), "");
+    const Vector found = stage.raw_zero_g();
+    EXPECT_NEAR(found[0], 5e-3, 5e-5);
+    EXPECT_NEAR(found[1], -3e-3, 5e-5);
+    EXPECT_NEAR(found[2], 2e-3, 5e-5);
+    // WHEN it is repeated with the same zeros
+    feed_unit(stage, frame, 5, 2);
+    ASSERT_EQ(stage.finish(true), "");
+    // THEN nothing is marked
+    EXPECT_EQ(stage.status().mark, "");
+    EXPECT_TRUE(stage.status().repeated);
+    // WHEN x has moved by 0.2 mg, far above its standard deviation of 0.01 mg
+    feed_unit(stage, frame, 5.2, 3);
+    ASSERT_EQ(stage.finish(true), "");
+    // THEN the campaign is marked, and the zeros of its dwells stay on show
+    EXPECT_THAT(stage.status().mark, HasSubstr("accelerometer x moved by +0."));
+    EXPECT_NEAR(stage.status().zero_mg[0], 5, 0.05);
+    // AND an `up` that the gimbals cannot bring to the azimuth axis is refused
+    rig.up = {0, 1};
+    EXPECT_THROW(ZeroingStage({}, rig, kSample_s), estimator::SettingsError);
+}
+
+TEST(StageFeed, PairsIncrementsByTheirCounterAndAccountsForEveryFrame) {
+    const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    rt::StageFeedSettings settings;
+    settings.increments = true;
+    rt::StageFeed feed(dbc, settings, nullptr);
+    drivers::Sample sample;
+    feed.take(sample);
+    const auto gyro = [&](int counter, Time t) {
+        return feed.take(frame_of(dbc, "GyroIncrements", {{"X", 2.0}, {"Counter", counter}}, t));
+    };
+    const auto force = [&](int counter, Time t) {
+        return feed.take(
+            frame_of(dbc, "AccelerometerIncrements", {{"Z", 0.098}, {"Counter", counter}}, t));
+    };
+    // Not asked for: taken off the way of the samples, counted, not given out.
+    EXPECT_TRUE(gyro(0, kSecond));
+    EXPECT_TRUE(force(0, kSecond));
+    feed.order(rt::StageFeed::Mode::increments);
+    const Time t = 2 * kSecond;
+    EXPECT_TRUE(gyro(254, t));
+    EXPECT_TRUE(force(254, t));
+    gyro(1, t + 30 * kMillisecond);  // two lost, across the wrap
+    force(1, t + 30 * kMillisecond);
+    gyro(2, t + 40 * kMillisecond);
+    force(3, t + 50 * kMillisecond);  // partners lost
+    gyro(4, t + 60 * kMillisecond);
+    force(4, t + 60 * kMillisecond);
+    gyro(8, t + 2660 * kMillisecond);  // once round and four more
+    force(8, t + 2660 * kMillisecond);
+    std::vector<double> at;
+    rt::Motion motion;
+    while (feed.pop(motion)) {
+        at.push_back(drivers::to_seconds(motion.time - t));
+        EXPECT_NEAR(motion.turn[0], 2 * kRadPerDeg / 3600, 1e-12);
+        EXPECT_NEAR(motion.force[2], 0.098, 1e-9);
+        EXPECT_TRUE(motion.good);
+    }
+    EXPECT_THAT(
+        at, testing::ElementsAre(0, testing::DoubleNear(0.03, 1e-9),
+                                 testing::DoubleNear(0.06, 1e-9), testing::DoubleNear(2.66, 1e-9)));
+    const auto c = feed.counters();
+    EXPECT_EQ(c.received, 12U);
+    EXPECT_EQ(c.received, 2 * c.pairs + c.alone + c.unasked);
+}
+
+}  // namespace
+}  // namespace vibrig::campaign

@@ -1,0 +1,218 @@
+#include "daemon/campaign/stop_monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
+#include "tests/unit/daemon/rt/fake_shaker.hpp"
+
+namespace vibrig::campaign {
+namespace {
+
+using drivers::kMillisecond;
+using drivers::kSecond;
+using drivers::Time;
+using News = StopMonitor::News;
+
+struct StopMonitorTest : testing::Test {
+    FakeShaker shaker;
+    FakeAccelerometers accelerometers;
+    StopSettings settings;
+    StopMonitor monitor{shaker, [this](Time at) { return accelerometers.monitor.rest(at); }, {}};
+    Time now = 10 * kSecond;
+    bool obeys = true;
+
+    StopMonitorTest() {
+        shaker.now.valid = true;
+        run(1);
+    }
+    void shake(double table_g) {
+        monitor.excited(table_g);
+        shaker.requests.push_back({15, table_g, 1});
+        run(1);
+    }
+    /// Until there is news, or so long; how long it took.
+    double run(double seconds, News* news = nullptr) {
+        const Time began = now;
+        while (now - began < drivers::from_seconds(seconds)) {
+            now += 50 * kMillisecond;
+            if (obeys) shaker.obey(now);
+            shaker.now.time = now;
+            accelerometers.run_to(now, shaker.now.measured_g);
+            const auto found = monitor.update(now);
+            if (news != nullptr && found != News::none) {
+                *news = found;
+                break;
+            }
+        }
+        return drivers::to_seconds(now - began);
+    }
+};
+
+TEST_F(StopMonitorTest, AStopIsDoneAfterAWindowOfRest) {
+    shake(5);
+    shaker.stop_now();
+    EXPECT_TRUE(monitor.stopping());
+    auto news = News::none;
+    const double took_s = run(3, &news);
+    EXPECT_EQ(news, News::confirmed);
+    EXPECT_GE(took_s, 0.5);
+    EXPECT_LE(took_s, 0.8);
+    EXPECT_FALSE(monitor.stopping());
+    EXPECT_FALSE(monitor.excited());
+}
+
+TEST_F(StopMonitorTest, AControllerThatReadsZeroProvesNothing) {
+    shake(5);
+    accelerometers.table_g = 5;
+    shaker.stop_now();
+    auto news = News::none;
+    const double took_s = run(10, &news);
+    EXPECT_EQ(news, News::disobeyed);
+    EXPECT_NEAR(took_s, 3, 0.15);
+    EXPECT_TRUE(monitor.stopping());
+    EXPECT_TRUE(monitor.unsettled(now));
+    news = News::none;
+    run(5, &news);
+    EXPECT_EQ(news, News::none) << "told once";
+}
+
+TEST_F(StopMonitorTest, ATableThatMovesUncommandedIsToldWhateverTheControllerReads) {
+    // GIVEN a stop that was confirmed, and a contactor that closes by itself afterwards
+    shake(5);
+    shaker.stop_now();
+    auto news = News::none;
+    run(5, &news);
+    ASSERT_EQ(news, News::confirmed);
+    accelerometers.table_g = 1;
+    news = News::none;
+    const double took_s = run(10, &news);
+    EXPECT_EQ(news, News::uncommanded);
+    EXPECT_LE(took_s, safety::kUnarmedMotion_s + 0.6) << "the window of rest and a second";
+    // THEN it is told once, and again when it comes again
+    news = News::none;
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+    accelerometers.table_g = 0;
+    run(2);
+    accelerometers.table_g = 1;
+    run(5, &news);
+    EXPECT_EQ(news, News::uncommanded);
+}
+
+TEST_F(StopMonitorTest, WhatIsCommandedOrABlowOfAMomentIsNotUncommanded) {
+    auto news = News::none;
+    shake(5);
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+    shaker.stop_now();
+    run(5, &news);
+    ASSERT_EQ(news, News::confirmed);
+    news = News::none;
+    accelerometers.table_g = 1;
+    run(0.3, &news);  // and half a second more in the window of rest
+    accelerometers.table_g = 0;
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+}
+
+TEST_F(StopMonitorTest, AHandOnThePlatformIsNotUncommandedWhereTheTableIsSeenStill) {
+    auto news = News::none;
+    accelerometers.platform_g = 1;
+    accelerometers.table_g = 0;
+    run(5, &news);
+    EXPECT_EQ(news, News::none);
+    // WHEN the table's accelerometer falls silent THEN the platform's speaks for it
+    accelerometers.table_good = false;
+    run(5, &news);
+    EXPECT_EQ(news, News::uncommanded);
+}
+
+TEST_F(StopMonitorTest, APlatformHasTheTimeOfItsPadsBeforeItDisobeys) {
+    // GIVEN a table that stops, and a platform that does not come to rest on its pads
+    shake(5);
+    accelerometers.platform_g = 1;
+    shaker.stop_now();
+    auto news = News::none;
+    const double took_s = run(30, &news);
+    EXPECT_EQ(news, News::disobeyed);
+    EXPECT_GT(monitor.longest_s(5), settings.deadline_s + 0.5) << "or this shows nothing";
+    EXPECT_NEAR(took_s, monitor.longest_s(5), 0.15);
+}
+
+TEST_F(StopMonitorTest, NorDoAccelerometersThatAreSilent) {
+    shake(5);
+    accelerometers.silent = true;
+    shaker.stop_now();
+    auto news = News::none;
+    EXPECT_NEAR(run(10, &news), 3, 0.15);
+    EXPECT_EQ(news, News::disobeyed);
+    EXPECT_NE(monitor.what_moves(now).find("no good accelerometer on the table"),
+              std::string::npos);
+}
+
+TEST_F(StopMonitorTest, ARigThatIsSwitchedOffIsNoAlarmAtTheStart) {
+    // GIVEN a rig that nothing has excited in this life, and that tells nothing
+    accelerometers.silent = true;
+    shaker.now.valid = false;
+    obeys = false;
+    run(1);
+    shaker.stop_now();
+    auto news = News::none;
+    run(20, &news);
+    // THEN it is neither at rest nor disobedient, and may be left alone
+    EXPECT_EQ(news, News::none);
+    EXPECT_TRUE(monitor.stopping());
+    EXPECT_FALSE(monitor.unsettled(now));
+}
+
+TEST_F(StopMonitorTest, ATableThatAnEarlierLifeLeftShakingIsOne) {
+    accelerometers.table_g = 1;
+    shaker.stop_now();
+    auto news = News::none;
+    EXPECT_NEAR(run(20, &news), 3, 0.15);
+    EXPECT_EQ(news, News::disobeyed);
+}
+
+TEST_F(StopMonitorTest, AHandOnAPlatformThatNothingHasExcitedIsNone) {
+    accelerometers.table_g = 0.04 * std::numbers::sqrt2;  // between rest and motion
+    shaker.stop_now();
+    auto news = News::none;
+    run(20, &news);
+    EXPECT_EQ(news, News::none);
+    EXPECT_TRUE(monitor.stopping());
+}
+
+TEST_F(StopMonitorTest, AControllerThatReadsOnIsDisobedient) {
+    shake(5);
+    obeys = false;
+    shaker.stop_waits = false;
+    shaker.stop_now();
+    shaker.stop_waits = false;  // acknowledged, read back as 0
+    shaker.now.running = false;
+    auto news = News::none;
+    EXPECT_NEAR(run(20, &news), 3, 0.15);
+    EXPECT_EQ(news, News::disobeyed);
+}
+
+TEST_F(StopMonitorTest, AStopThatComesWhileAnotherIsAwaitedKeepsTheFirstOnesTime) {
+    shake(5);
+    accelerometers.table_g = 5;
+    shaker.stop_now();
+    run(2);
+    shaker.stop_now();
+    auto news = News::none;
+    EXPECT_NEAR(run(10, &news), 1, 0.15);
+    EXPECT_EQ(news, News::disobeyed);
+}
+
+TEST(PadRingDown, IsAnAllowanceUntilItIsMeasuredAndThenLogarithmicInTheLevel) {
+    EXPECT_EQ(PadRingDown{}.from_s(9), safety::kRingDown_s);
+    // 0.5 g take 0.8 s at 3 / s: twenty times as much ln(20) / 3 = 1 s longer
+    const PadRingDown measured{0.5, 0.8, 3};
+    EXPECT_NEAR(measured.from_s(10), 0.8 + std::log(20) / 3, 1e-12);
+    EXPECT_EQ(measured.from_s(0.5), 0.8);
+    EXPECT_EQ(measured.from_s(0.1), 0.8) << "never shorter than it was seen to be";
+}
+
+}  // namespace
+}  // namespace vibrig::campaign

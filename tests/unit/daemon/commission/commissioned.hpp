@@ -1,0 +1,182 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <sstream>
+
+#include "daemon/commission/procedure.hpp"
+#include "tests/unit/estimator/commissioning/unknown_rig.hpp"
+
+namespace vibrig::commission {
+
+using drivers::kSecond;
+using drivers::Time;
+using estimator::commissioning::UnknownRig;
+
+inline constexpr std::array<const char*, 3> kGimbals{"outer", "inner", "azimuth"};
+
+/// A rig of which nobody knows anything, and people who answer truly; virtual time.
+class Commissioned : public ::testing::Test {
+  protected:
+    void rig_of(std::uint64_t seed) {
+        rig = std::make_unique<UnknownRig>(seed);
+        // A reading near its zero may wrap within a second's mean, here as on a rig.
+        procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
+                                                Stated{0, 2, true}, ports());
+    }
+
+    Ports ports() {
+        Ports p;
+        p.sample = [this] { return seen(now - kSecond / 40, 5 / 3600.0); };
+        p.second = [this] { return seen(now / kSecond * kSecond - kSecond, 1 / 3600.0); };
+        p.slew = [this](const Vec3& command, Time) { slew(command); };
+        p.release = [this](Time) {
+            ++released;
+            drift = rig->drift();
+            drifting_since = now;
+        };
+        p.gimbal = [this] {
+            return now >= arrives ? drivers::GimbalState::in_position
+                                  : drivers::GimbalState::slewing;
+        };
+        p.keep = [this](const Json& log) { kept = log; };
+        p.event = [this](Severity, const std::string& text) { events.push_back(text); };
+        return p;
+    }
+
+    void slew(const Vec3& command) {
+        ++slews;
+        drifting_since = 0;
+        for (std::size_t i = 0; !based && i < 3; ++i) base[i] = command[i] - travel[i] / gain;
+        based = true;
+        double farthest = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double to = gain * (command[i] - base[i]) + offset_deg;
+            farthest = std::max(farthest, std::abs(to - travel[i]));
+            if (i == 2 && to != travel[i])
+                azimuth_grew = rig->sign[2] * rig->direction[2] * (to - travel[i]) > 0;
+            EXPECT_LT(std::abs(to - travel[i]), 170) << "there are two ways round";
+            travel[i] = to;
+            most_travel[i] = std::max(most_travel[i], std::abs(to));
+        }
+        rig->go(travel);
+        arrives = now + drivers::from_seconds(farthest / 5);
+    }
+
+    Look seen(Time from, double noise_deg) {
+        Look look{from, from + kSecond, {}, rig->force_at(rig->angle_deg()), good};
+        look.to = now;
+        look.angle = rig->reading_at(rig->angle_deg());
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto c = static_cast<std::size_t>(rig->channel[i]);
+            look.angle[c] += noise_deg / rig->degrees[i] * rig->random.normal();
+            look.force[i] += 1e-5 * rig->random.normal();
+            if (drifting_since > 0)
+                look.angle[c] = drift.reading[c] +
+                                drift.slope[c] * drivers::to_seconds(from - drifting_since) / 3600;
+        }
+        return look;
+    }
+
+    /// A hand: by the reading, deg of the gimbal.
+    void turn(std::size_t gimbal, double to) {
+        travel[gimbal] = rig->sign[gimbal] * rig->direction[gimbal] * to;
+        rig->go(travel);
+        drift = rig->drift();  // a hand holds nothing
+        drifting_since = now;
+    }
+
+    std::string answer_to(const std::string& id, const std::string& text) {
+        if (const auto it = answers.find(id); it != answers.end()) return it->second;
+        if (id == "travel") {
+            std::ostringstream out;
+            for (const double most : rig->travel_deg)
+                out << -std::min(most, 175.0) << ' ' << std::min(most, 175.0) << ' ';
+            return out.str();
+        }
+        if (id == "latitude") return std::to_string(rig->truth.latitude_deg);
+        if (id == "compass") return std::to_string(rig->truth.azimuth_deg + 8);
+        if (id == "drawing") return rig->right_handed() ? "yes" : "no";
+        if (id == "anticlockwise") return azimuth_grew == rig->grows_anticlockwise() ? "yes" : "no";
+        if (id == "turn") {
+            turn(2, by_hand_deg[2] + (rig->grows_anticlockwise() ? 20 : -20));
+            return "done";
+        }
+        for (std::size_t i = 0; i < 3; ++i)
+            if (id == std::string("hand.") + kGimbals[i]) turn(i, 9);
+        if (id == "hand") {
+            constexpr std::array<const char*, 3> kLoud{"OUTER to ", "INNER to ", "AZIMUTH to "};
+            for (std::size_t i = 0; i < 3; ++i)
+                if (const auto at = text.find(kLoud[i]); at != std::string::npos)
+                    turn(i, by_hand_deg[i] = std::stod(text.substr(text.find("to ", at) + 3)));
+        }
+        if (id.starts_with("permit") || id == "power" || id == "go_on") return "yes";
+        return "";
+    }
+
+    /// To the end, or until `until` is asked. Wall and rig's time go together.
+    Json run(bool by_hand = false, const std::string& until = {}) {
+        if (!procedure->active()) {
+            EXPECT_EQ(procedure->begin("Ada", by_hand, now), "");
+        }
+        for (int n = 0; n < 200'000 && procedure->active(); ++n) {
+            now += kSecond / 10;
+            if (attended) procedure->attend("Ada", now);
+            procedure->step(now, now);
+            const Json state = procedure->state(0);
+            if (state["question"].is_null()) continue;
+            const std::string id = state["question"]["id"];
+            if (id == until) return state;
+            asked.push_back(id);
+            EXPECT_EQ(procedure->answer("Ada", id, answer_to(id, state["question"]["text"])), "")
+                << id;
+        }
+        return procedure->state(0);
+    }
+
+    /// Time passes, with somebody there; what is asked waits.
+    void pass(double seconds, const std::string& who = "Ada") {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += kSecond / 20;
+            if (!who.empty()) procedure->attend(who, now);
+            procedure->step(now, now);
+        }
+    }
+
+    /// Answers what is asked until `done`; nothing is asked then.
+    template <class Done>
+    void run_until(Done done) {
+        for (int n = 0; n < 200'000 && procedure->active(); ++n) {
+            now += kSecond / 20;
+            procedure->attend("Ada", now);
+            procedure->step(now, now);
+            const Json question = procedure->state(0)["question"];
+            if (question.is_null() && done()) return;
+            if (question.is_null()) continue;
+            ASSERT_EQ(procedure->answer("Ada", question["id"],
+                                        answer_to(question["id"], question["text"])),
+                      "");
+        }
+        FAIL() << procedure->state(0).dump(1);
+    }
+
+    [[nodiscard]] std::string question() const {
+        const Json state = procedure->state(0);
+        return state["question"].is_null() ? "" : state["question"]["id"].get<std::string>();
+    }
+
+    std::unique_ptr<UnknownRig> rig;
+    std::unique_ptr<Procedure> procedure;
+    std::map<std::string, std::string> answers;
+    std::vector<std::string> asked, events;
+    Time now = 100 * kSecond, arrives = 0, drifting_since = 0;
+    bool based = false, good = true, attended = true, azimuth_grew = false;
+    double gain = 1, offset_deg = 0;
+    Vec3 base{}, travel{}, most_travel{}, by_hand_deg{};
+    estimator::commissioning::FreeDrift drift;
+    int slews = 0, released = 0;
+    Json kept;  ///< what is on disk
+};
+
+}  // namespace vibrig::commission

@@ -1,0 +1,199 @@
+// What moves, for whom, and what stops it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/daemon/commission/commissioned.hpp"
+
+namespace vibrig::commission {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Moved : public Commissioned {
+  protected:
+    /// Into the sweeps: a gimbal moves, for seconds.
+    void into_a_sweep() {
+        rig_of(1);
+        EXPECT_EQ(procedure->begin("Ada", false, now), "");
+        run_until([this] {
+            return most_travel[0] > 40 && procedure->state(0)["moving"] == true &&
+                   arrives > now + kSecond;
+        });
+    }
+    /// Into a mean of a sweep: all gimbals stand.
+    void into_a_mean() {
+        into_a_sweep();
+        run_until([this] { return procedure->state(0)["moving"] == false; });
+        pass(1);
+    }
+};
+
+TEST_F(Moved, NothingMovesBeforeAPermissionOrAfterANo) {
+    rig_of(1);
+    static_cast<void>(run(false, "permit.hold"));
+    EXPECT_EQ(slews, 0);
+    EXPECT_EQ(procedure->answer("Ada", "permit.hold", "perhaps"),
+              "found \"perhaps\", expected yes or no");
+    EXPECT_EQ(procedure->answer("Ada", "permit.hold", "no"), "");
+    EXPECT_FALSE(procedure->active());
+    EXPECT_EQ(slews, 0);
+    EXPECT_EQ(procedure->state(0)["result"]["outcome"], "unfinished");
+}
+
+TEST_F(Moved, WithNobodyAtTheToolItStopsAndGoesOnByPermissionOnly) {
+    rig_of(1);
+    static_cast<void>(run(false, "permit.outer"));
+    EXPECT_EQ(procedure->answer("Ada", "permit.outer", "yes"), "");
+    // Into the sweeps, where moves take seconds.
+    const int before = slews;
+    while (slews < before + 25 && procedure->active()) {
+        now += kSecond / 20;
+        procedure->attend("Ada", now);
+        procedure->step(now, now);
+        const Json question = procedure->state(0)["question"];
+        if (question.is_null()) continue;
+        ASSERT_EQ(procedure->answer("Ada", question["id"], answer_to(question["id"], "")), "");
+    }
+    ASSERT_TRUE(procedure->active());
+    attended = false;
+    const Json state = run(false, "go_on");
+    ASSERT_EQ(state["question"]["id"], "go_on") << state.dump(1);
+    const int stopped = slews;
+    for (int n = 0; n < 200; ++n) {
+        now += kSecond / 20;
+        procedure->step(now, now);
+    }
+    EXPECT_EQ(slews, stopped);
+    attended = true;
+    EXPECT_EQ(run()["result"]["outcome"], "decided");
+}
+
+TEST_F(Moved, ACommandThatIsAnotherAngleThanTheReadingStopsAtOnce) {
+    rig_of(1);
+    offset_deg = 20;
+    const Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "undecided");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("by hand"));
+    EXPECT_EQ(slews, 1);
+    EXPECT_GE(released, 1);
+}
+
+TEST_F(Moved, ACommandInTurnsIsSeenAtASmallMove) {
+    rig_of(1);
+    gain = 360;
+    const Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "undecided");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("stopped"));
+    EXPECT_LT(std::max({most_travel[0], most_travel[1], most_travel[2]}), 30);
+}
+
+TEST_F(Moved, AChannelThatFallsSilentStopsAMove) {
+    into_a_sweep();
+    const int before = slews;
+    good = false;
+    pass(0.2);
+    EXPECT_EQ(question(), "go_on");
+    good = true;
+    pass(10);
+    EXPECT_LE(slews, before + 1) << "it holds";
+    EXPECT_EQ(procedure->answer("Ada", "go_on", "yes"), "");
+    EXPECT_EQ(run()["result"]["outcome"], "decided");
+}
+
+TEST_F(Moved, ARealRigIsNotMovedByCommand) {
+    rig_of(1);
+    procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
+                                            Stated{0, 2, false}, ports());
+    EXPECT_EQ(procedure->begin("Ada", false, now),
+              "this version moves no gimbal of a real rig by command: vibrig commission --by-hand");
+    EXPECT_FALSE(procedure->active());
+    pass(10);
+    EXPECT_EQ(slews + released, 0);
+    EXPECT_EQ(procedure->begin("Ada", true, now), "");
+    EXPECT_TRUE(procedure->active());
+}
+
+TEST_F(Moved, SomebodyElseAtAnotherToolIsNobodyHere) {
+    into_a_sweep();
+    const int before = slews;
+    pass(3, "status");
+    EXPECT_EQ(question(), "go_on") << "Ada is gone";
+    pass(5, "Bo (uid 1000)");
+    EXPECT_EQ(slews, before + 1) << "it holds";
+    EXPECT_THAT(procedure->answer("Bo (uid 1000)", "go_on", "yes"),
+                HasSubstr("Ada commissions it, and answers: found Bo"));
+    EXPECT_EQ(procedure->answer("ada (uid 1000)", "go_on", "yes"), "") << "the same person";
+    EXPECT_TRUE(procedure->state(0)["moving"] == true);
+}
+
+TEST_F(Moved, AnAnswerIsKeptWithWhoGaveIt) {
+    rig_of(1);
+    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    EXPECT_EQ(procedure->answer("Ada (uid 0)", "power", "yes"), "");
+    ASSERT_FALSE(events.empty());
+    EXPECT_EQ(events.back(),
+              "commissioning: Is the shaker's power stage off? yes, says Ada (uid 0)");
+}
+
+TEST_F(Moved, WhoIsGoneStopsAMeanToo) {
+    into_a_mean();
+    const int before = slews;
+    pass(3, "");
+    EXPECT_EQ(question(), "go_on");
+    EXPECT_EQ(slews, before);
+}
+
+TEST_F(Moved, NothingIsReleasedThatWasNeverCommanded) {
+    rig_of(1);
+    answers["stop"] = "release";
+    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    run_until([] { return true; });  // the first look
+    procedure->stop("by Ada", now);
+    EXPECT_EQ(released, 0);
+    EXPECT_EQ(procedure->answer("Ada", "go_on", "no"), "");
+    EXPECT_FALSE(procedure->active());
+    EXPECT_EQ(released + slews, 0);
+}
+
+TEST_F(Moved, AStopThatReleasesDoesSoWhereAllStandAndGoesBackBeforeItMeasures) {
+    answers["stop"] = "release";
+    into_a_mean();
+    const int before = slews;
+    procedure->stop("by Ada", now);
+    EXPECT_EQ(released, 1);
+    EXPECT_EQ(procedure->answer("Ada", "go_on", "yes"), "");
+    EXPECT_EQ(slews, before + 1) << "back to where it is measured";
+    EXPECT_EQ(run()["result"]["outcome"], "decided");
+}
+
+TEST_F(Moved, WhatWasPushedMeanwhileDoesNotGoTheLongWayRound) {
+    answers["stop"] = "release";
+    rig_of(1);
+    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    run_until([this] { return most_travel[2] > 110 && procedure->state(0)["moving"] == false; });
+    procedure->stop("by Ada", now);
+    ASSERT_EQ(released, 1);
+    travel[2] -= 175;  // by hand
+    rig->go(travel);
+    drift = rig->drift();
+    pass(1);
+    EXPECT_EQ(procedure->answer("Ada", "go_on", "yes"), "");  // slew() holds it to one way round
+    EXPECT_EQ(run()["result"]["outcome"], "decided");
+}
+
+TEST_F(Moved, AStopInAFreeDriftBeginsTheDriftAnew) {
+    rig_of(1);
+    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    run_until([this] { return released == 2 && procedure->state(0)["moving"] == false; });
+    pass(10);
+    const int before = slews;
+    procedure->stop("by Ada", now);
+    pass(3600);  // 10 deg and more
+    EXPECT_EQ(procedure->answer("Ada", "go_on", "yes"), "");
+    EXPECT_EQ(slews, before + 1);
+    const Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "decided") << result.dump(1);
+}
+
+}  // namespace
+}  // namespace vibrig::commission

@@ -1,0 +1,185 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "tests/unit/daemon/commission/commissioned.hpp"
+
+namespace vibrig::commission {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Of the keys found, against the truth.
+void expect_right(const UnknownRig& rig, const Json& result, bool commanded = true) {
+    const Json& found = result["found"];
+    std::array<std::size_t, 3> channel{0, 1, 2};
+    for (std::size_t g = 0; g < 3; ++g)
+        if (const auto key = std::string("can.signals.") + kGimbals[g]; found.contains(key))
+            channel[g] = static_cast<std::size_t>(found[key].get<std::string>()[0] - 'A');
+    for (std::size_t g = 0; g < 3; ++g)
+        ASSERT_EQ(static_cast<int>(channel[g]), rig.channel[g]) << result.dump(1);
+    const auto sign = found["platform.encoder_sign"].get<std::array<int, 3>>();
+    const auto zero = found["platform.encoder_zero_deg"].get<Vec3>();
+    const auto matrix = found["accelerometer.matrix"].get<std::array<Vec3, 3>>();
+    const auto zero_g = found["accelerometer.zero_g"].get<Vec3>();
+    EXPECT_EQ(sign[0], 1);
+    plant::Random random(1, 1);
+    double worst = 0;
+    for (int n = 0; n < 20; ++n) {
+        const plant::Vec3 at{360 * random.uniform(), 60 * (random.uniform() - 0.5),
+                             360 * random.uniform()};
+        const auto reading = rig.reading_at(at);
+        const auto force = rig.force_at(at);
+        Eigen::Vector3d angles;
+        for (std::size_t g = 0; g < 3; ++g)
+            angles[static_cast<int>(g)] =
+                sign[g] * (rig.degrees[g] * reading[channel[g]] - zero[g]) * M_PI / 180;
+        const auto up = estimator::commissioning::up_at(
+            angles, found["site.elevation_deg"].get<double>() * M_PI / 180);
+        for (std::size_t i = 0; i < 3; ++i) {
+            double platform = 0;
+            for (std::size_t k = 0; k < 3; ++k) platform += matrix[i][k] * (force[k] - zero_g[k]);
+            worst = std::max(worst, std::abs(platform - up[static_cast<int>(i)]));
+        }
+    }
+    EXPECT_LT(worst, 4e-3) << result.dump(1);
+    Eigen::Matrix3d m;
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+            m(i, k) = matrix[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)];
+    EXPECT_EQ(m.determinant() > 0, rig.right_handed());
+    // Counted about the other end of the outer axis, azimuth + 180.
+    const double turned = rig.sign[0] == 1 ? 0 : 180;
+    if (std::abs(rig.truth.latitude_deg) < 70) {
+        EXPECT_LT(
+            std::abs(std::remainder(
+                found["site.azimuth_deg"].get<double>() - rig.truth.azimuth_deg - turned, 360.0)),
+            1.0);
+    }
+    // Of the DBC: what does not count in deg, and what turns the other way.
+    std::size_t wrong = 0;
+    for (std::size_t g = 0; g < 3; ++g) {
+        if (rig.degrees[g] != 1) ++wrong;
+        if (commanded && rig.sign[g] * rig.direction[g] != 1) ++wrong;
+    }
+    EXPECT_EQ(result["corrections"].size(), wrong) << result["corrections"].dump(1);
+}
+
+TEST_F(Commissioned, RandomRigsAreNamedRightOrNotAtAll) {
+    int decided = 0, minutes = 0, senses = 0;
+    constexpr std::uint64_t kRigs = 24;
+    for (std::uint64_t seed = 1; seed <= kRigs; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        rig_of(seed);
+        based = false;
+        travel = {};
+        drifting_since = 0;
+        const Time began = now;
+        const Json state = run();
+        minutes = std::max(minutes, static_cast<int>((now - began) / (60 * kSecond)));
+        if (state["result"]["outcome"] != "decided") {
+            // Nothing is wrong with it but that north is too near the pole for anybody to tell.
+            EXPECT_THAT(state["result"]["why"].get<std::string>(), HasSubstr("inverted or not"));
+            continue;
+        }
+        ++decided;
+        double drawing = 0, sense = 0;
+        for (const auto& witness : state["result"]["witnesses"]) {
+            if (witness["name"] == "drawing") drawing = witness["ln_odds"];
+            if (witness["name"] == "sense") sense = witness["ln_odds"];
+        }
+        EXPECT_GE(drawing * sense, 0) << "true witnesses";
+        senses += sense != 0 ? 1 : 0;
+        expect_right(*rig, state["result"]);
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_LE(most_travel[i], 175 + 1e-9);
+    }
+    EXPECT_GE(decided, 22);
+    EXPECT_GE(senses, 20);
+    EXPECT_LE(minutes, 15);
+}
+
+TEST_F(Commissioned, ByHandNothingIsCommanded) {
+    for (const std::uint64_t seed : {3U, 5U, 8U}) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        rig_of(seed);
+        rig->by_hand = true;
+        travel = {};
+        drifting_since = 0;
+        const Json state = run(true);
+        ASSERT_EQ(state["result"]["outcome"], "decided") << state["result"].dump(1);
+        expect_right(*rig, state["result"], false);
+    }
+    EXPECT_EQ(slews, 0);
+    EXPECT_EQ(released, 0);
+}
+
+TEST_F(Commissioned, WhatIsStuckOrDeadIsNamed) {
+    rig_of(4);
+    rig->stuck = 1;
+    Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "undecided");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("INNER"));
+    rig_of(4);
+    based = false;
+    travel = {};
+    rig->dead = 2;
+    result = run()["result"];
+    EXPECT_EQ(result["outcome"], "refused");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("accelerometer.z"));
+    EXPECT_TRUE(result["found"].empty());
+}
+
+TEST_F(Commissioned, ALatitudeOfTheOtherHemisphereIsNotBelieved) {
+    int outvoted = 0;
+    for (std::uint64_t seed = 2; seed <= 10; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        rig_of(seed);
+        if (std::abs(rig->truth.latitude_deg) < 10) continue;  // nothing tells it there
+        based = false;
+        travel = {};
+        drifting_since = 0;
+        // The compass is right, and with drawing and sense it is three against one.
+        answers["latitude"] = std::to_string(-rig->truth.latitude_deg);
+        const Json result = run()["result"];
+        EXPECT_EQ(result["outcome"], "undecided") << result.dump(1);
+        EXPECT_TRUE(result["found"].empty()) << result["found"].dump(1);
+        const std::string why = result["why"];
+        if (why.find("site.latitude_deg") == std::string::npos) continue;  // too few witnesses
+        ++outvoted;
+        EXPECT_THAT(why, HasSubstr(std::string("the ") +
+                                   (rig->truth.latitude_deg > 0 ? "northern" : "southern") +
+                                   " hemisphere measured"));
+        EXPECT_THAT(why, HasSubstr("drawing +3.7"));
+        EXPECT_THAT(why, HasSubstr("latitude -"));
+    }
+    EXPECT_GE(outvoted, 4);
+}
+
+TEST_F(Commissioned, AWordAgainstAMeasurementStopsItAndBothAreShown) {
+    rig_of(6);
+    answers["which.outer"] = "inner";
+    answers["which.inner"] = "outer";
+    const Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "refused");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("gravity says"));
+    EXPECT_TRUE(result["found"].empty());
+}
+
+TEST_F(Commissioned, AnswersThatAreNoneAreToldWhatWasExpected) {
+    rig_of(1);
+    static_cast<void>(run(false, "travel"));
+    EXPECT_THAT(procedure->answer("Ada", "travel", "1 2 3"),
+                HasSubstr("expected for each gimbal free, or two numbers"));
+    EXPECT_THAT(procedure->answer("Ada", "travel", "free -30 30 free 1"),
+                HasSubstr("nothing after"));
+    EXPECT_THAT(procedure->answer("Ada", "travel", "-500 500 -30 30 -175 175"),
+                HasSubstr("expected"));
+    EXPECT_THAT(procedure->answer("Ada", "stop", "hold"), HasSubstr("asked is \"travel\""));
+    EXPECT_EQ(procedure->answer("Ada", "travel", ""), "");
+    EXPECT_THAT(procedure->answer("Ada", "stop", "x"), HasSubstr("expected hold or release"));
+}
+
+}  // namespace
+}  // namespace vibrig::commission

@@ -1,0 +1,206 @@
+// A daemon that dies at any step: what it kept is gone on from.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/unit/daemon/commission/commissioned.hpp"
+
+namespace vibrig::commission {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Resumed : public Commissioned {
+  protected:
+    /// To the end, or until so many answers and means are kept; nothing is written meanwhile.
+    void run_to(std::size_t entries) {
+        if (!procedure->active()) {
+            EXPECT_EQ(procedure->begin("Ada", false, now), "");
+        }
+        for (int n = 0; n < 200'000 && procedure->active() && kept.size() < entries; ++n) {
+            now += kSecond / 10;
+            procedure->attend("Ada", now);
+            procedure->step(now, now);
+            const Json question = procedure->state(0)["question"];
+            if (question.is_null() || kept.size() >= entries) continue;
+            EXPECT_EQ(procedure->answer("Ada", question["id"],
+                                        answer_to(question["id"], question["text"])),
+                      "");
+        }
+    }
+
+    /// Another daemon; the rig stands where it was, and drifts on if it was let go.
+    void die() {
+        procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
+                                                Stated{0, 2, true}, ports());
+        now += 60 * kSecond;
+        arrives = now;
+    }
+
+    void rig_again(std::uint64_t seed) {
+        rig_of(seed);
+        based = false;
+        travel = {};
+        drifting_since = 0;
+        kept = Json::array();
+        asked.clear();
+    }
+
+    Kept what_is_kept(const std::string& again = {}) { return {kept, {}, again}; }
+};
+
+TEST_F(Resumed, AtEveryStepNothingMovesWithoutAPermissionAndTheResultIsTheSame) {
+    rig_again(2);
+    const Json whole = run()["result"];
+    ASSERT_EQ(whole["outcome"], "decided") << whole.dump(1);
+    const std::size_t entries = kept.size();
+    ASSERT_GT(entries, 60U);
+    // All of them: VIBRIG_EVERY_STEP=1.
+    const std::size_t stride = std::getenv("VIBRIG_EVERY_STEP") != nullptr ? 1 : 7;
+    for (std::size_t at = 0; at < entries; at += stride) {
+        SCOPED_TRACE("dies after " + std::to_string(at) + " of " + std::to_string(entries));
+        rig_again(2);
+        run_to(at);
+        ASSERT_EQ(kept.size(), at);
+        die();
+        const int before = slews, let_go = released;
+        ASSERT_EQ(procedure->begin_again("Ada", false, what_is_kept(), now), "");
+        asked.clear();
+        EXPECT_EQ(kept.size(),
+                  at > 0 && procedure->state(0)["lines"].dump().find("anew") == std::string::npos
+                      ? at
+                      : 0);
+        bool permitted = false;
+        while (procedure->active() && !permitted) {
+            now += kSecond / 10;
+            procedure->attend("Ada", now);
+            procedure->step(now, now);
+            const auto id = question();
+            permitted = id.starts_with("permit");
+            if (permitted) break;
+            ASSERT_NE(id, "") << "it acts by itself: " << procedure->state(0).dump(1);
+            ASSERT_EQ(procedure->answer("Ada", id, answer_to(id, "")), "");
+            // The first look needs no permission.
+            for (int n = 0; n < 200 && question().empty() && procedure->active(); ++n) {
+                now += kSecond / 10;
+                procedure->attend("Ada", now);
+                procedure->step(now, now);
+            }
+        }
+        ASSERT_EQ(slews, before);
+        ASSERT_EQ(released, let_go);
+        if (kept.size() < at) based = false;  // it begins where it stands
+        const Json result = run()["result"];
+        ASSERT_EQ(result["outcome"], "decided") << result.dump(1);
+        ASSERT_EQ(result["found"]["platform.encoder_sign"],
+                  whole["found"]["platform.encoder_sign"]);
+        const auto was = whole["found"]["platform.encoder_zero_deg"].get<Vec3>();
+        const auto is = result["found"]["platform.encoder_zero_deg"].get<Vec3>();
+        for (std::size_t i = 0; i < 3; ++i)
+            ASSERT_LT(std::abs(std::remainder(is[i] - was[i], 360.0)), 0.1);
+        ASSERT_LT(std::abs(std::remainder(result["found"]["site.azimuth_deg"].get<double>() -
+                                              whole["found"]["site.azimuth_deg"].get<double>(),
+                                          360.0)),
+                  0.6);
+    }
+}
+
+TEST_F(Resumed, WhatWasMeasuredAllIsDecidedWithoutAMove) {
+    rig_again(3);
+    const Json whole = run()["result"];
+    die();
+    const int before = slews;
+    ASSERT_EQ(procedure->begin_again("Ada", false, what_is_kept(), now), "");
+    EXPECT_FALSE(procedure->active());
+    EXPECT_EQ(procedure->state(0)["result"], whole) << "to the bit";
+    EXPECT_EQ(slews, before);
+}
+
+TEST_F(Resumed, ARigThatWasMovedMeanwhileBeginsAnew) {
+    rig_again(2);
+    ASSERT_EQ(procedure->begin("Ada", false, now), "");
+    run_until(
+        [this] { return procedure->state(0)["lines"].dump().find("C  ") != std::string::npos; });
+    run_to(kept.size() + 8);
+    die();
+    ASSERT_EQ(procedure->begin_again("Ada", false, what_is_kept(), now), "");
+    rig->zero_g[0] += 0.02;
+    const Json state = run(false, "power");
+    ASSERT_EQ(state["question"]["id"], "power") << state.dump(1);
+    EXPECT_THAT(state["lines"].dump(),
+                HasSubstr("mg off the one measured in this position: it begins anew"));
+}
+
+TEST_F(Resumed, WhatMakesNoSenseBeginsAnew) {
+    for (const char* log :
+         {"[]", "[1]", "[{}]", R"([{"id":"power"}])",
+          R"([{"id":"power","value":"yes"},{"angle":3}])", R"([{"id":"power","value":7}])",
+          R"([{"id":"travel","value":"yes"}])", "{}", "null"}) {
+        SCOPED_TRACE(log);
+        rig_again(1);
+        const int before = slews;
+        Kept bad{Json::parse(log), {}, {}};
+        EXPECT_EQ(procedure->begin_again("Ada", false, bad, now), "");
+        EXPECT_EQ(question(), "power");
+        pass(3);
+        EXPECT_EQ(slews, before);
+    }
+}
+
+TEST_F(Resumed, OneWitnessIsAskedAgainAndNothingElseIsMeasured) {
+    for (const char* again : {"latitude", "compass", "drawing", "sense"}) {
+        SCOPED_TRACE(again);
+        rig_again(4);
+        answers = {{"compass", "-"}, {"drawing", "-"}, {"anticlockwise", "-"}};
+        const Json first = run()["result"];
+        ASSERT_EQ(first["outcome"], "undecided") << "one witness is none";
+        const auto stops = kept.size();
+        die();
+        answers.clear();
+        ASSERT_EQ(procedure->begin_again("Ada", false, what_is_kept(again), now), "");
+        asked.clear();
+        const Json second = run()["result"];
+        EXPECT_THAT(asked,
+                    ::testing::Contains(again == std::string("sense") ? "anticlockwise" : again));
+        for (const char* other : {"permit.outer", "which.outer", "power"})
+            EXPECT_THAT(asked, ::testing::Not(::testing::Contains(other)));
+        EXPECT_LE(kept.size(), stops + 4);
+        // Two that agree.
+        const bool enough = again != std::string("latitude");
+        EXPECT_EQ(second["outcome"], enough ? "decided" : first["outcome"]) << second.dump(1);
+        if (!enough) continue;
+        // And once more, of what is kept: to the bit.
+        die();
+        ASSERT_EQ(procedure->begin_again("Ada", false, what_is_kept(), now), "");
+        EXPECT_EQ(procedure->state(0)["result"], second);
+    }
+}
+
+TEST_F(Resumed, ByHandItGoesOnWhereItWas) {
+    rig_again(5);
+    rig->by_hand = true;
+    ASSERT_EQ(procedure->begin("Ada", true, now), "");
+    run_to(40);
+    die();
+    ASSERT_EQ(procedure->begin_again("Ada", true, what_is_kept(), now), "");
+    const Json result = run(true)["result"];
+    EXPECT_EQ(result["outcome"], "decided") << result.dump(1);
+    EXPECT_EQ(slews + released, 0);
+}
+
+TEST_F(Resumed, AScriptAnswersAtOnceWhileSomebodyIsThere) {
+    rig_again(2);
+    procedure->answer_all({{"power", "yes"}, {"travel", "free free free"}});
+    ASSERT_EQ(procedure->begin("Ada", false, now), "");
+    pass(10, "");
+    EXPECT_EQ(question(), "power") << "nobody is at the tool";
+    pass(0.3);
+    EXPECT_NE(question(), "power");
+    pass(10);
+    EXPECT_EQ(question(), "permit.hold") << "the script does not say, and nothing else is usual";
+}
+
+}  // namespace
+}  // namespace vibrig::commission

@@ -1,0 +1,234 @@
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/unit/daemon/configuration/support.hpp"
+
+namespace vibrig::configuration {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::vector<std::string> lines_of(const std::string& text) {
+    std::vector<std::string> lines;
+    for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t end = std::min(text.find('\n', begin), text.size());
+        lines.push_back(text.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return lines;
+}
+
+TEST(Errors, NameFileLineColumnKeyFoundAndExpected) {
+    EXPECT_EQ(complaint("[site]\nlatitude_deg = 91\n"),
+              "rig.toml:2:16: site.latitude_deg: found 91, expected a number from -90 to 90 deg");
+}
+
+TEST(Errors, ComeAllInOneGoInTheOrderOfTheFile) {
+    // GIVEN four mistakes, the first of them in a section that the schema has last
+    const std::string text =
+        "threads.estimator_priority = 100\n"
+        "[site]\n"
+        "latitude_deg = \"north\"\n"
+        "longitude_deg = 26\n"
+        "[noise]\n"
+        "resolver_bits = 20.5\n";
+    // THEN each has its line
+    EXPECT_THAT(
+        lines_of(complaint(text)),
+        ElementsAre(StartsWith("rig.toml:1:30: threads.estimator_priority: found 100, "),
+                    StartsWith("rig.toml:3:16: site.latitude_deg: found \"north\" (a string)"),
+                    StartsWith("rig.toml:4:1: site.longitude_deg: found an unknown key"),
+                    StartsWith("rig.toml:6:17: noise.resolver_bits: found 20.5, expected an "
+                               "integer from 8 to 32 bit")));
+}
+
+TEST(Errors, RefuseACpuThatNoMachineHas) {
+    EXPECT_EQ(complaint("threads.acquisition_cpu = -2"),
+              "rig.toml:1:27: threads.acquisition_cpu: found -2, expected an integer from -1 to "
+              "1023");
+}
+
+TEST(Errors, AnUnknownKeySuggestsTheNearestKnownOne) {
+    EXPECT_THAT(complaint("[site]\nlattitude_deg = 45"), EndsWith("perhaps site.latitude_deg"));
+    EXPECT_THAT(complaint("[campaign]\nfrequency_hz = 15"),
+                EndsWith("perhaps vibration.frequency_hz"));
+    EXPECT_THAT(complaint("[vibratoin]\nfrequency_hz = 15"), EndsWith("perhaps vibration"));
+    EXPECT_THAT(complaint("shaker.registers.freqency.address = 1"),
+                EndsWith("perhaps shaker.registers.frequency"));
+    // and none where none is near
+    EXPECT_THAT(complaint("[campaign]\nquux = 15"), Not(HasSubstr("perhaps")));
+    EXPECT_THAT(complaint("\"\" = 1"), HasSubstr("an unknown key"));
+    EXPECT_THAT(complaint("\"a\\nb\\u001b[2J\" = 1"), Not(HasSubstr("\x1b")));
+}
+
+struct Mistake {
+    const char* text;
+    const char* message;
+};
+
+class Values : public ::testing::TestWithParam<Mistake> {};
+
+TEST_P(Values, AreRefusedWithWhatWasFoundAndExpected) {
+    EXPECT_THAT(complaint(GetParam().text), EndsWith(GetParam().message)) << GetParam().text;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Numbers, Values,
+    ::testing::Values(
+        Mistake{"vibration.frequency_hz = nan", "found nan, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz = inf", "found inf, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz = -inf",
+                "found -inf, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz = 1e300",
+                "found 1e+300, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz = true",
+                "found true, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz = [15]",
+                "found an array of 1, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz = 1979-05-27",
+                "found a date or time, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.frequency_hz.hz = 15",
+                "found a table, expected a number from 0.1 to 2000 Hz"},
+        Mistake{"vibration.level_window_s = 1.9", "found 1.9, expected a number from 2 to 600 s"},
+        Mistake{"campaign.settle_s = 1", "found 1, expected a number from 2 to 3600 s"},
+        Mistake{"shaker.port = 9223372036854775807",
+                "found 9223372036854775807, expected an integer from 1 to 65535"},
+        Mistake{"shaker.port = 0", "found 0, expected an integer from 1 to 65535"},
+        Mistake{"shaker.registers.run.address = 65536",
+                "found 65536, expected an integer from 0 to 65535"},
+        Mistake{"platform.drift_sign = 0", "found 0, expected 1 or -1"},
+        Mistake{"can.fd = 1", "found 1, expected true or false"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    Words, Values,
+    ::testing::Values(
+        Mistake{"estimator.method = \"two_step\"",
+                "found \"two_step\", expected \"joint\" | \"two-step\""},
+        Mistake{"clock.source = 3", "found 3, expected \"real\" | \"rig\""},
+        Mistake{"platform.up = \"y\"",
+                R"(found "y" (a string), expected "+x", "-x", "+y", "-y", "+z" or "-z")"},
+        Mistake{"campaign.name = \"../up\"",
+                "found \"../up\", expected 1 to 64 letters, digits, ' ', '.', '_' or '-', not "
+                "starting with '.'"},
+        Mistake{"campaign.name = 7", "found 7, expected a string, 1 to 64 characters"},
+        Mistake{"can.interface = \"a_name_far_too_long\"",
+                "expected the name of a network interface, 1 to 15 characters, such as \"can0\""},
+        Mistake{"can.path = \"run/bus\"",
+                "found \"run/bus\", expected an absolute path or \"@name\", 2 to 107 bytes"},
+        Mistake{"server.socket = \"\"",
+                "found \"\", expected an absolute path or \"@name\", 2 to 107 bytes"},
+        Mistake{"can.signals.outer = \"Outer\"",
+                "found \"Outer\", expected \"Message.Signal\", or \"\" for not bound"},
+        Mistake{"gimbal.message = \"\"",
+                "found \"\", expected a name as in the DBC file: letters, digits and '_'"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    Arrays, Values,
+    ::testing::Values(
+        Mistake{"campaign.table_g = []",
+                "found an array of 0, expected an array of 1 to 100 numbers"},
+        Mistake{"campaign.table_g = 9", "found 9, expected an array of 1 to 100 numbers"},
+        Mistake{"campaign.table_g = [9, nan]",
+                "campaign.table_g[1]: found nan, expected a number from 0 to 1000 g"},
+        Mistake{"campaign.positions_deg = []",
+                "expected an array of 1 to 10000 positions [outer, inner, azimuth]"},
+        Mistake{"campaign.positions_deg = [[0, 0, 0], [0, 0]]",
+                "campaign.positions_deg[1]: found an array of 2, expected an array of 3 numbers"},
+        Mistake{"campaign.positions_deg = [[0, 85, 0]]",
+                "campaign.positions_deg[0][1]: found 85, expected a number from -80 to 80 deg"},
+        Mistake{"platform.encoder_sign = [1, 2, 1]",
+                "platform.encoder_sign[1]: found 2, expected 1 or -1"},
+        Mistake{"platform.gyro_x_axes = [\"+x\", \"-x\", \"+z\"]",
+                "found \"-x\" a second time, expected input, output and spin along x, y and z in "
+                "some order"},
+        Mistake{"accelerometer.zero_g = [0, 0]",
+                "found an array of 2, expected an array of 3 numbers"},
+        Mistake{"accelerometer.matrix = [[1, 0, 0], [0, 1, 0], [0, 0, \"1\"]]",
+                "accelerometer.matrix[2][2]: found \"1\" (a string), expected a number from -10 to "
+                "10"},
+        Mistake{"accelerometer.matrix = [[1, 2, 3], [1, 2, 3], [0, 0, 1]]",
+                "found a matrix with determinant 0, expected one that can be inverted (determinant "
+                "0.001 at least)"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    Tables, Values,
+    ::testing::Values(
+        Mistake{"site = 3", "site: found 3, expected a table"},
+        Mistake{"estimator.prior_sigma = 10", "estimator.prior_sigma: found 10, expected a table"},
+        Mistake{
+            "estimator.prior_sigma = { bias = -1 }",
+            "estimator.prior_sigma.bias: found -1, expected a number from 1e-09 to 1000000 deg/h"},
+        Mistake{"shaker.registers.watchdog = 6",
+                "found 6, expected a table (the register) or false (none)"},
+        Mistake{"[[shaker]]\nport = 1", "shaker: found an array of 1, expected a table"}));
+
+TEST(Errors, TooManyPositionsAreRefused) {
+    std::string text = "campaign.positions_deg = [";
+    for (int i = 0; i < 10'001; ++i) {
+        text += "[0,0,0],";
+    }
+    EXPECT_THAT(complaint(text + "]"), HasSubstr("found an array of 10001, expected"));
+}
+
+TEST(Errors, AHundredAreShownAndTheOthersCounted) {
+    std::string text;
+    for (int i = 0; i < 150; ++i) {
+        text += "wrong" + std::to_string(i) + " = 1\n";
+    }
+    const auto lines = lines_of(complaint(text));
+    ASSERT_EQ(lines.size(), 101U);
+    EXPECT_EQ(lines.back(), "rig.toml: and 50 more");
+}
+
+TEST(Errors, BrokenTomlIsToldWithLineAndColumn) {
+    EXPECT_THAT(complaint("[site]\nlatitude_deg = \n"), StartsWith("rig.toml:2:16: not TOML: "));
+    EXPECT_THAT(complaint("[site]\nlatitude_deg = 1\nlatitude_deg = 2\n"),
+                StartsWith("rig.toml:3:"));
+    EXPECT_THAT(complaint("[site\n"), StartsWith("rig.toml:1:"));
+    EXPECT_THAT(complaint(std::string("a = \"\xff\xfe\"")), StartsWith("rig.toml:1:"));
+    EXPECT_THAT(complaint(std::string("\0\0\0", 3)), StartsWith("rig.toml:"));
+    EXPECT_THAT(complaint("a = " + std::string(100'000, '[')), StartsWith("rig.toml:1:"));
+}
+
+class Files : public ::testing::Test {
+  protected:
+    Files() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~Files() override { std::filesystem::remove_all(folder_); }
+    std::string complaint_of(const std::filesystem::path& path) {
+        try {
+            static_cast<void>(load(path.string(), false));
+        } catch (const ConfigurationError& error) {
+            return error.what();
+        }
+        return "";
+    }
+    std::filesystem::path folder_;
+};
+
+TEST_F(Files, AreReadAndNamedAsGiven) {
+    const auto path = folder_ / "rig.toml";
+    std::ofstream(path) << "[site]\nlatitude_deg = 10\n[commission]\nsimulated = true\n";
+    const Loaded loaded = load(path.string(), true);
+    EXPECT_EQ(loaded.configuration.estimator.latitude_deg, 10);
+    EXPECT_EQ(loaded.effective.front().origin, path.string() + ":2");
+}
+
+TEST_F(Files, ThatCannotBeReadSayWhy) {
+    EXPECT_THAT(complaint_of(folder_ / "none.toml"), HasSubstr("No such file"));
+    EXPECT_THAT(complaint_of(folder_), HasSubstr("found a folder"));
+    EXPECT_THAT(complaint_of("/dev/zero"), HasSubstr("more than"));
+}
+
+TEST_F(Files, NoPathMeansAllDefaults) {
+    EXPECT_EQ(load("", false).configuration.estimator.latitude_deg, 45.75);
+}
+
+}  // namespace
+}  // namespace vibrig::configuration

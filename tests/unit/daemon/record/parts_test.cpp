@@ -1,0 +1,410 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "daemon/journal/database.hpp"
+#include "daemon/record/campaign_file.hpp"
+#include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/digest.hpp"
+#include "daemon/record/hdf5.hpp"
+#include "daemon/record/index.hpp"
+#include "daemon/record/replay.hpp"
+#include "estimator/filter/parameters.hpp"
+
+namespace vibrig::record {
+namespace {
+
+namespace fs = std::filesystem;
+using drivers::kSecond;
+using drivers::Time;
+
+constexpr Time kStep = 25 * drivers::kMillisecond;
+
+/// Every number another one.
+estimator::DwellRow row_of(int position) {
+    estimator::DwellRow row;
+    row.run = 1;
+    row.position = position;
+    row.middle_s = 100.0 * position;
+    for (Eigen::Index j = 0; j < 3; ++j) {
+        row.rate[j] = 1.0 + static_cast<double>(j);
+        row.ramp_variance(j, j) = 4.0 + static_cast<double>(j);
+        for (Eigen::Index k = 0; k < 3; ++k)
+            row.variance(j, k) = 10.0 + static_cast<double>(3 * j + k);
+        for (Eigen::Index t = 0; t < 10; ++t)
+            row.regressors(j, t) = 100.0 + static_cast<double>(10 * j + t);
+    }
+    row.vibration.gamma = {0.1, 1, 0.2, 0.3, 0.4, 0.5};
+    return row;
+}
+
+/// Campaigns in recordings/test-1: files with samples, and dwells of 100 samples.
+class Parts : public ::testing::Test {
+  protected:
+    Parts() {
+        std::string name = (fs::temp_directory_path() / "vibrig-parts.XXXXXX").string();
+        recordings_ = ::mkdtemp(name.data());
+        folder_ = recordings_ / "test-1";
+        fs::create_directory(folder_);
+    }
+    ~Parts() override {
+        std::error_code ignored;
+        fs::remove_all(recordings_, ignored);
+    }
+
+    static Head head(int part, bool restart = false, std::size_t before = 0) {
+        Head head;
+        head.name = "test";
+        head.started_by = "A. Person";
+        head.utc_ns = (1'700'000'000 + 1000 * part) * kSecond;
+        head.utc_offset_ns = 1'700'000'000 * kSecond;
+        head.clock = "real";
+        head.campaign = "test-1";
+        head.part = part;
+        head.restart = restart;
+        head.dwells_before = before;
+        return head;
+    }
+    /// `orders`: positions, each 100 samples from the next hundred on; the first `done` are done.
+    void write(const Head& head, Time from, const std::vector<int>& orders, std::size_t done,
+               const char* state = "finished") {
+        CampaignWriter writer((folder_ / part_name(head.part)).string(), head);
+        for (int i = 0; i < 400; ++i) {
+            drivers::Sample sample;
+            sample.time = from + i * kStep;
+            sample.sequence = static_cast<std::uint32_t>(i);
+            sample.force = {0, 1, 0};
+            writer.sample(sample);
+        }
+        for (std::size_t i = 0; i < orders.size(); ++i) {
+            const Time at = from + static_cast<Time>(i) * 100 * kStep;
+            writer.order({at,
+                          at,
+                          at + 100 * kStep,
+                          1,
+                          orders[i],
+                          9.0,
+                          false,
+                          {},
+                          0,
+                          {5.0, {1e-3, 1e-3, 1e-3}}});
+            if (i >= done) continue;
+            Dwell dwell;
+            dwell.time = at + 100 * kStep;
+            dwell.summary.run = 1;
+            dwell.summary.position = orders[i];
+            dwell.summary.samples = 100;
+            if (i > 0) dwell.row = row_of(orders[i]);
+            writer.dwell(dwell);
+        }
+        writer.end({state, "", "", "{}", head.utc_ns + kSecond});
+    }
+    std::string refusal() const {
+        try {
+            static_cast<void>(read_campaign(folder_.string()));
+        } catch (const std::runtime_error& error) {
+            return error.what();
+        }
+        return {};
+    }
+
+    fs::path recordings_, folder_;
+};
+
+TEST_F(Parts, HaveTheRowsOfTheirDwellsInTheOrderOfTheCoefficients) {
+    write(head(1), 10 * kSecond, {1, 2}, 2);
+    const hdf5::File file =
+        hdf5::File::open((folder_ / "campaign.h5").string(), hdf5::File::Mode::read);
+    const auto rate = file.doubles("/dwells/rate"),
+               regressors = file.doubles("/dwells/rate_regressors"),
+               covariance = file.doubles("/dwells/rate_covariance"),
+               ramp_sigma = file.doubles("/dwells/ramp_sigma"),
+               gamma = file.doubles("/dwells/gamma"), middle = file.doubles("/dwells/middle_s");
+    // the first was left out
+    EXPECT_TRUE(std::isnan(middle.values.at(0)));
+    EXPECT_TRUE(std::isnan(rate.values.at(2)));
+    EXPECT_EQ(middle.values.at(1), 200);
+    ASSERT_EQ(regressors.values.size(), 60U);
+    const estimator::DwellRow row = row_of(2);
+    for (std::size_t j = 0; j < 3; ++j) {
+        const auto g = static_cast<Eigen::Index>(j);
+        EXPECT_EQ(rate.values.at(3 + j), row.rate[g]);
+        EXPECT_EQ(covariance.values.at(9 + 3 * j + (j + 1) % 3), row.variance(g, (g + 1) % 3));
+        EXPECT_EQ(ramp_sigma.values.at(3 + j), std::sqrt(row.ramp_variance(g, g)));
+        for (std::size_t t = 0; t < 10; ++t) {
+            const auto group =
+                static_cast<Eigen::Index>(estimator::internal_of(10 * j + t) / estimator::kGyros);
+            EXPECT_EQ(regressors.values.at(30 + 10 * j + t), row.regressors(g, group));
+        }
+    }
+    EXPECT_EQ(gamma.values.at(6 + 3), row.vibration.gamma[3]);
+}
+
+TEST_F(Parts, OfARestartTakeThePlaceOfWhatWasNotFinished) {
+    // GIVEN a campaign that died in its third dwell, the second of them not in the journal either
+    write(head(1), 10 * kSecond, {1, 2, 3}, 2, "running");
+    // WHEN it went on after the first one, in the time of another boot
+    Head after = head(2, true, 1);
+    after.utc_offset_ns += 2000 * kSecond;
+    write(after, 1 * kSecond, {2, 3}, 2);
+    // THEN it reads as one campaign, each position once and in its times
+    const Campaign campaign = read_campaign(folder_.string());
+    EXPECT_EQ(campaign.samples.size(), 800U);
+    EXPECT_TRUE(std::ranges::is_sorted(campaign.samples, {}, &drivers::Sample::time));
+    ASSERT_EQ(campaign.dwells.size(), 3U);
+    const auto dwells = recorded_dwells(campaign);
+    ASSERT_EQ(dwells.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(dwells[i].order->position, static_cast<int>(i) + 1);
+        EXPECT_EQ(dwells[i].count, 100U);
+    }
+    EXPECT_EQ(dwells[1].first, 400U) << "the second of the new part";
+    EXPECT_EQ(campaign.samples[400].time, 2001 * kSecond);
+    EXPECT_EQ(campaign.restarted_at, 1U);
+    EXPECT_EQ(campaign.state, "finished");
+    EXPECT_TRUE(campaign.incomplete.empty()) << campaign.incomplete;
+    ASSERT_EQ(campaign.gaps.size(), 1U);
+    EXPECT_EQ(campaign.gaps[0].stream, "restart");
+}
+
+TEST_F(Parts, ThatLackWhatTheFilterHadAreNotReplayed) {
+    write(head(1), 10 * kSecond, {1, 2}, 1, "running");
+    write(head(2, true, 2), 100 * kSecond, {3}, 1);
+    const Campaign campaign = read_campaign(folder_.string());
+    EXPECT_NE(campaign.incomplete.find("found 1 dwells before the restart, expected 2"),
+              std::string::npos)
+        << campaign.incomplete;
+    EXPECT_THROW(static_cast<void>(replay(campaign, {}, {})), std::runtime_error);
+}
+
+TEST_F(Parts, AfterADiskThatRefusedHoldWhatWasKeptOnce) {
+    // GIVEN a file that was given up, and its next one with orders and samples of both
+    write(head(1), 10 * kSecond, {1, 2}, 1, "continued");
+    write(head(2), 10 * kSecond + 100 * kStep, {2, 3}, 2);
+    // WHEN the order of the second dwell is in both
+    const Campaign campaign = read_campaign(folder_.string());
+    // THEN nothing is there twice
+    EXPECT_EQ(campaign.samples.size(), 500U);
+    EXPECT_TRUE(
+        std::ranges::is_sorted(campaign.samples, std::less_equal{}, &drivers::Sample::time));
+    EXPECT_EQ(recorded_dwells(campaign).size(), 3U);
+}
+
+TEST_F(Parts, AfterARestartAndADiskThatRefusedAreInOneTime) {
+    // GIVEN a campaign that died, went on in the time of another boot, and had its disk refuse then
+    write(head(1), 5000 * kSecond, {1}, 1, "running");
+    Head after = head(2, true, 1);
+    after.utc_offset_ns += 9000 * kSecond;
+    write(after, 1 * kSecond, {2, 3}, 1, "continued");
+    Head third = after;
+    third.part = 3;
+    third.restart = false;
+    third.dwells_before = 0;
+    write(third, 1 * kSecond + 400 * kStep, {4}, 1);
+    // WHEN it is read
+    const Campaign campaign = read_campaign(folder_.string());
+    // THEN the newest file is not before the oldest, and nothing of it is taken for a copy
+    EXPECT_EQ(campaign.samples.size(), 1200U);
+    EXPECT_TRUE(std::ranges::is_sorted(campaign.samples, {}, &drivers::Sample::time));
+    EXPECT_EQ(campaign.dwells.size(), 3U);
+}
+
+TEST_F(Parts, AreRefusedByNameWhenOneIsMissing) {
+    for (const int part : {1, 2, 3})
+        write(head(part), part * 100 * kSecond, {part}, 1, part == 3 ? "finished" : "continued");
+    fs::remove(folder_ / "campaign-2.h5");
+    EXPECT_NE(refusal().find("missing campaign-2.h5 of campaign test-1"), std::string::npos)
+        << refusal();
+    fs::rename(folder_ / "campaign-3.h5", folder_ / "campaign-2.h5");
+    EXPECT_NE(refusal().find("found part 3 of campaign test-1, expected part 2"), std::string::npos)
+        << refusal();
+    fs::remove(folder_ / "campaign.h5");
+    fs::rename(folder_ / "campaign-2.h5", folder_ / "other.h5");
+    EXPECT_THROW(static_cast<void>(read_campaign((folder_ / "other.h5").string())),
+                 std::runtime_error);
+}
+
+TEST_F(Parts, AreFoundAmongManyAndInAnIndexThatIsDamaged) {
+    // GIVEN one campaign that is there, and many more in the index
+    write(head(1), 10 * kSecond, {1}, 1, "finished");
+    std::vector<std::string> told;
+    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    Index(recordings_.string(), tell).note(folder_.string());
+    const std::string path = Index::path_in(recordings_.string());
+    {
+        journal::Database database(path);
+        database.execute("BEGIN");
+        for (int i = 0; i < 20'000; ++i) {
+            const std::string key = "other-" + std::to_string(i);
+            database.run("INSERT INTO campaign VALUES (?, 'other', 'A. Person', ?, 'finished')",
+                         {std::string_view(key), std::int64_t{i}});
+        }
+        database.execute("COMMIT");
+    }
+    // THEN it is found by key and by name, and what is not is told with some that are
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    EXPECT_EQ(find_campaign("other-19999", {recordings_.string()}, tell),
+              (recordings_ / "other-19999").string());
+    try {
+        static_cast<void>(find_campaign("tset", {recordings_.string()}, tell));
+        FAIL() << "found";
+    } catch (const std::runtime_error& error) {
+        EXPECT_NE(std::string(error.what()).find("other-11 ..."), std::string::npos)
+            << error.what();
+    }
+    EXPECT_TRUE(told.empty());
+    // WHEN pages that opening does not read are overwritten
+    {
+        std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+        file.seekp(16 * 4096);
+        file << std::string(fs::file_size(path) - 16 * 4096, 'x');
+    }
+    // THEN it is made anew from the files, and told
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
+        << told[0];
+}
+
+TEST_F(Parts, AreInTheIndexWithTimesSizesAndHashes) {
+    write(head(1), 10 * kSecond, {1}, 1, "continued");
+    write(head(2), 100 * kSecond, {2}, 1);
+    std::vector<std::string> told;
+    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    {
+        Index index(recordings_.string(), tell);
+        EXPECT_TRUE(index.campaigns().empty());
+        index.note(folder_.string());
+    }
+    const auto campaigns = Index(recordings_.string(), tell).campaigns();
+    ASSERT_EQ(campaigns.size(), 1U);
+    EXPECT_EQ(campaigns[0].key, "test-1");
+    EXPECT_EQ(campaigns[0].state, "finished");
+    ASSERT_EQ(campaigns[0].files.size(), 2U);
+    const auto& file = campaigns[0].files[0];
+    EXPECT_EQ(file.name, "campaign-2.h5");
+    EXPECT_TRUE(file.closed);
+    EXPECT_EQ(file.rows, 400);
+    EXPECT_EQ(file.from_utc_ns, 1'700'000'100 * kSecond);
+    EXPECT_EQ(file.to_utc_ns, 1'700'000'100 * kSecond + 399 * kStep);
+    EXPECT_EQ(file.bytes, static_cast<std::int64_t>(fs::file_size(folder_ / file.name)));
+    EXPECT_EQ(file.sha256, sha256_of_file((folder_ / file.name).string()));
+    // WHEN a campaign is asked for by its name, THEN it is found
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    EXPECT_EQ(find_campaign("test-1", {recordings_.string()}, tell), folder_.string());
+    EXPECT_THROW(static_cast<void>(find_campaign("tset", {recordings_.string()}, tell)),
+                 std::runtime_error);
+    EXPECT_TRUE(told.empty());
+    // WHEN the last part is gone, THEN the index knows it
+    fs::remove(folder_ / "campaign-2.h5");
+    EXPECT_THROW(compare_with_index(folder_.string(), tell), std::runtime_error);
+}
+
+TEST_F(Parts, AreFoundAgainWhenTheIndexIsDamaged) {
+    write(head(1), 10 * kSecond, {1}, 1);
+    std::ofstream(Index::path_in(recordings_.string())) << std::string(5000, 'x');
+    std::vector<std::string> told;
+    const auto tell = [&told](const std::string& words) { told.push_back(words); };
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_NE(told[0].find("made anew from the files of 1 campaigns"), std::string::npos)
+        << told[0];
+    EXPECT_EQ(find_campaign("test", {recordings_.string()}, tell), folder_.string());
+    EXPECT_EQ(told.size(), 1U);
+}
+
+/// Three segments of a raw log, a minute each, and another's log of the time between.
+class RawSegments : public Parts {
+  protected:
+    RawSegments() {
+        write(head(1), 10 * kSecond, {1}, 1);
+        for (int n = 1; n <= 3; ++n) log(segment(n), 60 * n);
+        std::ofstream(folder_ / "dwells.csv")
+            << kDwellsHeader << "\n1,1,9,1700000070,1700000100,,0,0,0,0,0,0,0,0,0\n";
+    }
+    [[nodiscard]] std::string segment(int n) const {
+        return (folder_ / ("raw-000" + std::to_string(n) + ".log")).string();
+    }
+    static void log(const std::string& path, int from_s) {
+        std::ofstream file(path);
+        for (int i = 0; i < 60; ++i)
+            file << "(" << 1'700'000'000 + from_s + i << ".000000) vcan0 7FF#AB R\n";
+    }
+    /// Of frames that are no platform's: what comes before there is found no sample in them.
+    [[nodiscard]] std::string refusal_of(const std::vector<std::string>& logs) const {
+        try {
+            static_cast<void>(
+                campaign_from_candump(logs, (folder_ / "dwells.csv").string(), "", ""));
+        } catch (const std::runtime_error& error) {
+            return error.what();
+        }
+        return {};
+    }
+    [[nodiscard]] std::vector<std::string> missing(const std::vector<std::string>& logs) const {
+        return missing_raw(folder_.string(), logs, [](const std::string&) {});
+    }
+};
+
+TEST_F(RawSegments, ThatAreMissingAreNamed) {
+    const auto nothing = [](const std::string&) {};
+    EXPECT_THAT(missing(raw_files(folder_.string())), ::testing::IsEmpty());
+    // WHEN some are left out, or one is gone
+    EXPECT_THAT(missing({segment(2)}), ::testing::ElementsAre("raw-0001.log", "raw-0003.log"));
+    fs::remove(segment(2));
+    EXPECT_THAT(missing(raw_files(folder_.string())), ::testing::ElementsAre("raw-0002.log"));
+    EXPECT_THAT(recover(folder_.string(), nothing).at(0).missing_raw,
+                ::testing::ElementsAre("raw-0002.log"));
+    // WHEN it is the last one, THEN the index knows it
+    log(segment(2), 120);
+    Index(recordings_.string(), nothing).note(folder_.string());
+    fs::remove(segment(3));
+    EXPECT_THAT(missing(raw_files(folder_.string())),
+                ::testing::ElementsAre(::testing::HasSubstr("raw-0003.log, which the index has")));
+    EXPECT_EQ(recover(folder_.string(), nothing).at(0).missing_raw.size(), 1U);
+}
+
+TEST_F(RawSegments, AreReadInOrderAndOnce) {
+    EXPECT_THAT(in_order({segment(3), segment(1), segment(2)}),
+                ::testing::ElementsAre(segment(1), segment(2), segment(3)));
+    EXPECT_THAT(refusal_of({segment(2), segment(1)}), ::testing::HasSubstr("no sample in them"));
+    EXPECT_THAT(refusal_of({segment(1), segment(2), segment(1)}),
+                ::testing::HasSubstr("found it twice"));
+    // AND of others the time must not go back
+    const std::string other = (recordings_ / "other.log").string();
+    log(other, 180);
+    EXPECT_THAT(refusal_of({segment(2), other}), ::testing::HasSubstr("no sample in them"));
+    EXPECT_THAT(refusal_of({segment(3), other}),
+                ::testing::HasSubstr("other.log:1: found a time 59.000000 s before the end"));
+}
+
+TEST_F(RawSegments, AreNamedWhereTheFileBesideThemIsCutOff) {
+    const auto nothing = [](const std::string&) {};
+    const fs::path bad = recordings_ / "test-0", file = bad / "campaign.h5";
+    fs::copy(folder_, bad);
+    for (const std::uintmax_t size : {fs::file_size(file) / 2, std::uintmax_t{0}}) {
+        // GIVEN a campaign's file that is cut off, beside a good campaign
+        fs::resize_file(file, size);
+        const std::string words = "vibrig replay " + bad.string() + "/raw-*";
+        const auto hint = ::testing::ThrowsMessage<std::runtime_error>(
+            ::testing::AllOf(::testing::HasSubstr(file.string()), ::testing::HasSubstr(words)));
+        EXPECT_THAT([&] { static_cast<void>(recover(bad.string(), nothing)); }, hint);
+        EXPECT_THAT([&] { static_cast<void>(read_campaign(bad.string())); }, hint);
+        EXPECT_THAT([&] { static_cast<void>(read_campaign(file.string())); }, hint);
+        // WHEN all are recovered, THEN the other one is, and the index has it
+        const auto all = recover(recordings_.string(), nothing);
+        ASSERT_EQ(all.size(), 2U);
+        EXPECT_THAT(all[0].failed, ::testing::HasSubstr(words));
+        EXPECT_EQ(all[1].failed, "");
+        EXPECT_EQ(all[1].samples, 400U);
+        const auto known = Index(recordings_.string(), nothing).campaigns();
+        ASSERT_EQ(known.size(), 1U);
+        EXPECT_EQ(known[0].key, "test-1");
+    }
+}
+
+}  // namespace
+}  // namespace vibrig::record

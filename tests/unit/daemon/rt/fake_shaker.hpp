@@ -1,0 +1,57 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <vector>
+
+#include "drivers/shaker/shaker.hpp"
+
+namespace vibrig {
+
+/// Remembers what it was asked; the test decides what it reads back.
+class FakeShaker final : public drivers::Shaker {
+  public:
+    FakeShaker() { now.watchdog = drivers::WatchdogTimeout::kept; }
+    void start(std::function<bool()>, StateHandler) override {}
+    [[nodiscard]] bool request(const drivers::ShakerSetPoint& set_point,
+                               std::uint64_t under) noexcept override {
+        if (refuse || stop_pending() || under != stops()) return false;
+        requests.push_back(set_point);
+        return true;
+    }
+    void stop_now() noexcept override {
+        ++stops_asked;
+        stop_waits = true;
+    }
+    [[nodiscard]] std::uint64_t stops() const noexcept override { return stops_asked; }
+    [[nodiscard]] bool stop_pending() const noexcept override { return stop_waits; }
+    [[nodiscard]] bool busy() const noexcept override { return writing; }
+    [[nodiscard]] drivers::ShakerReading reading() const noexcept override { return now; }
+    [[nodiscard]] drivers::ShakerCounters counters() const noexcept override { return counts; }
+    [[nodiscard]] drivers::LinkState state() const noexcept override {
+        return drivers::LinkState::running;
+    }
+    void on_reading(std::function<void()>) override {}
+    void shut_down() noexcept override {}
+
+    /// Reads back at once what was asked last; a stop that waits comes first.
+    void obey(drivers::Time time) {
+        if (stop_waits.exchange(false)) requests.push_back({15, 0, 0});
+        now.time = time;
+        if (requests.empty()) return;
+        const drivers::ShakerSetPoint& wanted = requests.back();
+        now.amplitude_g = now.measured_g = wanted.amplitude_g;
+        now.frequency_hz = wanted.frequency_hz;
+        now.running = wanted.amplitude_g > 0;
+        now.state = wanted.amplitude_g > 0 ? 2 : 0;
+    }
+
+    drivers::ShakerReading now;
+    drivers::ShakerCounters counts;
+    std::vector<drivers::ShakerSetPoint> requests;
+    std::atomic<std::uint64_t> stops_asked{0};
+    std::atomic<bool> stop_waits{false};
+    bool refuse = false, writing = false;
+};
+
+}  // namespace vibrig

@@ -1,0 +1,150 @@
+#include "daemon/interlock/rest_monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace vibrig::rt {
+namespace {
+
+using drivers::kMillisecond;
+using drivers::kSecond;
+using drivers::Quality;
+using drivers::Time;
+
+/// Feeds a monitor with samples at 40 Hz, platform and table as the test wants them.
+struct RestMonitorTest : testing::Test {
+    static constexpr Time kPeriod = 25 * kMillisecond;
+    RestMonitor monitor{{}, kPeriod};
+    Time now = 10 * kSecond;
+    double platform_g = 0, table_g = 0;  ///< peak, at 15 Hz
+    double tilt_deg_per_s = 0, noise_g = 1e-4;
+    static constexpr unsigned kSeed = 1;
+    std::mt19937_64 random{kSeed};
+    bool force_valid = true, table_bound = true, table_valid = true;
+
+    drivers::Sample sample() {
+        std::normal_distribution<double> noise(0, noise_g);
+        drivers::Sample s;
+        s.time = now;
+        const double phase = 2 * std::numbers::pi * 15 * drivers::to_seconds(now);
+        const double tilt = tilt_deg_per_s * drivers::to_seconds(now) * std::numbers::pi / 180;
+        const double up = 1 + platform_g * std::sin(phase);
+        s.force = {up * std::sin(tilt) + noise(random), up * std::cos(tilt) + noise(random),
+                   noise(random)};
+        s.table_accel = table_g * std::cos(phase) + noise(random);
+        s.quality.fill(Quality::good);
+        if (!force_valid) s.quality[4] = Quality::flagged;
+        if (!table_valid) s.quality[6] = Quality::stale;
+        if (!table_bound) s.quality[6] = Quality::unbound;
+        return s;
+    }
+    Rest run(double seconds) {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += kPeriod;
+            monitor.add(sample());
+        }
+        return monitor.rest(now);
+    }
+};
+
+TEST_F(RestMonitorTest, NobodyCallsItRestBeforeAWindowOfSamples) {
+    EXPECT_EQ(monitor.rest(now).platform.verdict, RestVerdict::unknown);
+    EXPECT_FALSE(run(0.4).measured());
+    EXPECT_TRUE(run(0.2).measured());
+}
+
+TEST_F(RestMonitorTest, MeasuresTheRmsOfTheVibration) {
+    // GIVEN 5 g at the table and two thirds of it on the platform
+    table_g = 5;
+    platform_g = 10.0 / 3;
+    const Rest rest = run(2);
+    // THEN the rms is 1/sqrt(2) of the peak; 20 samples of 7.5 periods leave 7 % at most
+    EXPECT_EQ(rest.table.verdict, RestVerdict::moving);
+    EXPECT_NEAR(rest.table.rms_g, 5 / std::numbers::sqrt2, 0.25);
+    EXPECT_GT(rest.platform.rms_g, 1.0);  // the norm has no sign: above 1 g it folds over
+    EXPECT_TRUE(rest.moving());
+    EXPECT_FALSE(rest.measured());
+}
+
+TEST_F(RestMonitorTest, ALimitOfTwentyMilligTellsRestFromTheSmallestMotion) {
+    table_g = platform_g = 0.9 * 0.02 * std::numbers::sqrt2;
+    EXPECT_TRUE(run(2).measured());
+    table_g = platform_g = 1.15 * 0.02 * std::numbers::sqrt2;
+    const Rest rest = run(2);
+    EXPECT_EQ(rest.platform.verdict, RestVerdict::moving);
+    EXPECT_EQ(rest.table.verdict, RestVerdict::moving);
+}
+
+TEST_F(RestMonitorTest, ASlowTiltIsNoVibration) {
+    // GIVEN a platform that turns by 30 deg/s: each axis moves by 0.25 g in a window
+    tilt_deg_per_s = 30;
+    EXPECT_TRUE(run(3).measured());
+}
+
+TEST_F(RestMonitorTest, NoiseOfASixthOfTheLimitIsRestInEveryWindow) {
+    // 6 sigma: over 10 000 windows none is taken for motion
+    noise_g = 0.02 / 6;
+    run(1);
+    for (int i = 0; i < 10'000; ++i)
+        ASSERT_TRUE(run(0.025).measured()) << "sample " << i << ", seed " << kSeed;
+}
+
+TEST_F(RestMonitorTest, SilenceIsNotRest) {
+    ASSERT_TRUE(run(1).measured());
+    EXPECT_TRUE(monitor.rest(now + 150 * kMillisecond).measured());
+    const Rest later = monitor.rest(now + 250 * kMillisecond);
+    EXPECT_FALSE(later.measured());
+    EXPECT_FALSE(later.moving()) << "nobody knows";
+    EXPECT_EQ(later.platform.verdict, RestVerdict::unknown);
+}
+
+TEST_F(RestMonitorTest, InvalidAccelerometersAreNotRest) {
+    ASSERT_TRUE(run(1).measured());
+    force_valid = false;
+    EXPECT_EQ(run(0.5).platform.verdict, RestVerdict::unknown);
+    force_valid = true;
+    EXPECT_TRUE(run(0.7).measured());
+    table_valid = false;
+    EXPECT_FALSE(run(0.5).measured());
+}
+
+TEST_F(RestMonitorTest, ATableWithoutAnAccelerometerIsNotAsked) {
+    table_bound = false;
+    const Rest rest = run(1);
+    EXPECT_EQ(rest.table.verdict, RestVerdict::absent);
+    EXPECT_TRUE(rest.measured());
+    platform_g = 1;
+    EXPECT_TRUE(run(0.2).moving());
+}
+
+TEST_F(RestMonitorTest, ALostSampleNowAndThenDelaysNothing) {
+    for (int i = 0; i < 400; ++i) {
+        force_valid = i % 5 != 0;
+        const Rest rest = run(0.025);
+        if (i > 40) {
+            ASSERT_TRUE(rest.measured()) << "sample " << i;
+        }
+    }
+}
+
+TEST_F(RestMonitorTest, RestSinceAMomentRestsOnNothingBeforeIt) {
+    ASSERT_TRUE(run(1).measured());
+    const Time stopped = now;
+    EXPECT_FALSE(run(0.4).measured_since(stopped));
+    EXPECT_TRUE(run(0.2).measured_since(stopped));
+}
+
+TEST_F(RestMonitorTest, SlowSamplesGetAWindowOfEight) {
+    RestMonitor slow({}, kSecond);
+    for (int i = 0; i < 8; ++i) {
+        now += kSecond;
+        slow.add(sample());
+    }
+    EXPECT_TRUE(slow.rest(now + 2 * kSecond).measured());
+}
+
+}  // namespace
+}  // namespace vibrig::rt

@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "daemon/serve/client.hpp"
+#include "daemon/serve/status_json.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "tests/unit/daemon/serve/fake_source.hpp"
+#include "tests/unit/daemon/serve/raw_connection.hpp"
+
+namespace vibrig::serve {
+namespace {
+
+std::string error_of(const std::string& json) {
+    try {
+        (void)parse_command(json);
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "none";
+}
+
+TEST(Command, IsReadWithAllItsFields) {
+    const CommandRequest request =
+        parse_command(R"({"kind":"acknowledge","by":"Ada","argument":"trip"})");
+    EXPECT_EQ(request.kind, CommandRequest::Kind::acknowledge);
+    EXPECT_EQ(request.by, "Ada");
+    EXPECT_EQ(request.argument, "trip");
+    EXPECT_EQ(parse_command(R"({"kind":"arm","by":"Ada"})").kind, CommandRequest::Kind::arm);
+    EXPECT_EQ(parse_command(R"({"kind":"start","by":"Ada"})").kind, CommandRequest::Kind::start);
+    EXPECT_EQ(parse_command(R"({"kind":"pause","by":"Ada"})").kind, CommandRequest::Kind::pause);
+    EXPECT_EQ(parse_command(R"({"kind":"resume","by":"Ada"})").kind, CommandRequest::Kind::resume);
+    EXPECT_EQ(parse_command(R"({"kind":"abort","by":"Ada"})").kind, CommandRequest::Kind::abort);
+}
+
+TEST(Command, IsRefusedWithTheFieldAndWhatWasExpected) {
+    EXPECT_NE(error_of(""), "none");
+    EXPECT_NE(error_of("not json").find("not a Command in JSON"), std::string::npos);
+    EXPECT_NE(error_of("{}").find("kind: missing or unknown"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"unspecified","by":"A"})").find("kind:"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"explode","by":"A"})").find("explode"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":99,"by":"A"})").find("kind"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"arm"})").find("by: empty"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"arm","by":"   "})").find("by: empty"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"arm","by":"A\nfaked line"})").find("control character"),
+              std::string::npos);
+    for (const char* c : {"\\u001b", "\\u009b", "\\u2028", "\\u202e"})
+        EXPECT_NE(error_of(std::string(R"({"kind":"arm","by":"A)") + c + "\"}").find("control"),
+                  std::string::npos)
+            << c;
+    EXPECT_NE(
+        error_of(R"({"kind":"arm","by":")" + std::string(101, 'x') + "\"}").find("by: 101 bytes"),
+        std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"arm","by":"A","force":true})").find("force"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":"acknowledge","by":"A"})").find("argument: empty"),
+              std::string::npos);
+    for (const char* twice : {R"({"kind":"abort","kind":"arm","by":"A"})",
+                              R"({"by":"A","kind":"arm","k\u0069nd":"arm"})",
+                              R"({"kind":"arm","kind":"arm","by":"A"})"})
+        EXPECT_NE(error_of(twice).find("\"kind\" twice"), std::string::npos) << twice;
+    EXPECT_NE(error_of(R"({"kind":"arm","by":"A","by":"B"})").find("\"by\" twice"),
+              std::string::npos);
+    EXPECT_NE(error_of(R"({kind:"arm","by":"A"})").find("at byte 2"), std::string::npos);
+    EXPECT_NE(error_of(R"({"kind":1e999,"by":"A"})").find("out of range"), std::string::npos);
+    EXPECT_NE(error_of("[]"), "none");
+    EXPECT_NE(error_of("null"), "none");
+    EXPECT_NE(error_of(std::string(10'000, '[')), "none");
+}
+
+TEST(Command, ReachesTheSourceWithTheUidOfThePeer) {
+    // GIVEN a server
+    FakeSource source;
+    const TemporaryFolder folder;
+    const StatusServer server(source, folder.file("s"));
+    // WHEN a command is posted
+    Client client(folder.file("s"));
+    const Reply reply = client.post("/api/v1/commands", R"({"kind":"arm","by":"Ada"})");
+    // THEN it is dispatched with the name that was said and the uid the kernel knows
+    EXPECT_EQ(reply.status, 200);
+    EXPECT_EQ(reply.body, R"({"accepted":true,"message":"done"})");
+    ASSERT_EQ(source.requests().size(), 1u);
+    EXPECT_EQ(source.requests()[0].kind, CommandRequest::Kind::arm);
+    EXPECT_EQ(source.requests()[0].by, "Ada (uid " + std::to_string(getuid()) + ")");
+}
+
+TEST(Command, RefusedByTheSourceIsAConflictWithItsReason) {
+    FakeSource source;
+    source.answer_commands_with({false, "not armed"});
+    const TemporaryFolder folder;
+    const StatusServer server(source, folder.file("s"));
+    const std::string answer =
+        post(folder.file("s"), "/api/v1/commands", R"({"kind":"start","by":"Ada"})");
+    EXPECT_EQ(status_of(answer), 409);
+    EXPECT_NE(answer.find("application/problem+json"), std::string::npos);
+    EXPECT_NE(body_of(answer).find("\"detail\":\"not armed\""), std::string::npos) << answer;
+}
+
+TEST(Command, ThatIsBadNeverReachesTheSource) {
+    FakeSource source;
+    const TemporaryFolder folder;
+    const StatusServer server(source, folder.file("s"));
+    const std::string path = folder.file("s");
+    EXPECT_EQ(status_of(post(path, "/api/v1/commands", "{")), 400);
+    EXPECT_EQ(status_of(post(path, "/api/v1/commands", "")), 400);
+    EXPECT_EQ(status_of(post(path, "/api/v1/commands", std::string("\0\xFF", 2))), 400);
+    const RawConnection form(path);
+    form.send(
+        "POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nContent-Type: text/plain\r\n"
+        "Content-Length: 27\r\n\r\n{\"kind\":\"abort\",\"by\":\"Ada\"}");
+    EXPECT_EQ(status_of(form.answer()), 415);
+    // A request that is cut off in the middle of its body
+    const RawConnection half(path);
+    half.send(
+        "POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nContent-Length: 40\r\n\r\n"
+        "{\"kind\":\"abort\",\"by\":\"Ada\"}");
+    half.finish_sending();
+    EXPECT_EQ(half.until_closed(), "");
+    EXPECT_TRUE(source.requests().empty());
+}
+
+}  // namespace
+}  // namespace vibrig::serve

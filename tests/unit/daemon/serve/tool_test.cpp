@@ -1,0 +1,247 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "daemon/serve/status_json.hpp"
+#include "daemon/serve/status_server.hpp"
+#include "tests/unit/daemon/serve/fake_source.hpp"
+#include "tests/unit/daemon/serve/raw_connection.hpp"
+
+namespace vibrig::serve {
+namespace {
+
+struct Outcome {
+    int code = -1;
+    std::string output;  ///< standard output and error
+};
+
+Outcome vibrig(const std::string& arguments) {
+    const std::string command = std::string(VIBRIG_PROGRAM) + ' ' + arguments + " 2>&1";
+    FILE* const pipe = popen(command.c_str(), "r");
+    Outcome outcome;
+    std::array<char, 4096> block{};
+    while (const std::size_t got = std::fread(block.data(), 1, block.size(), pipe)) {
+        outcome.output.append(block.data(), got);
+    }
+    const int status = pclose(pipe);
+    outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return outcome;
+}
+
+class Tool : public testing::Test {
+  protected:
+    /// Until the program that was just started has asked: under a sanitizer that takes a while.
+    void wait_until_asked() {
+        const int before = source.asked;
+        for (int i = 0; i < 3000 && source.asked == before; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    /// The server shows a status for a moment before it asks for another one.
+    void show(const StatusData& status) {
+        source.set(status);
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+
+    FakeSource source;
+    TemporaryFolder folder;
+    std::string path = folder.file("s");
+    std::string at = " --socket " + path;
+};
+
+TEST_F(Tool, PrintsTheStatusAsTheServerSaysIt) {
+    const StatusServer server(source, path);
+    const Outcome json = vibrig("status --json" + at);
+    EXPECT_EQ(json.code, 0) << json.output;
+    EXPECT_EQ(json.output, status_json(source.status()) + '\n');
+    const Outcome table = vibrig("status" + at);
+    EXPECT_EQ(table.code, 0) << table.output;
+    EXPECT_NE(table.output.find("RECORDING  run 1/2, position 3/14"), std::string::npos)
+        << table.output;
+    EXPECT_EQ(table.output.find('\x1b'), std::string::npos) << "no colours into a pipe";
+}
+
+TEST_F(Tool, SaysWhenNoDaemonRuns) {
+    for (const char* command : {"status", "status --json", "watch", "events", "arm --by Ada",
+                                "abort --by Ada", "ack trip --by Ada"}) {
+        const Outcome outcome = vibrig(command + at);
+        EXPECT_EQ(outcome.code, 2) << command;
+        EXPECT_NE(outcome.output.find("no vibrigd answers at " + path + " (is it running?"),
+                  std::string::npos)
+            << outcome.output;
+    }
+}
+
+TEST_F(Tool, SendsCommandsAndReportsRefusals) {
+    const StatusServer server(source, path);
+    EXPECT_EQ(vibrig("arm --by 'Ada Lovelace'" + at).code, 0);
+    EXPECT_EQ(vibrig("start" + at).output, "done\n");
+    EXPECT_EQ(vibrig("pause" + at).code, 0);
+    EXPECT_EQ(vibrig("resume" + at).code, 0);
+    EXPECT_EQ(vibrig("abort" + at).code, 0);
+    EXPECT_EQ(vibrig("ack trip" + at).code, 0);
+    const auto requests = source.requests();
+    ASSERT_EQ(requests.size(), 6u);
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(static_cast<std::size_t>(requests[i].kind), i);
+    EXPECT_EQ(requests[0].by.rfind("Ada Lovelace (uid ", 0), 0u) << requests[0].by;
+    EXPECT_GT(requests[1].by.size(), std::string(" (uid 0)").size()) << "the login name";
+    EXPECT_EQ(requests[5].argument, "trip");
+
+    source.answer_commands_with({false, "the shaker is not armed"});
+    const Outcome refused = vibrig("start" + at);
+    EXPECT_EQ(refused.code, 1);
+    EXPECT_EQ(refused.output, "vibrig: the shaker is not armed\n");
+    EXPECT_EQ(vibrig("ack" + at).code, 2) << "what?";
+    EXPECT_EQ(vibrig("arm --by ''" + at).code, 2);
+    EXPECT_EQ(source.requests().size(), 7u);
+}
+
+TEST_F(Tool, WatchesUntilTheCampaignEnds) {
+    const StatusServer server(source, path);
+    StatusData status = full_status();
+    const std::string watch = "watch --until-finished --interval 0.05" + at;
+    status.state = CampaignState::finished;
+    show(status);
+    EXPECT_EQ(vibrig(watch).code, 0);
+    for (const CampaignState bad : {CampaignState::aborted, CampaignState::tripped}) {
+        status.state = bad;
+        show(status);
+        const Outcome outcome = vibrig(watch);
+        EXPECT_EQ(outcome.code, 1);
+        EXPECT_NE(outcome.output.find(name_of(bad)), std::string::npos) << outcome.output;
+    }
+    // GIVEN a campaign under way WHEN it goes on and ends THEN each place is one line
+    status.state = CampaignState::recording;
+    show(status);
+    Outcome outcome;
+    {
+        const std::jthread watcher([&] { outcome = vibrig(watch); });
+        wait_until_asked();
+        status.state = CampaignState::finished;
+        source.set(status);
+    }
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("finished"), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("verdict: doubtful"), std::string::npos) << outcome.output;
+    EXPECT_LE(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 3) << outcome.output;
+    // AND a result that is not valid is a no
+    status.verdict.level = 2;
+    show(status);
+    EXPECT_EQ(vibrig(watch).code, 1);
+}
+
+TEST_F(Tool, WatchFindsARestartedDaemonAgain) {
+    auto server = std::make_unique<StatusServer>(source, path);
+    StatusData status = full_status();
+    source.set(status);
+    Outcome outcome;
+    {
+        const std::jthread watcher(
+            [&] { outcome = vibrig("watch --until-finished --interval 0.05" + at); });
+        wait_until_asked();
+        server.reset();
+        // The tool runs and asks twenty times a second: it sees that nobody answers.
+        std::this_thread::sleep_for(std::chrono::seconds(2));
+        status.state = CampaignState::finished;
+        source.set(status);
+        server = std::make_unique<StatusServer>(source, path);
+    }
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("NO ANSWER FROM vibrigd"), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("answers again"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Tool, ListsEvents) {
+    const StatusServer server(source, path);
+    for (int i = 1; i <= 2500; ++i) {
+        EventRecord event;
+        event.source = "campaign";
+        event.text = "event " + std::to_string(i);
+        source.log.append(event);
+    }
+    const Outcome outcome = vibrig("events" + at);
+    EXPECT_EQ(outcome.code, 0);
+    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 2500);
+    EXPECT_NE(outcome.output.find("event 2500\n"), std::string::npos);
+    const Outcome json = vibrig("events --json" + at);
+    EXPECT_EQ(json.output.rfind("{\"id\":\"1\"", 0), 0u) << json.output.substr(0, 200);
+}
+
+TEST_F(Tool, FollowsEventsAcrossARestart) {
+    auto server = std::make_unique<StatusServer>(source, path);
+    const auto tell = [this](const std::string& text) {
+        EventRecord event;
+        event.source = "campaign";
+        event.text = text;
+        source.log.append(event);
+    };
+    const std::string file = folder.file("events");
+    const auto printed = [&](const std::string& text) {
+        for (int i = 0; i < 3000; ++i) {
+            std::ifstream input(file);
+            std::ostringstream all;
+            all << input.rdbuf();
+            if (all.str().find(text) != std::string::npos) return true;
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        return false;
+    };
+    tell("first event");
+    const std::string command =
+        "exec " + std::string(VIBRIG_PROGRAM) + " events --follow" + at + " >" + file + " 2>&1";
+    const pid_t follower = fork();
+    if (follower == 0) {
+        execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+        _exit(127);
+    }
+    EXPECT_TRUE(printed("first event"));
+    tell("second event");
+    EXPECT_TRUE(printed("second event"));
+    server.reset();
+    EXPECT_TRUE(printed("trying again"));
+    server = std::make_unique<StatusServer>(source, path);
+    EXPECT_TRUE(printed("the daemon has started anew"));
+    tell("third event");
+    EXPECT_TRUE(printed("third event"));
+    kill(follower, SIGKILL);
+    waitpid(follower, nullptr, 0);
+}
+
+/// On a terminal, as a person has it.
+Outcome on_terminal(const std::string& environment, const std::string& arguments) {
+    const std::string command = "TERM=xterm " + environment + " script -qec '" + VIBRIG_PROGRAM +
+                                ' ' + arguments + "' /dev/null </dev/null 2>&1";
+    FILE* const pipe = popen(command.c_str(), "r");
+    Outcome outcome;
+    std::array<char, 4096> block{};
+    while (const std::size_t got = std::fread(block.data(), 1, block.size(), pipe))
+        outcome.output.append(block.data(), got);
+    pclose(pipe);
+    return outcome;
+}
+
+TEST_F(Tool, HasColoursOnATerminalThatWantsThem) {
+    const StatusServer server(source, path);
+    for (const char* command : {"status", "selftest"}) {
+        SCOPED_TRACE(command);
+        const std::string line = command + at;
+        EXPECT_NE(on_terminal("", line).output.find("\x1b["), std::string::npos);
+        for (const char* none : {"NO_COLOR=1", "NO_COLOR=1 FORCE_COLOR=1"})
+            EXPECT_EQ(on_terminal(none, line).output.find("\x1b["), std::string::npos);
+        EXPECT_NE(on_terminal("NO_COLOR=", line).output.find("\x1b["), std::string::npos)
+            << "empty is as not set";
+        EXPECT_EQ(vibrig(line).output.find("\x1b["), std::string::npos) << "into a pipe";
+        EXPECT_EQ(on_terminal("NO_COLOR=1", line + " --json").output.find("\x1b["),
+                  std::string::npos);
+    }
+}
+
+}  // namespace
+}  // namespace vibrig::serve

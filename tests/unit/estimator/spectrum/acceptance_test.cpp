@@ -1,0 +1,391 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "estimator/spectrum/analysis.hpp"
+#include "estimator/spectrum/sampling.hpp"
+#include "tests/unit/estimator/spectrum/survey.hpp"
+
+// The acceptance table of the theory (docs/theory/spectrum.md): a slice of the campaigns in every
+// run, all of them with the label soak. Campaigns are drawn from rows.
+namespace vibrig::estimator::spectrum {
+namespace {
+
+using Eigen::Index;
+using namespace testing;
+
+/// Nothing declared that these rows do not have.
+Settings settings_of() {
+    Settings settings;
+    settings.uncertainty.gain_between_frequencies.u = 0;
+    settings.uncertainty.accelerometer_gain.u = 0;
+    settings.uncertainty.resolver_harmonics = {};
+    return settings;
+}
+
+Analysis campaign(const Settings& settings, const Truth& truth, std::vector<PlannedDwell> plan,
+                  unsigned seed, bool mixed = true) {
+    std::mt19937_64 random(seed);
+    if (mixed) shuffle(plan, random);
+    Dwells dwells = dwells_of(settings, truth, plan);
+    add_noise(dwells, random);
+    return analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), Form::automatic);
+}
+
+std::vector<Situation> attitudes_of(const Profile& profile) {
+    std::vector<Situation> out;
+    for (const auto& deg : eight_attitudes()) out.push_back(situation_of(profile, deg));
+    return out;
+}
+
+/// Errors of a prediction: mean squares, absolute and in units of u, and within two u.
+struct Errors {
+    double square = 0, in_u = 0;
+    int within = 0, count = 0;
+    [[nodiscard]] double rms() const { return std::sqrt(square / count); }
+    [[nodiscard]] double rms_in_u() const { return std::sqrt(in_u / count); }
+};
+
+void add_errors(Errors& to, const Settings& settings, const Truth& truth, const Model& model,
+                const Profile& profile, double elastic_beyond = 0) {
+    const auto situations = attitudes_of(profile);
+    const Prediction predicted = predict(model, situations, {elastic_beyond, false});
+    for (Index k = 0; k < predicted.drift.rows(); ++k) {
+        const Eigen::Vector3d is =
+            drift_of(settings, truth, situations[static_cast<std::size_t>(k)]);
+        for (Index j = 0; j < 3; ++j) {
+            const double off = predicted.drift(k, j) - is[j];
+            to.square += off * off;
+            to.in_u += std::pow(off / predicted.u(k, j), 2);
+            to.within += std::abs(off) <= 2 * predicted.u(k, j) ? 1 : 0;
+            ++to.count;
+        }
+    }
+}
+
+/// The survey of a rig whose coefficients are half elastic at 60 Hz.
+void expect_survey_predicts(unsigned campaigns, double slack) {
+    constexpr std::array<double, 6> kPublished{0.0074, 0.0039, 0.0038, 0.0038, 0.0137, 0.0039};
+    const Truth truth = Truth::common(0.5, kSixty);
+    const auto profiles = six_profiles();
+    std::array<Errors, 6> errors;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        const Analysis found = campaign(settings_of(), truth, survey(), seed);
+        for (const Mixture& gyro : found.gyros) {
+            EXPECT_TRUE(gyro.named()) << "seed " << seed;
+            EXPECT_NEAR(tell(gyro).at(0).hz.mean, 60, 0.6) << "seed " << seed;
+        }
+        EXPECT_EQ(found.model.highest_hz, 125);
+        EXPECT_TRUE(found.model.refusal.empty()) << found.model.refusal;
+        for (std::size_t p = 0; p < profiles.size(); ++p)
+            add_errors(errors[p], settings_of(), truth, found.model, profiles[p]);
+    }
+    for (std::size_t p = 0; p < profiles.size(); ++p) {
+        SCOPED_TRACE(profiles[p].name);
+        EXPECT_LT(errors[p].rms(), 1.15 * slack * kPublished[p]);
+        EXPECT_GT(errors[p].rms_in_u(), 0.85 / slack);
+        EXPECT_LT(errors[p].rms_in_u(), 1.2 * slack);
+        std::printf("%-20s %.4f (%.2f) within 2 u %.3f\n", profiles[p].name.c_str(),
+                    errors[p].rms(), errors[p].rms_in_u(),
+                    static_cast<double>(errors[p].within) / errors[p].count);
+    }
+}
+
+TEST(SpectrumAcceptance, SurveyPredictsTheSixProfiles) { expect_survey_predicts(3, 1.25); }
+TEST(SpectrumAcceptance, SoakSurveyPredictsTheSixProfiles) { expect_survey_predicts(20, 1); }
+
+TEST(SpectrumAcceptance, CampaignAtOneFrequencyIsWrongAndSaysThatItIsNotCovered) {
+    constexpr std::array<double, 6> kPublished{0.211, 0.160, 0.125, 0.0415, 0.819, 0.0318};
+    const Truth truth = Truth::common(0.5, kSixty);
+    const Analysis found = campaign(settings_of(), truth, today(), 1);
+    EXPECT_EQ(found.form, Form::flat);
+    const auto profiles = six_profiles();
+    for (std::size_t p = 0; p < profiles.size(); ++p) {
+        SCOPED_TRACE(profiles[p].name);
+        EXPECT_FALSE(predict(found.model, attitudes_of(profiles[p])).covered());
+        Errors errors;
+        add_errors(errors, settings_of(), truth, found.model, profiles[p]);
+        std::printf("%-20s %.4f of %.4f\n", profiles[p].name.c_str(), errors.rms(), kPublished[p]);
+    }
+}
+
+/// False alarms over flat rigs, and what the prediction costs there.
+void expect_flat(unsigned campaigns) {
+    unsigned alarms = 0, named = 0;
+    double sum = 0;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        const Analysis found = campaign(settings_of(), {}, survey(), seed);
+        alarms += found.flat.alarm ? 1U : 0U;
+        for (const Mixture& gyro : found.gyros) named += gyro.named() ? 1U : 0U;
+        EXPECT_EQ(found.flat.degrees, 108);
+        sum += found.flat.chi_square;
+    }
+    const double n = campaigns;
+    // The drift that the rates do not exclude is in the covariance: less than the 108 of noise
+    // alone.
+    EXPECT_GT(sum / n, 85 - 4 * std::sqrt(216 / n));
+    EXPECT_LT(sum / n, 108 + 4 * std::sqrt(216 / n));
+    EXPECT_LE(alarms, 1U);
+    EXPECT_EQ(named, 0U);
+}
+TEST(SpectrumAcceptance, FlatRigsRaiseNoAlarm) { expect_flat(4); }
+TEST(SpectrumAcceptance, SoakFlatRigsRaiseNoAlarm) { expect_flat(30); }
+
+TEST(SpectrumAcceptance, SharesSeenAreThePublishedOnes) {
+    const Analysis found = campaign(settings_of(), {}, survey(), 1);
+    // 40, 60, 120, 300, 1000 Hz.
+    constexpr std::array<double, 5> kPublished{0.006, 0.006, 0.006, 0.17, 2.2};
+    for (std::size_t i = 0; i < kPublished.size(); ++i) {
+        const auto& [hz, share] = found.flat.smallest_seen[i];
+        EXPECT_NEAR(share / kPublished[i], 1, 0.35) << hz;
+    }
+}
+
+/// A small elastic part, seen by the flatness test.
+unsigned alarms_of(const Truth& truth, const Settings& settings, double gain_scatter,
+                   unsigned campaigns) {
+    unsigned alarms = 0;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        auto plan = survey();
+        std::mt19937_64 random(1000 + seed);
+        std::normal_distribution<double> normal;
+        std::map<double, double> gains;
+        for (PlannedDwell& dwell : plan) {
+            if (!(dwell.hz > 0)) continue;
+            if (!gains.contains(dwell.hz)) gains[dwell.hz] = 1 + gain_scatter * normal(random);
+            dwell.gain = gains[dwell.hz];
+        }
+        alarms += campaign(settings, truth, plan, seed).flat.alarm ? 1U : 0U;
+    }
+    return alarms;
+}
+
+TEST(SpectrumAcceptance, GainScatterAlarmsUnlessDeclared) {
+    Settings declared = settings_of();
+    declared.uncertainty.gain_between_frequencies.u = 0.005;
+    EXPECT_EQ(alarms_of({}, declared, 0.005, 4), 0U);
+    EXPECT_GE(alarms_of({}, settings_of(), 0.02, 2), 2U);
+    EXPECT_EQ(alarms_of(Truth::common(0.02, kSixty), declared, 0, 3), 3U);
+}
+TEST(SpectrumAcceptance, SoakGainScatterAlarmsUnlessDeclared) {
+    Settings declared = settings_of();
+    declared.uncertainty.gain_between_frequencies.u = 0.005;
+    EXPECT_LE(alarms_of({}, declared, 0.005, 30), 1U);
+    const unsigned undeclared = alarms_of({}, settings_of(), 0.005, 40);
+    EXPECT_GE(undeclared, 10U);
+    EXPECT_LE(undeclared, 24U);
+    EXPECT_GE(alarms_of(Truth::common(0.02, kSixty), declared, 0, 30), 27U);
+    EXPECT_LE(alarms_of({}, declared, 0, 30), 1U);
+}
+
+Truth two_resonances_of(double first_hz, double first_share, double second_hz,
+                        double second_share) {
+    Truth truth = Truth::common(first_share, {first_hz, 0.05});
+    const Truth more = Truth::common(second_share, {second_hz, 0.05});
+    for (std::size_t j = 0; j < 3; ++j) truth.elastic[j].push_back(more.elastic[j][0]);
+    return truth;
+}
+
+TEST(SpectrumAcceptance, TwoResonancesInsideThePlanAreFound) {
+    for (const auto& [f1, s1, f2, s2] :
+         {std::array{40., .25, 95., .25}, std::array{60., .5, 90., -.2}}) {
+        const Truth truth = two_resonances_of(f1, s1, f2, s2);
+        const Analysis found = campaign(settings_of(), truth, survey(), 1);
+        Errors errors;
+        for (const Profile& profile : six_profiles())
+            add_errors(errors, settings_of(), truth, found.model, profile);
+        EXPECT_LT(errors.rms_in_u(), 1.5);
+        for (std::size_t j = 0; j < 3; ++j) {
+            ASSERT_TRUE(found.second[j]) << f1;
+            EXPECT_GE(found.lack_of_fit[j], kAlarm);
+            const auto told = tell(found.gyros[j]);
+            ASSERT_EQ(told.size(), 2U);
+            const auto& [low, high] = std::minmax(told[0].hz, told[1].hz,
+                                                  [](auto& a, auto& b) { return a.mean < b.mean; });
+            EXPECT_NEAR(low.mean, f1, std::max(5.0, 3 * low.sigma));
+            EXPECT_NEAR(high.mean, f2, std::max(5.0, 3 * high.sigma));
+        }
+    }
+}
+
+TEST(SpectrumAcceptance, AThirdResonanceIsNotPredictedWith) {
+    Truth truth = two_resonances_of(30, 0.4, 55, -0.4);
+    for (std::size_t j = 0; j < 3; ++j)
+        truth.elastic[j].push_back(Truth::common(0.4, {105, 0.05}).elastic[j][0]);
+    const Analysis found = campaign(settings_of(), truth, survey(), 1);
+    EXPECT_NE(found.model.refusal.find("more than two resonances"), std::string::npos)
+        << found.model.refusal;
+}
+
+/// Biases that move are no spectrum.
+void expect_drift_is_no_spectrum(unsigned campaigns) {
+    for (const int kind : {0, 1, 2}) {
+        unsigned alarms = 0;
+        for (unsigned seed = 1; seed <= campaigns; ++seed) {
+            auto plan = survey();
+            std::mt19937_64 random(seed);
+            shuffle(plan, random);
+            Dwells dwells = dwells_of(settings_of(), {}, plan);
+            add_noise(dwells, random);
+            std::normal_distribution<double> normal;
+            Eigen::Vector3d walk = Eigen::Vector3d::Zero();
+            for (std::size_t i = 0; i < dwells.list.size(); ++i) {
+                const double hours = 160.0 / 3600;
+                for (Index j = 0; j < 3; ++j)
+                    walk[j] += kind == 0   ? 0.03 * std::sqrt(hours) * normal(random)
+                               : kind == 1 ? (i == 30 ? 0.1 : 0)
+                                           : 0.05 * hours;
+                dwells.list[i].row.rate += walk;
+            }
+            alarms += analyse(settings_of(),
+                              SpectralTable(settings_of(), dwells.list, dwells.kinds), Form::flat)
+                              .flat.alarm
+                          ? 1U
+                          : 0U;
+        }
+        EXPECT_LE(alarms, 1U) << "drift " << kind;
+    }
+}
+TEST(SpectrumAcceptance, MovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(2); }
+TEST(SpectrumAcceptance, SoakMovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(40); }
+
+TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) {
+    const Truth truth = Truth::common(0.5, {300, 0.05});
+    const Analysis found = campaign(settings_of(), truth, survey(), 1);
+    const Profile& integrity = built_in_profiles()[0];
+    const Prediction predicted = predict(found.model, attitudes_of(integrity));
+    EXPECT_FALSE(predicted.covered());
+    Errors errors;
+    add_errors(errors, settings_of(), truth, found.model, integrity, 1);
+    EXPECT_LT(errors.rms_in_u(), 1);
+}
+
+/// Random rigs: each gyro its own resonance, or none.
+void expect_coverage(unsigned campaigns) {
+    Errors errors;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        std::mt19937_64 random(5000 + seed);
+        std::uniform_real_distribution<double> uniform;
+        std::normal_distribution<double> normal;
+        Truth truth = Truth::common(1, kSixty);
+        for (auto& gyro : truth.elastic) {
+            if (uniform(random) < 0.3) {
+                gyro.clear();
+                continue;
+            }
+            gyro[0].resonance = {25 * std::pow(12, uniform(random)),
+                                 0.015 * std::pow(10, uniform(random))};
+            for (double& e : gyro[0].coefficients) e = 0.3 * 0.03 * normal(random);
+        }
+        const Analysis found = campaign(settings_of(), truth, survey(), seed);
+        for (const Profile& profile : six_profiles())
+            add_errors(errors, settings_of(), truth, found.model, profile);
+    }
+    std::printf("random rigs: error/u %.2f, within 2 u %.3f\n", errors.rms_in_u(),
+                static_cast<double>(errors.within) / errors.count);
+    if (campaigns >= 20) {
+        EXPECT_GE(static_cast<double>(errors.within) / errors.count, 0.93);
+        EXPECT_LE(static_cast<double>(errors.within) / errors.count, 0.98);
+    }
+    EXPECT_LT(errors.rms_in_u(), campaigns >= 20 ? 1.1 : 1.4);
+}
+TEST(SpectrumAcceptance, PredictionsCoverRandomRigs) { expect_coverage(5); }
+TEST(SpectrumAcceptance, SoakPredictionsCoverRandomRigs) { expect_coverage(40); }
+
+/// Slow samples of random dwells: 2.2 % of their level, in the budget or taken as exact.
+double error_of_random_dwells(bool budgeted, unsigned campaigns) {
+    const auto octave = [](double from) {
+        const double density = 9 / from;
+        return Profile{"from " + std::to_string(from),
+                       {{from, density}, {2 * from, density}},
+                       {},
+                       {0, 1, 0},
+                       0};
+    };
+    const double s = realised_error(3600, 40, 200);
+    Errors errors;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        std::mt19937_64 random(seed);
+        std::normal_distribution<double> normal;
+        Dwells dwells = dwells_of(settings_of(), {}, survey());
+        for (SpectralDwell& dwell : dwells.list) {
+            if (!dwell.kind) continue;
+            dwell.row.vibration.kappa =
+                1 + (dwell.row.vibration.kappa - 1) * (1 + s * normal(random));
+            dwell.relative_error = budgeted ? s : 0;
+            Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+            moment(1, 1) = dwell.row.vibration.kappa - 1;
+            const Attitude at = attitude(settings_of(), dwell.row.angles, moment);
+            for (std::size_t j = 0; j < 3; ++j)
+                dwell.row.regressors.row(static_cast<Index>(j)) = at.base[j];
+        }
+        for (std::size_t k = 0; k < dwells.kinds.size(); ++k) {
+            const Profile profile = octave(12 + 15.0 * static_cast<double>(k));
+            dwells.kinds[k] = {profile.name, bands_of(profile, 100)};
+        }
+        add_noise(dwells, random);
+        // A model of constant bias: drift states would take the scatter for their own.
+        Settings settings = settings_of();
+        settings.drift.model = uncertainty::BiasModel::constant;
+        const Analysis found =
+            analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), Form::flat);
+        add_errors(errors, settings, {}, found.model, six_profiles()[2]);
+    }
+    return errors.rms_in_u();
+}
+TEST(SpectrumAcceptance, RealisedLevelsErrorIsInTheBudget) {
+    EXPECT_NEAR(error_of_random_dwells(true, 20), 1, 0.25);
+    EXPECT_GT(error_of_random_dwells(false, 20), 1.3);
+}
+
+/// Four profiles at four attitudes that the fit has not seen, noise of a dwell on each.
+TEST(SpectrumAcceptance, VerificationConfirmsAndContradicts) {
+    const Truth truth = Truth::common(0.5, kSixty);
+    const auto profiles = six_profiles();
+    double squares = 0;
+    unsigned confirmed = 0, contradicted = 0;
+    constexpr unsigned kCampaigns = 6;
+    for (unsigned seed = 1; seed <= kCampaigns; ++seed) {
+        const Analysis found = campaign(settings_of(), truth, survey(), seed);
+        std::vector<Situation> situations;
+        for (const std::size_t p : {1U, 2U, 3U, 4U}) {
+            for (std::size_t a = 0; a < 4; ++a)
+                situations.push_back(situation_of(profiles[p], eight_attitudes()[2 * a]));
+        }
+        std::mt19937_64 random(900 + seed);
+        std::normal_distribution<double> normal;
+        Eigen::MatrixXd measured(16, 3);
+        for (Index k = 0; k < 16; ++k) {
+            measured.row(k) =
+                drift_of(settings_of(), truth, situations[static_cast<std::size_t>(k)]);
+            for (Index j = 0; j < 3; ++j) measured(k, j) += 0.007 * normal(random);
+        }
+        const std::vector<Eigen::Matrix3d> variances(16, 4.9e-5 * Eigen::Matrix3d::Identity());
+        const std::vector<double> exact(16, 0.0);
+        const Verification right =
+            verify(predict(found.model, situations, {0, false}), measured, variances, exact);
+        confirmed += right.confirmed ? 1U : 0U;
+        squares += right.z.squaredNorm() / (16 * 3);
+        Model without = found.model;
+        for (auto& gyro : without.mixture) {
+            for (Hypothesis& one : gyro) one.x.tail(6).setZero();
+        }
+        const Verification wrong =
+            verify(predict(without, situations, {0, false}), measured, variances, exact);
+        contradicted += wrong.confirmed ? 0 : 1;
+        EXPECT_GT(wrong.larger, 2);
+    }
+    EXPECT_GE(confirmed, kCampaigns - 1);
+    EXPECT_EQ(contradicted, kCampaigns);
+    EXPECT_NEAR(std::sqrt(squares / kCampaigns), 1, 0.15);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::spectrum

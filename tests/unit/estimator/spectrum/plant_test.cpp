@@ -1,0 +1,73 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "estimator/spectrum/table.hpp"
+#include "tests/plant/recording.hpp"
+#include "tests/unit/estimator/spectrum/survey.hpp"
+
+namespace vibrig::estimator::spectrum {
+namespace {
+
+using namespace testing;
+
+/// The simulated rig integrates the yielding mass in time; the model knows only its mean.
+TEST(SpectrumPlant, AgreesWithTheModelOverTheFrequencies) {
+    plant::Truth truth;
+    truth.hard = true;
+    truth.elastic_share = {0.5, 0.5, 0.5};
+    truth.resolver_arcsec = truth.accelerometer_g = truth.gyro_random_walk_deg_per_rt_h = 0;
+    truth.resolver_bits = 24;
+    plant::CampaignPlan plan;
+    plan.positions_deg = {{45, 0, 60}, {-60, 10, 20}};
+    plan.frequency_hz = {15, 35, 45, 55, 65, 85, 101.3};
+    plan.table_g.assign(plan.frequency_hz.size(), 6);
+    plan.dwell_s = 60;
+    Settings settings;
+    std::optional<Identification> dwell;
+    std::pair<std::size_t, std::size_t> now{0, 0};
+    std::map<std::size_t, std::vector<DwellRow>> rows;
+    const auto close = [&] {
+        if (!dwell) return;
+        const DwellSummary summary = dwell->end_dwell();
+        ASSERT_EQ(dwell->rows().size(), 1U) << summary.reason;
+        rows[now.first].push_back(dwell->rows()[0]);
+    };
+    plant::simulate(truth, plan, [&](const plant::PlannedSample& sample) {
+        if (now != std::pair{sample.run, sample.position}) {
+            close();
+            now = {sample.run, sample.position};
+            settings.frequency_hz = plan.hz_of(sample.run);
+            dwell.emplace(settings, 1);
+            dwell->begin_dwell({static_cast<int>(sample.run), static_cast<int>(sample.position)});
+        }
+        Measurement measurement;
+        measurement.time_s = sample.time_s;
+        for (std::size_t i = 0; i < 3; ++i) {
+            measurement.angle_rad[i] = sample.readings.encoder_deg[i] * std::numbers::pi / 180;
+            measurement.force_g[i] = sample.readings.raw_g[i];
+        }
+        static_cast<void>(dwell->add(measurement));
+    });
+    close();
+    const Truth of_model = Truth::common(0.5, kSixty);
+    ASSERT_EQ(rows.size(), plan.frequency_hz.size());
+    for (const auto& [run, of_run] : rows) {
+        const double hz = plan.hz_of(run);
+        for (const DwellRow& row : of_run) {
+            Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+            moment(1, 1) = 18;
+            const Eigen::Vector3d is =
+                drift_of(settings, of_model, {row.angles, moment, {{hz, 1, 0}}, 0});
+            for (Eigen::Index j = 0; j < 3; ++j)
+                EXPECT_NEAR(row.rate[j], is[j], 2e-4) << hz << " Hz, gyro " << j;
+            EXPECT_NEAR(row.vibration.kappa, 19, 19 * 1e-4) << hz;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::spectrum

@@ -1,0 +1,157 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+#include "tests/unit/estimator/uncertainty/theory_rows.hpp"
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using estimator::testing::balanced;
+using estimator::testing::result_of;
+using estimator::testing::theory_rows;
+
+Assessment of_clean_rig(const Settings& settings) {
+    return assess(settings, result_of(theory_rows(settings, balanced(6, 14.0 / 3))));
+}
+
+/// Coefficients of one kind over the three gyros: bias, linear, squares, products.
+std::size_t kind(std::size_t i) {
+    const std::size_t group = internal_of(i) / kGyros;
+    return group == kDt ? 0 : group <= kDo ? 1 : group <= kDoo ? 2 : 3;
+}
+
+/// rms of a contribution over a kind, in units of sigma; several elements of one input together.
+std::array<double, 4> share(const Assessment& a, const std::string& input,
+                            const std::string& begins = "") {
+    std::array<double, 4> sum{}, count{};
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const Coefficient& c = a.coefficients[i];
+        double square = 0;
+        for (const Contribution& one : c.budget) {
+            if (one.input == input && one.element.starts_with(begins))
+                square += one.contribution * one.contribution;
+        }
+        sum[kind(i)] += square / (c.sigma * c.sigma);
+        count[kind(i)] += 1;
+    }
+    for (std::size_t k = 0; k < 4; ++k) sum[k] = std::sqrt(sum[k] / count[k]);
+    return sum;
+}
+
+TEST(Budget, OfACleanRigIsThatOfTheBalancedPlan) {
+    const Assessment a = of_clean_rig({});
+    const auto near = [&](const std::string& input, const std::array<double, 4>& expected,
+                          const std::string& begins = "") {
+        const std::array<double, 4> found = share(a, input, begins);
+        for (std::size_t k = 0; k < 4; ++k)
+            EXPECT_NEAR(found[k], expected[k], 0.0015 + 0.05 * expected[k])
+                << input << " " << begins << " " << k;
+    };
+    near("latitude", {.025, .123, .023, .035});
+    near("azimuth", {.015, .111, .073, .073});
+    near("encoder_zero", {.013, .068, .037, .054});
+    near("non_orthogonality", {.005, .039, .008, .019});
+    near("resolver_harmonics", {.011, .044, .011, .029}, "1 per turn");
+    near("resolver_harmonics", {.008, .069, .018, .061}, "2 per turn");
+    near("resolver_harmonics", {.083, .414, .067, .116}, "16 per turn");
+    near("time_base", {.005, .025, .005, .007});
+    near("accelerometer_gain", {.022, .006, .662, .537});
+    near("accelerometer_zero_g", {.002, .026, .008, .013});
+    near("accelerometer_cross", {.001, .007, .021, .036});
+    near("local_g", {0, .003, .001, .001});
+}
+
+TEST(Budget, AddsUpToTheCombinedUncertaintyWithTheLargestFirst) {
+    const Assessment a = of_clean_rig({});
+    for (const Coefficient& c : a.coefficients) {
+        double square = 0, before = 1e9;
+        for (const Contribution& one : c.budget) {
+            EXPECT_LE(one.contribution, before);
+            before = one.contribution;
+            square += one.contribution * one.contribution;
+        }
+        EXPECT_NEAR(std::sqrt(square), c.u, 1e-9 * c.u);
+        EXPECT_NEAR(c.expanded, c.k * c.u, 1e-12);
+        EXPECT_TRUE(std::isnan(c.u_use));
+    }
+    // D_SSx of -0.030990 deg/h/g^2: the gain brings 2.90e-4; with k 1.96 for 95 %.
+    const Coefficient& d = a.coefficients[6];
+    EXPECT_NEAR(d.u, std::hypot(d.u_a, d.u_b), 1e-12);
+    EXPECT_NEAR(d.k, 1.96, 0.01);
+    EXPECT_EQ(d.budget[0].input, "noise and drift states");
+    EXPECT_EQ(d.budget[1].input, "accelerometer_gain");
+    EXPECT_NEAR(d.budget[1].contribution / std::abs(d.value), 2.90e-4 / 0.030990, 1e-4);
+}
+
+TEST(Budget, ADeclaredLatitudeIsNoMisfit) {
+    // GIVEN a rig 6 arcmin from where it is thought to be
+    Settings at;
+    at.latitude_deg += 0.1;
+    Settings believed;
+    std::vector<DwellRow> rows = theory_rows(at, balanced(6, 14.0 / 3));
+    const Kinematics true_site(at), site(believed);
+    for (DwellRow& row : rows)
+        row.rate += true_site.pose(row.angles).earth_rate - site.pose(row.angles).earth_rate;
+    std::mt19937_64 random(5);
+    estimator::testing::add_noise(rows, random);
+    // WHEN it is declared as 10 arcsec, or as 6 arcmin
+    const Assessment narrow = assess(believed, result_of(rows));
+    believed.uncertainty.latitude_arcsec.u = 360;
+    const Assessment wide = assess(believed, result_of(rows));
+    // THEN that is a misfit by name and size, or none
+    EXPECT_EQ(narrow.verdict.level, Level::not_valid) << narrow.verdict.sentence;
+    EXPECT_NE(narrow.verdict.sentence.find("latitude 6."), std::string::npos)
+        << narrow.verdict.sentence;
+    EXPECT_LT(narrow.p, 1e-3);
+    EXPECT_GT(wide.p, 1e-3);
+    EXPECT_EQ(wide.verdict.level, Level::valid) << wide.verdict.sentence;
+}
+
+TEST(Budget, CorrelationsEnterAndImpossibleOnesAreRefused) {
+    Settings settings;
+    settings.uncertainty.correlations = {{"latitude", "azimuth", 0.9}};
+    const Assessment with = of_clean_rig(settings), without = of_clean_rig({});
+    double change = 0;
+    for (std::size_t i = 0; i < kParameters; ++i)
+        change =
+            std::max(change, std::abs(with.coefficients[i].u_b / without.coefficients[i].u_b - 1));
+    EXPECT_GT(change, 1e-3);
+
+    const auto refused = [](std::vector<Correlation> list) {
+        Inputs inputs;
+        inputs.correlations = std::move(list);
+        try {
+            check(inputs);
+        } catch (const SettingsError& error) {
+            return std::string(error.what());
+        }
+        return std::string();
+    };
+    EXPECT_EQ(refused({{"latitude", "azimuth", 0.3}}), "");
+    EXPECT_NE(refused({{"latitude", "longitude", 0.3}}).find("'longitude'"), std::string::npos);
+    EXPECT_NE(refused({{"latitude", "azimuth", 1.5}}).find("1.5"), std::string::npos);
+    EXPECT_NE(refused({{"latitude", "azimuth", 0.9},
+                       {"azimuth", "time_base", 0.9},
+                       {"latitude", "time_base", -0.9}})
+                  .find("exclude one another"),
+              std::string::npos);
+}
+
+TEST(Budget, ForAnotherPowerOnTheSwitchingOnIsAdded) {
+    Settings settings;
+    settings.uncertainty.turn_on_bias = 0.05;
+    settings.uncertainty.turn_on_linear = 0.01;
+    const Assessment a = of_clean_rig(settings);
+    EXPECT_GT(a.coefficients[0].u_use, 0.05);
+    EXPECT_NEAR(a.coefficients[1].u_use, std::hypot(a.coefficients[1].u, 0.01), 1e-12);
+    EXPECT_EQ(a.coefficients[4].u_use, a.coefficients[4].u);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::uncertainty

@@ -1,0 +1,181 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "estimator/filter/parameters.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+#include "tests/unit/estimator/rig_simulator.hpp"
+#include "tests/unit/estimator/uncertainty/theory_rows.hpp"
+
+// Whole campaigns as their rows, with what the bias did added to them.
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using estimator::testing::add_noise;
+using estimator::testing::kTable2;
+using Rows = std::vector<DwellRow>;
+using Random = std::mt19937_64;
+/// Adds what the rig did to the rates.
+using Misdeed = std::function<void(Rows&, Random&)>;
+
+double gauss(Random& random) { return std::normal_distribution<double>()(random); }
+double sign(Random& random) { return random() % 2 == 0 ? 1.0 : -1.0; }
+
+Misdeed step(double size, std::size_t after) {
+    return [=](Rows& rows, Random& random) {
+        for (Eigen::Index j = 0; j < 3; ++j) {
+            const double s = size * sign(random);
+            for (std::size_t k = after; k < rows.size(); ++k) rows[k].rate[j] += s;
+        }
+    };
+}
+
+Misdeed ramp(double per_hour) {
+    return [=](Rows& rows, Random& random) {
+        for (Eigen::Index j = 0; j < 3; ++j) {
+            const double s = per_hour * sign(random);
+            for (DwellRow& row : rows) row.rate[j] += s * (row.middle_s - rows[0].middle_s) / 3600;
+        }
+    };
+}
+
+Misdeed walk(double per_root_hour) {
+    return [=](Rows& rows, Random& random) {
+        for (Eigen::Index j = 0; j < 3; ++j) {
+            double bias = 0;
+            for (std::size_t k = 1; k < rows.size(); ++k) {
+                const double h = (rows[k].middle_s - rows[k - 1].middle_s) / 3600;
+                bias += per_root_hour * std::sqrt(h) * gauss(random);
+                rows[k].rate[j] += bias;
+            }
+        }
+    };
+}
+
+Misdeed scatter(double size) {
+    return [=](Rows& rows, Random& random) {
+        for (DwellRow& row : rows) {
+            for (Eigen::Index j = 0; j < 3; ++j) row.rate[j] += size * gauss(random);
+        }
+    };
+}
+
+struct Tally {
+    double rms = 0, within_2 = 0, nees = 0;
+    int valid = 0, doubtful = 0, not_valid = 0;
+};
+
+/// Errors in u_A against the truth whose D_F is its mean over the dwells.
+Tally campaigns(const std::vector<estimator::testing::PlannedRow>& plan, const Misdeed& misdeed,
+                int count, std::uint64_t seed) {
+    Settings settings;
+    const Rows clean = estimator::testing::theory_rows(settings, plan);
+    Random random(seed);
+    Tally tally;
+    for (int c = 0; c < count; ++c) {
+        Rows rows = clean;
+        if (misdeed) misdeed(rows, random);
+        std::array<double, 3> moved{};
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+            for (std::size_t j = 0; j < 3; ++j) {
+                const auto g = static_cast<Eigen::Index>(j);
+                moved[j] += (rows[k].rate[g] - clean[k].rate[g]) / static_cast<double>(rows.size());
+            }
+        }
+        add_noise(rows, random);
+        const Assessment a = assess(settings, estimator::testing::result_of(rows));
+        Eigen::VectorXd error(kParameters);
+        for (std::size_t i = 0; i < kParameters; ++i) {
+            const double truth = kTable2[i] + (i % kGroups == 0 ? moved[i / kGroups] : 0.0);
+            error[static_cast<Eigen::Index>(i)] = a.coefficients[i].value - truth;
+            const double in_u = error[static_cast<Eigen::Index>(i)] / a.coefficients[i].u_a;
+            tally.rms += in_u * in_u;
+            tally.within_2 += std::abs(in_u) <= 2 ? 1 : 0;
+        }
+        tally.nees += error.dot(a.covariance_a.llt().solve(error));
+        ++(a.verdict.level == Level::valid      ? tally.valid
+           : a.verdict.level == Level::doubtful ? tally.doubtful
+                                                : tally.not_valid);
+        if (::testing::Test::HasFailure()) break;
+    }
+    const double all = 30.0 * count;
+    tally.rms = std::sqrt(tally.rms / all);
+    tally.within_2 /= all;
+    tally.nees /= count;
+    return tally;
+}
+
+std::ostream& operator<<(std::ostream& out, const Tally& t) {
+    return out << "rms " << t.rms << ", within 2 " << t.within_2 << ", NEES " << t.nees << ", "
+               << t.valid << " V " << t.doubtful << " D " << t.not_valid << " N";
+}
+
+using estimator::testing::balanced;
+using estimator::testing::balanced_with_rest;
+using estimator::testing::sequential;
+constexpr double kFirst = 6, kSecond = 14.0 / 3;
+
+/// What 20 campaigns say, against rms of error/u_A of many.
+void expect(const Tally& tally, double rms) {
+    EXPECT_NEAR(tally.rms, rms, 0.15) << tally;
+    EXPECT_LE(tally.rms, 1.2) << tally;
+    EXPECT_GE(tally.within_2, 0.92) << tally;
+}
+
+TEST(Campaigns, OfACleanRigAreValid) {
+    const std::uint64_t seed = 11;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Tally tally = campaigns(balanced(kFirst, kSecond), {}, 40, seed);
+    expect(tally, 0.94);
+    // One false alarm in 230 campaigns: two of 40 once in 80 times.
+    EXPECT_GE(tally.valid, 38) << tally;
+    const Tally rest = campaigns(balanced_with_rest(kFirst), {}, 20, seed);
+    expect(rest, 0.98);
+    EXPECT_GE(rest.valid, 19) << rest;
+}
+
+TEST(Campaigns, WhoseBiasStepsWalksDriftsOrScattersAreDoubtfulAndCoveredByU) {
+    const std::uint64_t seed = 12;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const auto plan = balanced(kFirst, kSecond);
+    const auto run = [&](const char* what, const Misdeed& misdeed, double rms, int most_not_valid) {
+        SCOPED_TRACE(what);
+        const Tally tally = campaigns(plan, misdeed, 20, seed);
+        expect(tally, rms);
+        EXPECT_LE(tally.valid, 1) << tally;
+        EXPECT_LE(tally.not_valid, most_not_valid) << tally;
+    };
+    run("step 0.1 deg/h half way", step(0.1, 14), 1.0, 0);
+    run("step 0.1 deg/h after dwell 6", step(0.1, 6), 1.0, 0);
+    run("ramp 0.05 deg/h/h", ramp(0.05), 0.93, 0);
+    run("walk 0.03 deg/h/sqrt(h)", walk(0.03), 0.93, 0);
+    run("scatter 0.03 deg/h", scatter(0.03), 1.06, 4);
+}
+
+TEST(Campaigns, InWhichARunFollowsTheOtherCannotTellAStepBetweenThem) {
+    const auto plan = sequential(kFirst, kSecond);
+    const Tally unknown = campaigns(plan, {}, 3, 13);
+    EXPECT_EQ(unknown.doubtful, 3) << unknown;
+    Settings settings;
+    settings.drift.power = Power::unbroken;
+    Rows rows = estimator::testing::theory_rows(settings, plan);
+    Random random(13);
+    add_noise(rows, random);
+    const Assessment a = assess(settings, estimator::testing::result_of(rows));
+    EXPECT_EQ(a.verdict.level, Level::valid) << a.verdict.sentence;
+    EXPECT_GT(a.worst_step, 500);
+}
+
+TEST(CampaignsSoak, OfAThousandCleanOnesTenAreNotValidAtMost) {
+    const std::uint64_t seed = 14;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Tally tally = campaigns(balanced(kFirst, kSecond), {}, 1000, seed);
+    EXPECT_LE(tally.doubtful + tally.not_valid, 10) << tally;
+    EXPECT_NEAR(tally.rms, 0.94, 0.05) << tally;
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::uncertainty

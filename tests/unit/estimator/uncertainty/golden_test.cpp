@@ -1,0 +1,131 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "estimator/filter/parameters.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+#include "estimator/uncertainty/fit.hpp"
+#include "tests/unit/estimator/rig_simulator.hpp"
+#include "tests/unit/estimator/uncertainty/theory_rows.hpp"
+
+namespace vibrig::estimator::uncertainty {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using estimator::testing::kTable2;
+
+/// The 28 dwells of 9 and 7 g in balanced order; gyro x with a step of 0.03 deg/h half way and a
+/// known scatter, y and z without error.
+struct Golden : ::testing::Test {
+    Golden() {
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            rows[i].rate[0] +=
+                0.03 * ((i >= 14 ? 1 : 0) - 0.5) + 0.007 * std::sin(static_cast<double>(i) + 1);
+        table = dwell_table(rows);
+        for (Index j = 0; j < 3; ++j) {
+            GyroRates& gyro = gyros[static_cast<std::size_t>(j)];
+            gyro.time_h = table.time_h;
+            gyro.rate.resize(28);
+            gyro.variance = VectorXd::Constant(28, estimator::testing::kRateVariance);
+            gyro.regressors.resize(28, 10);
+            gyro.prior_information = VectorXd::Zero(10);
+            for (Index k = 0; k < 28; ++k) {
+                gyro.rate[k] = rows[static_cast<std::size_t>(k)].rate[j];
+                gyro.regressors.row(k) = rows[static_cast<std::size_t>(k)].regressors.row(j);
+            }
+        }
+        for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];
+    }
+    Settings settings;
+    std::vector<DwellRow> rows =
+        estimator::testing::theory_rows(settings, estimator::testing::balanced(6, 14.0 / 3));
+    DwellTable table;
+    std::array<GyroRates, 3> gyros;
+    ParameterArray truth{};
+};
+
+TEST_F(Golden, CoefficientsAveragedOverWhatTheBiasMayHaveDone) {
+    const DriftAverage x = average_drift(gyros[0], {});
+    const std::array<double, 10> value{0.998034960, -0.996291486, 0.999073778, -0.998755712,
+                                       0.030312460, -0.029705849, 0.030035466, -0.030215453,
+                                       0.030229967, -0.030435685};
+    const std::array<double, 10> u_a{0.006220955, 0.006278360, 0.002554037, 0.003007621,
+                                     0.000589308, 0.000416786, 0.000455474, 0.000503806,
+                                     0.000799740, 0.000505476};
+    for (Index i = 0; i < 10; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        EXPECT_NEAR(x.value[i], value[k], 2e-7) << i;
+        EXPECT_NEAR(std::sqrt(x.covariance(i, i)), u_a[k], 2e-7) << i;
+    }
+    // The gain is the estimator itself.
+    EXPECT_LT((x.gain * gyros[0].rate - x.value).norm(), 1e-9);
+}
+
+TEST_F(Golden, WeightsOfTheHypotheses) {
+    const DriftAverage x = average_drift(gyros[0], {});
+    const auto weight = [&](const auto& is) {
+        double sum = 0;
+        for (const auto& [what, w] : x.likeliest) sum += is(what) ? w : 0;
+        return sum;
+    };
+    using H = DriftHypothesis;
+    const auto slow = [](const H& h, double b, double c) {
+        return h.step_after == 0 && h.unbalance == H::Unbalance::none && h.scatter == 0 &&
+               h.walk == b && h.trend == c;
+    };
+    const auto step = [](const H& h, int k) {
+        return h.step_after == k && h.unbalance == H::Unbalance::none && h.walk == 0;
+    };
+    EXPECT_NEAR(weight([&](const H& h) { return step(h, 14); }), 0.633477, 5e-6);
+    EXPECT_NEAR(weight([&](const H& h) { return step(h, 13); }), 0.159903, 5e-6);
+    EXPECT_NEAR(weight([&](const H& h) { return slow(h, 4, 0); }), 0.068824, 5e-6);
+    EXPECT_NEAR(weight([&](const H& h) { return slow(h, 4, 4); }), 0.033894, 5e-6);
+    EXPECT_NEAR(x.weights.none / 1.9e-21, 1, 0.05);
+    EXPECT_EQ(x.step.after_dwell, 14);
+    EXPECT_NEAR(x.step.size, 0.03, 2 * x.step.sigma);
+}
+
+TEST_F(Golden, LackOfFitAndEvidence) {
+    // 121.12379 holds the prior's share, sum (D / sigma)^2 = 0.1361.
+    const NullFit fit(table, MatrixXd(84, 0), VectorXd::Zero(30));
+    EXPECT_NEAR(fit.chi_square(), 121.12379 - 0.13615, 2e-4);
+    EXPECT_EQ(fit.degrees(), 54);
+    RampFit ramps = fit_ramps(table, fit.value());
+    for (double& mean : ramps.mean) mean = 0;
+    const auto evidence = weigh_patterns(table, fit, ramps, ForwardModel(settings, truth), gyros);
+    const auto odds = [&](Pattern pattern) {
+        for (const Evidence& e : evidence) {
+            if (e.pattern == pattern) return e.log_odds;
+        }
+        return -1.0;
+    };
+    EXPECT_NEAR(odds(Pattern::step), 43.978, 2e-3);
+    // Walk and scatter by an independent calculation of the definition: the mean over the sizes is
+    // taken once for each gyro. Taken twice it would be 40.908 and 28.010.
+    EXPECT_NEAR(odds(Pattern::walk), 42.5315, 1e-3);
+    EXPECT_NEAR(odds(Pattern::trend), 38.160, 2e-3);
+    EXPECT_NEAR(odds(Pattern::scatter), 29.6628, 1e-3);
+    EXPECT_EQ(evidence.front().pattern, Pattern::step);
+    EXPECT_EQ(evidence.front().after_dwell, 14);
+    EXPECT_NEAR(evidence.front().size[0], 0.03, 2 * evidence.front().sigma[0]);
+}
+
+TEST_F(Golden, SignaturesOfTheFirstDwell) {
+    const ForwardModel model(settings, truth);
+    const auto of = [&](Misfit misfit, Index unknown, double sizes) {
+        const Signatures s = signatures(misfit, table, model, 0.007);
+        return Eigen::Vector3d(s.z.col(unknown).head<3>() * sizes / s.size);
+    };
+    const auto near = [](const Eigen::Vector3d& z, double x, double y, double zz) {
+        EXPECT_LT((z - Eigen::Vector3d(x, y, zz)).cwiseAbs().maxCoeff(), 2e-9) << z.transpose();
+    };
+    near(of(Misfit::azimuth, 0, 1), 8.394e-6, -3.053002e-3, 6.709e-6);
+    near(of(Misfit::latitude, 0, 1), 3.133562e-3, 1.5326e-5, 3.053447e-3);
+    near(of(Misfit::cross_axis, 0, 0.01), 5.405939e-3, -5.393863e-3, -5.373123e-3);
+    near(of(Misfit::cross_axis, 1, 0.01), -5.338426e-3, -5.415576e-3, -5.461420e-3);
+}
+
+}  // namespace
+}  // namespace vibrig::estimator::uncertainty
