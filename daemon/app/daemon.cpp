@@ -13,8 +13,8 @@
 #include <fstream>
 
 #include "daemon/order/campaign_order.hpp"
-#include "daemon/serve/one_line.hpp"
 #include "daemon/results/result_json.hpp"
+#include "daemon/serve/one_line.hpp"
 #include "daemon/version.hpp"
 #include "drivers/sample/signal_binding.hpp"
 #include "estimator/identification/plan_report.hpp"

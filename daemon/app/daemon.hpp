@@ -10,14 +10,16 @@
 #include <optional>
 #include <thread>
 
+#include "daemon/app/campaign_forecast.hpp"
 #include "daemon/archive/outbox.hpp"
 #include "daemon/campaign/campaign.hpp"
-#include "daemon/app/campaign_forecast.hpp"
 #include "daemon/commission/procedure.hpp"
 #include "daemon/commission/progress.hpp"
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/domain/status.hpp"
 #include "daemon/dwells/anew.hpp"
 #include "daemon/fleet/publisher.hpp"
+#include "daemon/interlock/interlock.hpp"
 #include "daemon/journal/journal.hpp"
 #include "daemon/log/log_queue.hpp"
 #include "daemon/noise/noise_monitor.hpp"
@@ -26,14 +28,13 @@
 #include "daemon/record/recorder.hpp"
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
-#include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/real_clock.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/rt/stirred_waiter.hpp"
 #include "daemon/serve/event_log.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/watch/guard_link.hpp"
+#include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig {

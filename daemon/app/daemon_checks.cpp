@@ -8,8 +8,8 @@
 #include <cstring>
 #include <filesystem>
 
-#include "daemon/campaign/rig_frame.hpp"
 #include "daemon/app/daemon.hpp"
+#include "daemon/campaign/rig_frame.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
 

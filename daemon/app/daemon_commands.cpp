@@ -2,8 +2,8 @@
 // and end there by name.
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/configuration/cross_checks.hpp"
 #include "daemon/app/daemon.hpp"
+#include "daemon/configuration/cross_checks.hpp"
 
 namespace vibrig {
 

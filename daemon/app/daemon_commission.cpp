@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <numbers>
 
-#include "daemon/commission/acceptance.hpp"
 #include "daemon/app/daemon.hpp"
+#include "daemon/commission/acceptance.hpp"
 #include "daemon/version.hpp"
 
 namespace vibrig {

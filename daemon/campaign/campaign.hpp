@@ -14,13 +14,13 @@
 #include "daemon/campaign/pace.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
-#include "daemon/rt/dwell_order.hpp"
-#include "daemon/interlock/interlock.hpp"
-#include "daemon/rt/stage_feed.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/interlock/interlock.hpp"
+#include "daemon/rt/dwell_order.hpp"
+#include "daemon/rt/stage_feed.hpp"
 #include "drivers/gimbal/gimbal.hpp"
-#include "drivers/shaker/shaker.hpp"
 #include "drivers/gimbal/torquer.hpp"
+#include "drivers/shaker/shaker.hpp"
 
 namespace vibrig::campaign {
 

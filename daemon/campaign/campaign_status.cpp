@@ -6,6 +6,7 @@
 #include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::campaign {
 

@@ -6,8 +6,8 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/rt/stage_feed.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/rt/stage_feed.hpp"
 #include "estimator/zeros/calibration.hpp"
 
 namespace vibrig::campaign {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "daemon/rt/frame_latency.hpp"
 #include "daemon/interlock/rest_monitor.hpp"
+#include "daemon/rt/frame_latency.hpp"
 #include "drivers/annunciator/annunciator.hpp"
-#include "drivers/sample/assembler.hpp"
 #include "drivers/can/can_port.hpp"
+#include "drivers/sample/assembler.hpp"
 #include "drivers/sample/sample.hpp"
 #include "drivers/shaker/shaker.hpp"
 #include "estimator/allan/noise_terms.hpp"

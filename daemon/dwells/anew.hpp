@@ -4,6 +4,7 @@
 #include <string>
 
 #include "daemon/noise/noise_monitor.hpp"
+#include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 
 namespace vibrig::dwells {

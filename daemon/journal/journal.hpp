@@ -13,13 +13,13 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/domain/status.hpp"
 #include "daemon/journal/chained_file.hpp"
 #include "daemon/journal/checkpoint.hpp"
 #include "daemon/journal/latches.hpp"
 #include "daemon/journal/watch.hpp"
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/ring.hpp"
-#include "daemon/domain/status.hpp"
 
 namespace vibrig::journal {
 

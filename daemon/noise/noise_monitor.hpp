@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/rt/angle_blocks.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/rt/angle_blocks.hpp"
 #include "estimator/allan/dwell_monitor.hpp"
 #include "estimator/identification/dwell_residual.hpp"
 

@@ -4,8 +4,8 @@
 #include <cstdio>
 #include <string>
 
-#include "daemon/results/progress.hpp"
 #include "daemon/papers/reproduce.hpp"
+#include "daemon/results/progress.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 

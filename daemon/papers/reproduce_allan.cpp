@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tool/analysis/allan_analysis.hpp"
-#include "daemon/results/progress.hpp"
 #include "daemon/papers/reproduce.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/tool/analysis/allan_analysis.hpp"
 #include "estimator/allan/deviation.hpp"
 #include "estimator/allan/dynamic.hpp"
 #include "estimator/allan/synthetic.hpp"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "daemon/tool/design/plan_study.hpp"
 #include "daemon/papers/reproduce.hpp"
+#include "daemon/tool/design/plan_study.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
 

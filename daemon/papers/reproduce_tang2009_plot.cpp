@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/plot/chart.hpp"
 #include "daemon/papers/reproduce_text.hpp"
+#include "daemon/plot/chart.hpp"
 
 namespace vibrig::tool::tang2009 {
 

@@ -8,8 +8,9 @@
 #include <thread>
 
 #include "daemon/results/progress.hpp"
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/linear_algebra.hpp"
+#include "estimator/identification/crlb.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::tool::tang2009 {

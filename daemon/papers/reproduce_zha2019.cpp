@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/results/progress.hpp"
 #include "daemon/papers/reproduce.hpp"
 #include "daemon/papers/reproduce_zha2019_vehicle.hpp"
+#include "daemon/results/progress.hpp"
 #include "estimator/levelling/simulation.hpp"
 
 namespace vibrig::tool::zha2019 {

@@ -5,9 +5,9 @@
 #include <cstdio>
 
 #include "daemon/plan/forecast.hpp"
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/plan/positions.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 

@@ -6,6 +6,7 @@
 
 #include "daemon/plan/plan_file.hpp"
 #include "estimator/filter/settings.hpp"
+#include "estimator/identification/result.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"

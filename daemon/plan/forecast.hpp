@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "daemon/plan/plan_file.hpp"
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/settings.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/plan/model.hpp"
 
 namespace vibrig::plan {

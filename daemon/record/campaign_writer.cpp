@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::record {
 

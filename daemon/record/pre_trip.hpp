@@ -9,8 +9,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/rt/ring.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/rt/ring.hpp"
 #include "drivers/sample/sample.hpp"
 
 namespace vibrig::record {

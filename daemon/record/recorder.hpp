@@ -10,16 +10,16 @@
 #include <thread>
 #include <variant>
 
+#include "daemon/domain/status.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/record/records.hpp"
 #include "daemon/record/settings.hpp"
 #include "daemon/rt/ring.hpp"
-#include "drivers/base/snapshot.hpp"
-#include "daemon/domain/status.hpp"
-#include "drivers/can/can_port.hpp"
 #include "drivers/base/clock.hpp"
+#include "drivers/base/snapshot.hpp"
+#include "drivers/can/can_port.hpp"
 
 namespace vibrig::record {
 

@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "daemon/domain/status.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/frame_record.hpp"
-#include "daemon/domain/status.hpp"
 #include "drivers/sample/sample.hpp"
+#include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::record {

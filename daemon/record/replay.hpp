@@ -6,6 +6,7 @@
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::record {
 

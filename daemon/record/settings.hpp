@@ -21,7 +21,7 @@ struct Settings {
 struct Instrument {
     std::string name, serial, certificate;
     std::string uncertainty;  ///< as its certificate has it, with k
-    std::string due;  ///< YYYY-MM-DD; empty: not stated
+    std::string due;          ///< YYYY-MM-DD; empty: not stated
     /// On a day written the same way.
     [[nodiscard]] bool overdue(const std::string& day) const { return !due.empty() && due < day; }
 };

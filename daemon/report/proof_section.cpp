@@ -6,8 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/report/report.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/report/report.hpp"
 
 namespace vibrig::report {
 

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <numbers>
 
+#include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/report/conditions_section.hpp"
 #include "daemon/report/journal_section.hpp"
@@ -18,7 +19,6 @@
 #include "daemon/report/proof_section.hpp"
 #include "daemon/report/result_charts.hpp"
 #include "daemon/report/uncertainty_section.hpp"
-#include "daemon/plot/chart.hpp"
 #include "daemon/version.hpp"
 #include "estimator/filter/instruction_set.hpp"
 

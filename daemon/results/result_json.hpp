@@ -3,8 +3,8 @@
 #include <string>
 
 #include "daemon/dwells/anew.hpp"
-#include "daemon/tool/analysis/spectrum_result.hpp"
-#include "estimator/identification/identification.hpp"
+#include "daemon/results/spectrum_result.hpp"
+#include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {

@@ -72,7 +72,7 @@ std::string verdict(const Assessment& assessed) {
     return text;
 }
 
-std::string amplitudes(const estimator::Result& result) {
+std::string amplitude_lines(const estimator::Result& result) {
     std::string text = line("%-12s %12s %11s  %12s %12s", "run", "amplitude g", "sigma g", "kappa",
                             "frequency Hz");
     for (const estimator::RunAmplitude& run : result.amplitudes) {
@@ -140,7 +140,7 @@ std::string monte_carlo_text(const estimator::uncertainty::MonteCarlo& drawn) {
 
 std::string result_table(const estimator::Result& result, const Assessment& assessed) {
     std::string text = coefficients(result, assessed) + "\nVibration on the platform (peak):\n" +
-                       amplitudes(result) + "\n";
+                       amplitude_lines(result) + "\n";
     text += "samples " + std::to_string(result.samples) + ", rejected " +
             std::to_string(result.rejected) + ", NIS per degree of freedom " +
             number("%.4f", result.nis_per_dof) + "\n";

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {

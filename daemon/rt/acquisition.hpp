@@ -8,19 +8,19 @@
 #include <functional>
 #include <optional>
 
+#include "daemon/interlock/interlock.hpp"
+#include "daemon/interlock/rest_monitor.hpp"
 #include "daemon/rt/frame_latency.hpp"
 #include "daemon/rt/frame_record.hpp"
-#include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/rate_meter.hpp"
 #include "daemon/rt/real_time.hpp"
-#include "daemon/interlock/rest_monitor.hpp"
 #include "daemon/rt/rig_clock.hpp"
 #include "daemon/rt/rig_time_link.hpp"
 #include "daemon/rt/ring.hpp"
-#include "drivers/base/snapshot.hpp"
 #include "daemon/rt/stage_feed.hpp"
-#include "drivers/sample/assembler.hpp"
+#include "drivers/base/snapshot.hpp"
 #include "drivers/can/can_port.hpp"
+#include "drivers/sample/assembler.hpp"
 
 namespace vibrig::rt {
 

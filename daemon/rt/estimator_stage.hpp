@@ -8,8 +8,8 @@
 #include "daemon/rt/fed.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/rt/ring.hpp"
-#include "drivers/base/snapshot.hpp"
 #include "drivers/base/clock.hpp"
+#include "drivers/base/snapshot.hpp"
 #include "drivers/sample/sample.hpp"
 #include "estimator/identification/identification.hpp"
 

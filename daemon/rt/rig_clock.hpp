@@ -4,8 +4,8 @@
 #include <mutex>
 #include <vector>
 
-#include "drivers/base/event_fd.hpp"
 #include "drivers/base/clock.hpp"
+#include "drivers/base/event_fd.hpp"
 
 namespace vibrig::rt {
 

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "daemon/rt/ring.hpp"
+#include "drivers/base/clock.hpp"
 #include "drivers/base/snapshot.hpp"
 #include "drivers/can/can_port.hpp"
-#include "drivers/base/clock.hpp"
 #include "drivers/sample/sample.hpp"
 #include "drivers/sample/signal_binding.hpp"
 #include "proto/dbc.hpp"

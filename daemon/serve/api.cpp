@@ -14,6 +14,7 @@
 #include "daemon/serve/page.hpp"
 #include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_json.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::serve {
 namespace {

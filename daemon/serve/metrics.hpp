@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "daemon/serve/api.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/serve/api.hpp"
 
 namespace vibrig::serve {
 

@@ -9,6 +9,7 @@
 #include "daemon/serve/one_line.hpp"
 #include "daemon/serve/readiness.hpp"
 #include "daemon/serve/status_message.hpp"
+#include "estimator/identification/result.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {

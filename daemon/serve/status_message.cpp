@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/identification/result.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/serve/caller.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/serve/caller.hpp"
 
 namespace vibrig::serve {
 

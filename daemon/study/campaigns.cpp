@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "daemon/order/campaign_order.hpp"
 #include "daemon/dwells/anew.hpp"
 #include "daemon/dwells/player.hpp"
+#include "daemon/order/campaign_order.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/study/rig_keys.hpp"
 #include "estimator/uncertainty/assessment.hpp"

@@ -5,10 +5,11 @@
 #include <cstdint>
 
 #include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/measurement.hpp"
 #include "estimator/filter/settings.hpp"
-#include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/ud_filter.hpp"
+#include "estimator/filter/vibration_moment.hpp"
 
 namespace vibrig::estimator {
 

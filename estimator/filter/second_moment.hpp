@@ -2,10 +2,10 @@
 
 #include <Eigen/Core>
 
-#include "estimator/filter/vibration_moment.hpp"
-#include "estimator/filter/settings.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/product.hpp"
+#include "estimator/filter/settings.hpp"
+#include "estimator/filter/vibration_moment.hpp"
 
 namespace vibrig::estimator {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "estimator/filter/drift_filter.hpp"
-#include "estimator/identification/dwell_row.hpp"
 #include "estimator/filter/normal_sums.hpp"
+#include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/two_step.hpp"
 
 namespace vibrig::estimator {

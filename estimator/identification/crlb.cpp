@@ -7,8 +7,8 @@
 
 #include "estimator/filter/drift_filter.hpp"
 #include "estimator/filter/linear_algebra.hpp"
-#include "estimator/identification/observability.hpp"
 #include "estimator/filter/settings_check.hpp"
+#include "estimator/identification/observability.hpp"
 
 namespace vibrig::estimator {
 namespace {

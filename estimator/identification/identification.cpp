@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/identification/identification_impl.hpp"
 #include "estimator/filter/settings_check.hpp"
+#include "estimator/identification/identification_impl.hpp"
 
 namespace vibrig::estimator {
 namespace {

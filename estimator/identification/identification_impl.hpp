@@ -4,18 +4,18 @@
 #include <array>
 #include <vector>
 
-#include "estimator/identification/batch_solver.hpp"
 #include "estimator/filter/drift_filter.hpp"
+#include "estimator/identification/batch_solver.hpp"
 #include "estimator/identification/dwell_buffer.hpp"
 #include "estimator/identification/dwell_record.hpp"
-#include "estimator/level/growing_tensor.hpp"
-#include "estimator/identification/identification.hpp"
 #include "estimator/identification/observability.hpp"
+#include "estimator/identification/result.hpp"
+#include "estimator/identification/two_step.hpp"
+#include "estimator/level/growing_tensor.hpp"
 #include "estimator/level/paper_level.hpp"
 #include "estimator/level/saturation_detector.hpp"
 #include "estimator/level/stuck_detector.hpp"
 #include "estimator/level/sync_motion.hpp"
-#include "estimator/identification/two_step.hpp"
 #include "estimator/level/vibration_level.hpp"
 
 namespace vibrig::estimator {

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/identification/result.hpp"
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::estimator {
 

@@ -3,8 +3,8 @@
 #include <map>
 #include <string>
 
-#include "estimator/identification/observability.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/observability.hpp"
 
 namespace vibrig::estimator {
 

@@ -7,6 +7,7 @@
 
 #include "estimator/filter/measurement.hpp"
 #include "estimator/filter/settings.hpp"
+#include "estimator/filter/vibration_moment.hpp"
 
 namespace vibrig::estimator {
 

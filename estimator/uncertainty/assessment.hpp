@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/budget.hpp"
 #include "estimator/uncertainty/fit.hpp"
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "estimator/filter/drift_model.hpp"
-#include "estimator/identification/dwell_row.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/identification/dwell_row.hpp"
 
 namespace vibrig::estimator::uncertainty {
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::estimator::uncertainty {
 

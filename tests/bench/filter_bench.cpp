@@ -7,11 +7,11 @@
 
 #include "estimator/filter/drift_filter.hpp"
 #include "estimator/filter/drift_model.hpp"
-#include "estimator/identification/identification.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/second_moment.hpp"
 #include "estimator/filter/ud_filter.hpp"
+#include "estimator/identification/identification.hpp"
 #include "tests/bench/dense_filter.hpp"
 #include "tests/bench/multiply_adds.hpp"
 

@@ -18,10 +18,10 @@
 
 #include "daemon/journal/database.hpp"
 #include "daemon/journal/journal.hpp"
+#include "daemon/plot/chart.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/replay.hpp"
-#include "daemon/plot/chart.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"

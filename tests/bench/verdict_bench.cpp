@@ -2,6 +2,7 @@
 
 #include <random>
 
+#include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 

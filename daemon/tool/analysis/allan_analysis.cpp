@@ -8,8 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "daemon/tool/analysis/column_file.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/tool/analysis/column_file.hpp"
 
 namespace vibrig::tool {
 

@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "daemon/plan/number_table.hpp"
+#include "daemon/plot/chart.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/plan_terms.hpp"
-#include "daemon/plot/chart.hpp"
 #include "estimator/allan/edf.hpp"
 #include "estimator/plan/calibration.hpp"
 #include "proto/option_value.hpp"

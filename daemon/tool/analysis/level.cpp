@@ -16,10 +16,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "daemon/tool/commands.hpp"
-#include "daemon/results/exit_status.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/tool/commands.hpp"
 #include "estimator/levelling/simulation.hpp"
 #include "proto/option_value.hpp"
 

@@ -17,9 +17,9 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/results/assessment_json.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"
-#include "daemon/tool/analysis/spectrum_result.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/spectrum/profile.hpp"

@@ -20,8 +20,8 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "daemon/tool/commands.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/tool/commands.hpp"
 
 namespace vibrig::tool {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimator/commissioning/consistency.hpp"
-#include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::tool {
 

@@ -8,10 +8,10 @@
 #include <optional>
 #include <utility>
 
-#include "estimator/level/hann.hpp"
 #include "estimator/filter/kinematics.hpp"
-#include "estimator/plan/positions.hpp"
+#include "estimator/level/hann.hpp"
 #include "estimator/level/vibration_level.hpp"
+#include "estimator/plan/positions.hpp"
 
 namespace vibrig::tool {
 

@@ -10,13 +10,13 @@
 #include <optional>
 #include <string>
 
-#include "daemon/results/assessment_json.hpp"
-#include "daemon/tool/commands.hpp"
-#include "daemon/results/exit_status.hpp"
-#include "daemon/tool/recordings/identified.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/results/exit_status.hpp"
 #include "daemon/results/result_table.hpp"
 #include "daemon/tool/analysis/uncertainty_text.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/identified.hpp"
 
 namespace vibrig::tool {
 namespace {

@@ -15,11 +15,11 @@
 #include <stdexcept>
 #include <vector>
 
+#include "daemon/plot/chart.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/results/progress.hpp"
 #include "daemon/tool/analysis/column_file.hpp"
 #include "daemon/tool/commands.hpp"
-#include "daemon/results/exit_status.hpp"
-#include "daemon/plot/chart.hpp"
-#include "daemon/results/progress.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "proto/option_value.hpp"

@@ -9,11 +9,11 @@
 #include <memory>
 #include <stdexcept>
 
+#include "daemon/plot/chart.hpp"
+#include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/design/plan_study.hpp"
 #include "daemon/tool/design/plan_turntable.hpp"
-#include "daemon/plot/chart.hpp"
-#include "daemon/results/progress.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::planner {

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tool/design/plan_study.hpp"
 #include "daemon/tool/analysis/uncertainty_text.hpp"
+#include "daemon/tool/design/plan_study.hpp"
 
 namespace vibrig::tool::planner {
 

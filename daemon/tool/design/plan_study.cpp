@@ -9,9 +9,9 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/tool/design/plan_terms.hpp"
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"

@@ -4,8 +4,8 @@
 #include <numeric>
 #include <string_view>
 
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/plan/positions.hpp"
 #include "estimator/uncertainty/planned.hpp"
 

@@ -8,12 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "daemon/plot/chart.hpp"
 #include "daemon/study/merge.hpp"
 #include "daemon/study/reduce.hpp"
 #include "daemon/study/run.hpp"
 #include "daemon/study/status.hpp"
 #include "daemon/tool/commands.hpp"
-#include "daemon/plot/chart.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "daemon/tool/design/study_submit.hpp"
 #include "proto/option_value.hpp"

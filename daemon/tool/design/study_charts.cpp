@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "daemon/plot/chart.hpp"
 #include "daemon/study/reduce.hpp"
 #include "daemon/study/statistics.hpp"
-#include "daemon/plot/chart.hpp"
 #include "daemon/tool/design/study_output.hpp"
 #include "estimator/filter/parameters.hpp"
 

@@ -4,9 +4,9 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "daemon/results/progress.hpp"
 #include "daemon/study/run.hpp"
 #include "daemon/study/status.hpp"
-#include "daemon/results/progress.hpp"
 
 namespace vibrig::tool::studies {
 

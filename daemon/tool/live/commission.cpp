@@ -25,8 +25,8 @@
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/journal/latches.hpp"
-#include "daemon/tool/live/answers.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/live/answers.hpp"
 #include "daemon/tool/live/key_by_key.hpp"
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
@@ -435,8 +435,7 @@ int state_gyros(const CommissionOptions& options) {
 }
 
 int commission(const CommissionOptions& options) {
-    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units",
-                                                      "excitation"};
+    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units", "excitation"};
     constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
                                                         "earth"};
     bool gyros = false;

@@ -14,8 +14,8 @@
 #include <set>
 #include <sstream>
 
-#include "daemon/tool/commands.hpp"
 #include "daemon/results/exit_status.hpp"
+#include "daemon/tool/commands.hpp"
 
 namespace vibrig::tool {
 namespace {

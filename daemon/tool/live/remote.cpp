@@ -13,10 +13,10 @@
 #include <memory>
 #include <thread>
 
+#include "daemon/results/exit_status.hpp"
 #include "daemon/serve/render.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
-#include "daemon/results/exit_status.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool {

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "daemon/serve/client.hpp"
 #include "daemon/results/exit_status.hpp"
+#include "daemon/serve/client.hpp"
 #include "proto/vibrig.pb.h"
 
 /// What the commands that talk to a running daemon share.

@@ -9,11 +9,11 @@
 
 #include "daemon/archive/trend.hpp"
 #include "daemon/archive/verify.hpp"
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/archive_serve.hpp"
-#include "daemon/results/assessment_json.hpp"
-#include "daemon/tool/commands.hpp"
-#include "daemon/results/progress.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::tool {

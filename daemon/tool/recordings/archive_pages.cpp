@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/archive/trend.hpp"
-#include "daemon/serve/api.hpp"
 #include "daemon/plot/xml_text.hpp"
+#include "daemon/serve/api.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
 #include "estimator/identification/identification.hpp"
 #include "proto/text.hpp"

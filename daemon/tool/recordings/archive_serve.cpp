@@ -7,9 +7,9 @@
 #include <iostream>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/results/exit_status.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/tool/recordings/archive_pages.hpp"
-#include "daemon/results/exit_status.hpp"
 
 namespace vibrig::tool {
 

@@ -17,14 +17,14 @@
 #include <string>
 
 #include "daemon/journal/certificates.hpp"
+#include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/report/analysis.hpp"
 #include "daemon/report/certificate.hpp"
-#include "daemon/tool/recordings/campaign_argument.hpp"
-#include "daemon/tool/commands.hpp"
-#include "daemon/plot/chart.hpp"
-#include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/print_pdf.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::tool {

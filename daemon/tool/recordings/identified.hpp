@@ -4,8 +4,8 @@
 #include <string>
 
 #include "daemon/dwells/anew.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
-#include "daemon/tool/analysis/spectrum_result.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
 
 namespace vibrig::tool {

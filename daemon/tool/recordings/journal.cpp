@@ -12,8 +12,8 @@
 
 #include "daemon/journal/verify.hpp"
 #include "daemon/record/campaign_file.hpp"
-#include "daemon/tool/commands.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/tool/commands.hpp"
 #include "proto/text.hpp"
 
 namespace vibrig::tool {

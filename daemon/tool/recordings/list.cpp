@@ -7,10 +7,10 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/results/assessment_json.hpp"
 #include "daemon/tool/colour.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 
 namespace vibrig::tool {
 

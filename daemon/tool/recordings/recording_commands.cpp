@@ -15,11 +15,11 @@
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
 #include "daemon/report/report.hpp"
-#include "daemon/tool/recordings/campaign_argument.hpp"
-#include "daemon/tool/commands.hpp"
 #include "daemon/results/exit_status.hpp"
-#include "daemon/tool/recordings/mat_file.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/mat_file.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {

@@ -15,15 +15,15 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/plot/chart.hpp"
 #include "daemon/report/journal_section.hpp"
 #include "daemon/report/report.hpp"
-#include "daemon/tool/recordings/campaign_argument.hpp"
-#include "daemon/tool/commands.hpp"
 #include "daemon/results/exit_status.hpp"
-#include "daemon/plot/chart.hpp"
-#include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/results/result_table.hpp"
+#include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "proto/text.hpp"
 

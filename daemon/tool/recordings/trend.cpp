@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/archive/trend.hpp"
-#include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
 #include "estimator/identification/identification.hpp"
 #include "proto/text.hpp"

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tool/recordings/archive_place.hpp"
-#include "daemon/results/assessment_json.hpp"
 #include "daemon/plot/chart.hpp"
+#include "daemon/results/assessment_json.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::tool {

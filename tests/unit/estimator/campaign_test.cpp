@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

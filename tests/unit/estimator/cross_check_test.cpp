@@ -5,6 +5,7 @@
 #include <string>
 
 #include "estimator/identification/plan_report.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

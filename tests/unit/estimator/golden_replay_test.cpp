@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/identification/identification.hpp"
 #include "estimator/filter/instruction_set.hpp"
+#include "estimator/identification/identification.hpp"
 
 // A committed recording and what was once identified from it: when the numbers move, the review
 // shows it. To write them anew: VIBRIG_WRITE_GOLDEN=FILE estimator_test

@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/second_moment.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

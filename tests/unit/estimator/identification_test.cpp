@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 #include "tests/unit/support/allocation_count.hpp"
 

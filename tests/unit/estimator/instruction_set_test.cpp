@@ -6,6 +6,7 @@
 #include <string>
 
 #include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {

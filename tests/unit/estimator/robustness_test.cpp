@@ -6,6 +6,7 @@
 #include <string>
 
 #include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 // What goes wrong on a rig must be flagged and counted, and the coefficients stay within 4 sigma or

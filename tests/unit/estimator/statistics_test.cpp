@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/identification.hpp"
-#include "estimator/filter/linear_algebra.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 // Many simulated campaigns (9 and 7 g at the table, Table 1 of Tang et al. 2009): are the errors as

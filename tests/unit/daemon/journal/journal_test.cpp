@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "daemon/journal/database.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::journal {
 namespace {

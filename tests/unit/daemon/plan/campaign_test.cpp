@@ -7,9 +7,9 @@
 
 #include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/forecast.hpp"
+#include "estimator/filter/kinematics.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/identification/identification.hpp"
-#include "estimator/filter/kinematics.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/positions.hpp"
 #include "tests/plant/recording.hpp"

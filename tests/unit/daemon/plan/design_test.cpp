@@ -5,8 +5,8 @@
 #include <numeric>
 #include <random>
 
-#include "estimator/identification/crlb.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/plan/augmentation.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/exact.hpp"

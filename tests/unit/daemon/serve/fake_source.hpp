@@ -7,8 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/serve/event_log.hpp"
 #include "daemon/domain/status.hpp"
+#include "daemon/serve/event_log.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::v1 {
 class Status;

@@ -1,4 +1,5 @@
 #include "daemon/serve/status_message.hpp"
+#include "estimator/identification/result.hpp"
 #include "proto/vibrig.pb.h"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "daemon/dwells/player.hpp"
-#include "daemon/rt/estimator_stage.hpp"
 #include "daemon/results/result_json.hpp"
+#include "daemon/rt/estimator_stage.hpp"
 #include "tests/plant/recording.hpp"
 
 namespace vibrig::dwells {

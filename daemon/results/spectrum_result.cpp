@@ -1,4 +1,4 @@
-#include "daemon/tool/analysis/spectrum_result.hpp"
+#include "daemon/results/spectrum_result.hpp"
 
 #include <algorithm>
 #include <array>
