@@ -64,8 +64,8 @@ double beta_fraction(double a, double b, double x) {
 double beta_lower(double a, double b, double x) {
     if (x <= 0) return 0;
     if (x >= 1) return 1;
-    const double scale = std::exp(log_gamma(a + b) - log_gamma(a) - log_gamma(b) +
-                                  a * std::log(x) + b * std::log1p(-x));
+    const double scale = std::exp(log_gamma(a + b) - log_gamma(a) - log_gamma(b) + a * std::log(x) +
+                                  b * std::log1p(-x));
     if (x < (a + 1) / (a + b + 2)) return scale * beta_fraction(a, b, x) / a;
     return 1 - scale * beta_fraction(b, a, 1 - x) / b;
 }
