@@ -435,8 +435,7 @@ int state_gyros(const CommissionOptions& options) {
 }
 
 int commission(const CommissionOptions& options) {
-    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units",
-                                                      "excitation"};
+    constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units", "excitation"};
     constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
                                                         "earth"};
     bool gyros = false;
