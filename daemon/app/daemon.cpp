@@ -426,6 +426,8 @@ void Daemon::control_loop() {
             // Nobody is to see "finished" before there is a result.
             if (!concluding_ || to_write_ != ToWrite::complete)
                 campaign_.fill(campaign_status_, now);
+            if (procedure_ && procedure_->active())
+                campaign_status_.reason = procedure_->progress();
             campaign_status_.interlock.latches = latches_.open();
             campaign_status_.noise = noise_monitor_.status();
             armed_.store(!campaign_status_.armed_by.empty());

@@ -422,6 +422,14 @@ Time Procedure::step(Time now, Time wall) {
     return now + kPoll;
 }
 
+std::string Procedure::progress() const {
+    const std::string what = doing_ == Doing::asking ? "asked: " + question_.text
+                             : lines_.empty()        ? "first look"
+                                                     : lines_.back();
+    return fmt::format("{}: {}, {} positions, {} free drifts", by_, what, stops_.size(),
+                       drifts_.size());
+}
+
 Json Procedure::state(std::size_t after) const {
     Json question;
     if (doing_ == Doing::asking)

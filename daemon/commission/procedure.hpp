@@ -84,6 +84,8 @@ class Procedure {
     [[nodiscard]] bool active() const noexcept { return doing_ != Doing::nothing; }
     [[nodiscard]] const std::string& by() const noexcept { return by_; }
     [[nodiscard]] bool by_hand() const noexcept { return by_hand_; }
+    /// Who does what, on one line, for those who only watch.
+    [[nodiscard]] std::string progress() const;
     [[nodiscard]] const Finding& finding() const noexcept { return finding_; }
     /// Question, lines from number `after` on, and what was found.
     [[nodiscard]] Json state(std::size_t after) const;

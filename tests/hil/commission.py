@@ -256,7 +256,7 @@ def killed(checks, programs, folder, kills):
         _, whole_run = u.commission()
         whole_keys = whole_run["found"]
         with open(progress, encoding="utf-8") as file:
-            checks.check(len(json.load(file)["log"]) > KILLS[-2], "what is done is kept")
+            checks.check(len(json.load(file)["log"]) > KILLS[1], "what is done is kept")
         for kill in kills:
             u.rig.daemon.end()
             u.rig.daemon = r.Child("vibrigd", [u.rig.program("vibrigd"), "--config", u.rig.configuration], folder,
@@ -371,6 +371,8 @@ def dialogue(checks, programs, folder):
         checks.check(not wide and "\x1b" not in t.seen, "in 80 columns and without colours", wide or t.seen)
         time.sleep(0.5)
         checks.equal(u.rig.status()["campaign"]["state"], "commissioning", "the status says so")
+        seen = u.rig.status()["campaign"]["reason"]
+        checks.check(seen.startswith("Ada") and "free drifts" in seen, "and who is at what", seen)
         for command in ("arm", "selftest", "commission"):
             refused = u.rig.tool(command, "--by", "Bo")
             checks.check(refused.returncode == 1, f"meanwhile no {command}", refused.stderr)

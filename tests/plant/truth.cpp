@@ -19,6 +19,7 @@ constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II
                                                      "OO", "SS", "IO", "IS", "OS"};
 
 constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
+constexpr std::array<std::string_view, 3> kAmplitudeUnits{"g_peak", "g_rms", "mps2_peak"};
 
 std::string text_of(const Json& json) {
     std::string text = json.dump();
@@ -78,6 +79,13 @@ struct Reader {
         }
         fail(key, "found " + text_of(json) + ", expected \"outer\", \"inner\" or \"azimuth\"");
     }
+    void value(const std::string& key, const Json& json, AmplitudeUnit& out, int, int) const {
+        const auto* const at = std::ranges::find(kAmplitudeUnits, json);
+        if (at == kAmplitudeUnits.end())
+            fail(key,
+                 "found " + text_of(json) + ", expected \"g_peak\", \"g_rms\" or \"mps2_peak\"");
+        out = static_cast<AmplitudeUnit>(at - kAmplitudeUnits.begin());
+    }
     void value(const std::string& key, const Json& json, std::uint16_t& out, int low,
                int high) const {
         int number = 0;
@@ -119,6 +127,7 @@ struct Writer {
     static Json json(int v) { return v; }
     static Json json(bool v) { return v; }
     static Json json(std::uint16_t v) { return v; }
+    static Json json(AmplitudeUnit v) { return kAmplitudeUnits[static_cast<std::size_t>(v)]; }
     static Json json(GimbalAxis v) { return kGimbalNames[static_cast<std::size_t>(v)]; }
     template <class T>
     static Json json(const std::optional<T>& v) {
@@ -239,6 +248,10 @@ Truth parse_truth(std::string_view text, const std::string& file) {
     read_coefficients(root, file, truth);
     Reader reader{root, file};
     for_each_field(truth, reader);
+    ShakerLies& lies = truth.shaker_lies;
+    lies.timeout_ignored = lies.timeout_ignored || !truth.watchdog_works;
+    lies.unit_rms = lies.unit_rms || truth.amplitude_unit == AmplitudeUnit::g_rms;
+    lies.unit_mps2 = lies.unit_mps2 || truth.amplitude_unit == AmplitudeUnit::mps2_peak;
     if (const auto seed = root.find("seed"); seed != root.end()) {
         if (!seed->is_number_unsigned()) {
             throw PlantError(file + ": seed: found " + text_of(*seed) +

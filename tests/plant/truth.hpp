@@ -26,6 +26,9 @@ struct Axis {
 
 enum class GimbalAxis : std::uint8_t { outer, inner, azimuth };
 
+/// What a controller's amplitudes are in: peak g, rms g, peak m/s^2.
+enum class AmplitudeUnit : std::uint8_t { g_peak, g_rms, mps2_peak };
+
 /// Positions within one gyro's ten coefficients; F fixed, I input, O output, S spin (IEEE Std 517).
 enum Term : std::size_t { kF, kI, kO, kS, kII, kOO, kSS, kIO, kIS, kOS, kTerms };
 
@@ -145,6 +148,9 @@ struct Truth {
     double limit_g = 20;                  ///< largest set-point accepted
     double limit_mm = 25;                 ///< peak displacement that trips the limit switch
     ShakerLies shaker_lies;
+    // A rig's nature rather than a lie for a while; parse_truth() makes lies of them.
+    bool watchdog_works = true;
+    AmplitudeUnit amplitude_unit = AmplitudeUnit::g_peak;
 
     std::uint64_t seed = 1;
 

@@ -86,6 +86,8 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "frequency_drift_hz_per_h", t.frequency_drift_hz_per_h, -1e3, 1e3);
     field("shaker", "limit_g", t.limit_g, 0.1, 100.0);
     field("shaker", "limit_mm", t.limit_mm, 0.1, 1000.0);
+    field("shaker", "watchdog_works", t.watchdog_works, 0, 0);
+    field("shaker", "amplitude_unit", t.amplitude_unit, 0, 0);
     field("shaker", "ack_without_stop", t.shaker_lies.ack_without_stop, 0, 0);
     field("shaker", "timeout_ignored", t.shaker_lies.timeout_ignored, 0, 0);
     field("shaker", "timeout_scaled", t.shaker_lies.timeout_scaled, 0.0, 1000.0);

@@ -102,6 +102,20 @@ TEST(Truth, NamesTheKeyOfBadInput) {
     expect(good.substr(0, good.size() / 2), "not JSON");
 }
 
+TEST(Truth, AWatchdogThatDoesNotWorkAndAnotherUnitAreLiesOfTheController) {
+    const std::string json = to_json(Truth{});
+    const auto lies = [&json](const std::string& from, const std::string& to) {
+        return parse_truth(replaced(json, from, to), "truth.json").shaker_lies;
+    };
+    EXPECT_TRUE(lies("\"watchdog_works\": true", "\"watchdog_works\": false").timeout_ignored);
+    EXPECT_TRUE(lies("\"g_peak\"", "\"g_rms\"").unit_rms);
+    EXPECT_TRUE(lies("\"g_peak\"", "\"mps2_peak\"").unit_mps2);
+    EXPECT_FALSE(parse_truth(json, "truth.json").shaker_lies.timeout_ignored);
+    EXPECT_EQ(complaint(replaced(json, "\"g_peak\"", "\"g\"")),
+              "truth.json: shaker.amplitude_unit: found \"g\", expected \"g_peak\", \"g_rms\" or "
+              "\"mps2_peak\"");
+}
+
 TEST(Truth, RefusesAnAxisUsedTwice) {
     Truth twice;
     twice.channel[1] = GimbalAxis::outer;
