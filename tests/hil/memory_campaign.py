@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Resident memory of vibrigd within one campaign of many dwells, recorded, its status asked for all the while, on the
-seqpacket bus and the rig's clock. What grows, grows with the dwells; short ones stand for those of 110 s.
+seqpacket bus and the rig's clock. Short dwells stand for those of 110 s in what grows with their number; what grows with
+the samples of a recording (the index of its chunks) is not seen here.
 
 usage: memory_campaign.py PROGRAMS [--dwells N]
 """
