@@ -353,7 +353,7 @@ struct VerdictStatus {
         double time_h = 0;
         std::array<double, 3> value{}, sigma{};
     };
-    std::shared_ptr<const std::vector<Residual>> residuals;  ///< null: none
+    std::shared_ptr<const std::vector<Residual>> residuals = {};  ///< null: none
 };
 
 struct StatusData {

@@ -44,7 +44,7 @@ summary{cursor:pointer;color:var(--link)}
 .mark span{transform:rotate(-35deg);font:700 min(17vw,9rem)/1 system-ui,sans-serif;letter-spacing:.06em;color:var(--bad);opacity:.13}
 @page{size:A4;margin:16mm 14mm 18mm;@bottom-right{content:"page " counter(page) " of " counter(pages);font:8pt sans-serif}}
 @media print{:root{--ink:#000;--paper:#fff;--soft:#444;--rule:#bbb;--band:#f4f4f4;--bad:#900;--link:#000}
-body{max-width:none;padding:0;font-size:10pt}nav,details{display:none}figure,tr{break-inside:avoid}tbody tr:nth-child(-n+3){break-before:avoid}tbody tr:nth-last-child(-n+3){break-before:avoid}h2{break-after:avoid}
+body{max-width:none;padding:0;font-size:10pt}nav,details{display:none}figure svg{max-width:82%}figure,tr{break-inside:avoid}tbody tr:nth-child(-n+3){break-before:avoid}tbody tr:nth-last-child(-n+3){break-before:avoid}h2{break-after:avoid}
 table{font-size:7.6pt}th,td{padding:.12rem .4rem}.wide{overflow:visible}}
 )";
 

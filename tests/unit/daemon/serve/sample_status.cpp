@@ -182,6 +182,8 @@ StatusData full_status() {
     }
     s.noise.gyros[0].terms.fill({true, 0.01, 0.002, 0.014});
     s.verdict = {28, 1, "doubtful", "doubtful, because the drift walked", 3.5, true};
+    s.verdict.residuals = std::make_shared<const std::vector<VerdictStatus::Residual>>(
+        1, VerdictStatus::Residual{2, 3, 0.75, {0.001, -0.002, 0.003}, {0.01, 0.02, 0.03}});
     s.noise.angle_in_force_arcsec = 5;
     s.noise.block_s = 1;
     s.noise.dwells = 81;
