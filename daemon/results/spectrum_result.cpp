@@ -285,12 +285,11 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
     const Analysis& of = spectrum.analysis;
     tell_coefficients(of, assessed);
     assessed.rates = rates_of(spectrum);
-    if (!of.model.refusal.empty() && of.form != Form::groups)
+    if (!of.model.refusal.empty() && of.form == Form::resonance)
         doubt(assessed.verdict, of.model.refusal);
     if (of.flat.alarm && of.form != Form::resonance)
-        doubt(assessed.verdict, line("quadratic coefficients depend on the frequency (chi-square "
-                                     "%.0f of %d)",
-                                     of.flat.chi_square, of.flat.degrees));
+        doubt(assessed.verdict, "quadratic coefficients depend on the frequency (p = " +
+                                    std::to_string(of.flat.p) + " that they do not)");
 }
 
 void add_spectrum(const SpectrumResult& of, Json& root) {

@@ -18,6 +18,9 @@ struct SpectrumResult {
     [[nodiscard]] bool several() const { return table.kinds().size() > 1; }
 };
 
+/// Beyond it the covariances of all rates take too long.
+inline constexpr std::size_t kMostSpectralDwells = 400;
+
 /// "auto", "flat", "groups" or "resonance".
 [[nodiscard]] estimator::spectrum::Form form_of(const std::string& name);
 

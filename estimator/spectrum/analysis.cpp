@@ -279,17 +279,21 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         }
     }
     const Declared declared = declared_of(settings, table, out.groups.value, out.vibration_rates);
-    VectorXd rates(3 * n);
-    for (Index k = 0; k < n; ++k)
-        rates.segment<3>(3 * k) = table.rows()[static_cast<std::size_t>(k)].rate;
-    out.flat = test_flatness(
-        table, rates, joint_covariance(table, covariances, out.vibration_rates, declared.rates),
-        prior, scattered);
+    if (table.kinds().size() > 1) {
+        VectorXd rates(3 * n);
+        for (Index k = 0; k < n; ++k)
+            rates.segment<3>(3 * k) = table.rows()[static_cast<std::size_t>(k)].rate;
+        out.flat = test_flatness(
+            table, rates, joint_covariance(table, covariances, out.vibration_rates, declared.rates),
+            prior, scattered);
+    }
     for (std::size_t j = 0; j < 3; ++j)
         settle(table, j, problems[j], of_gyro(declared.rates, static_cast<Index>(j)), form, out);
     out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
     put_together(out, add_effects(table, problems, declared, out));
     set_reach(settings, table, out);
+    if (form == Form::flat && out.flat.alarm)
+        out.model.refusal = "quadratic coefficients depend on the frequency, and are taken as flat";
     return out;
 }
 

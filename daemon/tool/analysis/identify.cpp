@@ -3,8 +3,10 @@
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <functional>
@@ -36,6 +38,8 @@
 #include "daemon/tool/simulated.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "estimator/identification/identification.hpp"
+#include "estimator/level/vibration_level.hpp"
+#include "estimator/spectrum/sampling.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -193,6 +197,29 @@ DwellKinds kinds_of(const std::vector<Dwell>& dwells, const estimator::Settings&
     return kinds;
 }
 
+/// A frequency of which a harmonic falls on a multiple of the sampling rate, where the recording
+/// itself names its frequencies: the level, and with it the row, would be wrong.
+void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& rows,
+                      const estimator::Settings& settings, const std::string& file) {
+    if (rows.front().frequency_hz < 0) return;
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < std::min<std::size_t>(rows.size(), 1001); ++i)
+        times_s.push_back(rows[i].time_s);
+    const double period_s = estimator::median_interval(times_s);
+    if (!(period_s > 0)) return;
+    namespace spectrum = estimator::spectrum;
+    for (const spectrum::Kind& kind : kinds.kinds()) {
+        const double hz = kind.hz(), window_s = settings.level_window_s;
+        if (!spectrum::forbidden(hz, 1 / period_s, window_s)) continue;
+        std::array<char, 240> text{};
+        std::snprintf(text.data(), text.size(),
+                      ": column frequency_hz: found %g Hz at %g samples/s, of which a harmonic "
+                      "falls on a multiple of the rate, expected another: the nearest is %g Hz",
+                      hz, 1 / period_s, spectrum::nearest_free(hz, 1 / period_s, window_s));
+        throw std::runtime_error(file + text.data());
+    }
+}
+
 /// What a dwell at another frequency than the filter's says: by a filter of its own, so that the
 /// coefficients at the reference frequency take nothing of it.
 void add_apart(estimator::Identification& apart, estimator::Result& to) {
@@ -210,6 +237,7 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
     const DwellKinds kinds = kinds_of(dwells, settings, request, file);
     const auto reference = kinds.reference();
     if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
+    refuse_forbidden(kinds, rows, settings, file);
     const bool common_clock = has_common_clock(dwells);
     estimator::Identification identification(settings, dwells.size());
     RigDoubts doubts(settings);
@@ -258,7 +286,7 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
         }
         if (apart) add_apart(*apart, others);
     }
-    plan.tell();
+    if (!request.held_out) plan.tell();
     Found whole = with_doubts(identification.result(), doubts);
     found.result = std::move(whole.result);
     found.contradiction = std::move(whole.contradiction);
@@ -400,7 +428,13 @@ Identified identify_recording(const std::string& file, const std::string& config
     }
     identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
-    if (identified.assessed.done && found.spectral.size() >= 2) {
+    if (found.spectral.size() > kMostSpectralDwells && found.kinds.size() > 1) {
+        identified.result.warnings.push_back(
+            "found " + std::to_string(found.spectral.size()) + " dwells, expected at most " +
+            std::to_string(kMostSpectralDwells) +
+            " for coefficients over frequency: those at the reference frequency stand");
+    } else if (identified.assessed.done && found.spectral.size() >= 2 &&
+               found.spectral.size() <= kMostSpectralDwells) {
         identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
                                           std::move(found.kinds), request.form);
         adopt(*identified.spectrum, identified.settings, identified.assessed);

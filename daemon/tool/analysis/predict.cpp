@@ -176,7 +176,9 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
         throw std::runtime_error(
             "--verify: found a random profile, expected one of sines alone: a "
             "recording of random dwells is not read");
-    const Identified found = identify_recording(recording, config);
+    SpectrumRequest request;
+    request.held_out = true;
+    const Identified found = identify_recording(recording, config, request);
     const auto& rows = found.result.rows.empty() || !found.spectrum
                            ? std::vector<estimator::DwellRow>(found.result.rows)
                            : std::vector<estimator::DwellRow>(found.spectrum->table.rows().begin(),

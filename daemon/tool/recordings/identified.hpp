@@ -24,6 +24,8 @@ struct Identified {
 struct SpectrumRequest {
     Spectra spectra;  ///< of dwells, where the recording does not say
     estimator::spectrum::Form form = estimator::spectrum::Form::automatic;
+    /// The dwells are to prove a result, not to make one: what they cannot determine is not said.
+    bool held_out = false;
 };
 
 /// Identifies FILE: a CSV recording, or a campaign (folder, HDF5 file or name). `config`: a TOML

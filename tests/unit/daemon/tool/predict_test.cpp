@@ -114,6 +114,20 @@ TEST_F(Predict, SurveyNamesTheResonanceAndTellsStaticCoefficients) {
     EXPECT_EQ(found["dwell_rates"][0]["lines"][0][0], 15);
 }
 
+TEST_F(Predict, WhatIsTakenAsFlatAgainstTheDataIsDoubtedAndNotPredictedWith) {
+    const Ended flat = run("identify survey.csv --spectrum flat --json");
+    EXPECT_EQ(flat.exit_code, 0);
+    EXPECT_EQ(flat.json()["verdict"]["word"], "doubtful");
+    EXPECT_EQ(flat.json()["verdict"]["sentence"],
+              "doubtful, because quadratic coefficients depend on the frequency (p = 0.000000 that "
+              "they do not)");
+    write("flat.json", flat.out);
+    const Ended ended = run("predict flat.json --profile sine.json --attitude 0,0,0");
+    EXPECT_EQ(ended.exit_code, 2);
+    EXPECT_THAT(ended.error, HasSubstr("are taken as flat"));
+    EXPECT_EQ(run("predict flat.json --profile sine.json --attitude 0,0,0 --force").exit_code, 1);
+}
+
 TEST_F(Predict, HeldOutDwellsConfirm) {
     const Ended ended =
         run("predict result.json --profile sine.json --verify held_out.csv --config held.toml "
@@ -125,6 +139,7 @@ TEST_F(Predict, HeldOutDwellsConfirm) {
     EXPECT_EQ(prediction["attitudes"].size(), 1U);
     EXPECT_EQ(prediction["attitudes"][0]["drift"].size(), 3U);
     EXPECT_EQ(prediction["power_outside"], 0);
+    EXPECT_EQ(ended.error, "");
 }
 
 TEST_F(Predict, HeldOutDwellsContradictAResultWithoutItsElasticPart) {
@@ -206,6 +221,15 @@ TEST_F(Predict, BadInputIsNamedByPlaceAndValue) {
             "--verify: found a random profile");
     write("old.json", R"({"parameters": []})");
     refused("old.json --profile truck --attitude 0,0,0", "old.json: spectrum: found nothing");
+}
+
+TEST_F(Predict, ForbiddenFrequencyIsRefusedAndTheNearestFreeOneNamed) {
+    ASSERT_EQ(plant("--dwell 5 --table-g 1,1 --frequency 15,60 -o closed.csv").exit_code, 0);
+    const Ended ended = run("identify closed.csv");
+    EXPECT_EQ(ended.exit_code, 2);
+    EXPECT_THAT(ended.error, HasSubstr("closed.csv: column frequency_hz: found 60 Hz at 40 "
+                                       "samples/s"));
+    EXPECT_THAT(ended.error, HasSubstr("the nearest is 60.2 Hz"));
 }
 
 TEST_F(Predict, SpectraOfARecordingWithoutTheColumn) {
