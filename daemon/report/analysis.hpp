@@ -44,6 +44,9 @@ struct Analysis {
     std::array<std::vector<estimator::allan::Point>, 3> allan;
     std::array<double, estimator::kParameters> expected_sigma{};  ///< of the plan; infinite: none
     std::string journal;  ///< journal_verdict() of its daemon's journal
+    /// What an archive has of the unit: a table with heads, and in words; empty: none was asked.
+    std::vector<std::vector<std::string>> history;
+    std::string history_note;
 };
 
 using Progress = std::function<void(double fraction)>;

@@ -463,6 +463,11 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     }
     if (told == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
 
+    if (!a.history_note.empty()) {
+        page.section("history", "Earlier campaigns of the unit");
+        page.paragraph(a.history_note);
+        if (a.history.size() > 1) page.table(a.history);
+    }
     page.section("comparison", "Comparison with an earlier campaign");
     if (!earlier) {
         page.paragraph("None was given (--compare CAMPAIGN).");

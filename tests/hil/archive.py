@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.request
 
 import h5py
@@ -101,11 +102,15 @@ def replace(file, name, text):
     file[name] = numpy.bytes_(text.encode())   # of fixed length, as vibrigd writes it
 
 
+def configure(rig, archive_folder, serial):
+    rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": serial}, server={"page": "127.0.0.1:0"},
+                  archive={"folder": archive_folder, "rig": "rig-7", "retry_max_s": 1.0})
+
+
 def measure(checks, rig, seed, archive_folder, disk):
     """A whole campaign on the rig's clock, with an archive that is not there."""
     rig.start_plant("--seed", str(seed))
-    rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": "0017"}, server={"page": "127.0.0.1:0"},
-                  archive={"folder": archive_folder, "rig": "rig-7", "retry_max_s": 1.0})
+    configure(rig, archive_folder, "0017")
     rig.daemon = r.Child("vibrigd", [rig.program("vibrigd"), "--config", rig.configuration], rig.folder, disk.environment())
     rig.wait_for(r.measuring, 60)
     for command in ("arm", "start"):
@@ -151,18 +156,25 @@ def comes_back(checks, rig, lab):
     status = rig.wait_for(lambda s: r.measuring(s) and "archive" in s, 60)
     time.sleep(1)
     checks.equal(number(rig.status(), "delivered"), 0, "after a restart it is not delivered again")
-    page = next(line.split("live page: ")[1].strip() for line in rig.daemon.text().splitlines() if "live page: " in line)
-    with urllib.request.urlopen(page + "api/v1/unit", timeout=10) as answer:
-        unit = json.load(answer)
-    checks.equal(unit["unit"]["serial"], "0017", "the rig's server shows the unit's earlier campaigns")
+    page = rig.daemon.text().split("live page: ")[-1].split()[0]   # of the newest start
+    unit, end = {}, time.monotonic() + 30
+    while "unit" not in unit and time.monotonic() < end:   # it is asked for when nobody else wants the processor
+        time.sleep(0.2)
+        with urllib.request.urlopen(page + "api/v1/unit", timeout=10) as answer:
+            unit = json.load(answer)
+    checks.equal(unit.get("unit", {}).get("serial"), "0017", "the rig's server shows the unit's earlier campaigns")
     with urllib.request.urlopen(page + "metrics", timeout=10) as answer:
         checks.check("vibrig_archive_waiting 0" in answer.read().decode(), "and the metrics that none waits")
 
 
 def moves(checks, rig, lab, base):
-    """A unit whose history is elsewhere."""
+    """Another unit on the rig, whose history is elsewhere."""
+    configure(rig, lab.folder, "0018")
+    rig.daemon.end()
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
     for i in range(12):
-        clone(base, os.path.join(rig.folder, "history", f"old-{i}"), -30 + i, shift=-400 + 0.1 * i)
+        clone(base, os.path.join(rig.folder, "history", f"old-{i}"), -30 + i, serial="0018", shift=-400 + 0.1 * i)
     run = lab.add(os.path.join(rig.folder, "history"), "rig-7")
     checks.check(run.returncode == 0, "twelve earlier campaigns are added", run.stdout + run.stderr)
     for command in ("arm", "start"):
@@ -173,12 +185,47 @@ def moves(checks, rig, lab, base):
     events = rig.tool("events").stdout
     checks.check("has moved by more than its" in events and "D_Fx" in events,
                  "a campaign that moves a coefficient by more than its unit's history allows is an alarm", events[-800:])
-    trend = lab.run("trend", "0017", "--json", "--plot", os.path.join(rig.folder, "trend"))
+    trend = lab.run("trend", "0018", "--json", "--plot", os.path.join(rig.folder, "trend"))
     found = json.loads(trend.stdout or '{"campaigns": [], "coefficients": []}')
-    checks.equal(len(found["campaigns"]), 14, "vibrig trend has all its campaigns")
+    checks.equal(len(found["campaigns"]), 13, "vibrig trend has all its campaigns")
     checks.check(any(c["name"] == "D_Fx" and c["shutdown_instability"]["p"] < 1e-6 for c in found["coefficients"]),
                  "and says that D_Fx is not stable over shutdowns")
     checks.equal(len(glob.glob(os.path.join(rig.folder, "trend", "*.svg"))), 31, "and draws a chart of each")
+
+
+def browsed(checks, lab, folder):
+    """As a browser shows it; the door picks its port."""
+    server = r.Child("serve", [lab.program, "archive", "serve", *lab.where(), "--page", "127.0.0.1:0"], folder)
+    end = time.monotonic() + 10
+    while "archive: " not in server.text() and time.monotonic() < end:
+        time.sleep(0.05)
+    page = server.text().split("archive: ")[-1].strip()
+
+    def shown(path):
+        # Nothing of the browser's own may go out, and it is to be alone.
+        return subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+                               "--disable-background-networking", "--disable-component-update", "--disable-sync",
+                               f"--user-data-dir={folder}/chromium", "--dump-dom", page + path],
+                              capture_output=True, text=True, timeout=60).stdout
+    front = shown("")
+    checks.check('href="/unit?serial=0017"' in front and "rig-7" in front, "Chromium shows units and campaigns", front[:500])
+    unit = shown("unit?serial=0017")
+    checks.check(unit.count("<img") == 30 and 'id="trend"' in unit and "shutdown instability" in unit,
+                 "and a unit's trend with its charts", unit[:500])
+    key = (lab.campaigns("--serial", "0017") or [{"hash": ""}])[0]
+    campaign = shown("campaign?hash=" + key["hash"])
+    checks.check("campaign.h5" in campaign and "D_OSz" in campaign, "and a campaign with its files", campaign[:500])
+    with urllib.request.urlopen(f"{page}file?hash={key['hash']}&name=campaign.h5", timeout=30) as answer, \
+            open(os.path.join(lab.folder, key["campaign"], "campaign.h5"), "rb") as file:
+        checks.check(answer.read() == file.read(), "a download is the recording")
+    refused = []
+    for path, data in (("file?hash=" + key["hash"] + "&name=..%2F..%2Frecordings.sqlite3", None), ("api/v1/commands", b"{}")):
+        try:
+            urllib.request.urlopen(page + path, data, timeout=10)
+        except urllib.error.HTTPError as error:
+            refused.append(error.code)
+    checks.equal(refused, [404, 405], "what lies elsewhere is not shown, and nothing can be commanded")
+    checks.equal(server.end(), 0, "it ends when it is told")
 
 
 def kills(checks, programs, folder, base, seed):
@@ -291,7 +338,7 @@ def shared(checks, programs, folder, base):
     checks.check(early.returncode == 2 and server.folder in early.stderr, "a server that is not there is named", early.stderr)
     server.start()
     checks.check(until_delivered(lab, base, "rig-1") == 1 and len(lab.campaigns() or []) == 1, "what could not be registered then is now")
-    campaigns = [(base, "rig-1")] + [(clone(base, os.path.join(folder, "many", f"{rig}-{i}"), i, serial=f"{rig}-{i % 2}"), rig)
+    campaigns = [(base, "rig-1")] + [(clone(base, os.path.join(folder, "many", f"{rig}-{i}"), i + 1, serial=f"{rig}-{i % 2}"), rig)
                  for i in range(8) for rig in ("rig-1", "rig-2")]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         rigs = [pool.submit(lambda mine: [until_delivered(lab, f, rig) for f, rig in mine], [c for c in campaigns if c[1] == rig])
@@ -333,6 +380,7 @@ def main():
         moves(checks, rig, lab, base)
         rig.daemon.end()
         rig.plant.end()
+        browsed(checks, lab, folder)
         sick_archive(checks, lab, disk, clone(base, os.path.join(folder, "another"), 3))
         os.mkdir(os.path.join(folder, "full"))
         full_archive(checks, programs, os.path.join(folder, "full"), small)

@@ -2,6 +2,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/archive/trend.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/plot/chart.hpp"
 #include "daemon/report/journal_section.hpp"
@@ -22,6 +24,7 @@
 #include "daemon/results/progress.hpp"
 #include "daemon/results/result_table.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "daemon/tool/simulated.hpp"
@@ -39,6 +42,7 @@ struct ReportArguments {
     std::string campaign, output = "report.html", config, compare, pdf, journal;
     bool strict = false;
     bool same_unit = false;
+    ArchiveOptions archive = {};
 };
 
 struct CompensateArguments {
@@ -56,6 +60,47 @@ std::string filled_in(const char* format, auto... values) {
 estimator::Settings report_settings(const record::Campaign& campaign, const std::string& config) {
     return config.empty() ? report::settings_of(campaign)
                           : configuration::load(config, false).configuration.estimator;
+}
+
+/// This campaign's coefficients beside those of the unit's earlier ones in an archive.
+void add_history(const record::Campaign& campaign, const ArchiveOptions& where,
+                 report::Analysis& analysis) {
+    const std::string serial = report::paperwork_of(campaign).unit_serial;
+    if (serial.empty() || !whereabouts_of(where).named) return;
+    archive::Filter filter;
+    filter.serial = serial;
+    filter.until_utc_ns = campaign.head.utc_ns;
+    auto index = open_index(where);
+    const auto before = index->results(filter);
+    archive::Entry now;
+    now.simulated = campaign.head.simulated;
+    now.started_utc_ns = campaign.head.utc_ns;
+    now.rig = before.empty() ? "" : before.back().rig;
+    archive::take_result(campaign.result_json, now);
+    const auto moved = archive::moved(now, before);
+    const auto trend = archive::trend_of(before, archive::kShutdownAfterH);
+    analysis.history_note =
+        "Unit " + serial + ": " + std::to_string(trend.campaigns.size()) +
+        " earlier campaigns in the archive." +
+        (moved.empty() ? "" : " What is marked has moved by more than they allow, at 1 in 1000.");
+    analysis.history = {
+        {"coefficient", "now", "mean before", "95 %", "shutdown instability", "unit"}};
+    const auto number = [](double value) {
+        std::array<char, 32> text{};
+        std::snprintf(text.data(), text.size(), "%.5f", value);
+        return std::string(text.data());
+    };
+    for (const auto& of : trend.coefficients) {
+        const auto& c = now.coefficients[of.position];
+        const bool far = std::ranges::any_of(
+            moved, [&](const archive::Moved& one) { return one.position == of.position; });
+        analysis.history.push_back({estimator::parameter_names()[of.position],
+                                    c ? (far ? "!" : "") + number(c->value) : "not determined",
+                                    number(of.mean),
+                                    number(of.mean_low) + " .. " + number(of.mean_high),
+                                    of.shutdown.tested ? number(of.shutdown.value) : "not known",
+                                    estimator::parameter_unit(of.position)});
+    }
 }
 
 int make_report(const ReportArguments& arguments) {
@@ -76,6 +121,13 @@ int make_report(const ReportArguments& arguments) {
         analysis = report::analyse(campaign, settings, [&](double fraction) {
             progress.show(static_cast<std::size_t>(100 * fraction), 100);
         });
+    }
+    try {
+        add_history(campaign, arguments.archive, analysis);
+    } catch (const std::exception& error) {
+        // The report is of this campaign: an archive that is gone does not keep it.
+        analysis.history_note = std::string("The archive could not be asked: ") + error.what();
+        std::cerr << error.what() << '\n';
     }
     analysis.journal = report::journal_verdict(campaign, arguments.journal);
     if (analysis.journal.starts_with('!'))
@@ -328,6 +380,9 @@ void add_reports(CLI::App& app, int& exit_code) {
     reporting->add_option("--journal", report->journal,
                           "the daemon's journal, to be verified (default: journal.sqlite3 beside "
                           "the campaign's folder)");
+    reporting->add_option("--archive", report->archive.archive,
+                          "show the unit's earlier campaigns in this archive (default: "
+                          "$VIBRIG_ARCHIVE)");
     reporting->add_option("--pdf", report->pdf, "print it to this PDF file, too (with chromium)");
     reporting->add_flag("--strict", report->strict, "a doubtful result is a no as well");
     reporting->footer(

@@ -192,7 +192,7 @@ limits = 5
 )");
     for (const char* part :
          {"rig.toml:3:1: anunciator: found an unknown table, expected one of accelerometer, "
-          "annunciator, campaign, can, ",
+          "annunciator, archive, campaign, can, ",
           "rig.toml:5:1: annunciator.comand: found an unknown key, expected one of command, "
           "command_limit_s, modbus\n",
           "rig.toml:6:27: annunciator.modbus.horn_coils: found an unknown key, expected one of "
