@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -236,6 +237,54 @@ Key correlations() {
             read, write};
 }
 
+/// Structural classes of misfit, by the names that the verdict has for them.
+Key freed_classes() {
+    using estimator::uncertainty::kStructuralNames;
+    using estimator::uncertainty::Misfit;
+    const std::string name = "estimator.free";
+    std::string words;
+    for (const char* word : kStructuralNames)
+        words += (words.empty() ? "\"" : ", \"") + std::string(word) + "\"";
+    auto read = [name, words](const toml::node& node, C& c, Problems& problems) {
+        const std::string expected = "each once of " + words;
+        const toml::array* list =
+            read_array(node, name, 0, kStructuralNames.size(), "classes of misfit", problems);
+        if (list == nullptr) return;
+        std::vector<Misfit> out;
+        for (std::size_t i = 0; i < list->size(); ++i) {
+            const auto* word = list->get(i)->as_string();
+            const auto at = std::find_if(
+                kStructuralNames.begin(), kStructuralNames.end(),
+                [&](const char* one) { return word != nullptr && word->get() == one; });
+            const auto misfit = static_cast<Misfit>(at - kStructuralNames.begin());
+            if (at == kStructuralNames.end() ||
+                std::find(out.begin(), out.end(), misfit) != out.end()) {
+                problems.add(place_of(list->get(i)->source()), name + "[" + std::to_string(i) + "]",
+                             describe(*list->get(i)), expected);
+                continue;
+            }
+            out.push_back(misfit);
+        }
+        c.estimator.free = std::move(out);
+    };
+    auto write = [](C& c) {
+        std::string text;
+        for (const Misfit one : c.estimator.free)
+            text += (text.empty() ? "" : ", ") +
+                    write_text(kStructuralNames[static_cast<std::size_t>(one)]);
+        return "[" + text + "]";
+    };
+    return {name,
+            "words",
+            "",
+            words,
+            "what the data determine along with the coefficients: costs sigma, and what is "
+            "declared of it no longer counts",
+            read,
+            write,
+            schema_of_array("{\"enum\":[" + words + "]}", 0, kStructuralNames.size())};
+}
+
 /// Not declared while it is negative inside; no value in a file says so.
 Key optional_number(std::string name, std::string unit, Range range, std::string doc,
                     At<double> at) {
@@ -295,6 +344,7 @@ void add_inputs(std::vector<Key>& keys) {
 }  // namespace
 
 void add_uncertainty_keys(std::vector<Key>& keys) {
+    keys.push_back(freed_classes());
     add_inputs(keys);
     const auto in = [](C & c) -> auto& { return c.estimator.uncertainty; };
     keys.push_back(choice<SyncMotionOf>(

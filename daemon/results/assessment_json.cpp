@@ -131,6 +131,17 @@ Json dwell_rates(const Assessment& a) {
     return list;
 }
 
+Json freed(const Assessment& a) {
+    Json list = Json::array();
+    for (const FreedUnknown& of : a.freed)
+        list.push_back({{"class", of.of_class},
+                        {"element", text_or_null(of.element)},
+                        {"value", number_or_null(of.value)},
+                        {"sigma", number_or_null(of.sigma)},
+                        {"unit", text_or_null(of.unit)}});
+    return list;
+}
+
 Json matrix(const Eigen::MatrixXd& of) {
     Json rows = Json::array();
     for (Eigen::Index i = 0; i < of.rows(); ++i) {
@@ -158,6 +169,7 @@ Json assessment_json(const Assessment& a) {
     root["drift"] = drift(a);
     root["cross_axis"] = cross_axis(a);
     root["sync_motion_arcsec"] = number_or_null(a.sync_arcsec);
+    if (!a.freed.empty()) root["freed"] = freed(a);
     root["dwell_rates"] = dwell_rates(a);
     return root;
 }

@@ -69,6 +69,10 @@ std::string verdict(const Assessment& assessed) {
     std::string text = "verdict: " + of.sentence + "\n";
     for (std::size_t i = 1; i < of.reasons.size(); ++i)
         text += "  also: " + of.reasons[i].text + "\n";
+    for (const auto& one : assessed.freed)
+        text += line("freed: %s%s%s %.3g +- %.2g %s", one.of_class.c_str(),
+                     one.element.empty() ? "" : ", ", one.element.c_str(), one.value, one.sigma,
+                     one.unit.c_str());
     return text;
 }
 

@@ -60,6 +60,35 @@ struct Inputs {
     double coverage = 0.95;
 };
 
+/// A way in which a rig may differ from the model, with one or more unknowns.
+enum class Misfit : std::uint8_t {
+    cross_axis,
+    azimuth,
+    latitude,
+    time_base,
+    encoder_zero,
+    non_orthogonality,
+    resolver_1,
+    resolver_2,
+    resolver_16,
+    cubic,
+    trend,
+    step,
+    unbalance_trend,
+    unbalance_step
+};
+/// Of the structural ones, up to the cubic term: as the verdict names them, and as they are freed.
+inline constexpr std::array<const char*, 10> kStructuralNames{"cross-axis",
+                                                              "azimuth",
+                                                              "latitude",
+                                                              "time base",
+                                                              "encoder zero",
+                                                              "non-orthogonality",
+                                                              "resolver, once per turn",
+                                                              "resolver, twice per turn",
+                                                              "resolver, 16 per turn",
+                                                              "cubic term"};
+
 enum class BiasModel : std::uint8_t { automatic, constant, walk };
 /// Whether the gyros' power was on all the time.
 enum class Power : std::uint8_t { unknown, unbroken, per_run };

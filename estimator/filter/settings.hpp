@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <vector>
 
 #include "estimator/filter/declared.hpp"
 
@@ -70,6 +71,7 @@ struct Settings {
     // uncertainty, drift
     uncertainty::Inputs uncertainty;
     uncertainty::Drift drift;
+    std::vector<uncertainty::Misfit> free;  ///< structural classes that the data determine as well
 };
 
 /// Noise as the filter takes it.

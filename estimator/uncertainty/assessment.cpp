@@ -97,6 +97,32 @@ void widen_constant(const Settings& settings, const Assessment& out, Together& a
     all.covariance *= out.birge * out.birge;
 }
 
+/// What the dwells say when each gyro's bias may have moved.
+struct Averaged {
+    std::array<GyroRates, 3> gyros;
+    std::array<DriftAverage, 3> drift;
+    ParameterArray coefficients{};
+};
+
+Averaged averaged(const DwellTable& table, const Settings& settings) {
+    Averaged out{gyros_of(table, settings), {}, {}};
+    for (std::size_t j = 0; j < 3; ++j) {
+        out.drift[j] = average_drift(out.gyros[j], settings.drift);
+        for (std::size_t g = 0; g < kGroups; ++g)
+            out.coefficients[internal_index(g, j)] = out.drift[j].value[index(g)];
+    }
+    return out;
+}
+
+/// Columns by which the rates may differ from the model, for each gyro.
+void declare(const MatrixXd& columns, std::array<GyroRates, 3>& gyros) {
+    for (Index k = 0; k < columns.rows(); ++k) {
+        MatrixXd& of_gyro = gyros[static_cast<std::size_t>(k % 3)].declared;
+        if (k < 3) of_gyro.resize(columns.rows() / 3, columns.cols());
+        of_gyro.row(k / 3) = columns.row(k);
+    }
+}
+
 struct TypeB {
     MatrixXd sensitivity;  ///< 30 x m: G z
     MatrixXd covariance;   ///< 30 x 30
@@ -275,32 +301,31 @@ const char* word_of(Level level) noexcept {
 
 Assessment assess(const Settings& settings, const Result& result) {
     Assessment out;
-    const DwellTable table = dwell_table(result.rows);
+    DwellTable table = dwell_table(result.rows);
     if (table.dwells() >= 2 && settings.method == Method::joint) {
         out.done = true;
         out.model = settings.drift.model;
         out.times_assumed = table.times_assumed;
         const VectorXd prior = prior_information(settings);
-        std::array<GyroRates, 3> gyros = gyros_of(table, settings);
-        for (std::size_t j = 0; j < 3; ++j) out.drift[j] = average_drift(gyros[j], settings.drift);
-
-        ParameterArray coefficients{};
-        for (std::size_t g = 0; g < kGroups; ++g) {
-            for (std::size_t j = 0; j < kGyros; ++j)
-                coefficients[internal_index(g, j)] = out.drift[j].value[index(g)];
+        Averaged of = averaged(table, settings);
+        const Freed freed =
+            determine_freed(settings, table, ForwardModel(settings, of.coefficients), prior);
+        if (!freed.list.empty()) {
+            table.rows = freed.rows;
+            of = averaged(table, settings);
         }
-        const ForwardModel model(settings, coefficients);
-        InputSignatures inputs = input_signatures(settings.uncertainty, table, model);
+        out.freed = freed.list;
+        out.drift = of.drift;
+        const ForwardModel model(settings, of.coefficients);
+        const Inputs declared = without(settings.uncertainty, settings.free);
+        InputSignatures inputs = input_signatures(declared, table, model);
         out.inputs = std::move(inputs.list);
-        const MatrixXd u = input_covariance(settings.uncertainty, out.inputs);
+        const MatrixXd u = input_covariance(declared, out.inputs);
         const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
-        const MatrixXd scaled = inputs.rates * MatrixXd(root.matrixL());
-        for (Index k = 0; k < scaled.rows(); ++k) {
-            MatrixXd& of_gyro = gyros[static_cast<std::size_t>(k % 3)].declared;
-            if (k < 3) of_gyro.resize(table.dwells(), scaled.cols());
-            of_gyro.row(k / 3) = scaled.row(k);
-        }
-        const NullFit fit(table, scaled, prior);
+        MatrixXd scaled(inputs.rates.rows(), inputs.rates.cols() + freed.prior.cols());
+        scaled << inputs.rates * MatrixXd(root.matrixL()), freed.prior;
+        declare(scaled, of.gyros);
+        const NullFit fit(table, scaled, prior, freed.determined);
         out.chi_square = fit.chi_square();
         out.degrees = fit.degrees();
         if (out.degrees > 0) out.birge = std::sqrt(out.chi_square / out.degrees);
@@ -311,14 +336,15 @@ Assessment assess(const Settings& settings, const Result& result) {
         }
         Together all = join(out.drift, fit, table.dwells());
         widen_constant(settings, out, all);
+        freed.put_into(all.gain, all.covariance);
         out.gain = all.gain;
         out.covariance_type_a = all.covariance;
         out.ramps = fit_ramps(table, all.value);
         tell_sync(table, out);
         tell_cross_axis(table, out);
-        out.worst_step = worst_step(gyros);
-        tell_rates(table, fit.residual(all.value), fit.residual_variance(), out);
-        if (out.degrees >= 9) out.evidence = weigh_patterns(table, fit, out.ramps, model, gyros);
+        out.worst_step = worst_step(of.gyros);
+        tell_rates(table, fit.residual(all.value), fit.residual_variance(inputs.rates.cols()), out);
+        if (out.degrees >= 9) out.evidence = weigh_patterns(table, fit, out.ramps, model, of.gyros);
         const TypeB b = propagate(settings, all, inputs.rates, u, out.sync_bound);
         out.sensitivity = b.sensitivity;
         tell_coefficients(settings, result, table, fit, all, b, out);

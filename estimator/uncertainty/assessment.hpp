@@ -9,6 +9,7 @@
 #include "estimator/identification/result.hpp"
 #include "estimator/uncertainty/budget.hpp"
 #include "estimator/uncertainty/fit.hpp"
+#include "estimator/uncertainty/freed.hpp"
 
 namespace vibrig::estimator::uncertainty {
 
@@ -82,6 +83,7 @@ struct Assessment {
     std::vector<Evidence> evidence;  ///< the best first
     BiasModel model = BiasModel::automatic;
     std::array<DriftAverage, 3> drift;
+    std::vector<FreedUnknown> freed;
     double worst_step = 1;  ///< largest inflation of a sigma by one free step
     std::vector<CrossAxis> cross_axis;
     double sync_arcsec = 0, sync_bound = 0;  ///< deg/h/g^2

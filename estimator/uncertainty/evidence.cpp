@@ -135,25 +135,18 @@ void take_scatter(Evidence& out, const NullFit& fit, double s0) {
 }  // namespace
 
 const char* name_of(Pattern pattern) noexcept {
-    static constexpr std::array<const char*, kPatterns> kNames{"cross-axis",
-                                                               "azimuth",
-                                                               "latitude",
-                                                               "time base",
-                                                               "encoder zero",
-                                                               "non-orthogonality",
-                                                               "resolver, once per turn",
-                                                               "resolver, twice per turn",
-                                                               "resolver, 16 per turn",
-                                                               "cubic term",
-                                                               "trend",
-                                                               "step",
-                                                               "walk",
-                                                               "scatter",
-                                                               "mass unbalance trend",
-                                                               "mass unbalance step",
-                                                               "ramp within dwells",
-                                                               "gyro noise"};
-    return kNames[static_cast<std::size_t>(pattern)];
+    static constexpr std::array<const char*, kPatterns - kStructuralNames.size()> kOfStates{
+        "trend",
+        "step",
+        "walk",
+        "scatter",
+        "mass unbalance trend",
+        "mass unbalance step",
+        "ramp within dwells",
+        "gyro noise"};
+    const auto i = static_cast<std::size_t>(pattern);
+    return i < kStructuralNames.size() ? kStructuralNames[i]
+                                       : kOfStates[i - kStructuralNames.size()];
 }
 
 bool is_structural(Pattern pattern) noexcept { return pattern <= Pattern::cubic; }

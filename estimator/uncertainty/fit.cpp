@@ -35,7 +35,7 @@ VectorXd all_rates(const DwellTable& table) {
 }
 
 NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
-                 const VectorXd& prior_information)
+                 const VectorXd& prior_information, int freed)
     : table_(table), h_(all_regressors(table)), declared_(declared) {
     MatrixXd columns(h_.rows(), kCoefficients + declared.cols());
     columns << h_, declared;
@@ -59,7 +59,7 @@ NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
     // trace(I - P Pi0): how many coefficients the data determine.
     const double determined =
         static_cast<double>(kCoefficients) - covariance_.diagonal().dot(prior_information);
-    degrees_ = static_cast<int>(h_.rows()) - static_cast<int>(std::lround(determined));
+    degrees_ = static_cast<int>(h_.rows()) - static_cast<int>(std::lround(determined)) - freed;
 }
 
 MatrixXd NullFit::whitened(const MatrixXd& x) const {
@@ -80,6 +80,15 @@ NullFit::Projection NullFit::project(const MatrixXd& z) const {
     return {white.transpose() * y_left_, white.transpose() * left(white)};
 }
 
+MatrixXd NullFit::weights(const MatrixXd& z) const {
+    MatrixXd out = left(whitened(z));
+    for (Index k = 0; k < table_.dwells(); ++k) {
+        const Eigen::LLT<Eigen::Matrix3d> factor(table_.rows[static_cast<std::size_t>(k)].variance);
+        factor.matrixU().solveInPlace(out.middleRows<3>(3 * k));
+    }
+    return out;
+}
+
 VectorXd NullFit::change(const VectorXd& rates) const {
     return covariance_ * (white_.leftCols(kCoefficients).transpose() * whitened(rates));
 }
@@ -88,11 +97,11 @@ VectorXd NullFit::residual(const VectorXd& coefficients) const {
     return all_rates(table_) - h_ * coefficients;
 }
 
-VectorXd NullFit::residual_variance() const {
+VectorXd NullFit::residual_variance(Index declared) const {
     VectorXd variance(h_.rows());
     for (Index k = 0; k < table_.dwells(); ++k)
         variance.segment<3>(3 * k) = table_.rows[static_cast<std::size_t>(k)].variance.diagonal();
-    if (declared_.cols() > 0) variance += declared_.rowwise().squaredNorm();
+    if (declared > 0) variance += declared_.leftCols(declared).rowwise().squaredNorm();
     const MatrixXd hp = h_ * covariance_;
     variance -= hp.cwiseProduct(h_).rowwise().sum();
     return variance.cwiseMax(0.0);

@@ -15,8 +15,9 @@ namespace vibrig::estimator::uncertainty {
 class NullFit {
   public:
     /// `declared`: 3 n x m, a standard uncertainty each; `prior_information`: 30, filter order.
+    /// `freed`: unknowns among the declared ones that the data determine.
     NullFit(const DwellTable& table, const Eigen::MatrixXd& declared,
-            const Eigen::VectorXd& prior_information);
+            const Eigen::VectorXd& prior_information, int freed = 0);
 
     /// Chi-square of the rates about the model.
     [[nodiscard]] double chi_square() const { return chi_square_; }
@@ -29,7 +30,8 @@ class NullFit {
     [[nodiscard]] Eigen::VectorXd change(const Eigen::VectorXd& rates) const;
     /// y - H D and its variance, 3 n.
     [[nodiscard]] Eigen::VectorXd residual(const Eigen::VectorXd& coefficients) const;
-    [[nodiscard]] Eigen::VectorXd residual_variance() const;
+    /// With the first so many declared ones.
+    [[nodiscard]] Eigen::VectorXd residual_variance(Eigen::Index declared) const;
 
     /// s = z' Q0 y and F = z' Q0 z of some signatures.
     struct Projection {
@@ -37,6 +39,8 @@ class NullFit {
         Eigen::MatrixXd f;
     };
     [[nodiscard]] Projection project(const Eigen::MatrixXd& z) const;
+    /// Q0 z, 3 n x unknowns.
+    [[nodiscard]] Eigen::MatrixXd weights(const Eigen::MatrixXd& z) const;
 
   private:
     [[nodiscard]] Eigen::MatrixXd whitened(const Eigen::MatrixXd& x) const;

@@ -23,24 +23,6 @@ struct DwellTable {
 /// after a minute.
 [[nodiscard]] DwellTable dwell_table(std::span<const DwellRow> rows);
 
-/// A way in which a rig may differ from the model, with one or more unknowns.
-enum class Misfit {
-    cross_axis,
-    azimuth,
-    latitude,
-    time_base,
-    encoder_zero,
-    non_orthogonality,
-    resolver_1,
-    resolver_2,
-    resolver_16,
-    cubic,
-    trend,
-    step,
-    unbalance_trend,
-    unbalance_step
-};
-
 /// Rates that one unknown of a class moves, 3 n, for the size of the class.
 struct Signatures {
     Eigen::MatrixXd z;  ///< 3 n x unknowns

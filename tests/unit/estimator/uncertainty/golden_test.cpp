@@ -102,14 +102,45 @@ TEST_F(Golden, LackOfFitAndEvidence) {
         return -1.0;
     };
     EXPECT_NEAR(odds(Pattern::step), 43.978, 2e-3);
-    // Walk and scatter by an independent calculation of the definition: the mean over the sizes is
-    // taken once for each gyro. Taken twice it would be 40.908 and 28.010.
+    // Walk and scatter by the definition: the mean over the sizes is taken once for each gyro. What
+    // comes of taking it twice: OddsOfScatterAndWalkAgainFromTheDefinition.
     EXPECT_NEAR(odds(Pattern::walk), 42.5315, 1e-3);
     EXPECT_NEAR(odds(Pattern::trend), 38.160, 2e-3);
     EXPECT_NEAR(odds(Pattern::scatter), 29.6628, 1e-3);
     EXPECT_EQ(evidence.front().pattern, Pattern::step);
     EXPECT_EQ(evidence.front().after_dwell, 14);
     EXPECT_NEAR(evidence.front().size[0], 0.03, 2 * evidence.front().sigma[0]);
+}
+
+/// log of the mean of two, each worked out term by term from the likelihood ratios; `divisor`: by
+/// what the sums over five sizes are divided.
+double odds_again(const std::array<GyroRates, 3>& gyros, const std::array<double, 5>& sizes,
+                  bool walk, double divisor) {
+    double together = 0, apart = 1;
+    std::array<double, 5> product;
+    product.fill(1);
+    for (const GyroRates& gyro : gyros) {
+        const DriftLikelihood of(gyro);
+        double sum = 0;
+        for (std::size_t i = 0; i < sizes.size(); ++i) {
+            const double ratio =
+                std::exp(walk ? of.ratio_of_walk(sizes[i]) : of.ratio_of_scatter(sizes[i]));
+            product[i] *= ratio;
+            sum += ratio;
+        }
+        apart *= 0.5 + 0.5 * sum / divisor;
+    }
+    for (const double one : product) together += one / divisor;
+    return std::log(0.5 * together + 0.5 * apart);
+}
+
+TEST_F(Golden, OddsOfScatterAndWalkAgainFromTheDefinition) {
+    constexpr std::array<double, 5> kScatter{0.5, 1, 2, 4, 8}, kWalk{2, 4, 8, 16, 32};
+    EXPECT_NEAR(odds_again(gyros, kWalk, true, 5), 42.5315, 1e-3);
+    EXPECT_NEAR(odds_again(gyros, kScatter, false, 5), 29.6628, 1e-3);
+    // Five times too small: the mean over the five sizes taken twice.
+    EXPECT_NEAR(odds_again(gyros, kWalk, true, 25), 40.908, 2e-3);
+    EXPECT_NEAR(odds_again(gyros, kScatter, false, 25), 28.010, 2e-3);
 }
 
 TEST_F(Golden, SignaturesOfTheFirstDwell) {
