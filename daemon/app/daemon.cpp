@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include "daemon/order/campaign_order.hpp"
 #include "daemon/results/result_json.hpp"
@@ -473,26 +472,6 @@ void Daemon::write_result(const Judged& judged) {
     if (recorder_)
         recorder_->campaign_ended(
             {name_of(ended.state), ended.reason, campaign_.mark(), text, utc_now()});
-}
-
-void Daemon::write_result_file(const std::string& text, bool complete) {
-    if (configuration_.results.empty()) return;
-    // A partial result never takes the place of a complete one.
-    const auto path = std::filesystem::path(configuration_.results) /
-                      (complete ? "result.json" : "result-partial.json");
-    auto unfinished = path;
-    unfinished += ".new";
-    std::ofstream file(unfinished);
-    file << text;
-    file.close();
-    std::error_code error;
-    if (file) std::filesystem::rename(unfinished, path, error);
-    if (!file || error) {
-        log(Severity::alarm, "campaign", "cannot write " + path.string());
-    } else {
-        log(Severity::info, "campaign",
-            fmt::format("{} result in {}", complete ? "complete" : "partial", path.string()));
-    }
 }
 
 StatusData Daemon::status() const {

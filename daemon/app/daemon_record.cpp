@@ -1,8 +1,10 @@
-// What the daemon tells the recorder.
+// What the daemon tells the recorder, and its result file.
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -219,6 +221,26 @@ void Daemon::record_dwell(const estimator::DwellSummary& summary, const estimato
         result.rows.back().position == summary.position)
         dwell.row = result.rows.back();
     recorder_->dwell_done(std::move(dwell));
+}
+
+void Daemon::write_result_file(const std::string& text, bool complete) {
+    if (configuration_.results.empty()) return;
+    // A partial result never takes the place of a complete one.
+    const auto path = std::filesystem::path(configuration_.results) /
+                      (complete ? "result.json" : "result-partial.json");
+    auto unfinished = path;
+    unfinished += ".new";
+    std::ofstream file(unfinished);
+    file << text;
+    file.close();
+    std::error_code error;
+    if (file) std::filesystem::rename(unfinished, path, error);
+    if (!file || error) {
+        log(Severity::alarm, "campaign", "cannot write " + path.string());
+    } else {
+        log(Severity::info, "campaign",
+            fmt::format("{} result in {}", complete ? "complete" : "partial", path.string()));
+    }
 }
 
 }  // namespace vibrig

@@ -7,19 +7,13 @@
 
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/result_json.hpp"
+#include "daemon/results/text_line.hpp"
 
 namespace vibrig::tool {
 
 namespace {
 
 using estimator::uncertainty::Assessment;
-
-template <class... Values>
-std::string line(const char* format, Values... values) {
-    std::array<char, 256> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return std::string(text.data()) + "\n";
-}
 
 std::string number(const char* format, double value) {
     std::array<char, 64> text{};

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "daemon/results/assessment_json.hpp"
+#include "daemon/results/text_line.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::tool {
@@ -24,13 +25,6 @@ namespace uncertainty = estimator::uncertainty;
 using Json = nlohmann::ordered_json;
 
 constexpr std::array<const char*, 3> kGyros{"x", "y", "z"};
-
-template <class... Values>
-std::string line(const char* format, Values... values) {
-    std::array<char, 300> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return std::string(text.data()) + "\n";
-}
 
 Json numbers_of(const VectorXd& values) {
     Json list = Json::array();

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/allan_analysis.hpp"
 
 namespace vibrig::tool {
@@ -9,13 +10,6 @@ namespace vibrig::tool {
 namespace {
 
 constexpr double kShownWeight = 0.05;
-
-template <typename... Values>
-std::string line(const char* format, Values... values) {
-    std::array<char, 256> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return text.data();
-}
 
 const char* noise_name(allan::Alpha alpha) {
     switch (alpha) {

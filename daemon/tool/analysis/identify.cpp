@@ -35,6 +35,7 @@
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
+#include "daemon/tool/recordings/identified.hpp"
 #include "daemon/tool/simulated.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "estimator/identification/identification.hpp"

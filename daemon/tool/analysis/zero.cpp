@@ -18,6 +18,7 @@
 #include "daemon/plot/chart.hpp"
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
+#include "daemon/results/text_line.hpp"
 #include "daemon/tool/analysis/column_file.hpp"
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/observability.hpp"
@@ -57,13 +58,6 @@ struct Options {
     bool both_ways = false;
     std::string write;
 };
-
-template <typename... Values>
-std::string line(const char* format, Values... values) {
-    std::array<char, 320> out{};
-    std::snprintf(out.data(), out.size(), format, values...);
-    return out.data();
-}
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 

@@ -22,7 +22,7 @@ namespace {
 constexpr const char* kWhoVerifies = "vibrig journal verify: ";
 constexpr std::size_t kLargestReport = 256 << 20;
 
-struct VerifyOptions {
+struct JournalOptions {
     std::string file = "/var/lib/vibrig/journal.sqlite3", key;
     std::vector<std::string> anchors;
     bool json = false;
@@ -102,7 +102,7 @@ void print_words(const std::string& file, const journal::Verdict& verdict, bool 
     }
 }
 
-int verify(const VerifyOptions& options) {
+int verify(const JournalOptions& options) {
     journal::Expectation expected;
     expected.public_key = key_of(options.key);
     for (const std::string& argument : options.anchors) {
@@ -129,7 +129,7 @@ void add_journal(CLI::App& app, int& exit_code) {
     journal.footer("Example: vibrig journal verify");
     CLI::App& verifying =
         *journal.add_subcommand("verify", "Whether a journal is what was written into it");
-    auto options = std::make_shared<VerifyOptions>();
+    auto options = std::make_shared<JournalOptions>();
     verifying
         .add_option("FILE", options->file, "The journal; its signed head (.head) lies beside it")
         ->capture_default_str();
