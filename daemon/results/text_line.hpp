@@ -6,12 +6,18 @@
 
 namespace vibrig::tool {
 
-/// A line of a table, as printf has it; 320 characters at most.
+/// As printf has it; 319 characters at most.
 template <class... Values>
-[[nodiscard]] std::string line(const char* format, Values... values) {
+[[nodiscard]] std::string printed(const char* format, Values... values) {
     std::array<char, 320> text{};
     std::snprintf(text.data(), text.size(), format, values...);
-    return std::string(text.data()) + "\n";
+    return text.data();
+}
+
+/// The same, with the end of a line.
+template <class... Values>
+[[nodiscard]] std::string line(const char* format, Values... values) {
+    return printed(format, values...) + "\n";
 }
 
 }  // namespace vibrig::tool

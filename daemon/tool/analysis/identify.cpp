@@ -88,9 +88,10 @@ class RowsIdentified {
         static_cast<void>(identification_.add(measurement));
         doubts_.add(measurement);
     }
-    Found found() {
+    /// `held_out`: a few dwells that a result is tried on determine nothing by themselves.
+    Found found(bool held_out) {
         if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
-        plan_.tell();
+        if (!held_out) plan_.tell();
         auto result = identification_.result();
         for (auto& row : result.rows) row.common_clock = common_clock_;
         return with_doubts(std::move(result), doubts_);
@@ -122,7 +123,7 @@ class RowsIdentified {
 
 /// A file of any length, in memory that does not grow with it: another thread reads ahead.
 Found identify(proto::RecordingReader& file, std::uint64_t size,
-               const estimator::Settings& settings, const std::string& path) {
+               const estimator::Settings& settings, const std::string& path, bool held_out) {
     struct Block {
         std::vector<RecordingRow> rows;
         std::uint64_t bytes = 0;  ///< of the file, up to its end
@@ -145,7 +146,7 @@ Found identify(proto::RecordingReader& file, std::uint64_t size,
         for (const RecordingRow& row : block->rows) identified.add(row);
         progress.show(block->bytes, std::max(size, block->bytes));
     }
-    Found found = identified.found();
+    Found found = identified.found(held_out);
     // All that shook did so at the frequency of the configuration.
     const Spectra none;
     DwellKinds kinds(settings.frequency_hz, none);
@@ -423,9 +424,10 @@ Identified identify_recording(const std::string& file, const std::string& config
         identified.simulated = loaded.configuration.simulated() || reader.simulated();
         std::error_code unknown;
         const auto size = std::filesystem::file_size(file, unknown);
-        found = reader.has_frequency() || !request.spectra.empty()
-                    ? identify(rows_of(reader), identified.settings, request, file)
-                    : identify(reader, unknown ? 0 : size, identified.settings, file);
+        found =
+            reader.has_frequency() || !request.spectra.empty()
+                ? identify(rows_of(reader), identified.settings, request, file)
+                : identify(reader, unknown ? 0 : size, identified.settings, file, request.held_out);
     }
     identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);

@@ -142,29 +142,30 @@ std::string result_table(const zeros::CalibrationResult& r, const zeros::Observa
     std::string out = "axis      zero [mg]   sigma [mg]   level [']   converged\n";
     for (std::size_t i = 0; i < 3; ++i) {
         const zeros::AxisResult& axis = r.axis[i];
-        out += line("%-4s %14.5f %12.5f %11.4f   %s\n", kAxisLetters[i], axis.zero_mg,
-                    axis.sigma_mg, axis.zero_mg * 1e-3 / kDegree * 60,
-                    axis.converged_s ? line("%.0f s", *axis.converged_s).c_str() : "no");
+        out += printed("%-4s %14.5f %12.5f %11.4f   %s\n", kAxisLetters[i], axis.zero_mg,
+                       axis.sigma_mg, axis.zero_mg * 1e-3 / kDegree * 60,
+                       axis.converged_s ? printed("%.0f s", *axis.converged_s).c_str() : "no");
     }
-    out += line(
+    out += printed(
         "x and y are zero + 1 g x misalignment, z is zero + 1 g x scale error; of their "
         "sigma the filter's share is %.5f, %.5f, %.5f mg\n",
         r.axis[0].filter_sigma_mg, r.axis[1].filter_sigma_mg, r.axis[2].filter_sigma_mg);
     if (r.gyro_gain) {
-        out += line("vertical gyro against the azimuth read-out: %+.1f ppm\n", *r.gyro_gain * 1e6);
-    }
-    out += line("gyro biases %.4f, %.4f, %.4f deg/h (1 sigma %.2g, %.2g, %.2g)\n",
-                r.gyro_bias_deg_h[0], r.gyro_bias_deg_h[1], r.gyro_bias_deg_h[2],
-                r.gyro_sigma_deg_h[0], r.gyro_sigma_deg_h[1], r.gyro_sigma_deg_h[2]);
-    out += line("observability: rank %d of 15, smallest singular values %.2g, %.2g, %.2g\n",
-                seen.rank, seen.singular[12], seen.singular[13], seen.singular[14]);
-    for (std::size_t i = 0; i < seen.degree.size(); ++i) {
         out +=
-            line("  %-10s %-9.3g%s", zeros::kStateNames[i], seen.degree[i], i % 3 == 2 ? "\n" : "");
+            printed("vertical gyro against the azimuth read-out: %+.1f ppm\n", *r.gyro_gain * 1e6);
+    }
+    out += printed("gyro biases %.4f, %.4f, %.4f deg/h (1 sigma %.2g, %.2g, %.2g)\n",
+                   r.gyro_bias_deg_h[0], r.gyro_bias_deg_h[1], r.gyro_bias_deg_h[2],
+                   r.gyro_sigma_deg_h[0], r.gyro_sigma_deg_h[1], r.gyro_sigma_deg_h[2]);
+    out += printed("observability: rank %d of 15, smallest singular values %.2g, %.2g, %.2g\n",
+                   seen.rank, seen.singular[12], seen.singular[13], seen.singular[14]);
+    for (std::size_t i = 0; i < seen.degree.size(); ++i) {
+        out += printed("  %-10s %-9.3g%s", zeros::kStateNames[i], seen.degree[i],
+                       i % 3 == 2 ? "\n" : "");
     }
     if (r.innovation.blocks > 0) {
-        out += line("innovations: mean normalised square %.3f, expected %.3f to %.3f\n",
-                    r.innovation.mean_nis, r.innovation.low, r.innovation.high);
+        out += printed("innovations: mean normalised square %.3f, expected %.3f to %.3f\n",
+                       r.innovation.mean_nis, r.innovation.low, r.innovation.high);
     }
     for (const std::string& note : r.notes) out += "note: " + note + "\n";
     for (const std::string& problem : r.problems) out += "not valid: " + problem + "\n";
@@ -191,10 +192,10 @@ std::string apart_table(const zeros::ZerosApart& apart) {
     std::string out = "with z down as well\n";
     for (std::size_t i = 0; i < 3; ++i) {
         const double unit = i == 2 ? 1e-6 : kArcsec;
-        out += line("%-4s zero %.5f +- %.5f mg, %s %.3f +- %.3f %s\n", kAxisLetters[i],
-                    apart.zero_mg[i], std::sqrt(apart.covariance_mg2[i][i]),
-                    i == 2 ? "scale error" : "misalignment", apart.share[i] / unit,
-                    apart.share_sigma[i] / unit, i == 2 ? "ppm" : "arcsec");
+        out += printed("%-4s zero %.5f +- %.5f mg, %s %.3f +- %.3f %s\n", kAxisLetters[i],
+                       apart.zero_mg[i], std::sqrt(apart.covariance_mg2[i][i]),
+                       i == 2 ? "scale error" : "misalignment", apart.share[i] / unit,
+                       apart.share_sigma[i] / unit, i == 2 ? "ppm" : "arcsec");
     }
     return out;
 }
@@ -295,8 +296,9 @@ void write_increments(const Options& options, const zeros::CalibrationSettings& 
 int run_simulate(const Options& options) {
     zeros::CalibrationSettings s = settings_of(options);
     if (s.plan.duration_s / options.period_s > 1e7) {
-        throw std::invalid_argument(line("--duration: %g s are %g increments, expected at most 1e7",
-                                         s.plan.duration_s, s.plan.duration_s / options.period_s));
+        throw std::invalid_argument(
+            printed("--duration: %g s are %g increments, expected at most 1e7", s.plan.duration_s,
+                    s.plan.duration_s / options.period_s));
     }
     zeros::UnitErrors errors;
     for (std::size_t i = 0; i < 3; ++i) {
