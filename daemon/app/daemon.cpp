@@ -438,7 +438,8 @@ void Daemon::control_loop() {
     }
     if (to_write_ != ToWrite::nothing && dwells_with_estimator_ == 0) {
         assessing_.abandon();
-        write_result(judge(configuration_.estimator, whole_result(), again()));
+        write_result(judge(configuration_.estimator, whole_result(), again(),
+                           estimator::uncertainty::Stage::ended));
     }
     give_up_arming("the daemon is shutting down");
     finish_acknowledging(true);

@@ -196,7 +196,8 @@ class Daemon final : public StatusSource {
     [[nodiscard]] std::optional<Again> again() const;
     [[nodiscard]] static Judged judge(const estimator::Settings& settings,
                                       const estimator::Result& result,
-                                      const std::optional<Again>& again);
+                                      const std::optional<Again>& again,
+                                      estimator::uncertainty::Stage stage);
     [[nodiscard]] bool verdict_wanted();
     void keep(estimator::Result result);
     [[nodiscard]] estimator::Result whole_result() const;

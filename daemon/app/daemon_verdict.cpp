@@ -58,7 +58,7 @@ std::optional<Daemon::Again> Daemon::again() const {
 }
 
 Daemon::Judged Daemon::judge(const estimator::Settings& settings, const estimator::Result& result,
-                             const std::optional<Again>& again) {
+                             const std::optional<Again>& again, uncertainty::Stage stage) {
     Judged out;
     if (again && !result.dwells.empty()) {
         dwells::Anew anew(settings, again->found, result.dwells.size());
@@ -87,7 +87,7 @@ Daemon::Judged Daemon::judge(const estimator::Settings& settings, const estimato
             return out;
         }
     }
-    out.assessed = uncertainty::assess(settings, result);
+    out.assessed = uncertainty::assess(settings, result, stage);
     return out;
 }
 
@@ -131,8 +131,10 @@ void Daemon::take_verdict() {
         // dwell, is in nobody's way.
         const auto work = [settings = configuration_.estimator, result = whole_result(),
                            anew = concluding_ ? again() : std::nullopt,
+                           stage = concluding_ ? uncertainty::Stage::ended
+                                               : uncertainty::Stage::under_way,
                            trim = !memory_lock_.locked] {
-            auto found = judge(settings, result, anew);
+            auto found = judge(settings, result, anew, stage);
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;

@@ -299,7 +299,7 @@ const char* word_of(Level level) noexcept {
     return level == Level::valid ? "valid" : level == Level::doubtful ? "doubtful" : "not valid";
 }
 
-Assessment assess(const Settings& settings, const Result& result) {
+Assessment assess(const Settings& settings, const Result& result, Stage stage) {
     Assessment out;
     DwellTable table = dwell_table(result.rows);
     if (table.dwells() >= 2 && settings.method == Method::joint) {
@@ -349,7 +349,7 @@ Assessment assess(const Settings& settings, const Result& result) {
         out.sensitivity = b.sensitivity;
         tell_coefficients(settings, result, table, fit, all, b, out);
     }
-    out.verdict = judge(settings, result, out);
+    out.verdict = judge(settings, result, out, stage);
     return out;
 }
 

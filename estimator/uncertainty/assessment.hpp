@@ -95,8 +95,12 @@ struct Assessment {
     std::vector<InputSignature> inputs;
 };
 
+/// Whether dwells are still to come. Then what is not observable yet is no reason of a verdict.
+enum class Stage : std::uint8_t { under_way, ended };
+
 /// A pure function of settings and result (its rows, observability, cross-check and dwells): live,
 /// resumed, replayed and read from a file it gives the same to the last bit.
-[[nodiscard]] Assessment assess(const Settings& settings, const Result& result);
+[[nodiscard]] Assessment assess(const Settings& settings, const Result& result,
+                                Stage stage = Stage::ended);
 
 }  // namespace vibrig::estimator::uncertainty

@@ -279,7 +279,7 @@ void add_dwells(const Result& result, std::vector<Reason>& list) {
     list.push_back(std::move(first));
 }
 
-void add_result(const Result& result, std::vector<Reason>& list) {
+void add_observability(const Result& result, std::vector<Reason>& list) {
     std::string names;
     for (std::size_t i = 0; i < kParameters; ++i) {
         if (!result.observable[i])
@@ -289,7 +289,9 @@ void add_result(const Result& result, std::vector<Reason>& list) {
         list.push_back({"not observable",
                         "these positions and levels do not determine one by one " + names,
                         Level::not_valid});
-    const CrossCheck& check = result.cross_check;
+}
+
+void add_cross_check(const CrossCheck& check, std::vector<Reason>& list) {
     if (!check.done) {
         list.push_back({"cross-check", "no batch over the same readings to check the filter by",
                         Level::not_valid});
@@ -332,10 +334,11 @@ std::string sentence_of(const Assessment& a, const Verdict& verdict) {
 
 }  // namespace
 
-Verdict judge(const Settings& settings, const Result& result, const Assessment& a) {
+Verdict judge(const Settings& settings, const Result& result, const Assessment& a, Stage stage) {
     Verdict verdict;
     std::vector<Reason>& list = verdict.reasons;
-    add_result(result, list);
+    if (stage == Stage::ended) add_observability(result, list);
+    add_cross_check(result.cross_check, list);
     add_dwells(result, list);
     if (a.done) {
         add_patterns(settings, a, list);

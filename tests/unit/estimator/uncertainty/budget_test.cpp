@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <random>
@@ -151,6 +152,26 @@ TEST(Budget, ForAnotherPowerOnTheSwitchingOnIsAdded) {
     EXPECT_GT(a.coefficients[0].u_use, 0.05);
     EXPECT_NEAR(a.coefficients[1].u_use, std::hypot(a.coefficients[1].u, 0.01), 1e-12);
     EXPECT_EQ(a.coefficients[4].u_use, a.coefficients[4].u);
+}
+
+TEST(VerdictOnTheWay, WhatLaterDwellsWillDetermineIsNoReasonYet) {
+    // GIVEN the first level of a plan that takes one level after the other
+    const Settings settings;
+    auto plan = estimator::testing::sequential(6, 14.0 / 3);
+    plan.resize(plan.size() / 2);
+    Result result = result_of(theory_rows(settings, plan));
+    result.observable.fill(false);
+    const auto says = [](const Assessment& a) {
+        return std::ranges::any_of(a.verdict.reasons,
+                                   [](const Reason& r) { return r.code == "not observable"; });
+    };
+    // THEN as long as it goes on that is no fault of the rig, and in the end it is
+    const Assessment on_the_way = assess(settings, result, Stage::under_way);
+    EXPECT_FALSE(says(on_the_way));
+    EXPECT_NE(on_the_way.verdict.level, Level::not_valid) << on_the_way.verdict.sentence;
+    const Assessment ended = assess(settings, result);
+    EXPECT_TRUE(says(ended));
+    EXPECT_EQ(ended.verdict.level, Level::not_valid);
 }
 
 }  // namespace
