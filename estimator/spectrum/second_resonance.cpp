@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
 
-constexpr Index kLinear = kBase + 2 * kElastic, kNonlinear = 4;
+constexpr Index kLinearColumns = kBase + 2 * kElastic, kNonlinear = 4;
 
 /// Both resonances: ln hz of each, then ln damping.
 std::vector<Resonance> resonances_at(const Vector4d& p) {
@@ -28,7 +28,7 @@ class TwoResonances {
           gyro_(gyro),
           factor_(problem.covariance),
           rate_(factor_.matrixL().solve(problem.rate)),
-          information_(kLinear) {
+          information_(kLinearColumns) {
         information_.head(kBase) = problem.prior_sigma.array().square().inverse();
         information_.tail(2 * kElastic).setConstant(std::pow(kElasticSizes.back(), -2));
     }
@@ -51,19 +51,19 @@ class TwoResonances {
 
     /// Normal equations of all 26, and the slope of half the objective.
     [[nodiscard]] std::pair<MatrixXd, VectorXd> normal(const At& here) const {
-        MatrixXd j(rate_.size(), kLinear + kNonlinear);
-        j.leftCols(kLinear) = here.columns;
+        MatrixXd j(rate_.size(), kLinearColumns + kNonlinear);
+        j.leftCols(kLinearColumns) = here.columns;
         constexpr double kStep = 1e-5;
         for (Index i = 0; i < kNonlinear; ++i) {
             const Vector4d step = kStep * Vector4d::Unit(i);
-            j.col(kLinear + i) =
+            j.col(kLinearColumns + i) =
                 (whitened(here.p + step) - whitened(here.p - step)) * here.x / (2 * kStep);
         }
         MatrixXd all = j.transpose() * j;
-        all.diagonal().head(kLinear) += information_;
+        all.diagonal().head(kLinearColumns) += information_;
         all.diagonal().tail(2).array() += std::pow(kDampingSpread, -2);
         VectorXd slope = j.transpose() * (rate_ - here.columns * here.x);
-        slope.head(kLinear) -= information_.cwiseProduct(here.x);
+        slope.head(kLinearColumns) -= information_.cwiseProduct(here.x);
         slope.tail(2) -= off_prior(here.p) / kDampingSpread;
         return {all, slope};
     }
@@ -134,7 +134,7 @@ Mixture two_resonances(const SpectralTable& table, std::size_t gyro, const GyroP
          true});
     const VectorXd left = problem.rate - design(table, gyro, out.list[0].resonances) * best->x;
     out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
-    out.degrees = static_cast<int>(problem.rate.size() - kLinear - kNonlinear);
+    out.degrees = static_cast<int>(problem.rate.size() - kLinearColumns - kNonlinear);
     return out;
 }
 
