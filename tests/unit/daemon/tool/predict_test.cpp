@@ -101,7 +101,7 @@ TEST_F(Predict, SurveyNamesTheResonanceAndTellsStaticCoefficients) {
     EXPECT_EQ(spectrum["highest_hz"], 125);
     EXPECT_TRUE(spectrum["flat"]["alarm"]);
     EXPECT_EQ(spectrum["flat"]["dof"], 108);
-    for (int gyro = 0; gyro < 3; ++gyro) {
+    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         EXPECT_GT(spectrum["log_odds"][gyro], 4);
         EXPECT_NEAR(spectrum["resonance"][gyro]["hz"].get<double>(), 60, 1);
         EXPECT_LE(spectrum["mixture"][gyro].size(), 300U);
