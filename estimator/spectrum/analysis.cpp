@@ -261,7 +261,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     out.groups.value.resize(columns, 3);
     out.groups.sigma.resize(columns, 3);
     std::array<GyroProblem, 3> problems;
-    std::array<MatrixXd, 3> covariances;
+    std::array<MatrixXd, 3> if_flat;
     bool scattered = false;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto g = static_cast<Index>(j);
@@ -271,11 +271,13 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
             const auto gyro = rates_of(table, times, sigma, j, out.vibration_rates);
             const auto average = uncertainty::average_drift(gyro, settings.drift);
             out.vibration_rates.col(g) = vibration_part(table, j, average.value);
-            covariances[j] = uncertainty::mean_covariance(gyro, average);
             out.groups.value.col(g) = average.value;
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
             scattered |= average.weights.scatter > 0.5;
-            problems[j] = {gyro.rate, covariances[j], prior.col(g)};
+            problems[j] = {gyro.rate, uncertainty::mean_covariance(gyro, average), prior.col(g)};
+            if (table.kinds().size() > 1)
+                if_flat[j] =
+                    covariance_if_flat(gyro, average, table.base(j), prior.col(g), settings.drift);
         }
     }
     const Declared declared = declared_of(settings, table, out.groups.value, out.vibration_rates);
@@ -284,7 +286,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
         for (Index k = 0; k < n; ++k)
             rates.segment<3>(3 * k) = table.rows()[static_cast<std::size_t>(k)].rate;
         out.flat = test_flatness(
-            table, rates, joint_covariance(table, covariances, out.vibration_rates, declared.rates),
+            table, rates, joint_covariance(table, if_flat, out.vibration_rates, declared.rates),
             prior, scattered);
     }
     for (std::size_t j = 0; j < 3; ++j)

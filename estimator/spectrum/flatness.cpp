@@ -1,6 +1,7 @@
 #include "estimator/spectrum/flatness.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/uncertainty/distributions.hpp"
@@ -12,7 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSeen = 1.2816;  ///< 90 % of a normal distribution
+constexpr double kLeastSlow = 1e-3;  ///< of a slow change of the bias
+constexpr double kSeen = 1.2816;     ///< 90 % of a normal distribution
 constexpr double kDampingTold = 0.05;
 constexpr double kShare = 0.2;
 constexpr std::array<double, 5> kTold{40, 60, 120, 300, 1000};
@@ -72,7 +74,50 @@ double noncentrality(int degrees) {
     return lambda;
 }
 
+/// The likeliest changes of the bias without their scatter, each once.
+std::vector<std::pair<uncertainty::DriftHypothesis, double>> slow_part(
+    const uncertainty::DriftAverage& average) {
+    std::vector<std::pair<uncertainty::DriftHypothesis, double>> out;
+    for (auto [what, weight] : average.likeliest) {
+        what.scatter = 0;
+        const auto same = std::find_if(out.begin(), out.end(), [&what = what](const auto& other) {
+            return other.first == what;
+        });
+        if (same == out.end())
+            out.emplace_back(what, weight);
+        else
+            same->second += weight;
+    }
+    std::erase_if(out, [](const auto& one) { return one.second < kLeastSlow; });
+    return out;
+}
+
 }  // namespace
+
+MatrixXd covariance_if_flat(const uncertainty::GyroRates& gyro,
+                            const uncertainty::DriftAverage& of_groups, const MatrixXd& base,
+                            const VectorXd& prior_sigma, const uncertainty::Drift& drift) {
+    uncertainty::GyroRates flat = gyro;
+    flat.regressors = base;
+    flat.prior_information = prior_sigma.array().square().inverse();
+    double scatter = 0;
+    for (const auto& [what, weight] : of_groups.likeliest)
+        scatter += weight * what.scatter * what.scatter;
+    const Index n = gyro.dwells();
+    const MatrixXd unit = MatrixXd::Identity(n, n);
+    MatrixXd precision = MatrixXd::Zero(n, n);
+    double all = 0;
+    // Of the inverses: a change that is large, but hardly likely, does not hide the frequencies.
+    for (const auto& one : slow_part(uncertainty::average_drift(flat, drift))) {
+        uncertainty::DriftAverage alone;
+        alone.likeliest = {{one.first, 1.0}};
+        const MatrixXd covariance =
+            uncertainty::mean_covariance(flat, alone) + scatter * gyro.variance.mean() * unit;
+        precision += one.second * Eigen::LLT<MatrixXd>(covariance).solve(unit);
+        all += one.second;
+    }
+    return Eigen::LLT<MatrixXd>(MatrixXd(precision / all)).solve(unit);
+}
 
 VectorXd grouped_prior(const VectorXd& base, Index columns) {
     VectorXd out(columns);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/spectrum/table.hpp"
+#include "estimator/uncertainty/drift_states.hpp"
 
 namespace vibrig::estimator::spectrum {
 
@@ -30,6 +31,16 @@ inline constexpr double kAlarm = 1e-3;
 struct Groups {
     Eigen::MatrixXd value, sigma;
 };
+
+/// Covariance, n x n, of one gyro's rates about flat coefficients. Slow changes of the bias are
+/// weighed by how well they go with flat coefficients, which leave many more rates to tell them by
+/// than the groups do; the scatter by the groups, since what is not flat scatters about what is.
+/// `gyro`, `of_groups`: with the groups' columns; `base`, `prior_sigma`: the flat ones.
+[[nodiscard]] Eigen::MatrixXd covariance_if_flat(const uncertainty::GyroRates& gyro,
+                                                 const uncertainty::DriftAverage& of_groups,
+                                                 const Eigen::MatrixXd& base,
+                                                 const Eigen::VectorXd& prior_sigma,
+                                                 const uncertainty::Drift& drift);
 
 /// `covariance`: 3 n x 3 n, everything that is declared included; `prior_sigma`: 10 x 3, filter
 /// order. `scattered`: the dwells scatter beyond their noise; then the alarm needs an F test too.

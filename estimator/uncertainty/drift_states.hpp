@@ -31,6 +31,8 @@ struct DriftHypothesis {
     double trend = 0;    ///< end minus start
     int step_after = 0;  ///< dwells before a step; 0: none
     enum class Unbalance { none, trend, step } unbalance = Unbalance::none;
+
+    [[nodiscard]] bool operator==(const DriftHypothesis&) const = default;
 };
 
 /// Probabilities that the data leave, of what the bias did.

@@ -31,12 +31,12 @@ Settings settings_of() {
 }
 
 Analysis campaign(const Settings& settings, const Truth& truth, std::vector<PlannedDwell> plan,
-                  unsigned seed, bool mixed = true) {
+                  unsigned seed, bool mixed = true, Form form = Form::automatic) {
     std::mt19937_64 random(seed);
     if (mixed) shuffle(plan, random);
     Dwells dwells = dwells_of(settings, truth, plan);
     add_noise(dwells, random);
-    return analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), Form::automatic);
+    return analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), form);
 }
 
 std::vector<Situation> attitudes_of(const Profile& profile) {
@@ -80,7 +80,7 @@ void expect_survey_predicts(unsigned campaigns, double slack) {
         const Analysis found = campaign(settings_of(), truth, survey(), seed);
         for (const Mixture& gyro : found.gyros) {
             EXPECT_TRUE(gyro.named()) << "seed " << seed;
-            EXPECT_NEAR(tell(gyro).at(0).hz.mean, 60, 0.6) << "seed " << seed;
+            EXPECT_NEAR(tell(gyro).at(0).hz.mean, 60, 0.5) << "seed " << seed;
         }
         EXPECT_EQ(found.model.highest_hz, 125);
         EXPECT_TRUE(found.model.refusal.empty()) << found.model.refusal;
@@ -119,19 +119,24 @@ TEST(SpectrumAcceptance, CampaignAtOneFrequencyIsWrongAndSaysThatItIsNotCovered)
 /// False alarms over flat rigs, and what the prediction costs there.
 void expect_flat(unsigned campaigns) {
     unsigned alarms = 0, named = 0;
-    double sum = 0;
+    double sum = 0, of_noise = 0;
+    Settings noise = settings_of();
+    noise.drift.model = uncertainty::BiasModel::constant;
     for (unsigned seed = 1; seed <= campaigns; ++seed) {
         const Analysis found = campaign(settings_of(), {}, survey(), seed);
+        of_noise += campaign(noise, {}, survey(), seed, true, Form::flat).flat.chi_square;
         alarms += found.flat.alarm ? 1U : 0U;
         for (const Mixture& gyro : found.gyros) named += gyro.named() ? 1U : 0U;
         EXPECT_EQ(found.flat.degrees, 108);
         sum += found.flat.chi_square;
     }
     const double n = campaigns;
-    // The drift that the rates do not exclude is in the covariance: less than the 108 of noise
-    // alone.
-    EXPECT_GT(sum / n, 85 - 4 * std::sqrt(216 / n));
-    EXPECT_LT(sum / n, 108 + 4 * std::sqrt(216 / n));
+    std::printf("flat rigs: mean of T %.1f, by noise alone %.1f, of 108; %u alarms\n", sum / n,
+                of_noise / n, alarms);
+    EXPECT_NEAR(of_noise / n, 108, 4 * std::sqrt(216 / n));
+    // Scatter that the rates do not exclude takes 8 %, slow drift 2 % (the same rates: little of
+    // the spread of T is left in the ratio).
+    EXPECT_NEAR(sum / of_noise, 0.91, 0.04 * std::sqrt(30 / n));
     EXPECT_LE(alarms, 1U);
     EXPECT_EQ(named, 0U);
 }
@@ -179,10 +184,10 @@ TEST(SpectrumAcceptance, SoakGainScatterAlarmsUnlessDeclared) {
     declared.uncertainty.gain_between_frequencies.u = 0.005;
     EXPECT_LE(alarms_of({}, declared, 0.005, 30), 1U);
     const unsigned undeclared = alarms_of({}, settings_of(), 0.005, 40);
-    // A rate of 0.25 to 0.60, less and more two standard deviations of 40 campaigns. It was 8: the
-    // covariance is wider than that of noise alone, and the test so much less sharp.
-    EXPECT_GE(undeclared, 5U);
-    EXPECT_LE(undeclared, 30U);
+    std::printf("gain scatter not declared: %u of 40 alarm\n", undeclared);
+    // A rate of 0.25 to 0.60.
+    EXPECT_GE(undeclared, 10U);
+    EXPECT_LE(undeclared, 24U);
     EXPECT_GE(alarms_of(Truth::common(0.02, kSixty), declared, 0, 30), 27U);
     EXPECT_LE(alarms_of({}, declared, 0, 30), 1U);
 }
@@ -195,29 +200,35 @@ Truth two_resonances_of(double first_hz, double first_share, double second_hz,
     return truth;
 }
 
-TEST(SpectrumAcceptance, TwoResonancesInsideThePlanAreFound) {
-    for (const auto& [f1, s1, f2, s2] :
-         {std::array{40., .25, 95., .25}, std::array{60., .5, 90., -.2}}) {
-        const Truth truth = two_resonances_of(f1, s1, f2, s2);
-        const Analysis found = campaign(settings_of(), truth, survey(), 1);
-        Errors errors;
+/// Error of the predictions over u; every gyro has both resonances.
+double error_with_two(const Truth& truth, double f1, double f2, unsigned campaigns) {
+    Errors errors;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        const Analysis found = campaign(settings_of(), truth, survey(), seed);
         for (const Profile& profile : six_profiles())
             add_errors(errors, settings_of(), truth, found.model, profile);
-        // 1.2 is asked for over many; one campaign with one set of coefficients in error
-        // gives 1.44.
-        EXPECT_LT(errors.rms_in_u(), 1.5);
         for (std::size_t j = 0; j < 3; ++j) {
-            ASSERT_TRUE(found.second[j]) << f1;
+            EXPECT_TRUE(found.second[j]) << f1;
             EXPECT_GE(found.lack_of_fit[j], kAlarm);
             const auto told = tell(found.gyros[j]);
-            ASSERT_EQ(told.size(), 2U);
+            if (told.size() != 2) continue;
             const auto& [low, high] = std::minmax(told[0].hz, told[1].hz,
                                                   [](auto& a, auto& b) { return a.mean < b.mean; });
             EXPECT_NEAR(low.mean, f1, std::max(5.0, 3 * low.sigma));
             EXPECT_NEAR(high.mean, f2, std::max(5.0, 3 * high.sigma));
         }
     }
+    std::printf("two resonances, %g and %g Hz: error/u %.2f\n", f1, f2, errors.rms_in_u());
+    return errors.rms_in_u();
 }
+void expect_two_resonances(unsigned campaigns, double most) {
+    for (const auto& [f1, s1, f2, s2] :
+         {std::array{40., .25, 95., .25}, std::array{60., .5, 90., -.2}})
+        EXPECT_LT(error_with_two(two_resonances_of(f1, s1, f2, s2), f1, f2, campaigns), most);
+}
+// All predictions of a campaign share a few coefficients: one campaign strays by a third.
+TEST(SpectrumAcceptance, TwoResonancesInsideThePlanAreFound) { expect_two_resonances(1, 1.6); }
+TEST(SpectrumAcceptance, SoakTwoResonancesInsideThePlanAreFound) { expect_two_resonances(20, 1.2); }
 
 TEST(SpectrumAcceptance, AThirdResonanceIsNotPredictedWith) {
     Truth truth = two_resonances_of(30, 0.4, 55, -0.4);
