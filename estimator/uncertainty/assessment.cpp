@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
@@ -27,12 +28,17 @@ VectorXd prior_information(const Settings& settings) {
     return information;
 }
 
-/// Dwells after which a power cut is likely: each change of run, if the power goes with it.
+/// Dwells after which a power cut is likely: each change of run, if the power goes with it. An
+/// order that returns to a run mixes the levels, and nobody switches the gyros off at each change
+/// of level.
 std::vector<std::size_t> breaks_of(const DwellTable& table, const Drift& drift) {
     std::vector<std::size_t> breaks;
     if (drift.power != Power::per_run) return breaks;
-    for (std::size_t k = 1; k < table.rows.size(); ++k) {
-        if (table.rows[k].run != table.rows[k - 1].run) breaks.push_back(k);
+    std::set<int> begun;
+    for (std::size_t k = 0; k < table.rows.size(); ++k) {
+        if (k > 0 && table.rows[k].run == table.rows[k - 1].run) continue;
+        if (!begun.insert(table.rows[k].run).second) return {};
+        if (k > 0) breaks.push_back(k);
     }
     return breaks;
 }

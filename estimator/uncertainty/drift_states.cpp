@@ -79,6 +79,8 @@ void add_steps(std::vector<Weighted>& list, Index n, const std::vector<std::size
     constexpr std::array<std::pair<double, double>, 3> kWalks{{{0, 0.6}, {4, 0.2}, {16, 0.2}}};
     const std::vector<int> at = places(2, n - 2);
     for (const int k : at) {
+        if (std::find(breaks.begin(), breaks.end(), static_cast<std::size_t>(k)) != breaks.end())
+            continue;
         for (const auto& [walk, part] : kWalks)
             list.push_back({{0, walk, 0, k}, 0.1 / static_cast<double>(at.size()) * part});
     }

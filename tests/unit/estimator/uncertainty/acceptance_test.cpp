@@ -125,10 +125,11 @@ class Acceptance : public ::testing::Test {
         }
         return out;
     }
-    /// `levels`: those that may be found, "V", "VD", "D", "DN", "N"; in 19 of 20. `most`: of the
-    /// bias in u_A, and rms of the errors.
+    /// `levels`: those that may be found, "V", "VD", "D", "DN", "N"; in `least` of 20. `most`: of
+    /// the bias in u_A, and rms of the errors.
     static void expect(const char* what, const Change& change, const std::string& levels,
-                       double most, double rms = 1.2, const Settings& settings = {}) {
+                       double most, double rms = 1.2, const Settings& settings = {},
+                       int least = 19) {
         const Outcome o = outcome(settings, change);
         const std::string told = std::string(what) + ", seeds 1 to 20: bias " +
                                  std::to_string(o.bias_u) + " u_A, " + std::to_string(o.combined) +
@@ -140,7 +141,7 @@ class Acceptance : public ::testing::Test {
         for (std::size_t l = 0; l < 3; ++l) {
             if (levels.find("VDN"[l]) != std::string::npos) fitting += o.levels[l];
         }
-        EXPECT_GE(fitting, 19) << told;
+        EXPECT_GE(fitting, least) << told;
         EXPECT_LE(o.bias_u, most + 0.3) << told;
         EXPECT_LE(o.rms, rms) << told;
     }
@@ -293,11 +294,19 @@ TEST_F(Acceptance, SoakOfTheSystematicRows) {
     expect(
         "unbalance step 0.05",
         [](plant::Truth& t) {
-            t.unbalance_step_deg_h_g[0][0] = t.unbalance_step_deg_h_g[1][0] =
-                t.unbalance_step_deg_h_g[2][0] = 0.05;
+            for (auto& gyro : t.unbalance_step_deg_h_g) gyro = {0.05, 0.05, 0.05};
             t.step_after_dwell = 14;
         },
         "D", 0.8);
+    // Gyro z's I axis lies level in dwells 10 to 15: of D_Iz alone the places 9 to 15 fit alike,
+    // their mean is 2.2 dwells off, 2.2 * 0.05/28 deg/h/g = 0.9 u_A (u_A has their spread in it).
+    expect(
+        "unbalance step 0.05 of D_I alone",
+        [](plant::Truth& t) {
+            for (auto& gyro : t.unbalance_step_deg_h_g) gyro[0] = 0.05;
+            t.step_after_dwell = 14;
+        },
+        "D", 0.9);
     expect(
         "resolver 1 per turn 20 arcsec", [&](plant::Truth& t) { t.harmonic_1_arcsec = vec(20); },
         "VD", 0.6);
@@ -338,13 +347,15 @@ TEST_F(Acceptance, SoakOfTheSystematicRows) {
         "accelerometer zero 5 mg", [&](plant::Truth& t) { t.zero_g = vec(5e-3); }, "V", 2.4, 1.5);
     expect(
         "amplitude drift 5 %", [](plant::Truth& t) { t.amplitude_drift_per_h = 0.05; }, "V", 0.2);
+    // A step of 0.01 has a chi-square of 37.6 and is named in 86 of 100:
+    // docs/theory/uncertainty.md, "What can be named".
     for (const double size : {0.01, 0.03}) {
         expect(("bias step " + std::to_string(size) + " at half").c_str(),
                [&](plant::Truth& t) {
                    t.bias_step_deg_h = vec(size);
                    t.step_after_dwell = 14;
                },
-               "D", size > 0.02 ? 0.9 : 0.6);
+               "D", size > 0.02 ? 0.9 : 0.6, 1.2, {}, size > 0.02 ? 19 : 13);
     }
     expect(
         "night ramp 0.01", [&](plant::Truth& t) { t.bias_ramp_deg_h_h = vec(0.01); }, "VD", 0.4);
@@ -354,14 +365,14 @@ TEST_F(Acceptance, SoakOfTheSystematicRows) {
     expect(
         "unbalance step 0.01",
         [](plant::Truth& t) {
-            for (auto& row : t.unbalance_step_deg_h_g) row[0] = 0.01;
+            for (auto& gyro : t.unbalance_step_deg_h_g) gyro = {0.01, 0.01, 0.01};
             t.step_after_dwell = 14;
         },
-        "D", 0.7);
+        "VD", 0.7);
     expect(
         "unbalance ramp 0.01 per h",
         [](plant::Truth& t) {
-            for (auto& row : t.unbalance_ramp_deg_h_g_h) row[0] = 0.01;
+            for (auto& gyro : t.unbalance_ramp_deg_h_g_h) gyro = {0.01, 0.01, 0.01};
         },
         "VD", 0.5);
     expect(
@@ -380,12 +391,21 @@ TEST_F(Acceptance, SoakOfTheSystematicRows) {
         "D", 0.8);
     expect(
         "clock 1e-4", [](plant::Truth& t) { t.time_base = 1e-4; }, "V", 0.5);
+    // Named in two of three; of 20 fewer than 9 are found in one of a hundred.
     expect(
-        "clock 1e-3", [](plant::Truth& t) { t.time_base = 1e-3; }, "DN", 4.2, kAll);
+        "clock 1e-3", [](plant::Truth& t) { t.time_base = 1e-3; }, "N", 4.2, kAll, {}, 9);
     expect(
-        "cubic 1e-4", [](plant::Truth& t) { t.cubic_deg_h_g3[0][0] = 1e-4; }, "VD", 1.9);
+        "cubic 1e-4",
+        [](plant::Truth& t) {
+            for (auto& gyro : t.cubic_deg_h_g3) gyro[0] = 1e-4;
+        },
+        "V", 1.9);
     expect(
-        "cubic 1e-3", [](plant::Truth& t) { t.cubic_deg_h_g3[0][0] = 1e-3; }, "N", 17.7, kAll);
+        "cubic 1e-3",
+        [](plant::Truth& t) {
+            for (auto& gyro : t.cubic_deg_h_g3) gyro[0] = 1e-3;
+        },
+        "N", 12.6, kAll);
     expect(
         "base rocks 10 arcsec",
         [](plant::Truth& t) {

@@ -169,6 +169,27 @@ TEST(Campaigns, InWhichARunFollowsTheOtherCannotTellAStepBetweenThem) {
     EXPECT_GT(a.worst_step, 500);
 }
 
+/// Of clean rows, all gyros.
+double weight_of_a_step(const std::vector<estimator::testing::PlannedRow>& plan, Power power) {
+    Settings settings;
+    settings.drift.power = power;
+    Rows rows = estimator::testing::theory_rows(settings, plan);
+    Random random(15);
+    add_noise(rows, random);
+    double sum = 0;
+    for (const DriftAverage& gyro : assess(settings, estimator::testing::result_of(rows)).drift)
+        sum += gyro.weights.step;
+    return sum;
+}
+
+TEST(Campaigns, PowerPerRunIsABreakWhereALevelEndsButNotAtEachChangeOfAMixedOrder) {
+    const auto mixed = balanced(kFirst, kSecond), plain = sequential(kFirst, kSecond);
+    EXPECT_DOUBLE_EQ(weight_of_a_step(mixed, Power::per_run),
+                     weight_of_a_step(mixed, Power::unknown));
+    EXPECT_GT(weight_of_a_step(plain, Power::per_run),
+              weight_of_a_step(plain, Power::unknown) + 0.3);
+}
+
 TEST(CampaignsSoak, OfAThousandCleanOnesTenAreNotValidAtMost) {
     const std::uint64_t seed = 14;
     SCOPED_TRACE("seed " + std::to_string(seed));

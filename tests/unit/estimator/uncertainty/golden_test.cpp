@@ -158,5 +158,39 @@ TEST_F(Golden, SignaturesOfTheFirstDwell) {
     near(of(Misfit::cross_axis, 1, 0.01), -5.338426e-3, -5.415576e-3, -5.461420e-3);
 }
 
+/// What the named columns do together to a constant-bias estimate: the largest shift in sigma, and
+/// the chi-square by which it shows.
+struct Shown {
+    double shift = 0, chi_square = 0;
+};
+
+Shown shown(const NullFit& fit, const Signatures& of, const std::vector<Index>& columns,
+            double size) {
+    VectorXd z = VectorXd::Zero(of.z.rows());
+    for (const Index i : columns) z += of.z.col(i) * (size / of.size);
+    const VectorXd sigma = fit.covariance().diagonal().cwiseSqrt();
+    return {fit.change(z).cwiseQuotient(sigma).cwiseAbs().maxCoeff(), fit.project(z).f(0, 0)};
+}
+
+// The figures of docs/theory/uncertainty.md, "What can be named".
+TEST_F(Golden, WhatMisfitsShiftAndHowTheyShow) {
+    const NullFit fit(table, MatrixXd(84, 0), VectorXd::Zero(30));
+    const ForwardModel model(settings, truth);
+    const auto expect = [&](const Signatures& of, const std::vector<Index>& columns, double size,
+                            const Shown& is) {
+        const Shown found = shown(fit, of, columns, size);
+        EXPECT_NEAR(found.shift, is.shift, 0.01) << of.unit;
+        EXPECT_NEAR(found.chi_square, is.chi_square, 0.05) << of.unit;
+    };
+    const Signatures cubic = signatures(Misfit::cubic, table, model, 0.007);
+    expect(cubic, {0}, 1e-3, {3.98, 9.39});
+    expect(cubic, {0, 3, 6}, 1e-3, {17.69, 61.18});
+    expect(signatures(Misfit::step, table, model, 0.007, 14), {0, 1, 2}, 0.01, {0.88, 37.58});
+    const Signatures unbalance = signatures(Misfit::unbalance_step, table, model, 0.007, 14);
+    expect(unbalance, {0, 3, 6}, 0.01, {0.50, 12.83});
+    expect(unbalance, {0, 1, 2, 3, 4, 5, 6, 7, 8}, 0.01, {0.72, 33.86});
+    expect(signatures(Misfit::time_base, table, model, 0.007), {0}, 1e-3, {4.00, 23.17});
+}
+
 }  // namespace
 }  // namespace vibrig::estimator::uncertainty
