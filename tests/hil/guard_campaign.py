@@ -45,7 +45,7 @@ class Coils:
     """Horn and lamp, by pymodbus."""
 
     def __init__(self):
-        self.process = subprocess.Popen(["/usr/bin/python3", os.path.join(HERE, "../unit/annunciator/coil_server.py"), "honest"],
+        self.process = subprocess.Popen(["/usr/bin/python3", os.path.join(HERE, "../unit/drivers/annunciator/coil_server.py"), "honest"],
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                         preexec_fn=r.die_with_parent)
         self.port = int(self.process.stdout.readline())
