@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 
 #include "daemon/app/daemon.hpp"
 #include "daemon/journal/reread.hpp"
@@ -11,6 +12,8 @@ namespace vibrig {
 namespace uncertainty = estimator::uncertainty;
 
 namespace {
+
+constexpr std::size_t kShownResiduals = 128;
 
 /// With fewer rates than that to spare there is nothing to tell.
 constexpr int kFewestDegrees = 9;
@@ -168,7 +171,11 @@ void Daemon::tell_verdict(const uncertainty::Assessment& assessed) {
         }
     }
     auto residuals = std::make_shared<std::vector<VerdictStatus::Residual>>();
-    for (const auto& r : assessed.rates) {
+    // The newest: a status is made for each who asks, and stays as small however long a campaign
+    // is.
+    const std::size_t past =
+        assessed.rates.size() - std::min(assessed.rates.size(), kShownResiduals);
+    for (const auto& r : std::span(assessed.rates).subspan(past)) {
         const auto known = [](double x) { return std::isfinite(x); };
         if (std::ranges::all_of(r.residual, known) && std::ranges::all_of(r.residual_sigma, known))
             residuals->push_back({r.run, r.position, r.time_h, r.residual, r.residual_sigma});
