@@ -185,7 +185,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                interlock_.proving(what != campaign::Proving::nothing);
            },
            [this](const campaign::ProofRecord& record) {
-               if (journal_) journal_->proved(record.by, campaign::to_json(record));
+               enter_proof(record);
            },
            utc_now,
            [this] {

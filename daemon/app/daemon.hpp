@@ -15,6 +15,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/commission/procedure.hpp"
 #include "daemon/commission/progress.hpp"
+#include "daemon/commission/shaker_parts.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/domain/status.hpp"
 #include "daemon/dwells/anew.hpp"
@@ -132,6 +133,13 @@ class Daemon final : public StatusSource {
                                             const std::vector<commission::Part>& parts,
                                             const commission::Json& evidence,
                                             const configuration::Loaded& as);
+    [[nodiscard]] commission::ShakerParts shaker_parts(
+        const commission::AmplitudeWitness& witness) const;
+    void enter_proof(const campaign::ProofRecord& record);
+    [[nodiscard]] std::string enter_shaker_parts(const std::string& by,
+                                                 const commission::AmplitudeWitness& witness);
+    [[nodiscard]] CommandReply state_units(const CommandRequest& request,
+                                           const commission::Json& what);
     [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
     /// Returns when to be called next at the latest.
     [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);

@@ -121,7 +121,13 @@ void Daemon::commission(WaitingCommand waiting, Time now) {
     const auto after = what.contains("after") && what["after"].is_number_unsigned()
                            ? what["after"].get<std::size_t>()
                            : 0;
-    const Json reply{{"record", book_.status(utc_now())},
+    Json record = book_.status(utc_now());
+    record["buttons_left"] = campaign_.proof().buttons_left();
+    record["lacking"] = Json::object();
+    if (what.contains("shaker"))  // why parts are not given: no business of a poll
+        for (const auto& [part, why] : shaker_parts({}).lacking)
+            record["lacking"][name_of(part)] = why;
+    const Json reply{{"record", record},
                      {"simulated", configuration_.simulated()},
                      {"configuration", loaded_.path},
                      {"procedure", procedure_ ? procedure_->state(after) : Json()}};
@@ -164,6 +170,65 @@ CommandReply Daemon::do_commission(const CommandRequest& request, const Json& wh
     return {true, word == "stop" ? "stopped" : "ended"};
 }
 
+commission::ShakerParts Daemon::shaker_parts(const commission::AmplitudeWitness& witness) const {
+    std::vector<Json> proofs;
+    for (const auto& proof : campaign_.proof().with_these_keys())
+        proofs.push_back(Json::parse(campaign::to_json(proof)));
+    return commission::shaker_parts(proofs, campaign_.proof().buttons_left(), witness);
+}
+
+/// A proof is made: the journal has it, and the record what it shows of the shaker.
+void Daemon::enter_proof(const campaign::ProofRecord& record) {
+    if (journal_) journal_->proved(record.by, campaign::to_json(record));
+    if (!record.passed || !configuration_.record_demanded()) return;
+    try {
+        static_cast<void>(enter_shaker_parts(record.by, {}));
+    } catch (const std::exception& error) {
+        log(Severity::warning, "commissioning",
+            std::string("the proof is not in the record: ") + error.what());
+    }
+}
+
+/// Returns what was recorded, for a person. Throws std::runtime_error: why nothing was.
+std::string Daemon::enter_shaker_parts(const std::string& by,
+                                       const commission::AmplitudeWitness& witness) {
+    commission::PartRecord what;
+    what.by = {by};
+    what.utc_ns = utc_now();
+    what.version = kVersion;
+    if (const auto why = book_.not_proven_below_shaker(what.utc_ns); !why.empty())
+        throw std::runtime_error("the platform's part is to be proven before the shaker's: " + why);
+    std::string names;
+    const auto parts = shaker_parts(witness);
+    for (const auto& [part, evidence] : parts.proven) {
+        what.evidence = evidence;
+        book_.prove({part}, what, loaded_);
+        names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    }
+    auto text = fmt::format("{}{} recorded by {}", configuration_.simulated() ? "SIMULATED: " : "",
+                            names.empty() ? "nothing" : names, by);
+    for (const auto& [part, why] : parts.lacking)
+        text += fmt::format("; {} not: {}", name_of(part), why);
+    log(Severity::info, "commissioning", text);
+    return text;
+}
+
+CommandReply Daemon::state_units(const CommandRequest& request, const Json& what) {
+    commission::AmplitudeWitness witness;
+    witness.display = what.value("display", "");
+    if (what.contains("reference_g") && what["reference_g"].is_number())
+        witness.reference_g = what["reference_g"];
+    const auto units = commission::amplitude_units();
+    if (std::ranges::find(units, witness.display) == units.end() || !(witness.reference_g > 0))
+        return {false, fmt::format("units: found the display's unit \"{}\" and a reference of {} "
+                                   "g, expected one of g peak, g rms, g peak-peak, m/s2 peak, m/s2 "
+                                   "rms and a positive number",
+                                   witness.display, witness.reference_g)};
+    auto text = enter_shaker_parts(request.by, witness);
+    const bool stands = shaker_parts(witness).proven.contains(Part::units);
+    return {stands, std::move(text)};
+}
+
 CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Json& what,
                                          Time now) {
     if (auto why = guard_refuses(request); !why.empty()) return {false, why};
@@ -200,9 +265,10 @@ CommandReply Daemon::enter_in_record(const CommandRequest& request, const Json& 
                                    name_of(status.state))};
     const auto text = [&what](const char* key) { return what.value(key, std::string()); };
     try {
+        if (loaded_.path.empty()) return {false, "the daemon has no configuration file"};
+        if (text("part") == name_of(Part::units)) return state_units(request, what);
         const std::string second = text("second");
         if (auto why = commission::not_two(request.by, second); !why.empty()) return {false, why};
-        if (loaded_.path.empty()) return {false, "the daemon has no configuration file"};
         const auto file = configuration::load(loaded_.path, true);
         if (what["do"] == "accept") return accept_commissioning(request, second, file);
         if (text("part") != name_of(Part::gyros))

@@ -159,6 +159,7 @@ class Campaign {
     void fill(StatusData& status, drivers::Time now) const;
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
+    [[nodiscard]] const SafetyProof& proof() const { return proof_; }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that

@@ -19,8 +19,7 @@ using drivers::to_seconds;
 namespace {
 // How long a person has to press the emergency stop, and then to close its chain again.
 constexpr Time kPress = 60 * drivers::kSecond;
-// From the fall of the table to the register, and how long nothing may start with the chain closed.
-constexpr double kSeen_s = 0.5;
+// How long nothing may start with the chain closed.
 constexpr Time kClosed = 3 * drivers::kSecond;
 // What is called rest has to be so many times the noise.
 constexpr double kNoises = 6;
@@ -171,9 +170,9 @@ void Campaign::prove_clearing(Time now) {
 /// The hard-wired stop. Its opening trips as ever; on_trip() finds it here.
 void Campaign::prove_emergency_stop(Time now) {
     if (!std::exchange(requested_, true))
-        ports_.event(Severity::warning, fmt::format("proof: press the emergency stop now, within "
-                                                    "{:.0f} s",
-                                                    to_seconds(kPress)));
+        ports_.event(Severity::warning,
+                     fmt::format("proof: press the emergency stop{} now, within {:.0f} s",
+                                 proof_.named_button(), to_seconds(kPress)));
     if (now - entered_ > kPress) abort("nobody pressed the emergency stop", now);
 }
 
@@ -186,7 +185,8 @@ void Campaign::begin_pressed(Time now) {
     press_felt_ = false;
     stop_times_.begin(now);
     const Time fell = loop_->last_at_half();
-    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0, kSeen_s);
+    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0,
+               settings_.proof.seen_s);
 }
 
 /// After the trip: those who can tell, the button's own latch, and that closing the chain starts
