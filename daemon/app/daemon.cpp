@@ -184,9 +184,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                starving_.store(what == campaign::Proving::watchdog);
                interlock_.proving(what != campaign::Proving::nothing);
            },
-           [this](const campaign::ProofRecord& record) {
-               enter_proof(record);
-           },
+           [this](const campaign::ProofRecord& record) { enter_proof(record); },
            utc_now,
            [this] {
                const auto misfit = clock_misfit();

@@ -2,6 +2,7 @@
 // it finds goes into the record that arming demands.
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -240,17 +241,16 @@ CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Js
     if (!kept.again.empty() && !kept.why_not.empty())
         return {false, kept.why_not + ": there is nothing to ask again"};
     if (what.contains("answers") && !configuration_.simulated()) return {false, kNoScript};
-    auto fresh = make_procedure();
-    if (auto why = fresh->refusal(by_hand); !why.empty()) return {false, why};
     if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty())
         return {false, why};
-    procedure_ = std::move(fresh);
+    procedure_ = make_procedure();
     if (what.contains("answers")) procedure_->answer_all(what["answers"]);
     procedure_->attend(request.by, rt::wall_clock());
-    auto why = flag("resume") ? procedure_->begin_again(request.by, by_hand, kept, now)
-                              : procedure_->begin(request.by, by_hand, now);
+    if (flag("resume"))
+        procedure_->begin_again(request.by, by_hand, kept, now);
+    else
+        procedure_->begin(request.by, by_hand, now);
     if (!procedure_->active()) campaign_.end_commissioning(now);
-    if (!why.empty()) return {false, why};
     log(Severity::info, "commissioning",
         fmt::format("{} by {}", flag("resume") ? "taken up" : "begun", request.by));
     return {true, "begun"};

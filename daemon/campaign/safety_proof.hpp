@@ -15,7 +15,7 @@ namespace vibrig::campaign {
 struct ProofSettings {
     bool demanded = true;  ///< without one no campaign is armed
     double valid_h = 168;
-    double emergency_stop_days = 365;  ///< after so long its button is asked for
+    double emergency_stop_days = 365;                  ///< after so long its button is asked for
     std::vector<std::string> buttons{"rack", "door"};  ///< of the emergency stop
     double seen_s = 0.5;  ///< from the table's fall until its register shows one pressed
     /// What the proof covers, "key=value\n" each, sorted, values as --check prints them.

@@ -88,8 +88,8 @@ class Book {
     [[nodiscard]] std::vector<Standing> standing(std::int64_t utc_ns) const;
     /// Why nothing is armed; empty: all parts are proven, or none is demanded.
     [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
-    /// A part below the shaker's that does not stand: without it nothing of the shaker is witnessed.
-    /// Empty: all of them stand.
+    /// A part below the shaker's that does not stand: without it nothing of the shaker is
+    /// witnessed. Empty: all of them stand.
     [[nodiscard]] std::string not_proven_below_shaker(std::int64_t utc_ns) const;
     /// What the file says that is not a record; empty: nothing.
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }

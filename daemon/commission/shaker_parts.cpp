@@ -66,10 +66,10 @@ void judge_units(const Json& proof, const AmplitudeWitness& witness, ShakerParts
             "or the display's unit and a reference on the table (--display, --reference)",
             found.all[0].name, found.all[1].name, -found.all[1].ln_ratio);
     } else if (std::string(found.all[0].name) != "g peak") {
-        parts.lacking[Part::units] =
-            fmt::format("the controller counts in {}, expected g peak: its scale goes into "
-                        "shaker.registers.amplitude",
-                        found.all[0].name);
+        parts.lacking[Part::units] = fmt::format(
+            "the controller counts in {}, expected g peak: its scale goes into "
+            "shaker.registers.amplitude",
+            found.all[0].name);
     } else {
         parts.proven[Part::units] = evidence;
     }
@@ -84,14 +84,14 @@ std::vector<std::string> amplitude_units() {
     return names;
 }
 
-ShakerParts shaker_parts(const std::vector<Json>& proofs, const std::vector<std::string>& buttons_left,
+ShakerParts shaker_parts(const std::vector<Json>& proofs,
+                         const std::vector<std::string>& buttons_left,
                          const AmplitudeWitness& witness) {
     ShakerParts parts;
     if (proofs.empty() || proofs.back().at("passed") != true) {
-        const std::string why = proofs.empty()
-                                    ? "no safe-state proof"
-                                    : "the newest safe-state proof has not passed: " +
-                                          proofs.back().at("message").get<std::string>();
+        const std::string why = proofs.empty() ? "no safe-state proof"
+                                               : "the newest safe-state proof has not passed: " +
+                                                     proofs.back().at("message").get<std::string>();
         for (const Part part : kShakerParts) parts.lacking[part] = why;
         return parts;
     }
@@ -103,17 +103,16 @@ ShakerParts shaker_parts(const std::vector<Json>& proofs, const std::vector<std:
             continue;
         pressed[button] = rows_of(one, {"emergency stop", "closing"});
     }
-    parts.proven[Part::registers] = rows_of(newest, {"controller", "frequency", "stop, controller"});
+    parts.proven[Part::registers] =
+        rows_of(newest, {"controller", "frequency", "stop, controller"});
     parts.proven[Part::watchdog] = rows_of(newest, {"watchdog"});
-    parts.proven[Part::excitation] = rows_of(newest, {"transmission", "frequency", "distortion",
-                                                      "cross-axis", "phase"});
+    parts.proven[Part::excitation] =
+        rows_of(newest, {"transmission", "frequency", "distortion", "cross-axis", "phase"});
     parts.proven[Part::excitation]["table_g"] = newest.at("table_g");
     std::string left;
-    for (const auto& button : buttons_left)
-        left += (left.empty() ? "\"" : ", \"") + button + "\"";
+    for (const auto& button : buttons_left) left += (left.empty() ? "\"" : ", \"") + button + "\"";
     if (left.empty()) {
-        parts.proven[Part::stop] = {{"buttons", pressed},
-                                    {"stop", rows_of(newest, {"stop, "})}};
+        parts.proven[Part::stop] = {{"buttons", pressed}, {"stop", rows_of(newest, {"stop, "})}};
     } else {
         parts.lacking[Part::stop] = "not pressed yet: " + left;
     }

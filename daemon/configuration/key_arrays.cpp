@@ -199,8 +199,7 @@ Key numbers(std::string name, std::string unit, Range range, std::size_t at_most
         std::move(doc),  read,      write,           schema_of_array(schema_of(range), 1, at_most)};
 }
 
-Key names(std::string name, std::size_t at_most, std::string doc,
-          At<std::vector<std::string>> at) {
+Key names(std::string name, std::size_t at_most, std::string doc, At<std::vector<std::string>> at) {
     auto read = [name, at_most, at](const toml::node& node, Configuration& c, Problems& problems) {
         const toml::array* array = read_array(node, name, 1, at_most, "names", problems);
         std::vector<std::string> value;

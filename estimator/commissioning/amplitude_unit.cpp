@@ -28,8 +28,7 @@ UnitFinding amplitude_unit(double ratio, double uncertainty) {
     std::ranges::stable_sort(found.all, std::greater{}, &UnitHypothesis::ln_ratio);
     const double best = found.all[0].ln_ratio;
     for (auto& unit : found.all) unit.ln_ratio -= best;
-    found.decided =
-        best >= -kFits_sigma * kFits_sigma / 2 && found.all[1].ln_ratio <= -kDecided;
+    found.decided = best >= -kFits_sigma * kFits_sigma / 2 && found.all[1].ln_ratio <= -kDecided;
     return found;
 }
 

@@ -445,8 +445,9 @@ int commission(const CommissionOptions& options) {
     bool gyros = false;
     for (const auto& part : options.parts) {
         if (of_shaker(part))
-            throw std::runtime_error(part + ": found parts of the platform beside it, expected it "
-                                            "after them");
+            throw std::runtime_error(part +
+                                     ": found parts of the platform beside it, expected it "
+                                     "after them");
         gyros = gyros || part == "gyros";
         if (part != "gyros" && std::ranges::find(kMeasured, part) == kMeasured.end())
             throw std::runtime_error("found \"" + part +
@@ -494,8 +495,8 @@ void add_persons(CLI::App& command, CommissionOptions& options) {
 void add_commission(CLI::App& app, int& exit_code) {
     CLI::App& commissioning = *app.add_subcommand(
         "commission",
-        "Find out how a rig is wired, by moving its gimbals one by one, and record it. A rig that "
-        "is not simulated is moved by hand only (--by-hand)");
+        "Find out how a rig is wired, by moving its gimbals one by one, and record it. By command "
+        "where its angles are in degrees, else by hand (--by-hand)");
     auto options = std::make_shared<CommissionOptions>();
     options->at.socket = default_socket();
     commissioning
@@ -510,8 +511,7 @@ void add_commission(CLI::App& app, int& exit_code) {
     commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record");
     commissioning.add_option("--second", options->second, "Another person, for gyros");
     commissioning.add_flag("--by-hand", options->by_hand,
-                           "Nothing is commanded: a person turns the gimbals. The only way with "
-                           "a rig that is not simulated");
+                           "Nothing is commanded: a person turns the gimbals");
     commissioning.add_flag("--resume", options->resume,
                            "Go on where the daemon ended, by a new permission; where there is "
                            "nothing to go on with it begins anew");
@@ -539,7 +539,7 @@ void add_commission(CLI::App& app, int& exit_code) {
     commissioning.add_option("--answers", options->answers,
                              "JSON file, question to answer; simulated rigs only");
     commissioning.footer(
-        "Example: vibrig commission --by-hand --by 'Ada Lovelace'\n"
+        "Example: vibrig commission --by 'Ada Lovelace'\n"
         "Exit code 0: decided; 1: undecided, refused or unfinished. A rig is commissioned at the\n"
         "local socket only.");
 

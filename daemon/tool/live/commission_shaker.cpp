@@ -26,9 +26,9 @@ bool person_agrees(const ShakerCommission& options, std::ostream& out, const std
 /// The trip of a button that was pressed on purpose.
 void acknowledge_press(serve::Client& client, const ShakerCommission& options, std::ostream& out,
                        const std::string& button) {
-    if (!person_agrees(options, out,
-                       "The trip of \"" + button + "\" is latched. Acknowledge it, " + options.by +
-                           "?"))
+    if (!person_agrees(
+            options, out,
+            "The trip of \"" + button + "\" is latched. Acknowledge it, " + options.by + "?"))
         throw CommissionRefused("not acknowledged: vibrig ack --by NAME, then go on");
     v1::Command command;
     command.set_kind(v1::Command::acknowledge);
@@ -82,8 +82,10 @@ int commission_shaker(const ShakerCommission& options) {
     for (const auto& part : options.parts) {
         const bool proven = parts[part]["proven"];
         all = all && proven;
-        print_wrapped(out, part + (proven ? ": proven"
-                                          : " NOT: " + lacking.value(part, parts[part]["why"].get<std::string>())));
+        print_wrapped(
+            out, part + (proven ? ": proven"
+                                : " NOT: " +
+                                      lacking.value(part, parts[part]["why"].get<std::string>())));
     }
     if (!why.empty()) print_wrapped(out, "REFUSED: " + why);
     const char* outcome = !why.empty() ? "refused" : all ? "decided" : "undecided";

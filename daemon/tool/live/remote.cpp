@@ -121,8 +121,8 @@ void show_rows(std::ostream& out,
                const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& rows) {
     for (const auto& row : rows) {
         out << mark_of(row.passed()) << row.name() << ": " << row.value()
-                  << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low()
-                  << " to " << row.high() << '\n';
+            << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low() << " to "
+            << row.high() << '\n';
     }
 }
 
@@ -135,8 +135,7 @@ void show_signed_record(std::ostream& out, serve::Client& client, const std::str
         const auto journal = ask_status(client).journal();
         if (journal.path().empty()) return;
         if (!journal.proof_head().empty() && journal.proof_head() != before) {
-            out << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine)
-                      << '\n';
+            out << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine) << '\n';
             return;
         }
         std::this_thread::sleep_for(kLook);

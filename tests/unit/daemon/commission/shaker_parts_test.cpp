@@ -20,8 +20,12 @@ Json proof(const std::string& button, bool with_table, double ratio = 1.01) {
     row("stop, controller", 0.2);
     row("watchdog, rest", 1.6);
     if (!button.empty()) row("emergency stop, seen", 0.1);
-    return {{"by", "Ada"},        {"passed", true}, {"emergency_stop", !button.empty()},
-            {"button", button},   {"message", ""},  {"table_g", 0.5},
+    return {{"by", "Ada"},
+            {"passed", true},
+            {"emergency_stop", !button.empty()},
+            {"button", button},
+            {"message", ""},
+            {"table_g", 0.5},
             {"rows", std::move(rows)}};
 }
 
