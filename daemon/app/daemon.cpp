@@ -143,6 +143,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
                result_ = {};
                for (const std::string& line : check_plan(configuration_))
                    log(Severity::warning, "campaign", line);
+               take_type_prior();
            },
            [this](bool complete) {
                to_write_ = complete ? ToWrite::complete : ToWrite::partial;
@@ -162,6 +163,7 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
            [this] { return resume_gate(); },
            [this](const std::string& by) {
                planning_.abandon();
+               take_type_prior();
                identification_ = std::move(interrupted_->identification);
                noise_monitor_.continue_from(std::move(interrupted_->noise));
                if (journal_) journal_->campaign_resumed(interrupted_->id, by);
@@ -208,9 +210,15 @@ std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& he
     // waits for this thread, so that there the time is none.
     std::optional<plan::AdaptivePlan::Decision> decision;
     const auto choose = [this, here_deg, elapsed_s, covariance = identification_.covariance(),
-                         result = whole_result()] {
-        return adaptive_->next(plan::widened(covariance, configuration_.estimator, result),
-                               here_deg, elapsed_s, result.rows.size());
+                         result = whole_result(), prior = type_prior_] {
+        plan::Start start{plan::widened(covariance, configuration_.estimator, result), ""};
+        if (prior)
+            start = plan::start_of(*prior, std::move(start.covariance), configuration_.estimator,
+                                   result);
+        auto chosen =
+            adaptive_->next(start.covariance, here_deg, elapsed_s, result.rows.size());
+        chosen.words += start.words;
+        return chosen;
     };
     if (rig_clock_) {
         decision = choose();
@@ -462,8 +470,10 @@ void Daemon::write_result(const Judged& judged) {
         const std::lock_guard lock(mutex_);
         if (!campaign_.mark().empty())
             result_.warnings.push_back("campaign marked: " + campaign_.mark());
+        std::optional<tool::KnownType> type;
+        if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
         text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
-                                 judged.live.get());
+                                 judged.live.get(), nullptr, type ? &*type : nullptr);
     }
     StatusData ended;
     campaign_.fill(ended, clock_.now());

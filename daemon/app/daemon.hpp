@@ -24,6 +24,7 @@
 #include "daemon/log/log_queue.hpp"
 #include "daemon/noise/noise_monitor.hpp"
 #include "daemon/plan/aside.hpp"
+#include "daemon/plan/type_prior.hpp"
 #include "daemon/record/pre_trip.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/rt/acquisition.hpp"
@@ -201,6 +202,7 @@ class Daemon final : public StatusSource {
     [[nodiscard]] bool verdict_wanted();
     void keep(estimator::Result result);
     [[nodiscard]] estimator::Result whole_result() const;
+    void take_type_prior();
     /// What can be believed of the dwells so far; the verdict on all of them writes the result.
     void take_verdict();
     [[nodiscard]] static Severity severity_of(estimator::uncertainty::Level level);
@@ -272,6 +274,8 @@ class Daemon final : public StatusSource {
     drivers::Gimbal gimbal_;
     std::unique_ptr<drivers::Torquer> torquer_;  ///< null: no levelling
     std::optional<plan::AdaptivePlan> adaptive_;
+    /// Of the campaign; null: it is planned without. Control thread.
+    std::shared_ptr<const plan::TypePrior> type_prior_;
     plan::Aside<plan::AdaptivePlan::Decision> planning_{
         [this] { control_waiter_->notify(); }};  ///< what the control thread may not wait for
     const PlanData plan_;

@@ -1,5 +1,6 @@
 // What the daemon tells the recorder, and its result file.
 #include <spdlog/fmt/chrono.h>
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
@@ -155,9 +156,34 @@ void Daemon::open_outbox() {
         configuration_.archive,
         configuration_.record.folder.empty() ? configuration_.results
                                              : configuration_.record.folder,
-        configuration_.paperwork.unit_serial,
+        archive::Outbox::Unit{
+            configuration_.paperwork.unit_serial,
+            configuration_.campaign.type_prior ? configuration_.paperwork.unit_type : "",
+            configuration_.simulated()},
         [this](Severity severity, const std::string& text) { log(severity, "archive", text); });
     outbox_->start();
+}
+
+/// A campaign begins or goes on: what the archive knows of the unit's type by now.
+void Daemon::take_type_prior() {
+    type_prior_.reset();
+    if (!configuration_.campaign.type_prior) return;
+    const archive::Outbox::TypeKnown known =
+        outbox_ ? outbox_->type_known()
+                : archive::Outbox::TypeKnown{"", "nothing is recorded, so nothing is archived"};
+    try {
+        if (known.json.empty())
+            throw std::runtime_error(known.why_not.empty() ? "the archive has not answered yet"
+                                                           : known.why_not);
+        type_prior_ = std::make_shared<const plan::TypePrior>(plan::type_prior_of(known.json));
+        log(Severity::info, "campaign",
+            fmt::format("starts from {} units of type {} in the archive", type_prior_->of.units,
+                        type_prior_->type));
+    } catch (const std::runtime_error& error) {
+        log(Severity::warning, "campaign",
+            std::string("is planned without its type, campaign.prior = \"type\": ") +
+                error.what());
+    }
 }
 
 void Daemon::tell_recorder() {
