@@ -113,8 +113,8 @@ Population population_of(const std::vector<std::vector<Found>>& units) {
     MatrixXd next = seen + (1 - sums.share) * out.within - sums.mean_due;
     VectorXd sigma(size);
     for (Index i = 0; i < size; ++i) {
-        // What is left of a difference is known no better than the scatter it was taken from.
-        const double least = seen(i, i) * std::sqrt(2 / nu);
+        // What is left of a difference is known no better than what it was taken from.
+        const double least = std::max(seen(i, i), sums.mean_due(i, i)) * std::sqrt(2 / nu);
         sigma(i) = std::sqrt(std::max({next(i, i), least, 1e-300}));
     }
     for (Index i = 0; i < size; ++i)

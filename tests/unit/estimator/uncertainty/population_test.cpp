@@ -111,7 +111,7 @@ void expect_honest(std::uint64_t seed, int units) {
                         "called outside %.4f, variance over that alone %.3f\n",
                         known, common, found.coverage, found.with_coverage, found.called_outside,
                         found.variance_ratio);
-            SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << known
+            SCOPED_TRACE(::testing::Message() << "seed " << seed << ", " << known
                                             << " known units, correlation " << common);
             EXPECT_NEAR(found.with_coverage, 0.95, 0.015);
             EXPECT_LT(found.called_outside, 2 * kOutsider + 4 * std::sqrt(0.01 / units));
