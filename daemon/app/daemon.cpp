@@ -215,8 +215,7 @@ std::optional<campaign::Next> Daemon::next_dwell(const std::array<double, 3>& he
         if (prior)
             start = plan::start_of(*prior, std::move(start.covariance), configuration_.estimator,
                                    result);
-        auto chosen =
-            adaptive_->next(start.covariance, here_deg, elapsed_s, result.rows.size());
+        auto chosen = adaptive_->next(start.covariance, here_deg, elapsed_s, result.rows.size());
         chosen.words += start.words;
         return chosen;
     };

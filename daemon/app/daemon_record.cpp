@@ -181,8 +181,7 @@ void Daemon::take_type_prior() {
                         type_prior_->type));
     } catch (const std::runtime_error& error) {
         log(Severity::warning, "campaign",
-            std::string("is planned without its type, campaign.prior = \"type\": ") +
-                error.what());
+            std::string("is planned without its type, campaign.prior = \"type\": ") + error.what());
     }
 }
 

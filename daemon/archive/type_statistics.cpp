@@ -19,8 +19,8 @@ bool all_determined(const Entry& one) {
 Found found_of(const Entry& one, bool several_rigs) {
     constexpr auto kSize = static_cast<Eigen::Index>(estimator::kParameters);
     Found out{Eigen::VectorXd(kSize), Eigen::MatrixXd::Zero(kSize, kSize)};
-    const bool stored = one.covariance.size() == estimator::kParameters *
-                                                     (estimator::kParameters + 1) / 2;
+    const bool stored =
+        one.covariance.size() == estimator::kParameters * (estimator::kParameters + 1) / 2;
     Eigen::VectorXd u(kSize);
     for (Eigen::Index i = 0; i < kSize; ++i) {
         const Coefficient& c = *one.coefficients[static_cast<std::size_t>(i)];
@@ -57,8 +57,8 @@ TypeCampaigns by_unit(const std::vector<Entry>& campaigns, const std::string& wi
         }
         kept.push_back(&one);
     }
-    const bool several_rigs = std::ranges::any_of(
-        kept, [&](const Entry* one) { return one->rig != kept.front()->rig; });
+    const bool several_rigs =
+        std::ranges::any_of(kept, [&](const Entry* one) { return one->rig != kept.front()->rig; });
     std::map<std::string, std::vector<Found>> units;
     for (const Entry* one : kept) units[one->unit_serial].push_back(found_of(*one, several_rigs));
     for (auto& [serial, found] : units) out.units.push_back(std::move(found));

@@ -222,8 +222,8 @@ void CrossCheck::onlookers() {
 
 void CrossCheck::adaptive() {
     if (sound({"campaign.prior", "campaign.adaptive"}) && c_.campaign.type_prior) {
-        const char* const missing = !c_.campaign.adaptive          ? "campaign.adaptive = true"
-                                    : c_.archive.folder.empty()    ? "archive.folder"
+        const char* const missing = !c_.campaign.adaptive            ? "campaign.adaptive = true"
+                                    : c_.archive.folder.empty()      ? "archive.folder"
                                     : c_.paperwork.unit_type.empty() ? "unit.type"
                                                                      : nullptr;
         if (missing != nullptr)

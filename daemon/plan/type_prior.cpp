@@ -70,13 +70,13 @@ std::string to_json(const TypePrior& prior) {
                                 {"expected_sigma", std::sqrt(of.predicted(k, k))}});
     }
     return OrderedJson{{"type", prior.type},
-                {"simulated", prior.simulated},
-                {"units", of.units},
-                {"campaigns", of.campaigns},
-                {"coefficients", std::move(coefficients)},
-                {"covariance_between_units", lower_triangle(of.between)},
-                {"covariance_between_campaigns", lower_triangle(of.within)},
-                {"covariance_expected", lower_triangle(of.predicted)}}
+                       {"simulated", prior.simulated},
+                       {"units", of.units},
+                       {"campaigns", of.campaigns},
+                       {"coefficients", std::move(coefficients)},
+                       {"covariance_between_units", lower_triangle(of.between)},
+                       {"covariance_between_campaigns", lower_triangle(of.within)},
+                       {"covariance_expected", lower_triangle(of.predicted)}}
         .dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 

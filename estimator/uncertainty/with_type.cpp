@@ -11,8 +11,8 @@ WithType with_type(const Population& type, const Assessment& assessed) {
     Found found{Eigen::VectorXd(kSize), assessed.covariance_a};
     for (Eigen::Index i = 0; i < kSize; ++i)
         found.value(i) = assessed.coefficients[static_cast<std::size_t>(i)].value;
-    out.determined = assessed.done && found.covariance.rows() == kSize &&
-                     found.value.allFinite() && found.covariance.allFinite();
+    out.determined = assessed.done && found.covariance.rows() == kSize && found.value.allFinite() &&
+                     found.covariance.allFinite();
     if (!out.determined) return out;
     out.distance = distance(type, found);
     const Found joined = with_type(type, found);

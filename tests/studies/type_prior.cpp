@@ -1,6 +1,7 @@
-// What an adaptive campaign saves that starts from its unit's type, and whether it stays honest: units that scatter by
-// 10 % of the coefficients, an archive of forty of them, targets of 6.5 % of the coefficients. Dwells are their rates:
-// linear in the coefficients, with the noise that the plan counts on; how rates come from samples is another study's.
+// What an adaptive campaign saves that starts from its unit's type, and whether it stays honest:
+// units that scatter by 10 % of the coefficients, an archive of forty of them, targets of 6.5 % of
+// the coefficients. Dwells are their rates: linear in the coefficients, with the noise that the
+// plan counts on; how rates come from samples is another study's.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -60,11 +61,10 @@ class Study {
                                          here, 0, after.rows.size());
             if (next.verdict != AdaptivePlan::Verdict::go_on) break;
             here = next.run.position_deg;
-            const auto rows = estimator::rate_rows(
-                settings_,
-                {estimator::gimbal_deg(settings_, here), planning::kappa_of(next.run.level_g),
-                 kDwell_s},
-                {}, kPeriod_s);
+            const auto rows = estimator::rate_rows(settings_,
+                                                   {estimator::gimbal_deg(settings_, here),
+                                                    planning::kappa_of(next.run.level_g), kDwell_s},
+                                                   {}, kPeriod_s);
             using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
             after.rows.emplace_back(Eigen::Map<const Rows>(
                 rows.data(), static_cast<Index>(rows.size()) / kSize, kSize));
@@ -78,8 +78,7 @@ class Study {
 
     VectorXd unit() {
         VectorXd out(kSize);
-        for (Index i = 0; i < kSize; ++i)
-            out(i) = nominal(i) * (1 + kScatter * normal_(random_));
+        for (Index i = 0; i < kSize; ++i) out(i) = nominal(i) * (1 + kScatter * normal_(random_));
         return out;
     }
     uncertainty::Found measure(const VectorXd& truth, const Dwells& dwells) {
@@ -158,12 +157,13 @@ void run(std::uint64_t seed, int archives, int units) {
                 uncertainty::distance(type, study.measure(stranger, shorter)).outside() ? 1 : 0;
         }
     }
-    std::printf("shaker time with the type %.0f s, without %.0f s: %.3f; rms error over target "
-                "%.3f, without %.3f; coverage %.4f, without %.4f; outside %.4f; strangers found "
-                "%d of %d\n",
-                with.shaker_s, without.shaker_s, with.shaker_s / without.shaker_s,
-                std::sqrt(with.squares), std::sqrt(without.squares), with.covered, without.covered,
-                with.outside, found_strangers, strangers);
+    std::printf(
+        "shaker time with the type %.0f s, without %.0f s: %.3f; rms error over target "
+        "%.3f, without %.3f; coverage %.4f, without %.4f; outside %.4f; strangers found "
+        "%d of %d\n",
+        with.shaker_s, without.shaker_s, with.shaker_s / without.shaker_s, std::sqrt(with.squares),
+        std::sqrt(without.squares), with.covered, without.covered, with.outside, found_strangers,
+        strangers);
     // A third is saved, whole dwells: one of some forty on the shaker is 0.03
     EXPECT_LT(with.shaker_s / without.shaker_s, 0.70);
     // at equal accuracy,

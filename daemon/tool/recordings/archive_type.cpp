@@ -44,8 +44,8 @@ int type_statistics(const TypeOptions& o, const ArchiveOptions& where) {
     if (found.units.size() < estimator::uncertainty::kFewestUnits) {
         std::cerr << index->name() << ": found " << found.units.size() << " units of type '"
                   << proto::printable(o.type) << "' with " << found.campaigns << " campaigns on "
-                  << (o.simulated ? "simulated" : "real") << " rigs ("
-                  << found.left_out << " not valid or not whole left out), expected at least "
+                  << (o.simulated ? "simulated" : "real") << " rigs (" << found.left_out
+                  << " not valid or not whole left out), expected at least "
                   << estimator::uncertainty::kFewestUnits << " units\n";
         return kNo;
     }

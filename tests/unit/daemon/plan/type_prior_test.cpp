@@ -36,7 +36,8 @@ TypePrior type_about(const std::array<double, kParameters>& unit, double scatter
 estimator::Result result_with_noise(std::uint64_t seed, std::size_t dwells) {
     const estimator::Settings settings;
     std::mt19937_64 random(seed);
-    auto rows = estimator::testing::theory_rows(settings, estimator::testing::balanced(6, 14 / 3.0));
+    auto rows =
+        estimator::testing::theory_rows(settings, estimator::testing::balanced(6, 14 / 3.0));
     estimator::testing::add_noise(rows, random);
     rows.resize(std::min(rows.size(), dwells));
     return estimator::testing::result_of(rows);
@@ -115,8 +116,8 @@ TEST(TypePrior, IsGivenBesideTheResultAndNotInItsPlace) {
     for (std::size_t i = 0; i < kParameters; ++i) values[i] = assessed.coefficients[i].value;
     const TypePrior like = type_about(values, 0.01);
     const tool::KnownType known{like.type, like.of};
-    const json with = json::parse(
-        tool::result_json(result, assessed, true, nullptr, nullptr, nullptr, &known));
+    const json with =
+        json::parse(tool::result_json(result, assessed, true, nullptr, nullptr, nullptr, &known));
     const json without = json::parse(tool::result_json(result, assessed, true));
     EXPECT_EQ(with.at("parameters"), without.at("parameters"));
     EXPECT_FALSE(without.contains("type_prior"));

@@ -107,12 +107,13 @@ void expect_honest(std::uint64_t seed, int units) {
         for (const std::size_t known : {std::size_t{12}, std::size_t{30}, std::size_t{100}}) {
             Type type(seed, common);
             const Honesty found = honesty_of(type, known, units);
-            std::printf("%3zu known units, correlation %.1f: coverage %.4f, with the type %.4f, "
-                        "called outside %.4f, variance over that alone %.3f\n",
-                        known, common, found.coverage, found.with_coverage, found.called_outside,
-                        found.variance_ratio);
+            std::printf(
+                "%3zu known units, correlation %.1f: coverage %.4f, with the type %.4f, "
+                "called outside %.4f, variance over that alone %.3f\n",
+                known, common, found.coverage, found.with_coverage, found.called_outside,
+                found.variance_ratio);
             SCOPED_TRACE(::testing::Message() << "seed " << seed << ", " << known
-                                            << " known units, correlation " << common);
+                                              << " known units, correlation " << common);
             EXPECT_NEAR(found.with_coverage, 0.95, 0.015);
             EXPECT_LT(found.called_outside, 2 * kOutsider + 4 * std::sqrt(0.01 / units));
             EXPECT_LT(found.variance_ratio, 0.9);
