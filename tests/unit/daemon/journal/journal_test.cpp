@@ -224,7 +224,8 @@ TEST_F(JournalTest, KnowsAfterARestartWhichCertificatesWereIssued) {
     // THEN the refused ones are free, and each is an entry of the signed chain
     EXPECT_THAT(Journal(path, kHash).recovery().certificates, testing::ElementsAre("C-17 \"a\""));
     EXPECT_THAT(verify_file(path).found, IsEmpty());
-    ask("UPDATE command SET argument = replace(argument, '00', '01') WHERE id = 1");
+    static_cast<void>(
+        ask("UPDATE command SET argument = replace(argument, '00', '01') WHERE id = 1"));
     EXPECT_THAT(verify_file(path).found, testing::Contains(testing::HasSubstr("command 1")));
 }
 
