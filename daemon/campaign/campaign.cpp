@@ -51,10 +51,11 @@ rt::Guard guard_in(State state) {
 
 }  // namespace
 
-Campaign::Campaign(const Settings& settings, Ports ports)
+Campaign::Campaign(const Settings& settings, const Ports& ports)
     : settings_(settings),
-      ports_(std::move(ports)),
-      stop_(ports_.shaker, ports_.rest, settings_.stop),
+      ports_(ports),
+      stop_(
+          ports_.rig.shaker, [this](Time at) { return ports_.rig.rest(at); }, settings_.stop),
       proof_(settings_.proof) {
     plan_stops();
     make_stages();
@@ -69,11 +70,9 @@ bool Campaign::active() const {
 bool Campaign::done(Time now) const { return shutting_down_ && !active() && !stop_.unsettled(now); }
 
 std::string Campaign::not_fit_to_excite(Time now) const {
-    if (ports_.unfit) {
-        if (auto why = ports_.unfit(); !why.empty()) return why;
-    }
-    const auto reading = ports_.shaker.reading();
-    if (ports_.shaker.stop_pending()) return "a stop of the shaker is pending";
+    if (auto why = ports_.rig.unfit(); !why.empty()) return why;
+    const auto reading = ports_.rig.shaker.reading();
+    if (ports_.rig.shaker.stop_pending()) return "a stop of the shaker is pending";
     if (stop_.stopping()) {
         const auto why = stop_.what_moves(now);
         return "stopping: rest is not measured yet" + (why.empty() ? why : ": " + why);
@@ -100,18 +99,16 @@ static bool is_stop(CampaignState state) {
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
-    if (state == State::paused) ports_.gimbal.forget_position();
+    if (state == State::paused) ports_.rig.gimbal.forget_position();
     if (state == State::ramping) excited_deg_ = here().stop.position_deg;
     if (state == State::ramping || state == State::checking) {
         // From rest: what the table was told last is over, and no witness may hold it to that.
         asked_g_ = 0;
         tell_ramp(0, now);
     }
-    if (ports_.commanded) {
-        ports_.commanded(state == State::settling ? table_g() : 0, excited_deg_);
-    }
+    ports_.rig.commanded(state == State::settling ? table_g() : 0, excited_deg_);
     // A loop check begins at rest, and has to learn where the gimbals are.
-    ports_.guard(state == State::checking ? rt::Guard::armed : guard_in(state));
+    ports_.rig.guard(state == State::checking ? rt::Guard::armed : guard_in(state));
     pace_.enter(is_stop(state), now);
     entered_ = now;
     requested_ = false;
@@ -122,7 +119,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
     using Kind = CommandRequest::Kind;
     const auto refuse = [&](const std::string& why) { return CommandReply{false, why}; };
     const auto accept = [&](const std::string& text) {
-        ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+        ports_.log.event(Severity::info, fmt::format("{} by {}", text, request.by));
         return CommandReply{true, text};
     };
     if (request.by.empty()) return refuse("by: found nothing, expected the name of a person");
@@ -131,8 +128,8 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         case Kind::arm:
             if (const auto why = not_fit_to_arm(now); !why.empty()) return refuse(why);
             armed_by_ = request.by;
-            armed_under_ = ports_.shaker.stops();
-            armed_wall_ = ports_.wall();
+            armed_under_ = ports_.rig.shaker.stops();
+            armed_wall_ = ports_.log.wall();
             reason_.clear();
             enter(State::armed, now);
             armed_for_ = arming_text(request);
@@ -142,11 +139,11 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             if (state_ == State::checking) return refuse("a loop check is running");
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
-            if (!ports_.estimator_free()) return refuse("the last dwell is still being closed");
+            if (!ports_.dwells.free()) return refuse("the last dwell is still being closed");
             offer_.clear();
             offered_stops_.clear();
             offered_last_.reset();
-            ports_.begin();
+            ports_.dwells.begin();
             begin(request.by, now);
             return accept(started_by_ == armed_by_ ? "campaign started"
                                                    : "campaign started, armed by " + armed_by_);
@@ -172,7 +169,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             // One acknowledgement is for both: the controller latches its faults, too, and forgets
             // them when it is told to stop at rest.
             if (const auto why = not_fit_to_acknowledge(now); !why.empty()) return refuse(why);
-            const auto shaker = ports_.shaker.reading();
+            const auto shaker = ports_.rig.shaker.reading();
             const bool changed =
                 shaker.valid && shaker.watchdog == drivers::WatchdogTimeout::changed;
             const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
@@ -197,6 +194,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         case Kind::selftest:
             return begin_loop_check(request, now);
         case Kind::commission:  // the daemon's, by begin_commissioning()
+        case Kind::certificate:
             break;
     }
     return refuse("unknown command");
@@ -205,7 +203,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
 /// From the position after the ones in offer_, which is empty for a new campaign.
 void Campaign::begin(const std::string& by, Time now) {
     started_by_ = by;
-    ports_.gimbal.forget_position();
+    ports_.rig.gimbal.forget_position();
     dwells_ = std::exchange(offer_, {});
     positions_done_ = positions_before_ = dwells_.size();
     plan_stops();
@@ -244,7 +242,7 @@ Time Campaign::step_once(Time now) {
     if (pressed_ != Pressed::no) await_pressed(now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
-        !ports_.shaker.reading().valid) {
+        !ports_.rig.shaker.reading().valid) {
         abort("no valid read-back from the shaker", now);
     }
     insist_on_zero_torque(now);
@@ -272,20 +270,20 @@ Time Campaign::step_once(Time now) {
             if (!pause_asked_ || shutting_down_) start_position(now);
             return now + kSecond;
         case State::commissioning:
-            if (!ports_.shaker.reading().at_rest()) {
+            if (!ports_.rig.shaker.reading().at_rest()) {
                 abort("the shaker is not at rest, or cannot be read", now);
                 return now;
             }
-            ports_.gimbal.update(ports_.platform(), now);
-            return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+            ports_.rig.gimbal.update(ports_.rig.platform(), now);
+            return std::min(ports_.rig.gimbal.next_deadline(), now + kPoll);
         case State::idle:
         case State::armed:
         case State::finished:
         case State::aborted:
         case State::tripped:
             // An aborted slew's last command is repeated until the platform has it.
-            ports_.gimbal.update(ports_.platform(), now);
-            return std::min(ports_.gimbal.next_deadline(), now + kSecond);
+            ports_.rig.gimbal.update(ports_.rig.platform(), now);
+            return std::min(ports_.rig.gimbal.next_deadline(), now + kSecond);
     }
     return now + kSecond;
 }
@@ -295,7 +293,7 @@ void Campaign::start_position(Time now) {
     if (shutting_down_) return abort("the daemon is shutting down", now);
     if (pause_asked_) {
         if (state_ != State::paused) {
-            ports_.event(Severity::info, "paused");
+            ports_.log.event(Severity::info, "paused");
             enter(State::paused, now);
         }
         return;
@@ -310,7 +308,7 @@ void Campaign::start_position(Time now) {
         if (choice == Choice::end) return conclude(now);
     }
     const auto& angle = here().stop.position_deg;
-    ports_.event(
+    ports_.log.event(
         Severity::info,
         fmt::format("run {} of {}, position {}: {:g}, {:g}, {:g} deg, {:g} g, dwell {} of {}",
                     here().run, runs(),
@@ -323,7 +321,7 @@ void Campaign::start_position(Time now) {
 
 Time Campaign::slew(Time now) {
     // Gimbals never slew on a moving shaker, whoever moves it.
-    if (!ports_.shaker.reading().at_rest() || (!requested_ && stop_.rest(now).moving())) {
+    if (!ports_.rig.shaker.reading().at_rest() || (!requested_ && stop_.rest(now).moving())) {
         if (requested_) {
             abort("the shaker left rest during a slew", now);
         } else {
@@ -336,12 +334,12 @@ Time Campaign::slew(Time now) {
             abort(why, now);
             return now;
         }
-        ports_.gimbal.slew_to(here().stop.position_deg, now);
+        ports_.rig.gimbal.slew_to(here().stop.position_deg, now);
         requested_ = true;
     }
-    switch (ports_.gimbal.update(ports_.platform(), now)) {
+    switch (ports_.rig.gimbal.update(ports_.rig.platform(), now)) {
         case drivers::GimbalState::in_position:
-            ports_.gimbal.release(now);
+            ports_.rig.gimbal.release(now);
             part_ = Part::go;
             enter(level_ ? State::levelling : State::ramping, now);
             return now;
@@ -352,7 +350,7 @@ Time Campaign::slew(Time now) {
             abort("no gimbal status", now);
             return now;
         default:
-            return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+            return std::min(ports_.rig.gimbal.next_deadline(), now + kPoll);
     }
 }
 
@@ -365,18 +363,18 @@ bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading, dou
 /// A stop of another thread comes before the word of who ordered it and why, which is to be the
 /// reason; for so long it is waited for.
 bool Campaign::stopped_by_another(Time now) {
-    if (ports_.shaker.stops() == armed_under_) return false;
-    if (stopped_under_ != ports_.shaker.stops()) {
-        stopped_under_ = ports_.shaker.stops();
+    if (ports_.rig.shaker.stops() == armed_under_) return false;
+    if (stopped_under_ != ports_.rig.shaker.stops()) {
+        stopped_under_ = ports_.rig.shaker.stops();
         stopped_since_ = now;
     }
     return now - stopped_since_ < drivers::kSecond;
 }
 
 Time Campaign::ramp(Time now) {
-    const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
+    const auto gimbal = ports_.rig.gimbal.update(ports_.rig.platform(), now);
     if (gimbal == drivers::GimbalState::commanding)
-        return std::min(ports_.gimbal.next_deadline(), now + kPoll);
+        return std::min(ports_.rig.gimbal.next_deadline(), now + kPoll);
     if (gimbal != drivers::GimbalState::idle) {
         abort(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)), now);
         return now;
@@ -391,12 +389,13 @@ Time Campaign::ramp(Time now) {
         if (!requested_) abort("the shaker takes no set-point", now);
         return now + kPoll;
     }
-    if (!ports_.shaker.busy() && vibrating_as_commanded(ports_.shaker.reading(), table_g())) {
+    if (!ports_.rig.shaker.busy() &&
+        vibrating_as_commanded(ports_.rig.shaker.reading(), table_g())) {
         enter(State::settling, now);
         return now;
     }
     if (now - entered_ > from_seconds(settings_.ramp_s) + kRampGrace) {
-        const auto reading = ports_.shaker.reading();
+        const auto reading = ports_.rig.shaker.reading();
         abort(fmt::format("shaker: measured {:.3f} g, expected {:g} g within {:g} %",
                           reading.measured_g, table_g(), 100 * settings_.amplitude_tolerance),
               now);
@@ -423,12 +422,12 @@ Time Campaign::record(Time now) {
             order.zero_g = zero_->raw_zero_g();
             order.level_sigma_g = zero_->level_sigma(here().stop.position_deg);
         }
-        if (!ports_.order_dwell(order)) abort("the estimator takes no order", now);
+        if (!ports_.dwells.order(order)) abort("the estimator takes no order", now);
         return now + kPoll;
     }
-    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.shaker.reading(), table_g()) &&
+    if (table_g() > kAtRestG && !vibrating_as_commanded(ports_.rig.shaker.reading(), table_g()) &&
         !stopped_by_another(now)) {
-        const auto reading = ports_.shaker.reading();
+        const auto reading = ports_.rig.shaker.reading();
         abort(fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                           reading.state, reading.measured_g, table_g()),
               now);
@@ -457,11 +456,9 @@ Time Campaign::record(Time now) {
 void Campaign::next_position(Time now) {
     ++positions_done_;
     pace_.stop_done(now);
-    if (ports_.position_done) {
-        ports_.position_done(dwell_info(), dwells_.back(),
+    ports_.log.position_done(dwell_info(), dwells_.back(),
                              {here().stop.position_deg, table_g(), repeats_, used_s(now),
                               dwell_info().begin_s, dwell_utc_ns_});
-    }
     ++at_;
     enter(State::resting, now);
 }
@@ -499,15 +496,15 @@ void Campaign::finish(Time now) {
     expected_ = stops_.size();
     armed_by_.clear();
     enter(State::finished, now);
-    ports_.end(true);
-    ports_.event(Severity::info, "campaign finished");
+    ports_.dwells.end(true);
+    ports_.log.event(Severity::info, "campaign finished");
 }
 
 void Campaign::leave_dwell() {
     if (std::exchange(dwell_ordered_, false)) {
         rt::DwellOrder cancel;
         cancel.cancel = true;
-        static_cast<void>(ports_.order_dwell(cancel));
+        static_cast<void>(ports_.dwells.order(cancel));
     }
 }
 
@@ -522,7 +519,7 @@ void Campaign::end(State state, const std::string& why, Time now) {
     const bool commissioning = state_ == State::commissioning;
     if (checking) {
         loop_->not_completed(why);
-        if (check_ == Check::press && ports_.shaker.reading().emergency_stop_open) {
+        if (check_ == Check::press && ports_.rig.shaker.reading().emergency_stop_open) {
             begin_pressed(now);
         } else {
             conclude_proof("not completed: " + why + suspect_unit());
@@ -536,16 +533,16 @@ void Campaign::end(State state, const std::string& why, Time now) {
     armed_by_.clear();
     reason_ = why;
     enter(state, now);
-    if (slewing) ports_.gimbal.release(now);
+    if (slewing) ports_.rig.gimbal.release(now);
     if (state == State::tripped) {
-        ports_.event(Severity::trip, "stop of the shaker ordered: " + why);
+        ports_.log.event(Severity::trip, "stop of the shaker ordered: " + why);
     } else {
-        ports_.event(Severity::alarm, (checking        ? "loop check aborted: "
-                                       : commissioning ? "commissioning aborted: "
-                                                       : "campaign aborted: ") +
-                                          why);
+        ports_.log.event(Severity::alarm, (checking        ? "loop check aborted: "
+                                           : commissioning ? "commissioning aborted: "
+                                                           : "campaign aborted: ") +
+                                              why);
     }
-    if (had_campaign) ports_.end(false);
+    if (had_campaign) ports_.dwells.end(false);
 }
 
 void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
@@ -558,8 +555,8 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
     rejected_in_a_row_ = summary.left_out ? rejected_in_a_row_ + 1 : 0;
     if (summary.left_out) rejected_for_ = summary.reason;
     if (summary.flagged) {
-        ports_.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
-                                                    summary.position, summary.reason));
+        ports_.log.event(Severity::warning, fmt::format("run {} position {}: {}", summary.run,
+                                                        summary.position, summary.reason));
     }
 }
 
@@ -578,9 +575,9 @@ void Campaign::shut_down(Time now) {
     if (!active()) return;
     leave_dwell();
     leave_stage();
-    if (state_ == State::slewing || opening()) ports_.gimbal.release(now);
+    if (state_ == State::slewing || opening()) ports_.rig.gimbal.release(now);
     if (!stop_.excited()) return end(State::aborted, "the daemon is shutting down", now);
-    ports_.event(Severity::warning, "shutting down: ramping the shaker down");
+    ports_.log.event(Severity::warning, "shutting down: ramping the shaker down");
     enter(State::resting, now);
 }
 
