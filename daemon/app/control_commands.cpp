@@ -28,12 +28,15 @@ void ControlLoop::take_commands(Time now) {
     }
     finish_arming(now);
     finish_acknowledging(false);
+    finish_certificates(false);
     for (auto& waiting : taken) {
         if (waiting.abandoned->exchange(true)) continue;
         const auto kind = waiting.request.kind;
         if (kind == CommandRequest::Kind::abort) give_up_arming("aborted by " + waiting.request.by);
         if (kind == CommandRequest::Kind::commission) {
             commission(std::move(waiting), now);
+        } else if (kind == CommandRequest::Kind::certificate) {
+            begin_certificate(std::move(waiting));
         } else if (kind == CommandRequest::Kind::arm || kind == CommandRequest::Kind::selftest) {
             begin_arming(std::move(waiting), now);
         } else if (kind == CommandRequest::Kind::acknowledge) {

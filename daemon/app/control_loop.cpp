@@ -56,6 +56,7 @@ void ControlLoop::run() {
     dwells_.write_out(campaign_);
     give_up_arming("the daemon is shutting down");
     finish_acknowledging(true);
+    finish_certificates(true);
     if (done) end_arming("the daemon has ended in order");
     const std::lock_guard lock(mutex_);
     ended_ = done;

@@ -79,6 +79,9 @@ class ControlLoop {
     void give_up_arming(const std::string& why);
     /// Answers who acknowledged, once that is on disk; at the end of the daemon, all of them.
     void finish_acknowledging(bool at_once);
+    /// Likewise with a certificate that was issued (control_certificates.cpp).
+    void begin_certificate(WaitingCommand waiting);
+    void finish_certificates(bool at_once);
     void watch_arming();
     void end_arming(const std::string& why);
     [[nodiscard]] std::string journal_being_verified() const;
@@ -155,6 +158,7 @@ class ControlLoop {
         drivers::Time since_wall = 0;
     };
     std::vector<Acknowledging> acknowledging_;
+    std::vector<Acknowledging> certifying_;       ///< certificates that are not answered yet
     std::uint64_t entry_of_acknowledgement_ = 0;  ///< the newest; 0: none
     std::string armed_by_;                        ///< as last looked at
     drivers::ShakerReading first_reading_;

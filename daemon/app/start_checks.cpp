@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
 
@@ -27,10 +28,8 @@ namespace {
 void check_zeroing_travel(const configuration::Configuration& c) {
     if (!c.campaign.zeroing) return;
     const campaign::RigFrame frame(c.estimator);
-    for (const double azimuth_deg : {0.0, 90.0, -90.0}) {
-        for (const bool down : {false, true}) {
-            if (down && !c.campaign.zero.both_ways) continue;
-            const auto at = frame.azimuth_vertical_deg(azimuth_deg, down);
+    for (const auto& way : campaign::ways_of(c.campaign.zero)) {
+        for (const auto& at : campaign::slews_of(way, frame)) {
             for (std::size_t i = 0; i < 3; ++i) {
                 const auto& [low, high] = c.gimbal.travel_deg[i];
                 if (high - low >= 360 || drivers::within_travel(at[i], {low, high})) continue;

@@ -89,6 +89,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         case Kind::selftest:
             return begin_loop_check(request, now);
         case Kind::commission:  // the daemon's, by begin_commissioning()
+        case Kind::certificate:
             break;
     }
     return refuse("unknown command");

@@ -75,7 +75,7 @@ StageTimes stage_times(const Settings& settings) {
         const double before_s = 180 / settings.zero.slew_deg_per_s + times.levelling_s;
         times.closing_s =
             ZeroingStage(settings.zero, settings.rig, settings.sample_s).expected_s() +
-            (settings.zero.both_ways ? 2 : 1) * before_s;
+            static_cast<double>(ways_of(settings.zero).size()) * before_s;
     }
     return times;
 }

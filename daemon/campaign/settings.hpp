@@ -52,6 +52,8 @@ struct ZeroingSettings {
     /// z down too: the zeros apart from what an accelerometer shows of 1 g along z, by misalignment
     /// or scale.
     bool both_ways = true;
+    /// Platform y up and down too, slewed by the inner gimbal: the same where z cannot be down.
+    bool second_axis = false;
     double scale_factor = 1e-4;  ///< of the accelerometers, not known better, 1 sigma
     /// How still the platform stands, 1 sigma at most.
     double velocity_reference_mps = 0.005, position_reference_m = 0.01;

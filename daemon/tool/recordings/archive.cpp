@@ -143,6 +143,8 @@ int verify(const VerifyOptions& o, const ArchiveOptions& options) {
 
 void add_archive(CLI::App& app, int& exit_code) {
     CLI::App* group = app.add_subcommand("archive", "Campaigns of all rigs in one place");
+    group->footer(
+        "Example: vibrig archive add /var/lib/vibrig/demo-20260301T080000Z --archive /lab/archive");
     group->require_subcommand(1);
     auto where = std::make_shared<ArchiveOptions>();
 

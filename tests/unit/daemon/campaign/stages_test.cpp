@@ -486,7 +486,7 @@ TEST(ZeroingStage, TakesTheNoiseOfOneSampleAsADensityAtItsOwnRate) {
     rig.accelerometer_g = 1e-3;
     for (const double rate_hz : {40.0, 100.0, 1000.0}) {
         // white noise of sigma per sample has the density sigma sqrt(period)
-        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan(false).noise.velocity_random_walk,
+        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan().noise.velocity_random_walk,
                          1e-3 / std::sqrt(rate_hz));
     }
 }
