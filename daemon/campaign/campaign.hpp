@@ -137,7 +137,14 @@ class Campaign {
         int run = 1, position = 1;
     };
 
+    struct StateRow;
+    [[nodiscard]] static const StateRow& row_of(CampaignState state);
     drivers::Time step_once(drivers::Time now);
+    // One for each state; each returns when to be called next at the latest.
+    drivers::Time stand_by(drivers::Time now);
+    drivers::Time wait(drivers::Time now);
+    drivers::Time pause(drivers::Time now);
+    drivers::Time give_way(drivers::Time now);
     drivers::Time wait_for_platform(drivers::Time now);
     drivers::Time slew(drivers::Time now);
     drivers::Time zeroing(drivers::Time now);
