@@ -6,8 +6,9 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <utility>
 
-#include "daemon/app/daemon.hpp"
+#include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/version.hpp"
 
@@ -42,7 +43,7 @@ bool at_rest(CampaignState state) {
 
 }  // namespace
 
-std::unique_ptr<commission::Procedure> Daemon::make_procedure() {
+std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     commission::Names names;
     for (const auto& value : loaded_.effective) {
         constexpr std::array<const char*, 6> kKeys{"can.signals.outer",   "can.signals.inner",
@@ -94,11 +95,11 @@ std::unique_ptr<commission::Procedure> Daemon::make_procedure() {
         std::move(ports));
 }
 
-commission::Progress Daemon::progress() const {
+commission::Progress ControlLoop::progress() const {
     return {configuration_.commission.folder, Json(book_.keys(Part::bus))};
 }
 
-Time Daemon::step_commissioning(Time now) {
+Time ControlLoop::step_commissioning(Time now) {
     if (!procedure_ || !procedure_->active()) return drivers::kNever;
     if (!campaign_.commissioning()) {
         StatusData status;
@@ -111,7 +112,7 @@ Time Daemon::step_commissioning(Time now) {
     return next;
 }
 
-void Daemon::commission(WaitingCommand waiting, Time now) {
+void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const CommandRequest& request = waiting.request;
     const Json what = Json::parse(request.argument, nullptr, false);
     if (!what.is_object() || !what.contains("do") || !what["do"].is_string())
@@ -135,7 +136,7 @@ void Daemon::commission(WaitingCommand waiting, Time now) {
     waiting.reply.set_value({true, reply.dump(-1, ' ', false, Json::error_handler_t::replace)});
 }
 
-CommandReply Daemon::do_commission(const CommandRequest& request, const Json& what, Time now) {
+CommandReply ControlLoop::do_commission(const CommandRequest& request, const Json& what, Time now) {
     const auto text = [&what](const char* key) {
         return what.contains(key) && what[key].is_string() ? what[key].get<std::string>()
                                                            : std::string();
@@ -171,16 +172,19 @@ CommandReply Daemon::do_commission(const CommandRequest& request, const Json& wh
     return {true, word == "stop" ? "stopped" : "ended"};
 }
 
-commission::ShakerParts Daemon::shaker_parts(const commission::AmplitudeWitness& witness) const {
+commission::ShakerParts ControlLoop::shaker_parts(
+    const commission::AmplitudeWitness& witness) const {
     std::vector<Json> proofs;
     for (const auto& proof : campaign_.proof().with_these_keys())
         proofs.push_back(Json::parse(campaign::to_json(proof)));
     return commission::shaker_parts(proofs, campaign_.proof().buttons_left(), witness);
 }
 
-/// A proof is made: the journal has it, and the record what it shows of the shaker.
-void Daemon::enter_proof(const campaign::ProofRecord& record) {
-    if (journal_) journal_->proved(record.by, campaign::to_json(record));
+/// A proof was made: the record gets what it shows of the shaker.
+void ControlLoop::take_proof() {
+    const auto& proofs = campaign_.proof().history();
+    if (std::exchange(proofs_taken_, proofs.size()) == proofs.size()) return;
+    const auto& record = proofs.back();
     if (!record.passed || !configuration_.record_demanded()) return;
     try {
         static_cast<void>(enter_shaker_parts(record.by, {}));
@@ -191,8 +195,8 @@ void Daemon::enter_proof(const campaign::ProofRecord& record) {
 }
 
 /// Returns what was recorded, for a person. Throws std::runtime_error: why nothing was.
-std::string Daemon::enter_shaker_parts(const std::string& by,
-                                       const commission::AmplitudeWitness& witness) {
+std::string ControlLoop::enter_shaker_parts(const std::string& by,
+                                            const commission::AmplitudeWitness& witness) {
     commission::PartRecord what;
     what.by = {by};
     what.utc_ns = utc_now();
@@ -214,7 +218,7 @@ std::string Daemon::enter_shaker_parts(const std::string& by,
     return text;
 }
 
-CommandReply Daemon::state_units(const CommandRequest& request, const Json& what) {
+CommandReply ControlLoop::state_units(const CommandRequest& request, const Json& what) {
     commission::AmplitudeWitness witness;
     witness.display = what.value("display", "");
     if (what.contains("reference_g") && what["reference_g"].is_number())
@@ -230,9 +234,9 @@ CommandReply Daemon::state_units(const CommandRequest& request, const Json& what
     return {stands, std::move(text)};
 }
 
-CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Json& what,
-                                         Time now) {
-    if (auto why = guard_refuses(request); !why.empty()) return {false, why};
+CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, const Json& what,
+                                              Time now) {
+    if (auto why = outside_.refuses(request); !why.empty()) return {false, why};
     const auto flag = [&what](const char* key) { return what.contains(key) && what[key] == true; };
     const bool by_hand = flag("by_hand");
     commission::Kept kept;
@@ -256,7 +260,8 @@ CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Js
     return {true, "begun"};
 }
 
-CommandReply Daemon::enter_in_record(const CommandRequest& request, const Json& what, Time now) {
+CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const Json& what,
+                                          Time now) {
     StatusData status;
     campaign_.fill(status, now);
     if (!at_rest(status.state))
@@ -293,8 +298,9 @@ CommandReply Daemon::enter_in_record(const CommandRequest& request, const Json& 
     }
 }
 
-CommandReply Daemon::accept_commissioning(const CommandRequest& request, const std::string& second,
-                                          const configuration::Loaded& file) {
+CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
+                                               const std::string& second,
+                                               const configuration::Loaded& file) {
     using Outcome = commission::Finding::Outcome;
     const std::vector<Part> parts{Part::bus, Part::gimbals, Part::accelerometers, Part::earth};
     if (!procedure_ || procedure_->active() || procedure_->finding().outcome != Outcome::decided)
@@ -310,9 +316,9 @@ CommandReply Daemon::accept_commissioning(const CommandRequest& request, const s
     return reply;
 }
 
-CommandReply Daemon::record_parts(const CommandRequest& request, const std::string& second,
-                                  const std::vector<Part>& parts, const Json& evidence,
-                                  const configuration::Loaded& as) {
+CommandReply ControlLoop::record_parts(const CommandRequest& request, const std::string& second,
+                                       const std::vector<Part>& parts, const Json& evidence,
+                                       const configuration::Loaded& as) {
     commission::PartRecord what;
     what.evidence = evidence;
     what.by = {request.by, second};
