@@ -344,6 +344,7 @@ class Campaign {
     /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
     enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
     drivers::Time pressed_at_ = 0;  ///< when that began
+    drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
     bool press_felt_ = false;       ///< by the controller, too
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell

@@ -17,7 +17,8 @@ using drivers::Time;
 using drivers::to_seconds;
 
 namespace {
-// How long a person has to press the emergency stop, and then to close its chain again.
+// A person's time, not the rig's: how long there is to press the emergency stop, and then to close
+// its chain again.
 constexpr Time kPress = 60 * drivers::kSecond;
 // How long nothing may start with the chain closed.
 constexpr Time kClosed = 3 * drivers::kSecond;
@@ -168,11 +169,13 @@ void Campaign::prove_clearing(Time now) {
 
 /// The hard-wired stop. Its opening trips as ever; on_trip() finds it here.
 void Campaign::prove_emergency_stop(Time now) {
-    if (!std::exchange(requested_, true))
+    if (!std::exchange(requested_, true)) {
+        asked_wall_ = ports_.log.wall();
         ports_.log.event(Severity::warning,
                          fmt::format("proof: press the emergency stop{} now, within {:.0f} s",
                                      proof_.named_button(), to_seconds(kPress)));
-    if (now - entered_ > kPress) abort("nobody pressed the emergency stop", now);
+    }
+    if (ports_.log.wall() - asked_wall_ > kPress) abort("nobody pressed the emergency stop", now);
 }
 
 /// The opened chain has tripped: whether it was seen in time, by the table's own fall.
@@ -206,12 +209,12 @@ void Campaign::await_pressed(Time now) {
         proof_.row("emergency stop, the controller says fault", press_felt_);
         proof_.record().emergency_stop = true;
         pressed_ = Pressed::open;
-        pressed_at_ = now;
+        asked_wall_ = ports_.log.wall();
         if (reading.emergency_stop_open)
             ports_.log.event(Severity::warning, "proof: close the emergency-stop chain again");
     }
     if (pressed_ == Pressed::open) {
-        if (now - pressed_at_ > kPress)
+        if (ports_.log.wall() - asked_wall_ > kPress)
             return end_pressed("nobody closed the emergency-stop chain again");
         if (!reading.valid || reading.emergency_stop_open) return;
         pressed_ = Pressed::closed;
