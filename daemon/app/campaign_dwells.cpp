@@ -43,6 +43,7 @@ void CampaignDwells::begin() {
     with_.identification = estimator::Identification(configuration_.estimator);
     noise_monitor_.reset();
     verdict_told_.clear();
+    take_type_prior();
     const std::lock_guard lock(mutex_);
     verdict_ = {};
     result_ = {};
@@ -65,9 +66,14 @@ std::optional<campaign::Next> CampaignDwells::next(const std::array<double, 3>& 
     // waits for this thread, so that there the time is none.
     std::optional<plan::AdaptivePlan::Decision> decision;
     const auto choose = [this, here_deg, elapsed_s, covariance = with_.identification.covariance(),
-                         result = whole_result()] {
-        return adaptive_->next(plan::widened(covariance, configuration_.estimator, result),
-                               here_deg, elapsed_s, result.rows.size());
+                         result = whole_result(), prior = type_prior_] {
+        plan::Start start{plan::widened(covariance, configuration_.estimator, result), ""};
+        if (prior)
+            start = plan::start_of(*prior, std::move(start.covariance), configuration_.estimator,
+                                   result);
+        auto chosen = adaptive_->next(start.covariance, here_deg, elapsed_s, result.rows.size());
+        chosen.words += start.words;
+        return chosen;
     };
     if (with_.at_once) {
         decision = choose();
@@ -85,12 +91,35 @@ std::optional<campaign::Next> CampaignDwells::next(const std::array<double, 3>& 
     return next;
 }
 
+/// A campaign begins or goes on: what the archive knows of the unit's type by now.
+void CampaignDwells::take_type_prior() {
+    type_prior_.reset();
+    if (!configuration_.campaign.type_prior) return;
+    const archive::Outbox::TypeKnown known =
+        with_.outbox ? with_.outbox->type_known()
+                     : archive::Outbox::TypeKnown{"", "nothing is recorded, so nothing archived"};
+    try {
+        if (known.json.empty())
+            throw std::runtime_error(known.why_not.empty() ? "the archive has not answered yet"
+                                                           : known.why_not);
+        type_prior_ = std::make_shared<const plan::TypePrior>(plan::type_prior_of(known.json));
+        with_.events.log(Severity::info, "campaign",
+                         fmt::format("starts from {} units of type {} in the archive",
+                                     type_prior_->of.units, type_prior_->type));
+    } catch (const std::runtime_error& error) {
+        with_.events.log(
+            Severity::warning, "campaign",
+            std::string("is planned without its type, campaign.prior = \"type\": ") + error.what());
+    }
+}
+
 std::string CampaignDwells::resume_gate() const {
     return interrupted_ ? with_.fitness.resume_gate() : "the filter as it was is gone";
 }
 
 void CampaignDwells::resume(const std::string& by) {
     planning_.abandon();
+    take_type_prior();
     with_.identification = std::move(interrupted_->identification);
     noise_monitor_.continue_from(std::move(interrupted_->noise));
     if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
@@ -199,8 +228,10 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
         const std::lock_guard lock(mutex_);
         if (!campaign.mark().empty())
             result_.warnings.push_back("campaign marked: " + campaign.mark());
+        std::optional<tool::KnownType> type;
+        if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
         text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
-                                 judged.live.get());
+                                 judged.live.get(), nullptr, type ? &*type : nullptr);
     }
     StatusData ended;
     campaign.fill(ended, with_.clock.now());

@@ -8,12 +8,14 @@
 
 #include "daemon/app/events.hpp"
 #include "daemon/app/fitness.hpp"
+#include "daemon/archive/outbox.hpp"
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/ports.hpp"
 #include "daemon/dwells/anew.hpp"
 #include "daemon/noise/noise_monitor.hpp"
 #include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/aside.hpp"
+#include "daemon/plan/type_prior.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/stirred_waiter.hpp"
 #include "estimator/identification/result.hpp"
@@ -38,6 +40,7 @@ class CampaignDwells final : public campaign::Dwells {
         rt::EstimatorStage& stage;
         const std::unique_ptr<record::Recorder>& recorder;  ///< null: nothing is recorded
         const std::unique_ptr<journal::Journal>& journal;   ///< made by start(); null: none is kept
+        const std::unique_ptr<archive::Outbox>& outbox;     ///< likewise; null: no archive
         const Fitness& fitness;
         Events& events;
         bool at_once;        ///< the rig's clock waits for this thread: no thought takes time
@@ -97,6 +100,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] bool verdict_wanted();
     void take_noise(estimator::DwellSummary& dwell);
     void record_dwell(const estimator::DwellSummary& summary, const estimator::Result& result);
+    void take_type_prior();
     void keep(estimator::Result result);
     [[nodiscard]] estimator::Result whole_result() const;
     /// What can be believed of the dwells so far; the verdict on all of them writes the result.
@@ -120,6 +124,7 @@ class CampaignDwells final : public campaign::Dwells {
     std::optional<Interrupted> interrupted_;
     std::optional<std::size_t> resumed_;
     std::optional<plan::AdaptivePlan> adaptive_;
+    std::shared_ptr<const plan::TypePrior> type_prior_;  ///< null: it is planned without
     /// What the control thread may not wait for.
     plan::Aside<plan::AdaptivePlan::Decision> planning_{[this] { with_.control.notify(); }};
     /// Tens of milliseconds, with hundreds of dwells seconds.

@@ -122,7 +122,11 @@ void Daemon::open_outbox() {
     const auto& configuration = parts_.configuration;
     if (configuration.archive.folder.empty() || !parts_.recorder) return;
     parts_.outbox = std::make_unique<archive::Outbox>(
-        configuration.archive, parts_.recordings(), configuration.paperwork.unit_serial,
+        configuration.archive, parts_.recordings(),
+        archive::Outbox::Unit{
+            configuration.paperwork.unit_serial,
+            configuration.campaign.type_prior ? configuration.paperwork.unit_type : "",
+            configuration.simulated()},
         [this](Severity severity, const std::string& text) {
             parts_.events.log(severity, "archive", text);
         });

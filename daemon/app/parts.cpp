@@ -147,7 +147,7 @@ Parts::Parts(configuration::Loaded given, const log::LogQueue* queue)
       torquer(make_torquer(*this)),
       rig(gimbal, *shaker, acquisition, rest, fitness, interlock, events),
       dwells({loaded, clock, *control_waiter, identification, estimator_stage, recorder, journal,
-              fitness, events, rig_clock != nullptr, memory_lock.locked}),
+              outbox, fitness, events, rig_clock != nullptr, memory_lock.locked}),
       campaign_log(events, journal),
       campaign(configuration.campaign,
                {with_stages(rig, torquer.get(), stage_feed), dwells, campaign_log}) {

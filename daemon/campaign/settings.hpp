@@ -117,6 +117,7 @@ struct Settings {
     double target_linear = 0;     ///< deg/h/g
     double target_quadratic = 0;  ///< deg/h/g^2
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
+    bool type_prior = false;      ///< it starts from what the archive knows of the unit's type
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
     /// Before the first position; empty: no opening check.

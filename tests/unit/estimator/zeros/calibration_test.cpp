@@ -83,8 +83,11 @@ TEST(ZeroObservability, RanksAndSingularValuesAreThoseOfTheErrorModel) {
 
 TEST(ZeroObservability, MisalignmentAndScaleAreInTheZerosUnlessZIsTakenDownToo) {
     const Site site = thirty_degrees_north().site;
-    EXPECT_EQ(rank_with_shares({0, 90, -90}, false, site), 15);
-    EXPECT_EQ(rank_with_shares({0, 90, -90}, true, site), 18);
+    EXPECT_EQ(rank_with_shares({0, 90, -90}, {{2, false}}, site), 15);
+    EXPECT_EQ(rank_with_shares({0, 90, -90}, {{2, false}, {2, true}}, site), 18);
+    // AND slews about y, too, take them apart only both ways
+    EXPECT_LT(rank_with_shares({0, 60, -60}, {{2, false}, {1, false}}, site), 21);
+    EXPECT_EQ(rank_with_shares({0, 60, -60}, {{2, false}, {1, false}, {1, true}}, site), 21);
 }
 
 TEST(ZeroObservability, RefusesPlansThatCannotWork) {
