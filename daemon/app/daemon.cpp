@@ -98,7 +98,8 @@ Daemon::Daemon(configuration::Loaded loaded, const log::LogQueue* log_queue)
       pre_trip_(make_pre_trip()),
       stage_feed_(dbc_, campaign::stage_feed_settings(configuration_.campaign),
                   control_waiter_.get()),
-      rest_(configuration_.campaign.rest, configuration_.assembler.sample_period),
+      rest_(configuration_.campaign.rest, configuration_.assembler.sample_period,
+            witness_settings(configuration_, dbc_).count_g),
       acquisition_(
           io_, *port_, dbc_, configuration_.assembler, clock_, rig_clock_.get(),
           {estimator_ring_, *estimator_waiter_, *control_waiter_, interlock_, &stage_feed_,

@@ -175,6 +175,12 @@ void Daemon::take_over_latches() {
         latches_.add(latch);
         log(Severity::alarm, "journal",
             fmt::format("not acknowledged: {}: {}", latch.name, latch.cause));
+        // Whose word it was is not kept: each has to show anew that it lives.
+        if (latch.name == rt::condition_of(rt::Trip::stuck).name ||
+            latch.name == rt::condition_of(rt::Trip::amplitude_witness).name) {
+            rest_.doubt(drivers::Channel::accel_x);
+            rest_.doubt(drivers::Channel::table_accel);
+        }
     }
     const auto& campaign = configuration_.campaign;
     double level_g = campaign.loop.table_g;

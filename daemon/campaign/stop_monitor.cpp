@@ -114,7 +114,9 @@ std::string StopMonitor::what_moves(Time now) const {
         if (witness.verdict == RestVerdict::moving)
             add(fmt::format("{} {:.3f} g rms", name, witness.rms_g));
         if (witness.verdict == RestVerdict::unknown)
-            add(fmt::format("no good accelerometer on the {}", name));
+            add(witness.doubted
+                    ? fmt::format("accelerometer on the {} is doubted, and does not move", name)
+                    : fmt::format("no good accelerometer on the {}", name));
     };
     tell("table", measured.table);
     tell("platform", measured.platform);
