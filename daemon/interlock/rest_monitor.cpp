@@ -10,6 +10,8 @@ using drivers::Time;
 namespace {
 
 constexpr Time kStale = 200 * drivers::kMillisecond;
+// A window is summed up no more often: at 1 kHz it is of 500 samples.
+constexpr Time kJudgeEvery = 5 * drivers::kMillisecond;
 constexpr Time kFewest = 8;  // samples that an rms rests on
 // Of the samples of a window so many have to be there: now and then one is lost.
 constexpr double kShare = 0.75;
@@ -95,20 +97,22 @@ void RestMonitor::doubt(drivers::Channel channel) noexcept {
 }
 
 void RestMonitor::add(const drivers::Sample& sample) noexcept {
-    Rest rest;
     const std::span<const double, 4> counts(counts_g_);
     if (sample.force_good()) {
         const auto& f = sample.force;
         if (platform_doubt_.settled_by(sample.time, f, counts.first<3>())) platform_.clear();
         platform_.add(sample.time, std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]));
     }
-    rest.platform = platform_.judge(limit_g_);
     const auto quality = sample.of(drivers::Channel::table_accel);
     if (quality == drivers::Quality::good) {
         const double along = sample.table_accel;
         if (table_doubt_.settled_by(sample.time, {&along, 1}, counts.last<1>())) table_.clear();
         table_.add(sample.time, along);
     }
+    Rest rest = view_.read();
+    const Time judged = std::max(rest.platform.to, rest.table.to);
+    if (sample.time > judged && sample.time < judged + kJudgeEvery) return;
+    rest.platform = platform_.judge(limit_g_);
     rest.table = table_.judge(limit_g_);
     take_back(rest.platform, platform_doubt_);
     take_back(rest.table, table_doubt_);

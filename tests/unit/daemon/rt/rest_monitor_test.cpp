@@ -212,6 +212,29 @@ TEST_F(DoubtedWitnessTest, TheTablesOwnDoesNotSpeakForThePlatform) {
     EXPECT_FALSE(rest.measured());
 }
 
+TEST_F(RestMonitorTest, AtAKilohertzMotionIsSeenAsSoon) {
+    // GIVEN 1 kHz, where not each sample sums the window up anew
+    RestMonitor fast({}, drivers::kMillisecond);
+    const auto feed = [&](double seconds) {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += drivers::kMillisecond;
+            fast.add(sample());
+        }
+    };
+    feed(0.6);
+    ASSERT_TRUE(fast.rest(now).measured());
+    // WHEN it begins to shake THEN that is seen within 25 ms: of 1 g at 15 Hz a quarter of a period
+    table_g = platform_g = 1;
+    feed(0.025);
+    EXPECT_TRUE(fast.rest(now).moving());
+    table_g = platform_g = 0;
+    feed(0.49);
+    EXPECT_FALSE(fast.rest(now).measured());
+    feed(0.03);
+    EXPECT_TRUE(fast.rest(now).measured());
+    EXPECT_LE(now - fast.rest(now).platform.to, 5 * drivers::kMillisecond);
+}
+
 TEST_F(RestMonitorTest, SlowSamplesGetAWindowOfEight) {
     RestMonitor slow({}, kSecond);
     for (int i = 0; i < 8; ++i) {
