@@ -31,9 +31,9 @@ enum class RestVerdict : std::uint8_t {
 struct RestWitness {
     RestVerdict verdict = RestVerdict::unknown;
     double rms_g = 0;        ///< over the window; 0 while unknown
-    bool doubted = false;    ///< unknown because it has not been seen to move since it was doubted
     drivers::Time from = 0;  ///< first and last sample of the window
     drivers::Time to = 0;
+    bool doubted = false;  ///< unknown because it has not been seen to move since it was doubted
 };
 
 /// What all accelerometers say at one moment.

@@ -2,7 +2,7 @@
 """Resident memory of vibrigd within one campaign of many dwells, each as long as real ones, recorded, its status asked for
 all the while, on the seqpacket bus and the rig's clock.
 
-usage: memory_campaign.py PROGRAMS [--dwells N] [--dwell-s S]
+usage: memory_campaign.py PROGRAMS [--dwells N] [--dwell-s S] [--soak]
 """
 import argparse
 import os
@@ -30,9 +30,11 @@ def least(looks):
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("programs")
-    options.add_argument("--dwells", type=int, default=420)
+    options.add_argument("--dwells", type=int)
     options.add_argument("--dwell-s", type=float, default=100.0)
+    options.add_argument("--soak", action="store_true", help="420 dwells, 13 h of the rig")
     given = options.parse_args()
+    given.dwells = given.dwells or (420 if given.soak else 240)
     checks = r.Checks()
     campaign = {"name": "many", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 2]] * (given.dwells // 4),
                 "table_g": [9.0, 7.0], "dwell_s": given.dwell_s, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
