@@ -85,7 +85,8 @@ bool StopMonitor::late(Time now) const {
     if (waited_s <= settings_.deadline_s) return false;
     const auto measured = rest(now);
     if (controller_moves(shaker_.reading())) return true;
-    if (excited() ? not_at_rest(measured.table) : moves(measured.table)) return true;
+    const bool table_tells = excited() && !measured.table.doubted;
+    if (table_tells ? not_at_rest(measured.table) : moves(measured.table)) return true;
     if (waited_s <= longest_s(level_g_)) return false;
     return excited() ? not_at_rest(measured.platform) : moves(measured.platform);
 }

@@ -39,14 +39,16 @@ struct RestWitness {
 /// What all accelerometers say at one moment.
 struct Rest {
     RestWitness platform, table;
-    [[nodiscard]] bool measured() const noexcept {
-        return platform.verdict == RestVerdict::still &&
-               (table.verdict == RestVerdict::still || table.verdict == RestVerdict::absent);
-    }
-    /// Measured, and by nothing that was before `moment`.
+    [[nodiscard]] bool measured() const noexcept { return measured_since(0); }
+    /// Measured, and by nothing that was before `moment`. One that is doubted is no witness: the
+    /// other alone decides, and where there is none nobody does.
     [[nodiscard]] bool measured_since(drivers::Time moment) const noexcept {
-        return measured() && platform.from >= moment &&
-               (table.verdict == RestVerdict::absent || table.from >= moment);
+        const auto still = [moment](const RestWitness& witness) {
+            return witness.verdict == RestVerdict::still && witness.from >= moment;
+        };
+        if (platform.doubted) return still(table);
+        return still(platform) &&
+               (still(table) || table.doubted || table.verdict == RestVerdict::absent);
     }
     [[nodiscard]] bool moving() const noexcept {
         return platform.verdict == RestVerdict::moving || table.verdict == RestVerdict::moving;

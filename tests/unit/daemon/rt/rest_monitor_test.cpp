@@ -194,22 +194,27 @@ TEST_F(DoubtedWitnessTest, OneThatComesBackHasToShowAWholeWindowOfRest) {
     EXPECT_TRUE(run(0.3).measured_since(back));
 }
 
-TEST_F(DoubtedWitnessTest, TheTablesOwnDoesNotSpeakForThePlatform) {
+TEST_F(DoubtedWitnessTest, WhereAnotherIsThereThatOneAloneDecides) {
+    // GIVEN a table with an accelerometer of its own, and the platform's stuck
     table_bound = true;
     run(1);
-    monitor.doubt(drivers::Channel::table_accel);
-    now += kPeriod;
-    drivers::Sample still = sample();
-    still.table_accel = 0;
-    for (int i = 0; i < 40; ++i) {
-        still.time = now += kPeriod;
-        monitor.add(still);
-    }
-    const Rest rest = monitor.rest(now);
-    EXPECT_EQ(rest.platform.verdict, RestVerdict::still);
-    EXPECT_EQ(rest.table.verdict, RestVerdict::unknown);
-    EXPECT_TRUE(rest.table.doubted);
+    monitor.doubt(drivers::Channel::accel_y);
+    // THEN the table's says rest, and motion
+    EXPECT_TRUE(run_stuck(1).measured());
+    table_g = 1;
+    Rest rest = run_stuck(1);
+    EXPECT_TRUE(rest.moving());
     EXPECT_FALSE(rest.measured());
+    // WHEN the table's is doubted, too, and sticks THEN nobody says rest
+    table_g = noise_g = 0;
+    monitor.doubt(drivers::Channel::table_accel);
+    rest = run_stuck(3);
+    EXPECT_TRUE(rest.table.doubted && rest.platform.doubted);
+    EXPECT_FALSE(rest.measured());
+    // WHEN the platform's lives again THEN it decides
+    noise_g = 1e-4;
+    table_valid = false;
+    EXPECT_TRUE(run(1).measured());
 }
 
 TEST_F(RestMonitorTest, AtAKilohertzMotionIsSeenAsSoon) {
