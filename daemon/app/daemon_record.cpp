@@ -208,7 +208,7 @@ void Daemon::record_dwell(const estimator::DwellSummary& summary, const estimato
     if (!recorder_) return;
     // The identification is this thread's: the dwell is over and no other is ordered.
     estimator::Estimate estimate;
-    identification_.estimate(estimate);
+    identification_.solved(estimate);
     record::Dwell dwell;
     dwell.time = clock_.now();
     dwell.summary = summary;

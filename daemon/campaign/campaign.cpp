@@ -249,6 +249,7 @@ Time Campaign::step_once(Time now) {
     }
     insist_on_zero_torque(now);
     watch_gravity();
+    watch_power();
     watch_arming(now);
     switch (state_) {
         case State::waiting:
@@ -443,7 +444,7 @@ Time Campaign::record(Time now) {
         state_ = State::recording;
     }
     if (dwell_done_) {
-        dwell_ordered_ = false;
+        dwell_ordered_ = power_lost_ = false;
         next_position(now);
         return now;
     }
