@@ -24,6 +24,7 @@ const std::string kData = VIBRIG_TEST_DATA;
 struct Biases {
     uncertainty::BiasModel model;
     const char* file;
+    friend std::ostream& operator<<(std::ostream& out, const Biases& b) { return out << b.file; }
 };
 
 struct GoldenReplay : ::testing::TestWithParam<Biases> {
