@@ -45,9 +45,6 @@ struct TestOptions {
     bool json = false, emergency_stop = false;
 };
 
-/// The daemon understands and says no: not now, not you, not so often. Remotely as locally.
-bool is_no(int status) { return status == 403 || status == 409 || status == 429; }
-
 std::string json_of(const v1::Command& command) {
     std::string json;
     if (!google::protobuf::util::MessageToJsonString(command, &json).ok())
@@ -58,18 +55,6 @@ std::string json_of(const v1::Command& command) {
 std::string login_name() {
     const passwd* const entry = getpwuid(getuid());
     return entry != nullptr ? entry->pw_name : "uid " + std::to_string(getuid());
-}
-
-/// What the daemon says about an answer other than 200.
-std::string problem_of(const serve::Reply& reply) {
-    v1::Problem problem;
-    google::protobuf::util::JsonParseOptions options;
-    options.ignore_unknown_fields = true;
-    if (google::protobuf::util::JsonStringToMessage(reply.body, &problem, options).ok() &&
-        !problem.detail().empty()) {
-        return problem.detail();
-    }
-    return "HTTP status " + std::to_string(reply.status);
 }
 
 int width_of_output() {
@@ -241,20 +226,6 @@ int send_command(const CommandOptions& options) {
     return is_no(reply.status) ? kNo : kBadInput;
 }
 
-void add_socket(CLI::App& command, serve::Address& at) {
-    at.socket = default_socket();
-    command
-        .add_option("--socket", at.socket,
-                    "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
-        ->capture_default_str();
-    command.add_option("--host", at.host, "Another machine, HOST[:8443], over TLS")
-        ->envname("VIBRIG_HOST");
-    command
-        .add_option("--identity", at.identity,
-                    "Who you are there: FOLDER/NAME of `vibrig pki init`")
-        ->envname("VIBRIG_IDENTITY");
-}
-
 void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const char* name,
                  const char* help) {
     CLI::App& command = *app.add_subcommand(name, help);
@@ -281,6 +252,33 @@ void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const ch
 }
 
 }  // namespace
+
+bool is_no(int status) { return status == 403 || status == 409 || status == 429; }
+
+std::string problem_of(const serve::Reply& reply) {
+    v1::Problem problem;
+    google::protobuf::util::JsonParseOptions options;
+    options.ignore_unknown_fields = true;
+    if (google::protobuf::util::JsonStringToMessage(reply.body, &problem, options).ok() &&
+        !problem.detail().empty()) {
+        return problem.detail();
+    }
+    return "HTTP status " + std::to_string(reply.status);
+}
+
+void add_socket(CLI::App& command, serve::Address& at) {
+    at.socket = default_socket();
+    command
+        .add_option("--socket", at.socket,
+                    "Unix socket of the daemon; VIBRIG_SOCKET sets another default")
+        ->capture_default_str();
+    command.add_option("--host", at.host, "Another machine, HOST[:8443], over TLS")
+        ->envname("VIBRIG_HOST");
+    command
+        .add_option("--identity", at.identity,
+                    "Who you are there: FOLDER/NAME of `vibrig pki init`")
+        ->envname("VIBRIG_IDENTITY");
+}
 
 std::string default_socket() {
     const char* const other = std::getenv("VIBRIG_SOCKET");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <CLI/App.hpp>
 #include <string>
 
 #include "daemon/results/exit_status.hpp"
@@ -11,6 +12,12 @@ namespace vibrig::tool {
 
 /// VIBRIG_SOCKET, else the socket of the installed daemon.
 [[nodiscard]] std::string default_socket();
+/// --socket, --host, --identity.
+void add_socket(CLI::App& command, serve::Address& at);
+/// What the daemon says about an answer other than 200.
+[[nodiscard]] std::string problem_of(const serve::Reply& reply);
+/// The daemon understands and says no: not now, not you, not so often. Remotely as locally.
+[[nodiscard]] bool is_no(int status);
 /// Parses an answer; throws serve::ClientError with the daemon's own words when it is a problem.
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message);
 [[nodiscard]] v1::Status ask_status(serve::Client& client);

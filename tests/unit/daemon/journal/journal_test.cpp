@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "daemon/journal/database.hpp"
+#include "daemon/journal/verify.hpp"
 #include "estimator/identification/result.hpp"
 
 namespace vibrig::journal {
@@ -202,6 +203,30 @@ TEST_F(JournalTest, KeepsEventsAndWhoCommandedWhat) {
     const auto command = ask("SELECT kind, person, accepted, answer FROM command").at(0);
     EXPECT_EQ(command.texts[0] + command.texts[1] + command.texts[3], "armAdatripped");
     EXPECT_EQ(command.numbers[2], 0);
+}
+
+TEST_F(JournalTest, KnowsAfterARestartWhichCertificatesWereIssued) {
+    {
+        Journal journal(path, kHash);
+        EXPECT_THAT(journal.recovery().certificates, IsEmpty());
+        journal.start();
+        const auto issue = [&journal](const char* argument, bool accepted) {
+            EXPECT_NE(journal.command({CommandRequest::Kind::certificate, "Ada", argument},
+                                      {accepted, ""}, 7),
+                      0U);
+        };
+        issue(R"({"number":"C-17 \"a\"","pdf_sha256":"00"})", true);
+        issue(R"({"number":"C-18"})", false);
+        issue("no JSON", false);
+        journal.command({CommandRequest::Kind::arm, "Ada", ""}, {true, ""}, 7);
+        journal.stop();
+    }
+    // THEN the refused ones are free, and each is an entry of the signed chain
+    EXPECT_THAT(Journal(path, kHash).recovery().certificates, testing::ElementsAre("C-17 \"a\""));
+    EXPECT_THAT(verify_file(path).found, IsEmpty());
+    static_cast<void>(
+        ask("UPDATE command SET argument = replace(argument, '00', '01') WHERE id = 1"));
+    EXPECT_THAT(verify_file(path).found, testing::Contains(testing::HasSubstr("command 1")));
 }
 
 TEST_F(JournalTest, KeepsTheVerdictOfTheNewestLoopCheck) {

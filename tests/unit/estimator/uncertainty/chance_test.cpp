@@ -101,12 +101,18 @@ TEST(ByChance, SoakOfRowsWhoseBiasMoves) {
     row("cross E 10 % and walk 0.03, 9/0", "D", cross_and_walk, rest);
 }
 
+/// Harmonics of 5 % that alias onto the vibration itself: at a third of the sample rate the second,
+/// at a quarter the third.
 Chance aliased(int seeds, double frequency_hz) {
     Settings settings;
     settings.frequency_hz = frequency_hz;
     return over_seeds(
-        seeds, [](plant::Truth& t) { t.second_harmonic = t.third_harmonic = 0.05; }, "dwell",
-        settings);
+        seeds,
+        [=](plant::Truth& t) {
+            t.second_harmonic = 0.05;
+            t.third_harmonic = frequency_hz > 11 ? 0 : 0.05;
+        },
+        "dwell", settings);
 }
 
 Chance noisier(int seeds, double gyro, double resolver) {
@@ -126,6 +132,13 @@ const double kRmsOfAngles = std::sqrt(1 + 3 * (1 - 3.6e-5 / 4.891201e-5));
 TEST(ByChance, HarmonicsThatAliasAndNoiseThatIsWrongAreDoubtful) {
     expect_by_chance("a third of the sample rate", aliased(2, 40.0 / 3), "D", 1.8, 2);
     expect_by_chance("a quarter of the sample rate", aliased(2, 10), "D", 1.8, 2);
+    // The third harmonic stands still at a third of the sample rate: 0.05 * 6 g sin(phase) over
+    // gravity. Beyond 2 % of it no dwell is taken at all.
+    Settings third;
+    third.frequency_hz = 40.0 / 3;
+    const Chance still = over_seeds(
+        1, [](plant::Truth& t) { t.third_harmonic = 0.05; }, "dwell", third);
+    EXPECT_EQ(still.levels[2], 1);
     expect_by_chance("gyro noise 2 times", noisier(2, 2, 1), "D", 1.5, 2);
     expect_by_chance("resolver noise 2 times", noisier(2, 1, 2), "D", 1.3 * kRmsOfAngles, 2);
 }
