@@ -391,7 +391,8 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers, (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 1);
+    bytes.erase(numbers,
+                (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 1);
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(
