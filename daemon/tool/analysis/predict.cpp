@@ -56,14 +56,6 @@ nlohmann::json read_json(const std::string& path) {
     return root;
 }
 
-nlohmann::json read_json(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
-    return root;
-}
-
 /// Dwells under the profile: what they showed, and where.
 struct Held {
     std::vector<Situation> situations;

@@ -23,9 +23,9 @@ using planning::Vec3;
 constexpr double kLevel = 6;           ///< g at the platform
 constexpr std::size_t kAtFurther = 7;  ///< dwells of each further frequency
 constexpr double kIsolatedUpTo = 30;   ///< Hz; beyond it little passes the isolators
-constexpr Index kSquares = 6;
+constexpr Index kOfFrequency = 6;
 
-std::string text(double value) { return format("%.6g", value); }
+std::string short_number(double value) { return format("%.6g", value); }
 
 class SurveyPlan {
   public:
@@ -121,8 +121,8 @@ class SurveyPlan {
         if (highest <= 0 && profile_top_ > last) {
             highest = std::min(profile_top_, std::max(last, c_.spectrum.highest_hz));
             if (highest < profile_top_)
-                warnings_.push_back("the profile reaches to " + text(profile_top_) +
-                                    " Hz, the plan to " + text(highest) +
+                warnings_.push_back("the profile reaches to " + short_number(profile_top_) +
+                                    " Hz, the plan to " + short_number(highest) +
                                     " Hz (spectrum.highest_hz): what lies beyond is not measured");
         }
         double level = kLevel;
@@ -130,8 +130,8 @@ class SurveyPlan {
             level = *std::max_element(request_.levels_g.begin(), request_.levels_g.end());
             for (const double other : request_.levels_g) {
                 if (other != 0 && other != level)
-                    throw std::runtime_error("--levels: found " + text(other) + " and " +
-                                             text(level) +
+                    throw std::runtime_error("--levels: found " + short_number(other) + " and " +
+                                             short_number(level) +
                                              " g, expected one level with --frequencies");
             }
             if (!(level > 0))
@@ -145,12 +145,13 @@ class SurveyPlan {
                                    {1 / period(), c_.estimator.level_window_s}, mount_, limits);
         for (const auto& line : task_.lines) {
             if (line.hz != line.asked_hz)
-                warnings_.push_back(
-                    text(line.asked_hz) + " Hz is forbidden at " + text(1 / period()) +
-                    " samples/s: the nearest free frequency, " + text(line.hz) + " Hz, is planned");
+                warnings_.push_back(short_number(line.asked_hz) + " Hz is forbidden at " +
+                                    short_number(1 / period()) +
+                                    " samples/s: the nearest free frequency, " +
+                                    short_number(line.hz) + " Hz, is planned");
             if (line.limited)
-                warnings_.push_back(text(line.hz) + " Hz: the shaker's limits leave " +
-                                    text(line.level_g) + " g of " + text(level) +
+                warnings_.push_back(short_number(line.hz) + " Hz: the shaker's limits leave " +
+                                    short_number(line.level_g) + " g of " + short_number(level) +
                                     " g at the platform" +
                                     (!mount_.hard && line.hz > kIsolatedUpTo
                                          ? ": frequencies above 30 Hz want the hard mount"
@@ -193,7 +194,7 @@ class SurveyPlan {
     [[nodiscard]] Eigen::MatrixXd grouped() const {
         const Index further = static_cast<Index>(task_.lines.size()) - 1;
         Eigen::MatrixXd rows =
-            Eigen::MatrixXd::Zero(static_cast<Index>(runs_.size()), 10 + kSquares * further);
+            Eigen::MatrixXd::Zero(static_cast<Index>(runs_.size()), 10 + kOfFrequency * further);
         for (Index i = 0; i < rows.rows(); ++i) {
             const PlanRun& run = runs_[static_cast<std::size_t>(i)];
             Index group = 0;
@@ -205,8 +206,8 @@ class SurveyPlan {
             const auto row = planning::vibration_row(up, group == 0 ? level : 0);
             for (Index c = 0; c < 10; ++c) rows(i, c) = row[static_cast<std::size_t>(c)];
             if (group > 0)
-                rows.block(i, 10 + kSquares * (group - 1), 1, kSquares) =
-                    (planning::kappa_of(level) - 1) * rows.block(i, 4, 1, kSquares);
+                rows.block(i, 10 + kOfFrequency * (group - 1), 1, kOfFrequency) =
+                    (planning::kappa_of(level) - 1) * rows.block(i, 4, 1, kOfFrequency);
         }
         return rows;
     }
@@ -226,7 +227,7 @@ class SurveyPlan {
         for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
         if (request_.order == "balanced") {
             estimator::uncertainty::SearchSettings how;
-            how.starts = 2;
+            how.starts = 1;
             how.seed = request_.seed;
             order = estimator::uncertainty::balanced_order(visits, grouped(), timing_,
                                                            task_.rate_variance, how);
