@@ -268,8 +268,10 @@ class Campaign {
     /// Of the dwell that is being done.
     [[nodiscard]] estimator::DwellInfo dwell_info() const {
         return {here().run, here().position, table_g(),
-                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_))};
+                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_)),
+                power_lost_ && positions_done_ > 0};
     }
+    void watch_power();
     void take_over_origin();
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
@@ -320,6 +322,7 @@ class Campaign {
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;
+    bool power_lost_ = false;  ///< the gyros were seen run down since the dwell done last
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made
