@@ -6,6 +6,7 @@ usage: memory_campaign.py PROGRAMS [--dwells N] [--dwell-s S]
 """
 import argparse
 import os
+import statistics
 import sys
 import tempfile
 import time
@@ -15,7 +16,7 @@ import rig as r  # noqa: E402
 
 LIMIT_KB_PER_H = 100   # of the rig's time
 WARM = 140             # dwells until caches have their size; of the newest 128 more is kept than of those before
-TOGETHER = 80          # dwells of which the least is taken: what a verdict or an answer has while it is made is not kept
+TOGETHER = 70          # dwells of which the least is taken: what a verdict or an answer has while it is made is not kept
 
 
 def resident_kb(rig):
@@ -23,8 +24,13 @@ def resident_kb(rig):
         return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
 
 
-def least(looks):
-    return min(looks, key=lambda look: look[2])
+def growth_kb_per_h(looks):
+    """Slope of the least of each so many dwells: what the system gives comes in pieces, of which two alone would not do."""
+    least = {}
+    for dwells, hours, kilobytes in looks:
+        group = dwells // TOGETHER
+        least[group] = min(least.get(group, (kilobytes, hours)), (kilobytes, hours))
+    return statistics.linear_regression([hours for _, hours in least.values()], [kb for kb, _ in least.values()]).slope
 
 
 def main():
@@ -58,11 +64,9 @@ def main():
             rig.stop()
     warm = [look for look in looks if look[0] >= WARM]
     if checks.check(len(warm) >= 20, "it was looked at meanwhile", looks):
-        first, begin_h, before = least(look for look in warm if look[0] <= warm[0][0] + TOGETHER)
-        last, end_h, after = least(look for look in warm if look[0] >= warm[-1][0] - TOGETHER)
-        growth = (after - before) / (end_h - begin_h)
-        checks.note(f"{before} kB after {first} dwells and {begin_h:.1f} h, {after} kB after {last} and {end_h:.1f} h: "
-                    f"{growth:.0f} kB per hour of the rig")
+        growth = growth_kb_per_h(warm)
+        checks.note(f"{warm[0][2]} kB after {warm[0][0]} dwells and {warm[0][1]:.1f} h, {warm[-1][2]} kB after {warm[-1][0]} and "
+                    f"{warm[-1][1]:.1f} h: {growth:.0f} kB per hour of the rig")
         checks.check(growth <= LIMIT_KB_PER_H, f"resident memory grows by {LIMIT_KB_PER_H} kB per hour at most",
                      f"{growth:.0f}: {looks[::8]}")
     return checks.end()
