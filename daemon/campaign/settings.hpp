@@ -22,6 +22,8 @@ inline const std::vector<std::array<double, 3>> kTable1Positions{
 struct Stop {
     std::array<double, 3> position_deg{};  ///< as the encoders count
     double table_g = 0;
+    double frequency_hz = 0;  ///< 0: [vibration] frequency_hz
+    bool verify = false;      ///< held out: no part of the fit
 };
 
 /// Before each position: the platform's two channels across the vertical are brought level by fast
@@ -52,6 +54,8 @@ struct ZeroingSettings {
     /// z down too: the zeros apart from what an accelerometer shows of 1 g along z, by misalignment
     /// or scale.
     bool both_ways = true;
+    /// Platform y up and down too, slewed by the inner gimbal: the same where z cannot be down.
+    bool second_axis = false;
     double scale_factor = 1e-4;  ///< of the accelerometers, not known better, 1 sigma
     /// How still the platform stands, 1 sigma at most.
     double velocity_reference_mps = 0.005, position_reference_m = 0.01;
@@ -115,6 +119,7 @@ struct Settings {
     double target_linear = 0;     ///< deg/h/g
     double target_quadratic = 0;  ///< deg/h/g^2
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
+    bool type_prior = false;      ///< it starts from what the archive knows of the unit's type
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
     /// Before the first position; empty: no opening check.

@@ -17,6 +17,7 @@
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
 #include "daemon/plan/plan_file.hpp"
+#include "daemon/plan/profile_file.hpp"
 #include "estimator/commissioning/opening.hpp"
 #include "estimator/filter/kinematics.hpp"
 
@@ -160,12 +161,47 @@ namespace {
 /// The plan's dwells, one by one; its levels stand in for table_g and are checked like them.
 void take_plan(Configuration& c) {
     c.campaign.table_g.clear();
-    for (const auto& run : plan::read_plan(c.campaign.plan, c.estimator.transmission)) {
-        c.campaign.stops.insert(c.campaign.stops.end(), run.count,
-                                campaign::Stop{run.position_deg, run.table_g});
+    const auto transmission = [&c](std::optional<double> hz) {
+        return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
+    };
+    for (const auto& run : plan::read_plan(c.campaign.plan, transmission)) {
+        c.campaign.stops.insert(
+            c.campaign.stops.end(), run.count,
+            campaign::Stop{run.position_deg, run.table_g, run.frequency_hz, run.verify});
         auto& levels = c.campaign.table_g;
         if (std::find(levels.begin(), levels.end(), run.table_g) == levels.end())
             levels.push_back(run.table_g);
+    }
+}
+
+/// What stands between table and platform, from what is stated of it.
+void take_mount(Configuration& c, const std::map<std::string, Place>& places) {
+    auto& s = c.spectrum;
+    s.mount_stated = places.contains("spectrum.mount") || places.contains("spectrum.transmission");
+    if (s.hard && !places.contains("vibration.transmission")) c.estimator.transmission = 1;
+    if (s.hard) c.campaign.resonance_hz = 0;
+    s.mount = {s.hard || (!s.mount_stated && c.estimator.transmission >= 1), {}, s.transmission};
+    if (!s.mount.hard)
+        s.mount.pads = estimator::spectrum::pads_with(
+            c.estimator.frequency_hz, std::min(c.estimator.transmission, 0.999), s.pads_damping);
+}
+
+/// Profiles that stand in files of their own.
+void take_profiles(Configuration& c, const std::string& name, Place place, Problems& problems) {
+    for (auto& one : c.profiles) {
+        if (one.file.empty()) continue;
+        resolve(one.file, std::filesystem::path(name).parent_path());
+        try {
+            auto stated = plan::read_profile(one.file);
+            stated.profile.name = one.profile.name;
+            if (one.profile.g_rms > 0) stated.profile.g_rms = one.profile.g_rms;
+            estimator::spectrum::check(stated.profile, one.file + ": ");
+            one.profile = stated.profile;
+            if (!stated.at.empty()) one.at_table = stated.at == "table";
+        } catch (const std::runtime_error& error) {
+            problems.add(place, "profile (" + one.profile.name + ").file", error.what(),
+                         "a profile as vibrig predict takes it");
+        }
     }
 }
 
@@ -188,13 +224,25 @@ void to_readings(Configuration& c) {
     for (auto& stop : c.campaign.stops) convert(stop.position_deg);
 }
 
-/// A default that depends on another key: zeros both ways where the outer gimbal turns that far.
-void take_the_ways_of_zeroing(Configuration& c) {
+/// Defaults that depend on another key: zeros both ways where the outer gimbal turns that far, else
+/// about a second axis where inner and azimuth gimbal do.
+void take_the_ways_of_zeroing(Configuration& c, bool second_axis_stated) {
     if (!c.campaign.zeroing || c.estimator.up.axis == 0) return;  // refused elsewhere
-    const auto& travel = c.gimbal.travel_deg[0];
-    const double outer_deg = estimator::azimuth_upright_deg(c.estimator, 0, true)[0];
-    c.campaign.zero.both_ways =
-        travel[1] - travel[0] >= 360 || drivers::within_travel(outer_deg, travel).has_value();
+    const auto within = [&c](const std::array<double, 3>& angles, std::size_t gimbals) {
+        for (std::size_t i = 0; i < gimbals; ++i) {
+            const auto& travel = c.gimbal.travel_deg[i];
+            if (travel[1] - travel[0] < 360 && !drivers::within_travel(angles[i], travel))
+                return false;
+        }
+        return true;
+    };
+    auto& zero = c.campaign.zero;
+    zero.both_ways = within(estimator::azimuth_upright_deg(c.estimator, 0, true), 1);
+    if (second_axis_stated || zero.both_ways) return;
+    const auto y = [&](double inner_deg, bool down) {
+        return within(estimator::inner_upright_deg(c.estimator, inner_deg, down), 3);
+    };
+    zero.second_axis = y(60, false) && y(-60, false) && y(60, true) && y(-60, true);
 }
 
 /// Where the opening check looks, as far as the travel allows it: the azimuth axis upright this way
@@ -243,7 +291,9 @@ std::string covered_by_proof(const std::vector<EffectiveValue>& effective) {
         // How long a proof is valid is no part of what it shows.
         if (value.key == "selftest.proof_valid_h" || value.key == "selftest.emergency_stop_days")
             continue;
-        if (std::ranges::find(kSections, section) != kSections.end())
+        // Bolted to the table it is another rig.
+        const bool hard = value.key == "spectrum.mount" && value.value == "\"hard\"";
+        if (hard || std::ranges::find(kSections, section) != kSections.end())
             lines.push_back(value.key + "=" + value.value + "\n");
     }
     std::ranges::sort(lines);
@@ -272,8 +322,11 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     Problems problems;
     Reader reader(c, problems);
     reader.read(table, "");
-    if (!reader.places().contains("zeroing.both_ways")) take_the_ways_of_zeroing(c);
+    if (!reader.places().contains("zeroing.both_ways"))
+        take_the_ways_of_zeroing(c, reader.places().contains("zeroing.second_axis"));
+    take_mount(c, reader.places());
     loaded.effective = effective_of(c, name, reader.places());
+    if (!c.profiles.empty()) take_profiles(c, name, reader.places().at("profile"), problems);
 
     const double factor = to_g_peak(c.amplitude_unit, c.estimator.gravity_mps2);
     c.shaker.registers.amplitude.scale *= factor;

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "daemon/app/daemon.hpp"
+#include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/version.hpp"
 
@@ -41,7 +41,7 @@ bool at_rest(CampaignState state) {
 
 }  // namespace
 
-std::unique_ptr<commission::Procedure> Daemon::make_procedure() {
+std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     commission::Names names;
     for (const auto& value : loaded_.effective) {
         constexpr std::array<const char*, 6> kKeys{"can.signals.outer",   "can.signals.inner",
@@ -93,11 +93,11 @@ std::unique_ptr<commission::Procedure> Daemon::make_procedure() {
         std::move(ports));
 }
 
-commission::Progress Daemon::progress() const {
+commission::Progress ControlLoop::progress() const {
     return {configuration_.commission.folder, Json(book_.keys(Part::bus))};
 }
 
-Time Daemon::step_commissioning(Time now) {
+Time ControlLoop::step_commissioning(Time now) {
     if (!procedure_ || !procedure_->active()) return drivers::kNever;
     if (!campaign_.commissioning()) {
         StatusData status;
@@ -110,7 +110,7 @@ Time Daemon::step_commissioning(Time now) {
     return next;
 }
 
-void Daemon::commission(WaitingCommand waiting, Time now) {
+void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const CommandRequest& request = waiting.request;
     const Json what = Json::parse(request.argument, nullptr, false);
     if (!what.is_object() || !what.contains("do") || !what["do"].is_string())
@@ -128,7 +128,7 @@ void Daemon::commission(WaitingCommand waiting, Time now) {
     waiting.reply.set_value({true, reply.dump(-1, ' ', false, Json::error_handler_t::replace)});
 }
 
-CommandReply Daemon::do_commission(const CommandRequest& request, const Json& what, Time now) {
+CommandReply ControlLoop::do_commission(const CommandRequest& request, const Json& what, Time now) {
     const auto text = [&what](const char* key) {
         return what.contains(key) && what[key].is_string() ? what[key].get<std::string>()
                                                            : std::string();
@@ -164,9 +164,9 @@ CommandReply Daemon::do_commission(const CommandRequest& request, const Json& wh
     return {true, word == "stop" ? "stopped" : "ended"};
 }
 
-CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Json& what,
-                                         Time now) {
-    if (auto why = guard_refuses(request); !why.empty()) return {false, why};
+CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, const Json& what,
+                                              Time now) {
+    if (auto why = outside_.refuses(request); !why.empty()) return {false, why};
     const auto flag = [&what](const char* key) { return what.contains(key) && what[key] == true; };
     const bool by_hand = flag("by_hand");
     commission::Kept kept;
@@ -191,7 +191,8 @@ CommandReply Daemon::begin_commissioning(const CommandRequest& request, const Js
     return {true, "begun"};
 }
 
-CommandReply Daemon::enter_in_record(const CommandRequest& request, const Json& what, Time now) {
+CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const Json& what,
+                                          Time now) {
     StatusData status;
     campaign_.fill(status, now);
     if (!at_rest(status.state))
@@ -227,8 +228,9 @@ CommandReply Daemon::enter_in_record(const CommandRequest& request, const Json& 
     }
 }
 
-CommandReply Daemon::accept_commissioning(const CommandRequest& request, const std::string& second,
-                                          const configuration::Loaded& file) {
+CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
+                                               const std::string& second,
+                                               const configuration::Loaded& file) {
     using Outcome = commission::Finding::Outcome;
     const std::vector<Part> parts{Part::bus, Part::gimbals, Part::accelerometers, Part::earth};
     if (!procedure_ || procedure_->active() || procedure_->finding().outcome != Outcome::decided)
@@ -244,9 +246,9 @@ CommandReply Daemon::accept_commissioning(const CommandRequest& request, const s
     return reply;
 }
 
-CommandReply Daemon::record_parts(const CommandRequest& request, const std::string& second,
-                                  const std::vector<Part>& parts, const Json& evidence,
-                                  const configuration::Loaded& as) {
+CommandReply ControlLoop::record_parts(const CommandRequest& request, const std::string& second,
+                                       const std::vector<Part>& parts, const Json& evidence,
+                                       const configuration::Loaded& as) {
     commission::PartRecord what;
     what.evidence = evidence;
     what.by = {request.by, second};

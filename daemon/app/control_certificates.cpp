@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "daemon/app/daemon.hpp"
+#include "daemon/app/control_loop.hpp"
 
 namespace vibrig {
 
@@ -43,7 +43,7 @@ Issued issued_of(const std::string& argument) {
 
 }  // namespace
 
-void Daemon::begin_certificate(WaitingCommand waiting) {
+void ControlLoop::begin_certificate(WaitingCommand waiting) {
     const auto issued = issued_of(waiting.request.argument);
     if (!issued.wrong.empty()) return answer(waiting, {false, issued.wrong});
     if (!journal_)
@@ -67,7 +67,7 @@ void Daemon::begin_certificate(WaitingCommand waiting) {
 }
 
 /// The PDF is given away once its hash is on disk.
-void Daemon::finish_certificates(bool at_once) {
+void ControlLoop::finish_certificates(bool at_once) {
     std::erase_if(certifying_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
             if (!at_once && rt::wall_clock() - one.since_wall < kJournalPatience) return false;
