@@ -136,6 +136,12 @@ void ControlLoop::take_over_latches() {
         latches_.add(latch);
         log(Severity::alarm, "journal",
             fmt::format("not acknowledged: {}: {}", latch.name, latch.cause));
+        // Whose word it was is not kept: each witness has to show anew that it lives.
+        if (latch.name == rt::condition_of(rt::Trip::stuck).name ||
+            latch.name == rt::condition_of(rt::Trip::amplitude_witness).name) {
+            parts_.rest.doubt(drivers::Channel::accel_x);
+            parts_.rest.doubt(drivers::Channel::table_accel);
+        }
     }
     const auto& campaign = configuration_.campaign;
     double level_g = campaign.loop.table_g;

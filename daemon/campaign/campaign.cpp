@@ -142,6 +142,7 @@ Time Campaign::step_once(Time now) {
     }
     insist_on_zero_torque(now);
     watch_gravity();
+    watch_power();
     watch_arming(now);
     return (this->*row_of(state_).step)(now);
 }

@@ -235,6 +235,7 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
+    CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
@@ -269,8 +270,10 @@ class Campaign {
     /// Of the dwell that is being done.
     [[nodiscard]] estimator::DwellInfo dwell_info() const {
         return {here().run, here().position, table_g(),
-                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_))};
+                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_)),
+                power_lost_ && positions_done_ > 0};
     }
+    void watch_power();
     void take_over_origin();
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
@@ -321,6 +324,7 @@ class Campaign {
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;
+    bool power_lost_ = false;  ///< the gyros were seen run down since the dwell done last
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made

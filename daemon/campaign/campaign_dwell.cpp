@@ -133,7 +133,7 @@ Time Campaign::record(Time now) {
         state_ = State::recording;
     }
     if (dwell_done_) {
-        dwell_ordered_ = false;
+        dwell_ordered_ = power_lost_ = false;
         next_position(now);
         return now;
     }

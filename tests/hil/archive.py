@@ -6,6 +6,8 @@ usage: archive.py PROGRAMS [--seed N]
 """
 import concurrent.futures
 import glob
+import importlib.machinery
+import importlib.util
 import json
 import os
 import random
@@ -152,12 +154,14 @@ def browsed(checks, lab, folder):
     checks.equal(server.end(), 0, "it ends when it is told")
 
 
-def served_remotely(checks, lab, folder):
+def served_remotely(checks, lab, folder, serial="0017"):
     """The archive's door to elsewhere: certificates on both sides, and roles, as at the rig's."""
     pki, other = os.path.join(folder, "pki"), os.path.join(folder, "other-pki")
     for where, names in ((pki, ["--operator", "ada", "--viewer", "wall", "--viewer", "old"]), (other, ["--viewer", "wall"])):
         run = subprocess.run([lab.program, "pki", "init", "--folder", where, "--host", "127.0.0.1", *names], capture_output=True, text=True)
         checks.check(run.returncode == 0, "vibrig pki init makes certificates", run.stderr)
+    for end in (".crt", ".key"):   # whoever has it keeps it
+        shutil.copy(os.path.join(pki, "old" + end), os.path.join(pki, "gone" + end))
     subprocess.run([lab.program, "pki", "revoke", "--folder", pki, "old"], check=True, capture_output=True)
     without_role(pki)
     door = {"--certificate": "server.crt", "--key": "server.key", "--clients-ca": "authority.crt", "--revoked": "revoked.crl"}
@@ -176,16 +180,16 @@ def served_remotely(checks, lab, folder):
         time.sleep(0.05)
     checks.check("with certificates: https://" in server.text(), "archive serve --remote says where it is", server.text())
     port = int(server.text().split("with certificates: ")[-1].strip().rstrip("/").rsplit(":", 1)[1])
-    key = (lab.campaigns("--serial", "0017") or [{"hash": "", "campaign": ""}])[0]
+    key = (lab.campaigns("--serial", serial) or [{"hash": "", "campaign": ""}])[0]
     with open(os.path.join(lab.folder, key["campaign"], "campaign.h5"), "rb") as file:
         recording = file.read()
     for name in ("ada", "wall"):
         status, page = asked(port, pki, name, "/")
-        checks.check(status == 200 and b'href="/unit?serial=0017"' in page, f"{name} sees the units over TLS", str(status))
+        checks.check(status == 200 and f"/unit?serial={serial}".encode() in page, f"{name} sees the units over TLS", str(status))
         checks.check(asked(port, pki, name, f"/file?hash={key['hash']}&name=campaign.h5") == (200, recording), f"{name} takes a recording")
         checks.equal(asked(port, pki, name, "/api/v1/commands", "POST")[0], 405, f"{name} can command nothing")
     checks.equal(asked(port, pki, "guest", "/")[0], 403, "a certificate without a role sees nothing")
-    for what, name, more in (("without a certificate", None, {}), ("with one that is revoked", "old", {}),
+    for what, name, more in (("without a certificate", None, {}), ("with one that is revoked", "gone", {}),
                              ("with one of another authority", os.path.join(other, "wall"), {}),
                              ("in TLS 1.1", "ada", {"version": ssl.TLSVersion.TLSv1_1})):
         status, page = asked(port, pki, name, "/", **more)
@@ -362,6 +366,29 @@ def kills(checks, programs, folder, base, seed):
                  "\n".join(wrong[:10]))
 
 
+def grows(checks, programs, folder):
+    """What is asked of many campaigns costs by what is said of them, not by how many there are. As ratios of processor time; the
+    figures are tests/bench/archive's."""
+    path = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "bench", "archive")
+    loader = importlib.machinery.SourceFileLoader("bench_archive", path)
+    bench = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(bench)
+    vibrig, cost = os.path.join(programs, "vibrig"), {}
+    for n in (1000, 10_000):
+        lab = os.path.join(folder, f"of-{n}")
+        os.makedirs(lab)
+        bench.make_sqlite(vibrig, lab, n)
+        for words in (("list", "--newest", "20"), ("list", "--serial", "unit-1"), ("trend", "unit-1", "--json"), ("list", "--json")):
+            cost[(n, *words)] = bench.look([vibrig, *words, "--archive", lab])
+    for words in (("list", "--newest", "20"), ("list", "--serial", "unit-1"), ("trend", "unit-1", "--json")):
+        few, many = cost[(1000, *words)][0], cost[(10_000, *words)][0]
+        checks.check(many < 3 * few, f"vibrig {' '.join(words)}: {many / few:.1f} times the processor time of ten times the campaigns",
+                     f"{few:.3f} s, {many:.3f} s")
+    few, many = cost[(1000, "list", "--json")], cost[(10_000, "list", "--json")]
+    checks.check(many[0] < 15 * few[0] and many[2] > 9 * few[2],
+                 f"vibrig list --json of 10 000: {many[0] / few[0]:.1f} times the processor time of 1000", f"{few}, {many}")
+
+
 def full_archive(checks, programs, folder, base):
     disk = recording_faults.SickDisk(folder)
     if disk.refused:
@@ -456,6 +483,7 @@ def main():
         os.mkdir(os.path.join(folder, "full"))
         full_archive(checks, programs, os.path.join(folder, "full"), small)
         kills(checks, programs, folder, small, seed)
+        grows(checks, programs, folder)
         if POSTGRES:
             shared(checks, programs, folder, small)
             hanging(checks, programs, folder, seed)

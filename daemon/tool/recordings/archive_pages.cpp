@@ -143,12 +143,16 @@ std::string ArchivePages::front(archive::Index& index) const {
                  "</td></tr>";
     archive::Filter filter;
     filter.newest = kNewest;
-    return page("Archive of campaigns",
-                "<h2>Units</h2><div class=\"scroll\"><table id=\"units\"><thead><tr><th>serial "
-                "number</th><th>type</th><th class=\"number\">campaigns</th><th>newest, UTC</th>"
-                "<th>its verdict</th></tr></thead><tbody>" +
-                    units + "</tbody></table></div><h2>Newest campaigns</h2>" +
-                    campaign_rows(index.campaigns(filter)));
+    return page(
+        "Archive of campaigns",
+        "<h2>Units</h2><p class=\"note\">Those of the newest " +
+            std::to_string(archive::Index::kOfNewest) +
+            " campaigns; any other is at /unit?serial=NUMBER.</p><div class=\"scroll\"><table "
+            "id=\"units\"><thead><tr><th>serial "
+            "number</th><th>type</th><th class=\"number\">campaigns</th><th>newest, UTC</th>"
+            "<th>its verdict</th></tr></thead><tbody>" +
+            units + "</tbody></table></div><h2>Newest campaigns</h2>" +
+            campaign_rows(index.campaigns(filter)));
 }
 
 std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) const {
