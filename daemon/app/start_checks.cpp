@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 #include "estimator/identification/plan_report.hpp"
