@@ -193,7 +193,7 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary,
     if (!with_.recorder) return;
     // The identification is this thread's: the dwell is over and no other is ordered.
     estimator::Estimate estimate;
-    with_.identification.estimate(estimate);
+    with_.identification.solved(estimate);
     record::Dwell dwell;
     dwell.time = with_.clock.now();
     dwell.summary = summary;

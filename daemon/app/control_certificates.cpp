@@ -11,8 +11,9 @@ namespace vibrig {
 
 namespace {
 
-constexpr drivers::Time kPatience = 2 * drivers::kSecond;  // the server waits 5 s for an answer
-constexpr std::size_t kLongestNumber = 100, kSha256 = 64;
+constexpr drivers::Time kJournalPatience =
+    2 * drivers::kSecond;  // the server waits 5 s for an answer
+constexpr std::size_t kLongestNumber = 100, kHashDigits = 64;
 
 struct Issued {
     std::string number, wrong;  ///< empty: it is fine
@@ -32,10 +33,10 @@ Issued issued_of(const std::string& argument) {
         issued.wrong = "certificate: campaign: found nothing, expected the recording's";
     for (const char* key : {"pdf_sha256", "json_sha256"}) {
         const std::string hash = text(key);
-        if (hash.size() != kSha256 ||
+        if (hash.size() != kHashDigits ||
             hash.find_first_not_of("0123456789abcdef") != std::string::npos)
             issued.wrong = fmt::format("certificate: {}: found \"{}\", expected {} digits 0 to f",
-                                       key, hash, kSha256);
+                                       key, hash, kHashDigits);
     }
     return issued;
 }
@@ -69,7 +70,7 @@ void ControlLoop::begin_certificate(WaitingCommand waiting) {
 void ControlLoop::finish_certificates(bool at_once) {
     std::erase_if(certifying_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
-            if (!at_once && rt::wall_clock() - one.since_wall < kPatience) return false;
+            if (!at_once && rt::wall_clock() - one.since_wall < kJournalPatience) return false;
             one.reply = {false, "the journal has not written it yet: the number is used up"};
         }
         one.waiting.reply.set_value(one.reply);

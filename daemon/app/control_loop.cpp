@@ -44,6 +44,7 @@ void ControlLoop::run() {
         // a campaign on the rig's clock depend on the machine's load.
         if (stirred || now >= next)
             next = std::min(campaign_.step(now), now + drivers::kSecond / 2);
+        take_proof();
         const Time commissioning = step_commissioning(now);
         dwells_.take_done(campaign_);
         watch_arming();
@@ -123,6 +124,7 @@ void ControlLoop::take_over() {
         }
     }
     campaign_.take_over_proofs(std::move(proofs));
+    proofs_taken_ = campaign_.proof().history().size();
     if (!book_.trouble().empty()) log(Severity::warning, "commissioning", book_.trouble());
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign)
@@ -134,6 +136,12 @@ void ControlLoop::take_over_latches() {
         latches_.add(latch);
         log(Severity::alarm, "journal",
             fmt::format("not acknowledged: {}: {}", latch.name, latch.cause));
+        // Whose word it was is not kept: each witness has to show anew that it lives.
+        if (latch.name == rt::condition_of(rt::Trip::stuck).name ||
+            latch.name == rt::condition_of(rt::Trip::amplitude_witness).name) {
+            parts_.rest.doubt(drivers::Channel::accel_x);
+            parts_.rest.doubt(drivers::Channel::table_accel);
+        }
     }
     const auto& campaign = configuration_.campaign;
     double level_g = campaign.loop.table_g;

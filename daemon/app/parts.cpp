@@ -23,7 +23,6 @@ bool rig_owns_time(const Configuration& configuration) {
 }
 
 rt::MemoryLock lock_memory(const Configuration& configuration) {
-    rt::give_large_blocks_back();
     if (rig_owns_time(configuration)) return {false, "not asked for: the rig owns the time"};
     if (!configuration.lock_memory) return {false, "not asked for: threads.lock_memory is false"};
     return rt::lock_memory();
@@ -140,7 +139,8 @@ Parts::Parts(configuration::Loaded given, const log::LogQueue* queue)
                         : nullptr),
       pre_trip(make_pre_trip(*this)),
       stage_feed(dbc, campaign::stage_feed_settings(configuration.campaign), control_waiter.get()),
-      rest(configuration.campaign.rest, configuration.assembler.sample_period),
+      rest(configuration.campaign.rest, configuration.assembler.sample_period,
+           witness_settings(configuration, dbc).count_g),
       acquisition(io, *port, dbc, configuration.assembler, clock, rig_clock.get(), wiring(*this)),
       fitness(configuration, clock, *port, acquisition),
       gimbal(dbc, configuration.gimbal, sending_port()),

@@ -93,6 +93,7 @@ class Campaign {
     void fill(StatusData& status, drivers::Time now) const;
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
+    [[nodiscard]] const SafetyProof& proof() const { return proof_; }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that
@@ -137,7 +138,14 @@ class Campaign {
         int run = 1, position = 1;
     };
 
+    struct StateRow;
+    [[nodiscard]] static const StateRow& row_of(CampaignState state);
     drivers::Time step_once(drivers::Time now);
+    // One for each state; each returns when to be called next at the latest.
+    drivers::Time stand_by(drivers::Time now);
+    drivers::Time wait(drivers::Time now);
+    drivers::Time pause(drivers::Time now);
+    drivers::Time give_way(drivers::Time now);
     drivers::Time wait_for_platform(drivers::Time now);
     drivers::Time slew(drivers::Time now);
     drivers::Time zeroing(drivers::Time now);
@@ -227,6 +235,7 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
+    CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
@@ -261,8 +270,10 @@ class Campaign {
     /// Of the dwell that is being done.
     [[nodiscard]] estimator::DwellInfo dwell_info() const {
         return {here().run, here().position, table_g(),
-                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_))};
+                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_)),
+                power_lost_ && positions_done_ > 0};
     }
+    void watch_power();
     void take_over_origin();
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
@@ -313,6 +324,7 @@ class Campaign {
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;
+    bool power_lost_ = false;  ///< the gyros were seen run down since the dwell done last
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made
@@ -336,6 +348,7 @@ class Campaign {
     /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
     enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
     drivers::Time pressed_at_ = 0;  ///< when that began
+    drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
     bool press_felt_ = false;       ///< by the controller, too
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell

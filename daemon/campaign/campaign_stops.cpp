@@ -184,6 +184,13 @@ void Campaign::take_over_origin() {
     *origin_ -= before + std::max(since, least);
 }
 
+/// Gyros run down when they lose their power, between two dwells or while the daemon is away: what
+/// the bias does then no walk tells.
+void Campaign::watch_power() {
+    const auto platform = ports_.rig.platform();
+    power_lost_ = power_lost_ || (platform.time > 0 && !platform.gyros_at_speed);
+}
+
 bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops) {
     offered_last_.reset();
     if (!stops.empty()) offered_last_ = stops.back();

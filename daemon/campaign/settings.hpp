@@ -22,6 +22,8 @@ inline const std::vector<std::array<double, 3>> kTable1Positions{
 struct Stop {
     std::array<double, 3> position_deg{};  ///< as the encoders count
     double table_g = 0;
+    double frequency_hz = 0;  ///< 0: [vibration] frequency_hz
+    bool verify = false;      ///< held out: no part of the fit
 };
 
 /// Before each position: the platform's two channels across the vertical are brought level by fast

@@ -90,7 +90,7 @@ std::string format_schema() {
         } else if (key.type == "tables") {
             value = "(see --check)";
         }
-        std::string what = padded(key.name, kKeyColumn) + key.type;
+        std::string what = padded(key.name + "  ", kKeyColumn) + key.type;
         for (const std::string& more : {key.unit, key.bounds})
             what += more.empty() ? "" : ", " + more;
         text += wrapped(what, 0) + wrapped(value.empty() ? "" : "= " + value, kInside) +

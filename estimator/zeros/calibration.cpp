@@ -378,15 +378,15 @@ struct Calibration::Impl {
         }
         for (std::size_t i = 0; !given_up && i < 3; ++i) {
             if (r.axis[i].converged_s) continue;
-            const bool sigma = trace.back().sigma_mg[i] >= settings.target_mg[i];
+            const double sigma_mg = r.axis[i].filter_sigma_mg;
             r.problems.push_back(text(
                 "%c has not converged after %.0f s: standard deviation %.3g mg, moved %.3g mg "
                 "within the last sweep, target %.3g mg; %s",
-                name(i), r.time_s, trace.back().sigma_mg[i], r.axis[i].movement_mg,
-                settings.target_mg[i],
-                sigma ? "lengthen the run by more sweeps"
-                      : "lengthen the run until a whole sweep has passed, and wait for the unit to "
-                        "be warm"));
+                name(i), r.time_s, sigma_mg, r.axis[i].movement_mg, settings.target_mg[i],
+                sigma_mg >= settings.target_mg[i]
+                    ? "lengthen the run by more sweeps"
+                    : "lengthen the run until a whole sweep has passed, and wait for the unit to "
+                      "be warm"));
         }
         if (!given_up && gain && std::abs(gain->value()) > kLargestGain) {
             r.problems.push_back(text(

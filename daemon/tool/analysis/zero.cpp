@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -265,7 +266,7 @@ zeros::Calibration calibration_of(const Options& options, const std::string& fil
                                   const zeros::Way& way) {
     zeros::CalibrationSettings settings = settings_of(options);
     settings.upright = way.upright;
-    settings.inverted = settings.inverted || way.down;
+    settings.inverted = way.down;
     // Of a file the reference is zero: how still the unit may have stood, not a measured noise.
     settings.noise.reference_is_bound = true;
     zeros::Calibration calibration(settings);
@@ -299,7 +300,8 @@ int run_file(const Options& options) {
         throw std::invalid_argument("zero: FILE or `simulate` expected");
     }
     std::vector<zeros::Calibration> runs;
-    runs.push_back(calibration_of(options, options.file, {}));
+    runs.push_back(calibration_of(options, options.file,
+                                  {options.calibration.upright, options.calibration.inverted}));
     using Of = std::pair<const std::string&, zeros::Way>;
     for (const auto& [file, way] : {Of{options.down, {2, true}}, Of{options.y_up, {1, false}},
                                     Of{options.y_down, {1, true}}}) {
@@ -349,13 +351,13 @@ int run_simulate(const Options& options) {
         write_increments(options, s, errors);
         return 0;
     }
-    std::vector<zeros::Way> ways{{}};
+    std::vector<zeros::Way> ways{{s.upright, s.inverted}};
     if (options.both_ways) ways.push_back({2, true});
     if (options.second_axis) ways.insert(ways.end(), {{1, false}, {1, true}});
     std::vector<zeros::Calibration> runs;
     for (const zeros::Way& way : ways) {
         s.upright = way.upright;
-        s.inverted = options.calibration.inverted != way.down;
+        s.inverted = way.down;
         runs.push_back(zeros::simulate(s, errors, options.period_s, options.seed + runs.size()));
     }
     return report(options, runs);
@@ -375,7 +377,10 @@ void add_common(CLI::App& command, Options& o) {
         ->check(proto::finite(proto::kAboveZero, 86400));
     command.add_flag("--static", s.allow_unobservable,
                      "go on with a plan that cannot tell zeros from tilt");
-    command.add_flag("--inverted", s.inverted, "platform z down");
+    command.add_option("--upright", s.upright, "platform axis turned about, y or z (z)")
+        ->transform(CLI::Transformer(std::map<std::string, int>{{"y", 1}, {"z", 2}}))
+        ->check(CLI::Range(1, 2));
+    command.add_flag("--inverted", s.inverted, "that axis down");
     command.add_option("--lever-arm", o.lever_arm, "from the azimuth axis, body axes, m (0,0,0)")
         ->expected(3)
         ->delimiter(',')

@@ -189,6 +189,11 @@ void look_for_daemon(const CertificateArguments& arguments) {
 int certify(const CertificateArguments& arguments) {
     Issue issue = read_paper(arguments.paper);
     issue.by = arguments.by;
+    try {
+        static_cast<void>(nlohmann::json(issue.by).dump());
+    } catch (const nlohmann::json::exception&) {
+        throw std::runtime_error("--by: found bytes that are not UTF-8, expected a name");
+    }
     issue.utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                        std::chrono::system_clock::now().time_since_epoch())
                        .count();

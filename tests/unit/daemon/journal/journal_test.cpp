@@ -386,18 +386,29 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
     }
 }
 
-/// As version 1 wrote it: without the four noise levels, position, repeats, time used and times of
-/// the beginning.
+/// As version 1 wrote it: without the four noise levels, position, repeats, time used, times of
+/// the beginning and whether power was lost.
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers, (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t));
+    bytes.erase(numbers,
+                (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 1);
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(
         ::crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
     bytes.append(reinterpret_cast<const char*>(&sum), sizeof sum);
     return bytes;
+}
+
+TEST_F(JournalTest, KnowsAfterWhichRestartThePowerWasLost) {
+    estimator::Identification filter{estimator::Settings{}};
+    for (const bool lost : {false, true}) {
+        DwellCheckpoint one = dwell(filter, 1), read;
+        one.info.power_lost = lost;
+        ASSERT_EQ(decode(encode(one, kHash), kHash, read), "");
+        EXPECT_EQ(read.info.power_lost, lost);
+    }
 }
 
 TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {

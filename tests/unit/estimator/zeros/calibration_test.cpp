@@ -83,8 +83,11 @@ TEST(ZeroObservability, RanksAndSingularValuesAreThoseOfTheErrorModel) {
 
 TEST(ZeroObservability, MisalignmentAndScaleAreInTheZerosUnlessZIsTakenDownToo) {
     const Site site = thirty_degrees_north().site;
-    EXPECT_EQ(rank_with_shares({0, 90, -90}, false, site), 15);
-    EXPECT_EQ(rank_with_shares({0, 90, -90}, true, site), 18);
+    EXPECT_EQ(rank_with_shares({0, 90, -90}, {{2, false}}, site), 15);
+    EXPECT_EQ(rank_with_shares({0, 90, -90}, {{2, false}, {2, true}}, site), 18);
+    // AND slews about y, too, take them apart only both ways
+    EXPECT_LT(rank_with_shares({0, 60, -60}, {{2, false}, {1, false}}, site), 21);
+    EXPECT_EQ(rank_with_shares({0, 60, -60}, {{2, false}, {1, false}, {1, true}}, site), 21);
 }
 
 TEST(ZeroObservability, RefusesPlansThatCannotWork) {
@@ -476,8 +479,10 @@ void expect_honest(std::uint64_t seeds, double slack) {
             std::cout << what << '\n';
             // THEN both ways the zeros are as sure as they say, whatever the misalignment
             EXPECT_NEAR(found.both_ways, 1, slack) << what;
-            // AND so they are where z stays up and a second axis is taken both ways
-            EXPECT_NEAR(found.second_axis, 1, slack) << what;
+            // AND so they are where z stays up and a second axis is taken both ways. Slews of 60
+            // deg tell a tilt that shows across less well than those of 90, and what is assumed
+            // of it beforehand is more than is there: up to a tenth on the safe side.
+            EXPECT_NEAR(found.second_axis, 0.95, slack + 0.05) << what;
             // AND one way they are not surer than they are, up to the size declared
             if (arcsec <= 50) {
                 EXPECT_LT(found.one_way, 1 + slack) << what;
