@@ -22,6 +22,8 @@ inline const std::vector<std::array<double, 3>> kTable1Positions{
 struct Stop {
     std::array<double, 3> position_deg{};  ///< as the encoders count
     double table_g = 0;
+    double frequency_hz = 0;  ///< 0: [vibration] frequency_hz
+    bool verify = false;      ///< held out: no part of the fit
 };
 
 /// Before each position: the platform's two channels across the vertical are brought level by fast
@@ -117,6 +119,7 @@ struct Settings {
     double target_linear = 0;     ///< deg/h/g
     double target_quadratic = 0;  ///< deg/h/g^2
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
+    bool type_prior = false;      ///< it starts from what the archive knows of the unit's type
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
     /// Before the first position; empty: no opening check.

@@ -17,6 +17,7 @@
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
 #include "daemon/plan/plan_file.hpp"
+#include "daemon/plan/profile_file.hpp"
 #include "estimator/commissioning/opening.hpp"
 #include "estimator/filter/kinematics.hpp"
 
@@ -160,12 +161,47 @@ namespace {
 /// The plan's dwells, one by one; its levels stand in for table_g and are checked like them.
 void take_plan(Configuration& c) {
     c.campaign.table_g.clear();
-    for (const auto& run : plan::read_plan(c.campaign.plan, c.estimator.transmission)) {
-        c.campaign.stops.insert(c.campaign.stops.end(), run.count,
-                                campaign::Stop{run.position_deg, run.table_g});
+    const auto transmission = [&c](std::optional<double> hz) {
+        return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
+    };
+    for (const auto& run : plan::read_plan(c.campaign.plan, transmission)) {
+        c.campaign.stops.insert(
+            c.campaign.stops.end(), run.count,
+            campaign::Stop{run.position_deg, run.table_g, run.frequency_hz, run.verify});
         auto& levels = c.campaign.table_g;
         if (std::find(levels.begin(), levels.end(), run.table_g) == levels.end())
             levels.push_back(run.table_g);
+    }
+}
+
+/// What stands between table and platform, from what is stated of it.
+void take_mount(Configuration& c, const std::map<std::string, Place>& places) {
+    auto& s = c.spectrum;
+    s.mount_stated = places.contains("spectrum.mount") || places.contains("spectrum.transmission");
+    if (s.hard && !places.contains("vibration.transmission")) c.estimator.transmission = 1;
+    if (s.hard) c.campaign.resonance_hz = 0;
+    s.mount = {s.hard || (!s.mount_stated && c.estimator.transmission >= 1), {}, s.transmission};
+    if (!s.mount.hard)
+        s.mount.pads = estimator::spectrum::pads_with(
+            c.estimator.frequency_hz, std::min(c.estimator.transmission, 0.999), s.pads_damping);
+}
+
+/// Profiles that stand in files of their own.
+void take_profiles(Configuration& c, const std::string& name, Place place, Problems& problems) {
+    for (auto& one : c.profiles) {
+        if (one.file.empty()) continue;
+        resolve(one.file, std::filesystem::path(name).parent_path());
+        try {
+            auto stated = plan::read_profile(one.file);
+            stated.profile.name = one.profile.name;
+            if (one.profile.g_rms > 0) stated.profile.g_rms = one.profile.g_rms;
+            estimator::spectrum::check(stated.profile, one.file + ": ");
+            one.profile = stated.profile;
+            if (!stated.at.empty()) one.at_table = stated.at == "table";
+        } catch (const std::runtime_error& error) {
+            problems.add(place, "profile (" + one.profile.name + ").file", error.what(),
+                         "a profile as vibrig predict takes it");
+        }
     }
 }
 
@@ -255,7 +291,9 @@ std::string covered_by_proof(const std::vector<EffectiveValue>& effective) {
         // How long a proof is valid is no part of what it shows.
         if (value.key == "selftest.proof_valid_h" || value.key == "selftest.emergency_stop_days")
             continue;
-        if (std::ranges::find(kSections, section) != kSections.end())
+        // Bolted to the table it is another rig.
+        const bool hard = value.key == "spectrum.mount" && value.value == "\"hard\"";
+        if (hard || std::ranges::find(kSections, section) != kSections.end())
             lines.push_back(value.key + "=" + value.value + "\n");
     }
     std::ranges::sort(lines);
@@ -286,7 +324,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     reader.read(table, "");
     if (!reader.places().contains("zeroing.both_ways"))
         take_the_ways_of_zeroing(c, reader.places().contains("zeroing.second_axis"));
+    take_mount(c, reader.places());
     loaded.effective = effective_of(c, name, reader.places());
+    if (!c.profiles.empty()) take_profiles(c, name, reader.places().at("profile"), problems);
 
     const double factor = to_g_peak(c.amplitude_unit, c.estimator.gravity_mps2);
     c.shaker.registers.amplitude.scale *= factor;

@@ -16,6 +16,8 @@
 #include "drivers/sample/assembler.hpp"
 #include "drivers/shaker/shaker.hpp"
 #include "estimator/filter/settings.hpp"
+#include "estimator/spectrum/mount.hpp"
+#include "estimator/spectrum/profile.hpp"
 
 namespace vibrig::configuration {
 
@@ -62,6 +64,27 @@ struct Configuration {
     [[nodiscard]] bool record_demanded() const {
         return !simulated() || (commission.enforce && commission.folder != kCommissionFolder);
     }
+    /// [spectrum]: several frequencies
+    struct Spectrum {
+        bool mixed = false;         ///< mode
+        bool hard = false;          ///< mount
+        bool mount_stated = false;  ///< by a key; else as [vibration] transmission has it
+        /// transmission: Hz and platform over table; empty: "pads"
+        std::vector<std::pair<double, double>> transmission;
+        double pads_damping = 0.2;
+        double highest_hz = 500;           ///< of what a survey plans
+        double elastic_beyond = 1;         ///< see estimator::spectrum::PredictionOptions
+        double tolerance_deg_h = 0;        ///< of a verification; 0: any
+        estimator::spectrum::Mount mount;  ///< what follows of them
+    } spectrum;
+    /// [[profile]]
+    struct NamedProfile {
+        estimator::spectrum::Profile profile;
+        std::string file;  ///< instead of psd; relative to the configuration's folder
+        int number = 0;    ///< in the controller; 0: not stated
+        bool at_table = false;
+    };
+    std::vector<NamedProfile> profiles;
     std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
     /// [server]: who may command at the socket, and where else is listened; empty: all, nowhere
     struct Server {

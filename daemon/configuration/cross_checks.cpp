@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/configuration/value.hpp"
+#include "estimator/spectrum/sampling.hpp"
 #include "estimator/uncertainty/budget.hpp"
 
 namespace vibrig::configuration {
@@ -48,6 +49,7 @@ void CrossCheck::refuse(std::initializer_list<std::string> keys, const std::stri
 void CrossCheck::everywhere() {
     bus();
     inputs();
+    mount();
     if (sound({"shaker.backoff_min_ms", "shaker.backoff_max_ms"}) &&
         c_.shaker.backoff_min > c_.shaker.backoff_max) {
         refuse({"shaker.backoff_min_ms", "shaker.backoff_max_ms"},
@@ -111,6 +113,9 @@ void CrossCheck::for_daemon() {
     set_points_fit();
     limits();
     frequency();
+    mode();
+    profiles();
+    frequencies_of_plan();
     travel();
 }
 
@@ -221,6 +226,14 @@ void CrossCheck::onlookers() {
 }
 
 void CrossCheck::adaptive() {
+    if (sound({"campaign.prior", "campaign.adaptive"}) && c_.campaign.type_prior) {
+        const char* const missing = !c_.campaign.adaptive            ? "campaign.adaptive = true"
+                                    : c_.archive.folder.empty()      ? "archive.folder"
+                                    : c_.paperwork.unit_type.empty() ? "unit.type"
+                                                                     : nullptr;
+        if (missing != nullptr)
+            refuse({"campaign.prior"}, "\"type\"", std::string(missing) + " with it");
+    }
     if (!sound({"campaign.adaptive"}) || !c_.campaign.adaptive) return;
     if (!c_.campaign.plan.empty()) {
         refuse({"campaign.adaptive", "campaign.plan"}, "an adaptive campaign with a plan file",
@@ -325,10 +338,19 @@ void CrossCheck::limits() {
     if (!sound({"vibration.frequency_hz", "site.gravity_mps2", "shaker.limits"})) {
         return;
     }
-    const double f = c_.estimator.frequency_hz;
-    const double omega = 2 * std::numbers::pi * f;
-    for (std::size_t i = 0; i < c_.campaign.table_g.size() && sound({"campaign.table_g"}); ++i) {
-        const double a = c_.campaign.table_g[i];
+    if (!sound({"campaign.table_g", "campaign.plan"})) return;
+    // Each level at its frequency, once.
+    std::vector<std::pair<double, double>> asked;
+    for (const auto& stop : c_.campaign.stops) {
+        const std::pair one{stop.table_g,
+                            stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz};
+        if (std::find(asked.begin(), asked.end(), one) == asked.end()) asked.push_back(one);
+    }
+    if (asked.empty()) {
+        for (const double g : c_.campaign.table_g) asked.emplace_back(g, c_.estimator.frequency_hz);
+    }
+    for (const auto& [a, f] : asked) {
+        const double omega = 2 * std::numbers::pi * f;
         const double mps2 = a * c_.estimator.gravity_mps2;
         const std::string found = plain(a) + " g at " + plain(f) + " Hz";
         const auto check = [&](double value, double limit, const char* unit, const char* key) {
@@ -364,7 +386,12 @@ void CrossCheck::frequency() {
         if (std::abs(f - m * rate / 2) < margin) {
             refuse({"vibration.frequency_hz", "can.sample_rate_hz"}, plain(f) + " Hz",
                    "at least " + rounded(margin) + " Hz off " + rounded(m * rate / 2) +
-                       " Hz, where it aliases to zero at " + rounded(rate) + " samples/s");
+                       " Hz, where it aliases to zero at " + rounded(rate) +
+                       " samples/s; the nearest free one is " +
+                       plain(estimator::spectrum::nearest_free(
+                           f, rate, c_.estimator.level_window_s,
+                           estimator::spectrum::kHarmonicsPlanned)) +
+                       " Hz");
         }
     }
     if (!sound({"vibration.transmission", "campaign.resonance_hz"})) {

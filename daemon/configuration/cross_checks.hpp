@@ -46,6 +46,10 @@ class CrossCheck {
     void limits();
     void frequency();
     void inputs();
+    void mount();
+    void mode();
+    void profiles();
+    void frequencies_of_plan();
     void travel();
 
     const Configuration& c_;

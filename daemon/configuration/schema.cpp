@@ -6,6 +6,7 @@ const std::vector<Key>& schema() {
     static const std::vector<Key> keys = [] {
         std::vector<Key> all;
         add_identification_keys(all);
+        add_spectrum_keys(all);
         add_uncertainty_keys(all);
         add_campaign_keys(all);
         add_shaker_keys(all);

@@ -170,6 +170,11 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(number("campaign.time_limit_s", "s", {0, 1e7},
                           "an adaptive campaign ends before it; 0: none",
                           [](C& c) -> double& { return c.campaign.time_limit_s; }));
+    keys.push_back(choice<bool>(
+        "campaign.prior", {{"none", false}, {"type", true}},
+        "type: an adaptive campaign starts from what the archive knows of the unit's type, while "
+        "the unit passes for one of it; results are given without and with it",
+        [](C & c) -> auto& { return c.campaign.type_prior; }));
     keys.push_back(boolean("campaign.levelling",
                            "the platform is levelled before each position; see [levelling]",
                            [](C& c) -> bool& { return c.campaign.levelling; }));

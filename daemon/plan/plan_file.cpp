@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string_view>
 
 #include "daemon/plan/number_table.hpp"
@@ -16,7 +15,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kMostRuns = 100'000;
-constexpr double kMostG = 1000;
+constexpr double kMostG = 1000, kMostHz = 20'000;
 constexpr double kMostInner = 80;  // beyond it the gimbals lock
 constexpr double kAgreement = 0.01;
 constexpr double kAtRestG = 1e-9;
@@ -36,7 +35,11 @@ void check_position(const std::array<double, 3>& position, const std::string& pl
 
 /// Levels at the platform and at the table from what the file has of them.
 void join_levels(PlannedRun& run, std::optional<double> level, std::optional<double> table,
-                 double transmission, const std::string& place) {
+                 const TransmissionAt& at, const std::string& place) {
+    const auto known = at(run.frequency_hz > 0 ? std::optional(run.frequency_hz) : std::nullopt);
+    if (!known)
+        refuse(place, number(run.frequency_hz) + " Hz", "a frequency of spectrum.transmission");
+    const double transmission = *known;
     for (const auto& g : {level, table}) {
         if (g && !(*g >= 0 && *g <= kMostG)) refuse(place, number(*g), "0 to 1000 g");
     }
@@ -59,7 +62,28 @@ std::optional<double> number_at(const Json& run, const char* key, const std::str
     return found->get<double>();
 }
 
-PlannedRun from_json(const Json& json, double transmission, const std::string& place) {
+/// Of rest it is 0.
+void take_frequency(PlannedRun& run, double hz, const std::string& place) {
+    if (hz != 0 && !(hz >= 0.1 && hz <= kMostHz))
+        refuse(place, number(hz), "0.1 to 20000 Hz, or 0 at rest");
+    run.frequency_hz = hz;
+}
+
+bool held_out(const Json& json, const std::string& place) {
+    for (const char* other : {"profile", "sweep", "level_db"}) {
+        if (const auto found = json.find(other); found != json.end())
+            refuse(place + "." + other, found->dump().substr(0, 60),
+                   "a sine with frequency_hz and level_g: random vibration and sweeps are not run");
+    }
+    const auto role = json.find("role");
+    if (role == json.end() || *role == "identify") return false;
+    if (*role != "verify")
+        refuse(place + ".role", role->dump().substr(0, 60), "\"identify\" or \"verify\"");
+    return true;
+}
+
+PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
+                     const std::string& place) {
     if (!json.is_object()) refuse(place, json.dump().substr(0, 60), "an object");
     PlannedRun run;
     const auto position = json.find("position");
@@ -72,6 +96,9 @@ PlannedRun from_json(const Json& json, double transmission, const std::string& p
     }
     for (std::size_t k = 0; k < 3; ++k) run.position_deg[k] = (*position)[k].get<double>();
     check_position(run.position_deg, place + ".position");
+    if (const auto hz = number_at(json, "frequency_hz", place))
+        take_frequency(run, *hz, place + ".frequency_hz");
+    run.verify = held_out(json, place);
     join_levels(run, number_at(json, "level_g", place), number_at(json, "table_g", place),
                 transmission, place);
     if (const auto count = number_at(json, "count", place)) {
@@ -84,7 +111,7 @@ PlannedRun from_json(const Json& json, double transmission, const std::string& p
 }
 
 std::vector<PlannedRun> runs_from_json(const std::string& text, const std::string& path,
-                                       double transmission) {
+                                       const TransmissionAt& transmission) {
     Json json;
     try {
         json = Json::parse(text);
@@ -116,17 +143,19 @@ std::vector<std::array<double, 3>> positions_of(const NumberTable& table, const 
 }
 
 std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string& path,
-                                      double transmission) {
+                                      const TransmissionAt& transmission) {
     const NumberTable table = read_table(
-        text, path, {"alpha_deg", "beta_deg", "gamma_deg", "level_g", "table_g", "count"});
+        text, path,
+        {"alpha_deg", "beta_deg", "gamma_deg", "level_g", "table_g", "count", "frequency_hz"});
     const auto positions = positions_of(table, path);
     const auto level = table.find("level_g"), table_g = table.find("table_g"),
-               count = table.find("count");
+               count = table.find("count"), frequency = table.find("frequency_hz");
     std::vector<PlannedRun> result(positions.size());
     for (std::size_t i = 0; i < result.size(); ++i) {
         const std::string place = path + ":" + std::to_string(table.lines[i]);
         const auto& row = table.rows[i];
         result[i].position_deg = positions[i];
+        if (frequency) take_frequency(result[i], row[*frequency], place + ": column frequency_hz");
         join_levels(result[i], level ? std::optional(row[*level]) : std::nullopt,
                     table_g ? std::optional(row[*table_g]) : std::nullopt, transmission, place);
         if (count) {
@@ -142,6 +171,10 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
 }  // namespace
 
 std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
+    return read_plan(path, [transmission](auto) { return std::optional(transmission); });
+}
+
+std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission) {
     const std::string text = content_of(path);
     const std::size_t first = text.find_first_not_of(" \t\r\n");
     auto runs = first != std::string::npos && text[first] == '{'

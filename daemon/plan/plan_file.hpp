@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,12 +21,21 @@ struct PlannedRun {
     double level_g = 0;                    ///< peak at the platform
     double table_g = 0;                    ///< peak at the table: what the shaker is told
     std::size_t count = 1;
+    double frequency_hz = 0;  ///< 0: the configuration's
+    bool verify = false;      ///< role "verify": held out of the fit
 };
+
+/// Platform over table; of a frequency, or, for none, of the configuration's. None: not known.
+using TransmissionAt = std::function<std::optional<double>(std::optional<double> hz)>;
 
 /// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; others
 /// ignored), or CSV with the columns alpha_deg, beta_deg, gamma_deg, level_g or table_g, and count
-/// if not 1. Where one level is missing, `transmission` (platform over table) gives it; where both
-/// are there and disagree by more than 1 %, the file is refused. Throws PlanFileError.
+/// if not 1; and per run frequency_hz, and (JSON) role "identify" or "verify". Where one level is
+/// missing, `transmission` (platform over table) gives it; where both are there and disagree by
+/// more than 1 %, the file is refused. Throws PlanFileError.
+[[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,
+                                                const TransmissionAt& transmission);
+/// The same at every frequency.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path, double transmission);
 
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError.

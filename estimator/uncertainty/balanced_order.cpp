@@ -25,22 +25,30 @@ constexpr double kForAllMoves = 28;
 constexpr double kSecondsPerHour = 3600;
 
 /// Against plans that do not determine a term: 10 deg/h, 10 deg/h/g, 1 deg/h/g^2.
-VectorXd prior_information() {
-    VectorXd information = VectorXd::Ones(10);
+VectorXd prior_information(Index columns) {
+    VectorXd information = VectorXd::Ones(columns);
     information.head<4>().setConstant(0.01);
     return information;
 }
 
+MatrixXd matrix_of(const std::vector<plan::Row>& rows) {
+    MatrixXd out(static_cast<Index>(rows.size()), static_cast<Index>(plan::kTerms));
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        for (std::size_t c = 0; c < plan::kTerms; ++c)
+            out(static_cast<Index>(i), static_cast<Index>(c)) = rows[i][c];
+    }
+    return out;
+}
+
 GyroRates rates_of(const std::vector<plan::Visit>& visits, const plan::Order& order,
-                   const std::vector<plan::Row>& rows, const plan::Timing& timing,
-                   double variance) {
+                   const MatrixXd& rows, const plan::Timing& timing, double variance) {
     const auto n = static_cast<Index>(order.size());
     GyroRates gyro;
     gyro.time_h.resize(n);
     gyro.rate = VectorXd::Zero(n);
     gyro.variance = VectorXd::Constant(n, variance);
-    gyro.regressors.resize(n, 10);
-    gyro.prior_information = prior_information();
+    gyro.regressors.resize(n, rows.cols());
+    gyro.prior_information = prior_information(rows.cols());
     plan::Vec3 here{};
     double now_s = 0;
     for (Index k = 0; k < n; ++k) {
@@ -50,7 +58,7 @@ GyroRates rates_of(const std::vector<plan::Visit>& visits, const plan::Order& or
         gyro.time_h[k] = (now_s + timing.dwell_s / 2) / kSecondsPerHour;
         now_s += timing.dwell_s + ramp_s;
         here = visits[i].position_deg;
-        for (Index c = 0; c < 10; ++c) gyro.regressors(k, c) = rows[i][static_cast<std::size_t>(c)];
+        gyro.regressors.row(k) = rows.row(static_cast<Index>(i));
     }
     return gyro;
 }
@@ -58,7 +66,8 @@ GyroRates rates_of(const std::vector<plan::Visit>& visits, const plan::Order& or
 VectorXd variances(const GyroRates& gyro, const RatesCovariance& rates) {
     MatrixXd information = rates.square(gyro.regressors);
     information.diagonal() += gyro.prior_information;
-    return information.llt().solve(MatrixXd::Identity(10, 10)).diagonal();
+    const Index n = information.rows();
+    return information.llt().solve(MatrixXd::Identity(n, n)).diagonal();
 }
 
 /// The last moves of a search are judged by chance alone: an own generator, the same everywhere.
@@ -94,7 +103,8 @@ double step_inflation(const GyroRates& gyro) {
     MatrixXd information = gyro.regressors.transpose() * weight.asDiagonal() * gyro.regressors;
     const VectorXd all = gyro.regressors.transpose() * weight;
     information.diagonal() += gyro.prior_information;
-    const MatrixXd p = information.llt().solve(MatrixXd::Identity(10, 10));
+    const Index columns = information.rows();
+    const MatrixXd p = information.llt().solve(MatrixXd::Identity(columns, columns));
     const double sum = weight.sum();
     double worst = 1, tail = 0;
     VectorXd of_tail = VectorXd::Zero(10);
@@ -108,15 +118,14 @@ double step_inflation(const GyroRates& gyro) {
         const double zz = tail * (1 - 2 * mean) + mean * mean * sum;
         const VectorXd b = p * hz;
         const double left = std::max(zz - b.dot(hz), 1e-12 * zz);
-        for (Index i = 0; i < 10; ++i)
+        for (Index i = 0; i < columns; ++i)
             worst = std::max(worst, std::sqrt(1 + b[i] * b[i] / (left * p(i, i))));
     }
     return worst;
 }
 
 OrderMerit merit_of(const std::vector<plan::Visit>& visits, const plan::Order& order,
-                    const std::vector<plan::Row>& rows, const plan::Timing& timing,
-                    double variance) {
+                    const MatrixXd& rows, const plan::Timing& timing, double variance) {
     const GyroRates gyro = rates_of(visits, order, rows, timing, variance);
     const VectorXd elapsed = gyro.time_h.array() - gyro.time_h[0];
     const VectorXd trend = kTrend * (gyro.time_h.array() - gyro.time_h.mean());
@@ -128,7 +137,7 @@ OrderMerit merit_of(const std::vector<plan::Visit>& visits, const plan::Order& o
     merit.largest = f.maxCoeff();
     const double logs = f.array().log().mean();
     std::sort(f.begin(), f.end());
-    merit.median = 0.5 * (f[4] + f[5]);
+    merit.median = 0.5 * (f[(f.size() - 1) / 2] + f[f.size() / 2]);
     merit.step = step_inflation(gyro);
     merit.slewing_s = plan::duration(visits, order, timing).slewing_s;
     merit.cost = logs + kOfLargest * std::log(merit.largest) + kOfStep * std::log(merit.step) +
@@ -136,9 +145,20 @@ OrderMerit merit_of(const std::vector<plan::Visit>& visits, const plan::Order& o
     return merit;
 }
 
+OrderMerit merit_of(const std::vector<plan::Visit>& visits, const plan::Order& order,
+                    const std::vector<plan::Row>& rows, const plan::Timing& timing,
+                    double variance) {
+    return merit_of(visits, order, matrix_of(rows), timing, variance);
+}
+
 plan::Order balanced_order(const std::vector<plan::Visit>& visits,
                            const std::vector<plan::Row>& rows, const plan::Timing& timing,
                            double variance, const SearchSettings& how) {
+    return balanced_order(visits, matrix_of(rows), timing, variance, how);
+}
+
+plan::Order balanced_order(const std::vector<plan::Visit>& visits, const MatrixXd& rows,
+                           const plan::Timing& timing, double variance, const SearchSettings& how) {
     plan::Order best(visits.size());
     std::iota(best.begin(), best.end(), std::size_t{0});
     if (visits.size() < kFewest) return best;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
@@ -24,6 +25,11 @@ struct OrderMerit {
                                   const std::vector<plan::Row>& rows, const plan::Timing& timing,
                                   double variance);
 
+/// The same for models of more coefficients: a row for each visit, the bias's column first.
+[[nodiscard]] OrderMerit merit_of(const std::vector<plan::Visit>& visits, const plan::Order& order,
+                                  const Eigen::MatrixXd& rows, const plan::Timing& timing,
+                                  double variance);
+
 struct SearchSettings {
     int starts = 6, moves = 6000;
     std::uint64_t seed = 1;
@@ -35,5 +41,8 @@ struct SearchSettings {
                                          const std::vector<plan::Row>& rows,
                                          const plan::Timing& timing, double variance,
                                          const SearchSettings& how = {});
+[[nodiscard]] plan::Order balanced_order(const std::vector<plan::Visit>& visits,
+                                         const Eigen::MatrixXd& rows, const plan::Timing& timing,
+                                         double variance, const SearchSettings& how = {});
 
 }  // namespace vibrig::estimator::uncertainty

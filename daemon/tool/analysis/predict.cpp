@@ -13,11 +13,11 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
-#include <tuple>
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/results/assessment_json.hpp"
 #include "daemon/results/spectrum_result.hpp"
+#include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"
 #include "estimator/filter/kinematics.hpp"
@@ -33,12 +33,11 @@ using namespace estimator::spectrum;
 using Eigen::Index;
 using PredictionJson = nlohmann::ordered_json;
 
-constexpr double kPadsDamping = 0.2;
-
 struct PredictOptions {
     std::string result, profile, config, at = "platform", recording;
     std::vector<std::string> attitudes;
-    double seconds = 0, elastic_beyond = 1, tolerance = 0;
+    double seconds = 0;
+    std::optional<double> elastic_beyond, tolerance;
     bool same_accelerometers = false, json = false, list = false, force = false;
 };
 
@@ -55,110 +54,6 @@ nlohmann::json read_json(const std::string& path) {
     nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
     if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
     return root;
-}
-
-std::vector<std::pair<double, double>> read_pairs(const nlohmann::json& root, const char* key,
-                                                  const char* form, const std::string& path) {
-    std::vector<std::pair<double, double>> out;
-    const auto found = root.find(key);
-    if (found == root.end()) return out;
-    const std::string place = path + ": " + key;
-    if (!found->is_array())
-        throw std::runtime_error(place + ": found " + found->dump() + ", expected [" + form +
-                                 ", ..]");
-    for (const auto& one : *found) {
-        if (!one.is_array() || one.size() != 2 || !one[0].is_number() || !one[1].is_number())
-            throw std::runtime_error(place + "[" + std::to_string(out.size()) + "]: found " +
-                                     one.dump() + ", expected " + form);
-        out.emplace_back(one[0].get<double>(), one[1].get<double>());
-    }
-    return out;
-}
-
-void refuse_unknown(const nlohmann::json& root, const std::string& path) {
-    constexpr std::array<const char*, 6> kKnown{"name", "psd", "sines", "direction", "g_rms", "at"};
-    for (const auto& [key, value] : root.items()) {
-        if (std::find(kKnown.begin(), kKnown.end(), key) == kKnown.end())
-            throw std::runtime_error(path + ": " + key +
-                                     ": found an unknown key, expected name, psd, sines, "
-                                     "direction (along one line), g_rms or at");
-    }
-}
-
-/// A built-in profile by its name, or a file; `at` becomes what the file says.
-Profile read_profile(const std::string& name, std::string& at) {
-    for (const Profile& profile : built_in_profiles()) {
-        if (profile.name == name) return profile;
-    }
-    if (!std::ifstream(name))
-        throw std::runtime_error("--profile: found '" + name +
-                                 "', expected a JSON file or one of minimum-integrity, truck");
-    const nlohmann::json root = read_json(name);
-    if (!root.is_object())
-        throw std::runtime_error(name + ": expected a JSON object with psd or sines");
-    refuse_unknown(root, name);
-    Profile profile;
-    profile.name = root.value("name", name);
-    profile.psd = read_pairs(root, "psd", "[hz, g2_hz]", name);
-    profile.sines = read_pairs(root, "sines", "[hz, g_peak]", name);
-    if (const auto found = root.find("direction"); found != root.end()) {
-        if (!found->is_array() || found->size() != 3 ||
-            !std::all_of(found->begin(), found->end(), [](auto& x) { return x.is_number(); }))
-            throw std::runtime_error(name + ": direction: found " + found->dump() +
-                                     ", expected [north, up, east]");
-        profile.direction = {(*found)[0].get<double>(), (*found)[1].get<double>(),
-                             (*found)[2].get<double>()};
-        if (profile.direction.norm() > 0) profile.direction.normalize();
-    }
-    if (const auto found = root.find("g_rms"); found != root.end()) {
-        if (!found->is_number() || !(found->get<double>() > 0))
-            throw std::runtime_error(name + ": g_rms: found " + found->dump() +
-                                     ", expected a number above 0");
-        profile.g_rms = found->get<double>();
-    }
-    if (const auto found = root.find("at"); found != root.end()) {
-        if (*found != "platform" && *found != "table")
-            throw std::runtime_error(name + ": at: found " + found->dump() +
-                                     ", expected \"platform\" or \"table\"");
-        at = found->get<std::string>();
-    }
-    check(profile, name + ": ");
-    return profile;
-}
-
-std::array<double, 3> read_attitude(const std::string& text) {
-    std::array<double, 3> deg{};
-    int used = 0;
-    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &deg[0], &deg[1], &deg[2], &used) != 3 ||
-        static_cast<std::size_t>(used) != text.size() ||
-        !std::all_of(deg.begin(), deg.end(), [](double x) { return std::abs(x) <= 360; }))
-        throw std::runtime_error("--attitude: found '" + text +
-                                 "', expected ALPHA,BETA,GAMMA of the gimbals, deg, -360 to 360");
-    if (std::abs(std::remainder(deg[1], 360)) > 80)
-        throw std::runtime_error("--attitude: found " + text +
-                                 ", expected an inner angle of at most 80 deg");
-    return deg;
-}
-
-/// A profile as the platform has it.
-struct AtPlatform {
-    std::vector<Band> bands;
-    Eigen::Matrix3d moment;
-};
-
-AtPlatform at_platform(const Profile& profile, const std::string& at,
-                       const estimator::Settings& rig) {
-    std::vector<Band> bands = bands_of(profile);
-    double power = mean_square(profile);
-    if (at == "table") {
-        if (!(rig.transmission < 1))
-            throw std::runtime_error("vibration.transmission: found " +
-                                     std::to_string(rig.transmission) +
-                                     ", expected pads (below 1) for a profile at the table");
-        std::tie(bands, power) =
-            behind(bands, power, pads_with(rig.frequency_hz, rig.transmission, kPadsDamping));
-    }
-    return {bands, power * profile.direction * profile.direction.transpose()};
 }
 
 /// Dwells under the profile: what they showed, and where.
@@ -343,12 +238,13 @@ Predicted predict_for(const PredictOptions& options) {
                                  "\", expected a campaign that a model fits (or --force)");
     Predicted out;
     out.refusal = model.refusal;
-    std::string at;
-    out.profile = read_profile(options.profile, at);
-    if (at.empty()) at = options.at;
-    const auto rig = configuration::load(options.config, false).configuration.estimator;
-    const AtPlatform vibration = at_platform(out.profile, at, rig);
-    const PredictionOptions how{options.elastic_beyond, options.same_accelerometers};
+    const auto rig = configuration::load(options.config, false).configuration;
+    const plan::StatedProfile stated = find_profile(options.profile, rig);
+    out.profile = stated.profile;
+    const AtPlatform vibration =
+        at_platform(out.profile, stated.at.empty() ? options.at : stated.at, rig);
+    const PredictionOptions how{options.elastic_beyond.value_or(rig.spectrum.elastic_beyond),
+                                options.same_accelerometers};
     std::vector<Situation> situations;
     for (const std::string& text : options.attitudes) {
         const auto deg = read_attitude(text);
@@ -359,8 +255,9 @@ Predicted predict_for(const PredictOptions& options) {
     if (!options.recording.empty()) {
         out.held = held_out(options.recording, options.config, out.profile, vibration);
         const Prediction of_held = predict(model, out.held.situations, how);
-        out.verification = verify(of_held, out.held.rates, out.held.variances,
-                                  out.held.relative_errors, options.tolerance);
+        out.verification =
+            verify(of_held, out.held.rates, out.held.variances, out.held.relative_errors,
+                   options.tolerance.value_or(rig.spectrum.tolerance_deg_h));
         if (situations.empty()) {
             situations = out.held.situations;
             out.deg = out.held.deg;
@@ -391,7 +288,7 @@ void add_predict(CLI::App& app, int& exit_code) {
     command->add_option("RESULT", options->result, "JSON of vibrig identify --json");
     command->add_option("--profile", options->profile,
                         "JSON file {psd: [[hz, g2_hz], ..], sines: [[hz, g_peak], ..], direction, "
-                        "g_rms, at}, or a name of --list");
+                        "g_rms, at}, a name of --list, or of a [[profile]] of the configuration");
     command
         ->add_option("--attitude", options->attitudes,
                      "ALPHA,BETA,GAMMA of the gimbals, deg; again for more")
@@ -406,11 +303,13 @@ void add_predict(CLI::App& app, int& exit_code) {
                         "recording of dwells under the profile (sines) that were not in the fit");
     command
         ->add_option("--tolerance", options->tolerance,
-                     "deg/h that two standard deviations stay below in a tight test")
+                     "deg/h that two standard deviations stay below in a tight test "
+                     "(spectrum.tolerance_deg_h)")
         ->check(proto::finite(proto::kAboveZero, 1e3));
     command
         ->add_option("--elastic-beyond", options->elastic_beyond,
-                     "elastic part allowed for beyond what was measured, of the static (1)")
+                     "elastic part allowed for beyond what was measured, of the static "
+                     "(spectrum.elastic_beyond)")
         ->check(proto::finite(0, 100));
     command->add_flag("--same-accelerometers", options->same_accelerometers,
                       "the profile was measured with the campaign's: their gain cancels");

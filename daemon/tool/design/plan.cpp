@@ -61,6 +61,9 @@ void check(Options& options) {
     if (options.dwell > 0) request.dwell_s = options.dwell;
     if (options.settle > 0) request.settle_s = options.settle;
     if (options.ramp > 0) request.ramp_s = options.ramp;
+    require((request.survey.mount.empty() && request.survey.attitudes.empty()) ||
+                request.survey.asked(),
+            "found --mount or --attitude alone", "--frequencies, --highest or --profile with it");
     require(request.evaluate.empty() || (request.runs == 0 && request.targets.empty()),
             "found --evaluate with --runs or --targets", "one of them");
 }
@@ -72,7 +75,8 @@ int run(Options& options) {
         {
             Progress progress("planning");
             progress.show(0, 1);
-            result = study(options.request);
+            result = options.request.survey.asked() ? survey_study(options.request)
+                                                    : study(options.request);
         }
         if (!options.output.empty()) plot::write_file(options.output, plan_json(result) + "\n");
         if (!options.plot.empty()) {
@@ -133,7 +137,8 @@ void add_turntable(CLI::App& command, Options& options) {
         ->needs(turntable)
         ->check(CLI::IsMember({"free", "both", "split-68", "split-86"}));
     for (const char* of_the_rig :
-         {"--positions", "--levels", "--grid", "--evaluate", "--done", "--targets", "--config"}) {
+         {"--positions", "--levels", "--grid", "--evaluate", "--done", "--targets", "--config",
+          "--frequencies", "--highest", "--mount", "--profile", "--attitude"}) {
         turntable->excludes(command.get_option(of_the_rig));
     }
 }
@@ -171,6 +176,32 @@ void add_candidates(CLI::App& command, Options& options) {
         ->check(proto::finite(0, 1e3));
     command.add_option("--without", request.without, "terms the model has not, such as D12,D13")
         ->delimiter(',');
+}
+
+void add_survey(CLI::App& command, Options& options) {
+    SurveyRequest& survey = options.request.survey;
+    command
+        .add_option("--frequencies", survey.frequencies,
+                    "a survey over frequency: Hz, the first one with all positions "
+                    "(vibration.frequency_hz); moved off those that sampling forbids")
+        ->delimiter(',')
+        ->check(proto::finite(1, 20'000));
+    command
+        .add_option("--highest", survey.highest_hz,
+                    "further frequencies at even ratios up to here, Hz (the profile's highest)")
+        ->check(proto::finite(1, 20'000));
+    command
+        .add_option("--mount", survey.mount,
+                    "isolated, or hard: the platform bolted to the table (spectrum.mount)")
+        ->check(CLI::IsMember({"isolated", "hard"}));
+    command.add_option("--profile", survey.profile,
+                       "positions for the drift under this profile: a JSON file, or a name of "
+                       "vibrig predict --list or of a [[profile]] of the configuration");
+    command
+        .add_option("--attitude", survey.attitudes,
+                    "with --profile: ALPHA,BETA,GAMMA of the gimbals, deg; again for more (the "
+                    "positions)")
+        ->allow_extra_args(false);
 }
 
 void add_time(CLI::App& command, Options& options) {
@@ -221,6 +252,7 @@ void add_plan(CLI::App& app, int& exit_code) {
         ->expected(3)
         ->check(proto::finite(0));
     planner::add_time(*command, *options);
+    planner::add_survey(*command, *options);
     command->add_option("--seed", request.seed, "of the random starts (1)")->check(proto::whole());
     command->add_option("--config", request.config, "configuration file (TOML) of the rig");
     command->add_option("-o,--output", options->output, "plan file for vibrigd ([campaign] plan)");
@@ -229,10 +261,19 @@ void add_plan(CLI::App& app, int& exit_code) {
     planner::add_turntable(*command, *options);
     command->footer(
         "Examples: vibrig plan --runs 20 --levels 0,6 -o plan.json --plot sphere.svg\n"
+        "          vibrig plan --frequencies 15,25,35 --highest 125 --mount hard -o survey.json\n"
         "          vibrig plan --turntable --spheres 1,8 --runs 40 -o turntable.csv\n"
         "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
         "asks for\nmore than the shaker's limits, 2 bad usage or input.");
-    command->callback([options, &exit_code] {
+    for (const char* other : {"--evaluate", "--done", "--targets", "--grid", "--time-costs"}) {
+        command->get_option(other)->excludes(command->get_option("--frequencies"));
+        command->get_option(other)->excludes(command->get_option("--highest"));
+        command->get_option(other)->excludes(command->get_option("--profile"));
+    }
+    const CLI::Option* order = command->get_option("--order");
+    command->callback([options, order, &exit_code] {
+        if (options->request.survey.asked() && order->count() == 0)
+            options->request.order = "balanced";
         exit_code = options->on_turntable
                         ? guarded([&] { return planner::run_turntable(*options); })
                         : planner::run(*options);

@@ -26,15 +26,61 @@ Json correlation(const planning::Evaluation& evaluation) {
             {"value", evaluation.correlation}};
 }
 
+Json survey_json(const Survey& of) {
+    Json lines = Json::array(), seen = Json::object();
+    for (std::size_t k = 0; k < of.lines.size(); ++k) {
+        const auto& line = of.lines[k];
+        lines.push_back({{"hz", line.hz},
+                         {"asked_hz", line.asked_hz},
+                         {"transmission", line.transmission},
+                         {"level_g", line.level_g},
+                         {"table_g", line.table_g},
+                         {"limited", line.limited},
+                         {"dwells", of.dwells[k]}});
+    }
+    for (const auto& [hz, share] : of.smallest_seen) seen[format("%g", hz)] = finite(share);
+    return {{"mount", of.hard ? "hard" : "isolated"},
+            {"frequencies", std::move(lines)},
+            {"highest_hz", of.highest_hz},
+            {"smallest_share_seen", std::move(seen)},
+            {"profile", of.profile.empty() ? Json(nullptr) : Json(of.profile)},
+            {"predicted_u_deg_h",
+             of.predicted_u_deg_h ? finite(*of.predicted_u_deg_h) : Json(nullptr)}};
+}
+
+std::string survey_text(const Survey& of) {
+    std::string text = format("\nsurvey, %s mount\n", of.hard ? "hard" : "isolated");
+    for (std::size_t k = 0; k < of.lines.size(); ++k) {
+        const auto& line = of.lines[k];
+        text += format("  %8.6g Hz %7.4g g platform %7.4g g table %4zu dwells%s%s\n", line.hz,
+                       line.level_g, line.table_g, of.dwells[k],
+                       line.hz != line.asked_hz
+                           ? format(", for %.6g Hz, which is forbidden", line.asked_hz).c_str()
+                           : "",
+                       line.limited ? ", the shaker's limit" : "");
+    }
+    text += "smallest elastic share of all quadratic coefficients that is seen with 90 %:";
+    for (const auto& [hz, share] : of.smallest_seen)
+        text += format("  %.3g %% at %g Hz", 100 * share, hz);
+    text += format("\na flat verdict reaches to %g Hz\n", of.highest_hz);
+    if (of.predicted_u_deg_h)
+        text += format("drift under %s: u %.4g deg/h, rms over resonances that may be\n",
+                       of.profile.c_str(), *of.predicted_u_deg_h);
+    return text;
+}
+
 }  // namespace
 
 std::string plan_json(const PlanStudy& study) {
     Json runs = Json::array();
     for (const PlanRun& run : study.runs) {
-        runs.push_back({{"position", to_attitude(study.rig, run.visit.position_deg)},
-                        {"level_g", run.visit.level_g},
-                        {"table_g", run.table_g},
-                        {"count", run.count}});
+        Json one{{"position", to_attitude(study.rig, run.visit.position_deg)},
+                 {"level_g", run.visit.level_g},
+                 {"table_g", run.table_g},
+                 {"count", run.count}};
+        if (run.frequency_hz > 0) one["frequency_hz"] = run.frequency_hz;
+        if (run.verify) one["role"] = "verify";
+        runs.push_back(std::move(one));
     }
     Json errors = Json::object();
     for (std::size_t i = 0; i < estimator::kParameters; ++i)
@@ -70,6 +116,7 @@ std::string plan_json(const PlanStudy& study) {
               {"optimal_shares", std::move(shares)},
               {"optimum_gap", study.optimum_gap},
               {"warnings", study.warnings}};
+    if (study.survey) json["survey"] = survey_json(*study.survey);
     if (study.uncertainty) {
         const auto& merit = study.uncertainty->merit;
         json["order_inflation"] = {{"bias", finite(merit.bias)},
@@ -115,8 +162,9 @@ std::string plan_table(const PlanStudy& study) {
     std::size_t number = 1;
     for (const PlanRun& run : study.runs) {
         const auto p = to_attitude(study.rig, run.visit.position_deg);
-        text += format("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu\n", number++, p[0], p[1],
-                       p[2], run.visit.level_g, run.table_g, run.count);
+        text += format("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu%s\n", number++, p[0], p[1],
+                       p[2], run.visit.level_g, run.table_g, run.count,
+                       run.frequency_hz > 0 ? format("  %.6g Hz", run.frequency_hz).c_str() : "");
     }
     const planning::Evaluation& e = study.evaluation;
     text += format("\n%zu runs of %g s, %.4g h: vibrating %.4g h, slewing %.4g h\n",
@@ -147,6 +195,7 @@ std::string plan_table(const PlanStudy& study) {
         }
         text += "  * against free directions at rest and at the highest level\n";
     }
+    if (study.survey) text += survey_text(*study.survey);
     text += '\n' + plan::forecast_table(study.forecast);
     if (study.uncertainty) {
         const auto& merit = study.uncertainty->merit;

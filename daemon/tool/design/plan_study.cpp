@@ -91,18 +91,25 @@ class Study {
         return positions;
     }
     [[nodiscard]] std::vector<plan::PlannedRun> plan_in(const std::string& path) const {
-        auto runs = plan::read_plan(path, c_.estimator.transmission);
+        const auto transmission = [this](std::optional<double> hz) {
+            return hz ? c_.spectrum.mount.transmission(*hz)
+                      : std::optional(c_.estimator.transmission);
+        };
+        auto runs = plan::read_plan(path, transmission);
         for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
         return runs;
     }
 
     [[nodiscard]] bool designs() const {
-        return request_.evaluate.empty() && (listed_.empty() || request_.runs > 0 || by_targets());
+        return request_.evaluate.empty() && request_.given.empty() &&
+               (listed_.empty() || request_.runs > 0 || by_targets());
     }
     [[nodiscard]] bool by_targets() const { return !request_.targets.empty(); }
 
     void choose_levels() {
         levels_ = request_.levels_g;
+        if (!request_.given.empty()) levels_.clear();
+        for (const PlanRun& run : request_.given) levels_.push_back(run.visit.level_g);
         if (!request_.evaluate.empty()) {
             given_ = plan_in(request_.evaluate);
             if (levels_.empty()) {
@@ -118,13 +125,23 @@ class Study {
         levels_.erase(std::unique(levels_.begin(), levels_.end(),
                                   [](double a, double b) { return std::abs(a - b) < kSameLevel; }),
                       levels_.end());
-        for (const double level : levels_) check_level(level);
+        if (!request_.given.empty()) return;
+        const bool one_frequency = std::all_of(
+            given_.begin(), given_.end(), [](const auto& run) { return run.frequency_hz == 0; });
+        for (const double level : levels_) {
+            if (one_frequency)
+                check_level(level, level / c_.estimator.transmission, c_.estimator.frequency_hz);
+        }
+        for (const auto& run : given_) {
+            if (!one_frequency)
+                check_level(run.level_g, run.table_g,
+                            run.frequency_hz > 0 ? run.frequency_hz : c_.estimator.frequency_hz);
+        }
     }
 
     /// Against the shaker's limits at the table.
-    void check_level(double level) {
-        const double table = level / c_.estimator.transmission;
-        const double omega = 2 * std::numbers::pi * c_.estimator.frequency_hz;
+    void check_level(double level, double table, double hz) {
+        const double omega = 2 * std::numbers::pi * hz;
         const double mps2 = table * c_.estimator.gravity_mps2;
         const auto check = [&](double value, double limit, const char* unit, const char* key) {
             if (value <= limit * (1 + 1e-9)) return;
@@ -186,9 +203,17 @@ class Study {
     }
 
     void find_runs() {
+        if (!request_.given.empty()) {
+            out_.runs = request_.given;
+            return;
+        }
         if (!given_.empty()) {
             for (const auto& run : given_)
-                take({run.position_deg, run.level_g}, run.table_g, run.count);
+                out_.runs.push_back({{run.position_deg, run.level_g},
+                                     run.table_g,
+                                     run.count,
+                                     run.frequency_hz,
+                                     run.verify});
             return;
         }
         const bool possible = planning::evaluate(candidates_.problem,
@@ -211,7 +236,7 @@ class Study {
     [[nodiscard]] double table_of(double level) const { return level / c_.estimator.transmission; }
 
     void take(const planning::Visit& visit, double table_g, std::size_t count) {
-        out_.runs.push_back({visit, table_g, count});
+        out_.runs.push_back({visit, table_g, count, 0, false});
     }
 
     /// What is measured already, as effort at candidates that are added for it.
@@ -297,7 +322,7 @@ class Study {
             for (std::size_t k = 0; k < run.count; ++k) {
                 visits.push_back(run.visit);
                 regressors.push_back(point(run.visit).f);
-                single.push_back({run.visit, run.table_g, 1});
+                single.push_back({run.visit, run.table_g, 1, run.frequency_hz, run.verify});
             }
         }
         planning::Order order(visits.size());
@@ -352,7 +377,8 @@ class Study {
         for (const PlanRun& run : out_.runs) {
             all.points.push_back(point(run.visit));
             effort.push_back(static_cast<double>(run.count));
-            planned.push_back({run.visit.position_deg, run.visit.level_g, run.table_g, run.count});
+            planned.push_back({run.visit.position_deg, run.visit.level_g, run.table_g, run.count,
+                               run.frequency_hz, run.verify});
         }
         if (!request_.done.empty()) {
             const planning::Effort before = done();
@@ -362,7 +388,7 @@ class Study {
                     planned.push_back({candidates_.visits[i].position_deg,
                                        candidates_.visits[i].level_g,
                                        table_of(candidates_.visits[i].level_g),
-                                       static_cast<std::size_t>(before[i])});
+                                       static_cast<std::size_t>(before[i]), 0, false});
             }
         }
         out_.evaluation = planning::evaluate(all, effort);

@@ -12,6 +12,7 @@
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"
+#include "estimator/spectrum/survey.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -25,6 +26,20 @@ std::string format(const char* pattern, Values... values) {
 }
 
 /// What `vibrig plan` is asked.
+struct SurveyRequest {
+    std::vector<double> frequencies;  ///< Hz
+    double highest_hz = 0;            ///< 0: the highest listed one, or the profile's
+    std::string mount;                ///< "isolated", "hard"; empty: the configuration's
+    std::string profile;              ///< file or name; empty: none
+    std::vector<std::string> attitudes;
+
+    [[nodiscard]] bool asked() const {
+        return !frequencies.empty() || highest_hz > 0 || !profile.empty();
+    }
+};
+
+struct PlanRun;
+
 struct PlanRequest {
     std::string positions;             ///< file; empty: the 26 directions of the cube
     std::vector<double> levels_g;      ///< at the platform; empty: see levels()
@@ -45,6 +60,8 @@ struct PlanRequest {
     std::string order = "travel";  ///< "travel", "balanced", "random", "list"
     std::size_t block = 8;
     std::uint64_t seed = 1;
+    SurveyRequest survey;
+    std::vector<PlanRun> given;  ///< runs made elsewhere, in their order
 };
 
 inline constexpr std::size_t kDefaultRuns = 14;
@@ -53,6 +70,8 @@ struct PlanRun {
     planning::Visit visit;
     double table_g = 0;
     std::size_t count = 1;
+    double frequency_hz = 0;  ///< 0: the configuration's
+    bool verify = false;      ///< held out of the fit
 };
 
 /// A position list read for one choice of the platform axis that is vertical at zero gimbal angles.
@@ -61,6 +80,17 @@ struct VerticalAxis {
     std::size_t directions = 0;
     std::size_t rank_one_level = 0, rank = 0;
     double d_efficiency = 0;  ///< against the free choice of directions at 0 and the highest level
+};
+
+/// What is said of a plan over frequency besides.
+struct Survey {
+    bool hard = false;
+    std::vector<estimator::spectrum::SurveyLine> lines;
+    std::vector<std::size_t> dwells;                       ///< of each line
+    std::vector<std::pair<double, double>> smallest_seen;  ///< resonance, Hz, and share
+    double highest_hz = 0;                                 ///< that a flat verdict reaches to
+    std::optional<double> predicted_u_deg_h;               ///< of the profile's drift
+    std::string profile;
 };
 
 struct PlanStudy {
@@ -79,6 +109,7 @@ struct PlanStudy {
     std::vector<std::string> warnings;
     bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
     std::string refusal;         ///< empty: the plan determines everything
+    std::optional<Survey> survey;
     double transmission = 0, frequency_hz = 0, dwell_s = 0;
     estimator::Settings rig;
 };
@@ -89,6 +120,9 @@ struct PlanStudy {
 
 /// Throws std::runtime_error for bad input.
 [[nodiscard]] PlanStudy study(const PlanRequest& request);
+
+/// A plan over frequency: see SurveyRequest. Throws std::runtime_error for bad input.
+[[nodiscard]] PlanStudy survey_study(const PlanRequest& request);
 
 [[nodiscard]] std::string plan_json(const PlanStudy& study);
 [[nodiscard]] std::string plan_table(const PlanStudy& study);

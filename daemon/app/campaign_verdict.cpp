@@ -1,0 +1,196 @@
+// What can be believed of a campaign, while it runs and in the end.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <span>
+
+#include "daemon/app/campaign_dwells.hpp"
+#include "daemon/journal/reread.hpp"
+
+namespace vibrig {
+
+namespace uncertainty = estimator::uncertainty;
+
+namespace {
+
+constexpr std::size_t kShownResiduals = 128;
+
+/// With fewer rates than that to spare there is nothing to tell.
+constexpr int kFewestDegrees = 9;
+/// Beyond so many dwells the verdict comes with every tenth of them.
+constexpr std::size_t kEveryDwell = 60, kAmongMany = 10;
+
+/// Run and position of the dwell that the strongest reason with one names; 0: none does.
+std::pair<int, int> dwell_named(const uncertainty::Assessment& assessed,
+                                const estimator::Result& result) {
+    for (const auto& reason : assessed.verdict.reasons) {
+        if (reason.dwell < 1) continue;
+        const auto at = static_cast<std::size_t>(reason.dwell) - 1;
+        // That of the filter counts all dwells, a pattern those that are kept.
+        if (reason.code == "dwell") {
+            if (at < result.dwells.size())
+                return {result.dwells[at].run, result.dwells[at].position};
+        } else if (at < assessed.rates.size()) {
+            return {assessed.rates[at].run, assessed.rates[at].position};
+        }
+    }
+    return {};
+}
+
+}  // namespace
+
+Severity CampaignDwells::severity_of(uncertainty::Level level) {
+    return level == uncertainty::Level::not_valid  ? Severity::alarm
+           : level == uncertainty::Level::doubtful ? Severity::warning
+                                                   : Severity::info;
+}
+
+/// Of the dwells so far, of all of them when the result is to be written.
+bool CampaignDwells::verdict_wanted() {
+    if (to_write_ != ToWrite::nothing) return !std::exchange(concluding_, true);
+    if (!std::exchange(verdict_due_, false)) return false;
+    const std::size_t dwells = with_.identification.rows().size();
+    return dwells <= kEveryDwell || dwells % kAmongMany == 0;
+}
+
+std::optional<CampaignDwells::Again> CampaignDwells::again() const {
+    const auto found = noise_monitor_.found();
+    if (!found) return {};
+    return Again{*found, with_.journal ? with_.journal->status().path : std::string(),
+                 journal::configuration_hash(result_configuration(with_.loaded))};
+}
+
+CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings,
+                                             const estimator::Result& result,
+                                             const std::optional<Again>& again,
+                                             uncertainty::Stage stage) {
+    Judged out;
+    if (again && !result.dwells.empty()) {
+        dwells::Anew anew(settings, again->found, result.dwells.size());
+        auto& identification = anew.identification();
+        out.not_anew =
+            again->journal.empty()
+                ? "no journal is kept"
+                : journal::reread(again->journal, again->configuration_hash, result.dwells.back(),
+                                  [&](const journal::DwellCheckpoint& dwell) {
+                                      if (dwell.measurements.empty()) return;
+                                      identification.begin_dwell(dwell.info);
+                                      for (const auto& m : dwell.measurements)
+                                          static_cast<void>(identification.add(m));
+                                      static_cast<void>(identification.end_dwell());
+                                  });
+        auto found = anew.result();
+        if (out.not_anew.empty() && found.dwells.size() != result.dwells.size())
+            out.not_anew = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
+                                       result.dwells.size(), again->journal);
+        if (out.not_anew.empty()) {
+            out.live = std::make_shared<const dwells::Live>(
+                dwells::Live{again->found, result, uncertainty::assess(settings, result)});
+            out.assessed =
+                uncertainty::assess(dwells::Anew::settings_of(settings, again->found), found);
+            out.anew = std::move(found);
+            return out;
+        }
+    }
+    out.assessed = uncertainty::assess(settings, result, stage);
+    return out;
+}
+
+/// The result becomes what was identified anew.
+void CampaignDwells::take_anew(const Judged& judged, campaign::Campaign& campaign) {
+    if (!judged.not_anew.empty()) {
+        const auto words =
+            "the noise found is not the configured one, and the campaign could not be identified "
+            "anew with it: " +
+            judged.not_anew;
+        with_.events.log(Severity::warning, "campaign", words);
+        const std::lock_guard lock(mutex_);
+        result_.warnings.push_back(words);
+    }
+    if (!judged.anew) return;
+    estimator::Result result = *judged.anew;
+    with_.events.log(Severity::warning, "campaign", result.warnings.back());
+    campaign.qualify(result);
+    keep(std::move(result));
+}
+
+/// Without the rows, which the identification has: they are most of what a long campaign holds.
+void CampaignDwells::keep(estimator::Result result) {
+    std::vector<estimator::DwellRow>().swap(result.rows);  // = {} would keep the memory
+    const std::lock_guard lock(mutex_);
+    result_ = std::move(result);
+}
+
+/// While no dwell is with the estimator. Only this thread changes result_.
+estimator::Result CampaignDwells::whole_result() const {
+    auto result = result_;
+    result.rows = with_.identification.rows();
+    return result;
+}
+
+void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
+    if (with_estimator_ != 0) return;
+    std::optional<Judged> judged;
+    if (verdict_wanted()) {
+        // In a thread of its own also where one may wait: what it has of memory, more with each
+        // dwell, is in nobody's way.
+        const auto work = [settings = configuration_.estimator, result = whole_result(),
+                           anew = concluding_ ? again() : std::nullopt,
+                           stage = concluding_ ? uncertainty::Stage::ended
+                                               : uncertainty::Stage::under_way,
+                           trim = !with_.memory_locked] {
+            auto found = judge(settings, result, anew, stage);
+            // Locked memory is not given back; asking for it would only disturb.
+            if (trim) rt::give_free_memory_back();
+            return found;
+        };
+        // The rig's clock waits for this thread: there a verdict takes no time.
+        if (with_.at_once) {
+            judged = assessing_.compute(work);
+        } else {
+            assessing_.ask(work);
+        }
+    }
+    if (!with_.at_once) judged = assessing_.take();
+    if (!judged) return;
+    tell_verdict(judged->assessed, campaign);
+    if (std::exchange(concluding_, false)) write_result(*judged, campaign);
+}
+
+void CampaignDwells::tell_verdict(const uncertainty::Assessment& assessed,
+                                  campaign::Campaign& campaign) {
+    const bool enough = assessed.done && assessed.degrees >= kFewestDegrees;
+    if (!enough && !concluding_) return;
+    const auto& verdict = assessed.verdict;
+    const std::string first = verdict.reasons.empty() ? "" : verdict.reasons.front().code;
+    const std::string told = uncertainty::word_of(verdict.level) + (" " + first);
+    if (enough && std::exchange(verdict_told_, told) != told) {
+        const auto said =
+            fmt::format("after {} dwells {}", assessed.rates.size(), verdict.sentence);
+        with_.events.log(severity_of(verdict.level), "fit", said);
+        if (verdict.level == uncertainty::Level::not_valid) {
+            const auto [run, position] = dwell_named(assessed, result_);
+            campaign.doubted(said, run, position);
+        }
+    }
+    auto residuals = std::make_shared<std::vector<VerdictStatus::Residual>>();
+    // The newest: a status is made for each who asks, and stays as small however long a campaign
+    // is.
+    const std::size_t past =
+        assessed.rates.size() - std::min(assessed.rates.size(), kShownResiduals);
+    for (const auto& r : std::span(assessed.rates).subspan(past)) {
+        const auto known = [](double x) { return std::isfinite(x); };
+        if (std::ranges::all_of(r.residual, known) && std::ranges::all_of(r.residual_sigma, known))
+            residuals->push_back({r.run, r.position, r.time_h, r.residual, r.residual_sigma});
+    }
+    const std::lock_guard lock(mutex_);
+    verdict_ = {static_cast<std::uint32_t>(assessed.rates.size()),
+                static_cast<int>(verdict.level),
+                uncertainty::word_of(verdict.level),
+                verdict.sentence,
+                assessed.widening,
+                concluding_,
+                std::move(residuals)};
+}
+
+}  // namespace vibrig

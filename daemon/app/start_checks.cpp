@@ -1,0 +1,121 @@
+// What can be said of a configuration before anything is opened.
+#include "daemon/app/start_checks.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
+#include "estimator/identification/plan_report.hpp"
+#include "estimator/level/vibration_level.hpp"
+
+namespace vibrig {
+
+proto::Dbc load_dbc(const std::string& path) {
+    return path.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")
+                        : proto::read_dbc(path);
+}
+
+namespace {
+
+/// Throws ConfigurationError where the cables do not let zeroing go.
+void check_zeroing_travel(const configuration::Configuration& c) {
+    if (!c.campaign.zeroing) return;
+    const campaign::RigFrame frame(c.estimator);
+    for (const auto& way : campaign::ways_of(c.campaign.zero)) {
+        for (const auto& at : campaign::slews_of(way, frame)) {
+            for (std::size_t i = 0; i < 3; ++i) {
+                const auto& [low, high] = c.gimbal.travel_deg[i];
+                if (high - low >= 360 || drivers::within_travel(at[i], {low, high})) continue;
+                throw configuration::ConfigurationError(fmt::format(
+                    "campaign.zeroing: found true, which needs a reading of {:g} deg of the {} "
+                    "gimbal, expected {:g} to {:g} deg (gimbal.travel_deg)",
+                    at[i], std::array{"outer", "inner", "azimuth"}[i], low, high));
+            }
+        }
+    }
+}
+
+}  // namespace
+
+void check_bindings(const configuration::Loaded& loaded) {
+    const auto& configuration = loaded.configuration;
+    const auto dbc = load_dbc(configuration.dbc);
+    boost::asio::io_context io;
+    const auto port = drivers::make_can_port(io, configuration.can);
+    std::string missing;
+    const auto add = [&](const drivers::BindingError& error) {
+        const auto same = [&](const auto& value) { return value.key == error.key(); };
+        const auto value = std::ranges::find_if(loaded.effective, same);
+        missing += (missing.empty() ? "" : "\n") +
+                   (value == loaded.effective.end() ? "" : value->origin + ": ") + error.what();
+    };
+    const auto collect = [&](const auto& bind) {
+        try {
+            bind();
+        } catch (const drivers::BindingError& error) {
+            if (error.all().empty()) add(error);
+            for (const auto& one : error.all()) add(one);
+        }
+    };
+    collect([&] {
+        const drivers::SampleAssembler assembler(dbc, configuration.assembler,
+                                                 [](const drivers::Sample&) {});
+    });
+    collect([&] { const drivers::Gimbal gimbal(dbc, configuration.gimbal, *port); });
+    std::string why;
+    collect([&] { why = campaign::check_stages(configuration.campaign, dbc, *port); });
+    if (!missing.empty()) throw configuration::ConfigurationError(missing);
+    if (!why.empty()) throw configuration::ConfigurationError(why);
+    check_zeroing_travel(configuration);
+}
+
+void check_results(const configuration::Configuration& configuration) {
+    const std::string& folder = configuration.results;
+    if (folder.empty()) return;
+    // It is made when it is not there: then what counts is the folder that it is made in.
+    auto there = std::filesystem::absolute(folder);
+    std::error_code error;
+    while (!std::filesystem::exists(there, error) && there.has_relative_path())
+        there = there.parent_path();
+    if (!std::filesystem::is_directory(there, error)) {
+        errno = ENOTDIR;
+    } else if (::access(there.c_str(), W_OK | X_OK) == 0) {
+        return;
+    }
+    throw configuration::ConfigurationError("campaign.results: found \"" + folder +
+                                            "\", expected a folder that can be written: " +
+                                            there.string() + ": " + std::strerror(errno));
+}
+
+std::vector<std::string> check_plan(const configuration::Configuration& configuration) {
+    const campaign::Settings& campaign = configuration.campaign;
+    std::vector<std::string> told;
+    const auto& rig = configuration.estimator;
+    if (rig.encoder_sign != std::array{1, 1, 1} ||
+        rig.encoder_zero_deg != std::array{0.0, 0.0, 0.0})
+        told.emplace_back(
+            "positions of lists and plans are gimbal angles, converted by platform.encoder_sign "
+            "and encoder_zero_deg: a file that states what the encoders show is to be mended");
+    // Of a plan file and of an adaptive campaign the forecast tells.
+    if (!campaign.stops.empty() || campaign.adaptive) return told;
+    for (auto& line : estimator::plan_warnings(
+             estimator::report_plan(rig,
+                                    estimator::campaign_plan(rig, campaign.positions_deg,
+                                                             campaign.table_g, campaign.dwell_s),
+                                    drivers::to_seconds(configuration.assembler.sample_period))))
+        told.push_back(std::move(line));
+    const std::string alias = estimator::VibrationLevel::aliasing(
+        rig.frequency_hz, drivers::to_seconds(configuration.assembler.sample_period),
+        rig.level_window_s);
+    if (!alias.empty()) told.push_back("vibration.frequency_hz: " + alias);
+    return told;
+}
+
+}  // namespace vibrig

@@ -1,0 +1,143 @@
+// Frequencies, levels and profiles against the samples, the shaker's limits and the accelerometers.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/value.hpp"
+#include "estimator/spectrum/sampling.hpp"
+
+namespace vibrig::configuration {
+
+namespace spectrum = estimator::spectrum;
+
+namespace {
+
+/// A peak that a random vibration reaches 1 time in 400, and one that it hardly ever does.
+constexpr double kPeaks = 3, kHardlyEver = 5;
+constexpr double kTwoPi = 2 * std::numbers::pi;
+
+double rate_of(const Configuration& c) {
+    return 1e9 / static_cast<double>(c.assembler.sample_period);
+}
+
+/// rms of acceleration in g, velocity in m/s and displacement in mm at the table, and of the
+/// acceleration at the platform; none where the transmission is not known.
+struct Motion {
+    double table_g = 0, velocity_mps = 0, displacement_mm = 0, platform_g = 0;
+};
+std::optional<Motion> motion_of(const Configuration& c, const Configuration::NamedProfile& of) {
+    const double all = spectrum::mean_square(of.profile), g = c.estimator.gravity_mps2;
+    Motion out;
+    for (const spectrum::Band& band : spectrum::bands_of(of.profile)) {
+        const auto ratio = c.spectrum.mount.transmission(band.hz);
+        if (!ratio) return std::nullopt;
+        const double power = all * band.share, over = *ratio * *ratio;
+        const double table = of.at_table ? power : power / over;
+        const double omega = kTwoPi * band.hz, still = g * g * table / (omega * omega);
+        out.table_g += table;
+        out.platform_g += of.at_table ? power * over : power;
+        out.velocity_mps += still;
+        out.displacement_mm += 1e6 * still / (omega * omega);
+    }
+    for (double* value : {&out.table_g, &out.velocity_mps, &out.displacement_mm, &out.platform_g})
+        *value = std::sqrt(*value);
+    return out;
+}
+
+}  // namespace
+
+void CrossCheck::mount() {
+    const auto& s = c_.spectrum;
+    if (!s.hard) return;
+    if (places_.contains("vibration.transmission") && c_.estimator.transmission != 1)
+        refuse({"vibration.transmission", "spectrum.mount"},
+               plain(c_.estimator.transmission) + " with a hard mount",
+               "1, or spectrum.mount \"isolated\"");
+    if (places_.contains("spectrum.transmission") && !s.transmission.empty())
+        refuse({"spectrum.transmission", "spectrum.mount"}, "ratios with a hard mount",
+               "\"pads\" (ignored), or spectrum.mount \"isolated\"");
+}
+
+void CrossCheck::profiles() {
+    if (!sound({"profile", "spectrum.transmission", "shaker.limits", "accelerometer.range_g"}))
+        return;
+    for (std::size_t i = 0; i < c_.profiles.size(); ++i) {
+        const auto& profile = c_.profiles[i];
+        const std::string key = "profile[" + std::to_string(i) + "]";
+        const auto blame = [&](const std::string& found, const std::string& expected) {
+            problems_.add(places_.contains("profile") ? places_.at("profile") : Place{},
+                          key + " (" + profile.profile.name + ")", found, expected);
+        };
+        const auto motion = motion_of(c_, profile);
+        if (!motion) {
+            blame("frequencies that spectrum.transmission does not reach",
+                  plain(c_.spectrum.transmission.front().first) + " to " +
+                      plain(c_.spectrum.transmission.back().first) + " Hz");
+            continue;
+        }
+        const auto check = [&](double rms, double limit, const char* unit, const char* limit_key) {
+            if (kPeaks * rms <= limit) return;
+            blame("peaks of 3 sigma of " + rounded(kPeaks * rms) + " " + unit + " at the table",
+                  rounded(limit) + " " + unit + " at most (" + limit_key +
+                      "): " + rounded(20 * std::log10(limit / (kPeaks * rms))) + " dB");
+        };
+        check(motion->table_g, c_.campaign.max_acceleration_g, "g", "shaker.limits.acceleration_g");
+        check(motion->velocity_mps, c_.campaign.max_velocity_mps, "m/s",
+              "shaker.limits.velocity_mps");
+        check(motion->displacement_mm, c_.campaign.max_displacement_mm, "mm",
+              "shaker.limits.displacement_mm");
+        const double needed = 1 + kHardlyEver * motion->platform_g;
+        if (c_.estimator.accelerometer_range_g > 0 && needed > c_.estimator.accelerometer_range_g)
+            blame("peaks of 1 g + 5 sigma of " + rounded(needed) + " g at the platform",
+                  rounded(c_.estimator.accelerometer_range_g) +
+                      " g at most (accelerometer.range_g), where readings are cut off");
+    }
+}
+
+void CrossCheck::mode() {
+    if (sound({"spectrum.mode"}) && c_.spectrum.mixed)
+        refuse({"spectrum.mode"}, "\"mixed\" without registers of mode and profile",
+               "\"sine\": vibrigd runs sines");
+}
+
+void CrossCheck::frequencies_of_plan() {
+    if (!sound({"campaign.plan", "can.sample_rate_hz", "vibration.level_window_s",
+                "vibration.frequency_hz", "spectrum.transmission"}))
+        return;
+    const double window_s = c_.estimator.level_window_s, rate = rate_of(c_);
+    for (std::size_t i = 0; i < c_.campaign.stops.size(); ++i) {
+        const auto& stop = c_.campaign.stops[i];
+        if (stop.verify) {
+            refuse({"campaign.plan"}, "dwell " + std::to_string(i + 1) + " of role \"verify\"",
+                   "\"identify\": vibrigd takes every dwell into the fit");
+            return;
+        }
+        if (stop.frequency_hz <= 0 || stop.table_g <= 0) continue;
+        const auto blame = [&](const char* other, const std::string& expected) {
+            refuse({"campaign.plan", other},
+                   "dwell " + std::to_string(i + 1) + " at " + plain(stop.frequency_hz) + " Hz",
+                   expected);
+        };
+        if (spectrum::forbidden(stop.frequency_hz, rate, window_s))
+            return blame("can.sample_rate_hz",
+                         "another frequency: at " + rounded(rate) +
+                             " samples/s a harmonic of it falls on a multiple of the rate; the "
+                             "nearest free one is " +
+                             plain(spectrum::nearest_free(stop.frequency_hz, rate, window_s,
+                                                          spectrum::kHarmonicsPlanned)) +
+                             " Hz");
+        if (stop.frequency_hz < c_.spectrum.mount.lowest_hz())
+            return blame("vibration.transmission", rounded(c_.spectrum.mount.lowest_hz()) +
+                                                       " Hz at least: below it the isolators "
+                                                       "amplify");
+        if (stop.frequency_hz != c_.estimator.frequency_hz)
+            return blame("vibration.frequency_hz",
+                         plain(c_.estimator.frequency_hz) +
+                             " Hz in every dwell (vibration.frequency_hz): vibrigd changes no "
+                             "frequency within a campaign");
+    }
+}
+
+}  // namespace vibrig::configuration

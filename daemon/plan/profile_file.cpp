@@ -1,0 +1,93 @@
+#include "daemon/plan/profile_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace vibrig::plan {
+
+namespace {
+
+using estimator::spectrum::Profile;
+
+nlohmann::json read_json(const std::string& path) {
+    std::ifstream file(path);
+    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
+    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
+    return root;
+}
+
+std::vector<std::pair<double, double>> read_pairs(const nlohmann::json& root, const char* key,
+                                                  const char* form, const std::string& path) {
+    std::vector<std::pair<double, double>> out;
+    const auto found = root.find(key);
+    if (found == root.end()) return out;
+    const std::string place = path + ": " + key;
+    if (!found->is_array())
+        throw std::runtime_error(place + ": found " + found->dump() + ", expected [" + form +
+                                 ", ..]");
+    for (const auto& one : *found) {
+        if (!one.is_array() || one.size() != 2 || !one[0].is_number() || !one[1].is_number())
+            throw std::runtime_error(place + "[" + std::to_string(out.size()) + "]: found " +
+                                     one.dump() + ", expected " + form);
+        out.emplace_back(one[0].get<double>(), one[1].get<double>());
+    }
+    return out;
+}
+
+void refuse_unknown(const nlohmann::json& root, const std::string& path) {
+    constexpr std::array<const char*, 6> kKnown{"name", "psd", "sines", "direction", "g_rms", "at"};
+    for (const auto& [key, value] : root.items()) {
+        if (std::find(kKnown.begin(), kKnown.end(), key) == kKnown.end())
+            throw std::runtime_error(path + ": " + key +
+                                     ": found an unknown key, expected name, psd, sines, "
+                                     "direction (along one line), g_rms or at");
+    }
+}
+
+}  // namespace
+
+StatedProfile read_profile(const std::string& path) {
+    const nlohmann::json root = read_json(path);
+    if (!root.is_object())
+        throw std::runtime_error(path + ": expected a JSON object with psd or sines");
+    refuse_unknown(root, path);
+    StatedProfile stated;
+    Profile& profile = stated.profile;
+    profile.name = path;
+    if (const auto found = root.find("name"); found != root.end()) {
+        if (!found->is_string())
+            throw std::runtime_error(path + ": name: found " + found->dump() + ", expected a text");
+        profile.name = found->get<std::string>();
+    }
+    profile.psd = read_pairs(root, "psd", "[hz, g2_hz]", path);
+    profile.sines = read_pairs(root, "sines", "[hz, g_peak]", path);
+    if (const auto found = root.find("direction"); found != root.end()) {
+        if (!found->is_array() || found->size() != 3 ||
+            !std::all_of(found->begin(), found->end(), [](auto& x) { return x.is_number(); }))
+            throw std::runtime_error(path + ": direction: found " + found->dump() +
+                                     ", expected [north, up, east]");
+        profile.direction = {(*found)[0].get<double>(), (*found)[1].get<double>(),
+                             (*found)[2].get<double>()};
+        if (profile.direction.norm() > 0) profile.direction.normalize();
+    }
+    if (const auto found = root.find("g_rms"); found != root.end()) {
+        if (!found->is_number() || !(found->get<double>() > 0))
+            throw std::runtime_error(path + ": g_rms: found " + found->dump() +
+                                     ", expected a number above 0");
+        profile.g_rms = found->get<double>();
+    }
+    if (const auto found = root.find("at"); found != root.end()) {
+        if (*found != "platform" && *found != "table")
+            throw std::runtime_error(path + ": at: found " + found->dump() +
+                                     ", expected \"platform\" or \"table\"");
+        stated.at = found->get<std::string>();
+    }
+    check(profile, path + ": ");
+    return stated;
+}
+
+}  // namespace vibrig::plan

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "estimator/spectrum/profile.hpp"
+
+namespace vibrig::plan {
+
+/// A profile with where it holds.
+struct StatedProfile {
+    estimator::spectrum::Profile profile;
+    std::string at;  ///< "platform" or "table"; empty: not stated
+};
+
+/// JSON: psd [[hz, g2_hz], ..], sines [[hz, g_peak], ..], and optionally name, direction, g_rms,
+/// at. Throws std::runtime_error with file, key, value and what was expected.
+[[nodiscard]] StatedProfile read_profile(const std::string& path);
+
+}  // namespace vibrig::plan

@@ -1,0 +1,69 @@
+#include "daemon/tool/analysis/profile_options.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+
+#include "estimator/spectrum/profile.hpp"
+
+namespace vibrig::tool {
+
+using namespace estimator::spectrum;
+
+plan::StatedProfile find_profile(const std::string& name, const configuration::Configuration& rig) {
+    std::string known;
+    for (const auto& one : rig.profiles) {
+        if (one.profile.name == name) return {one.profile, one.at_table ? "table" : "platform"};
+        known += one.profile.name + ", ";
+    }
+    for (const Profile& profile : built_in_profiles()) {
+        if (profile.name == name) return {profile, ""};
+    }
+    if (!std::ifstream(name))
+        throw std::runtime_error("--profile: found '" + name +
+                                 "', expected a JSON file or one of " + known +
+                                 "minimum-integrity, truck");
+    return plan::read_profile(name);
+}
+
+AtPlatform at_platform(const Profile& profile, const std::string& at,
+                       const configuration::Configuration& rig) {
+    std::vector<Band> bands = bands_of(profile);
+    double power = mean_square(profile);
+    if (at == "table") {
+        if (!rig.spectrum.mount_stated && !(rig.estimator.transmission < 1))
+            throw std::runtime_error("vibration.transmission: found " +
+                                     std::to_string(rig.estimator.transmission) +
+                                     ", expected pads (below 1) for a profile at the table");
+        double kept = 0;
+        for (Band& band : bands) {
+            const auto ratio = rig.spectrum.mount.transmission(band.hz);
+            if (!ratio)
+                throw std::runtime_error("spectrum.transmission: found nothing at " +
+                                         std::to_string(band.hz) +
+                                         " Hz, expected the whole profile within it");
+            kept += band.share *= *ratio * *ratio;
+        }
+        for (Band& band : bands) band.share /= kept;
+        power *= kept;
+    }
+    return {bands, power * profile.direction * profile.direction.transpose()};
+}
+
+std::array<double, 3> read_attitude(const std::string& text) {
+    std::array<double, 3> deg{};
+    int used = 0;
+    if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &deg[0], &deg[1], &deg[2], &used) != 3 ||
+        static_cast<std::size_t>(used) != text.size() ||
+        !std::all_of(deg.begin(), deg.end(), [](double x) { return std::abs(x) <= 360; }))
+        throw std::runtime_error("--attitude: found '" + text +
+                                 "', expected ALPHA,BETA,GAMMA of the gimbals, deg, -360 to 360");
+    if (std::abs(std::remainder(deg[1], 360)) > 80)
+        throw std::runtime_error("--attitude: found " + text +
+                                 ", expected an inner angle of at most 80 deg");
+    return deg;
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/plan/profile_file.hpp"
+#include "estimator/spectrum/elastic.hpp"
+
+namespace vibrig::tool {
+
+/// By its name: of the configuration's [[profile]] tables, built in, or a file. Throws
+/// std::runtime_error.
+[[nodiscard]] plan::StatedProfile find_profile(const std::string& name,
+                                               const configuration::Configuration& rig);
+
+/// A profile as the platform has it.
+struct AtPlatform {
+    std::vector<estimator::spectrum::Band> bands;
+    Eigen::Matrix3d moment;  ///< level frame, g^2
+};
+/// `at`: "platform" or "table". Throws std::runtime_error where nothing is known between them.
+[[nodiscard]] AtPlatform at_platform(const estimator::spectrum::Profile& profile,
+                                     const std::string& at,
+                                     const configuration::Configuration& rig);
+
+/// "ALPHA,BETA,GAMMA" of the gimbals, deg. Throws std::runtime_error.
+[[nodiscard]] std::array<double, 3> read_attitude(const std::string& text);
+
+}  // namespace vibrig::tool

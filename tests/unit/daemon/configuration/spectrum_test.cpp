@@ -1,0 +1,113 @@
+#include <filesystem>
+#include <fstream>
+
+#include "tests/unit/daemon/configuration/support.hpp"
+#include "tests/unit/plant/temporary_folder.hpp"
+
+namespace vibrig::configuration {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string profile_with(const std::string& lines) { return "[[profile]]\nname = \"p\"\n" + lines; }
+
+TEST(SpectrumKeys, AProfileIsTakenWithItsTable) {
+    const auto c = accepted(
+        profile_with("number = 3\npsd = [[10, 0.015], [40, 0.015], [500, 0.00015]]\ng_rms = 1.04\n"
+                     "direction = [0, 2, 0]\nat = \"table\"\n"));
+    ASSERT_EQ(c.profiles.size(), 1U);
+    EXPECT_EQ(c.profiles[0].profile.psd.size(), 3U);
+    EXPECT_EQ(c.profiles[0].profile.direction[1], 1);
+    EXPECT_TRUE(c.profiles[0].at_table);
+}
+
+TEST(SpectrumKeys, EachBadProfileIsToldWithPlaceValueAndWhatWasExpected) {
+    const auto said = [](const std::string& lines) {
+        return complaint(profile_with(lines), false);
+    };
+    EXPECT_THAT(said("psd = [[20, 0.01], [10, 0.01]]\n"),
+                AllOf(StartsWith("rig.toml:3:"), HasSubstr("profile[0].psd[1]"),
+                      HasSubstr("found 10 Hz after 20 Hz, expected growing frequencies")));
+    EXPECT_THAT(said("psd = [[20, 0.01], [30, 0]]\n"),
+                HasSubstr("profile[0].psd[1]: found 0 g^2/Hz, expected a density above 0"));
+    EXPECT_THAT(said("psd = [[20, -0.01], [30, 0.01]]\n"),
+                HasSubstr("profile[0].psd[0]: found -0.01 g^2/Hz, expected a density above 0"));
+    EXPECT_THAT(said("psd = [[20, 0.04], [120, 0.04]]\ng_rms = 3\n"),
+                AllOf(StartsWith("rig.toml:4:"),
+                      HasSubstr("profile[0].g_rms: found 3, expected that of the table within 1 "
+                                "%: 2")));
+    EXPECT_EQ(said("psd = [[20, 0.04], [120, 0.04]]\ng_rms = 2.015\n"), "");
+    EXPECT_THAT(said("psd = [[20, 0.04]]\n"), HasSubstr("profile[0].psd"));
+    EXPECT_THAT(said("psd = [[20, 0.04], [30]]\n"), HasSubstr("profile[0].psd[1]"));
+    EXPECT_THAT(said(""), HasSubstr("found neither psd nor file, expected one of them"));
+    EXPECT_THAT(said("psd = [[20, 0.04], [30, 0.04]]\nat = \"roof\"\n"),
+                HasSubstr("expected \"platform\" or \"table\""));
+    EXPECT_THAT(said("psd = [[20, 0.04], [30, 0.04]]\ncolour = 1\n"),
+                HasSubstr("profile[0].colour: found an unknown key"));
+    EXPECT_THAT(said("file = \"nowhere.json\"\n"), HasSubstr("nowhere.json"));
+    const std::string one = profile_with("psd = [[20, 0.04], [30, 0.04]]\n");
+    EXPECT_THAT(complaint(one + one, false), HasSubstr("profile[1].name"));
+}
+
+TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemon) {
+    // The truck type at a hard mount: 3 sigma are 3.1 g, 0.17 m/s and 1.66 mm.
+    const std::string truck =
+        "psd = [[10, 0.015], [40, 0.015], [500, 0.00015]]\n[spectrum]\nmount = \"hard\"\n";
+    const auto said = [&](const std::string& more) {
+        return complaint(profile_with(truck) + more, true);
+    };
+    EXPECT_EQ(said(""), "");
+    EXPECT_THAT(said("[shaker.limits]\nacceleration_g = 3\n"),
+                AllOf(HasSubstr("profile[0] (p): found peaks of 3 sigma of 3.128"),
+                      HasSubstr("shaker.limits.acceleration_g")));
+    EXPECT_THAT(said("[shaker.limits]\nvelocity_mps = 0.1\n"), HasSubstr("3 sigma of 0.17"));
+    EXPECT_THAT(said("[shaker.limits]\ndisplacement_mm = 1\n"), HasSubstr("3 sigma of 1.6"));
+    // 1 + 5 * 1.0429 g
+    EXPECT_THAT(said("[accelerometer]\nrange_g = 6\n"),
+                AllOf(HasSubstr("5 sigma of 6.21"), HasSubstr("accelerometer.range_g")));
+    EXPECT_EQ(said("[accelerometer]\nrange_g = 6.3\n"), "");
+    // Minimum integrity: 23 g, 6 dB too much.
+    EXPECT_THAT(complaint(profile_with("psd = [[20, 0.04], [1000, 0.04], [2000, 0.01]]\n"
+                                       "[spectrum]\nmount = \"hard\"\n"),
+                          true),
+                AllOf(HasSubstr("3 sigma of 23.0"), HasSubstr("-5.6")));
+}
+
+TEST(SpectrumKeys, AHardMountHasATransmissionOfOne) {
+    EXPECT_EQ(accepted("spectrum.mount = \"hard\"\n").estimator.transmission, 1);
+    EXPECT_THAT(complaint("vibration.transmission = 0.6667\nspectrum.mount = \"hard\"\n", false),
+                HasSubstr("found 0.6667 with a hard mount, expected 1"));
+    const auto c = accepted("spectrum.transmission = [[10, 0.9], [40, 0.15]]\n");
+    EXPECT_NEAR(c.spectrum.mount.transmission(40).value(), 0.15, 1e-12);
+    EXPECT_THAT(complaint("spectrum.transmission = [[40, 0.9], [10, 0.15]]\n", false),
+                HasSubstr("found 10 Hz after 40 Hz, expected growing frequencies"));
+    EXPECT_THAT(complaint("spectrum.transmission = \"felt\"\n", false), HasSubstr("\"pads\""));
+    // AND it is another rig than the one that was proved
+    EXPECT_NE(
+        accepted("vibration.transmission = 1\n").campaign.proof.keys,
+        accepted("vibration.transmission = 1\nspectrum.mount = \"hard\"\n").campaign.proof.keys);
+}
+
+TEST(SpectrumKeys, FrequenciesThatSamplingForbidsAreRefusedWithTheNearestFreeOne) {
+    EXPECT_THAT(complaint("vibration.frequency_hz = 60\n", true),
+                AllOf(HasSubstr("found 60 Hz"), HasSubstr("nearest free one is 60.2 Hz")));
+    const plant::TemporaryFolder folder;
+    const auto plan_at = [&](const std::string& hz) {
+        const std::string path = folder.file("plan.json");
+        std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3,"frequency_hz":)" << hz
+                            << "}]}";
+        return complaint("campaign.plan = \"" + path + "\"\n", true);
+    };
+    EXPECT_THAT(plan_at("60"), AllOf(StartsWith("rig.toml:1:"), HasSubstr("found dwell 1 at 60 Hz"),
+                                     HasSubstr("the nearest free one is 60.2 Hz")));
+    EXPECT_THAT(plan_at("10.7"), HasSubstr("below it the isolators amplify"));
+    EXPECT_THAT(plan_at("35.1"), HasSubstr("changes no frequency within a campaign"));
+    EXPECT_EQ(plan_at("15"), "");
+    EXPECT_THAT(complaint("spectrum.mode = \"mixed\"\n", true),
+                HasSubstr("found \"mixed\" without registers of mode and profile"));
+}
+
+}  // namespace
+}  // namespace vibrig::configuration

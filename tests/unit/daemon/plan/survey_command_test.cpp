@@ -1,0 +1,168 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "daemon/plan/plan_file.hpp"
+#include "estimator/spectrum/sampling.hpp"
+
+namespace {
+
+using SurveyJson = nlohmann::json;
+namespace spectrum = vibrig::estimator::spectrum;
+
+/// Runs the real program in a folder of its own.
+class SurveyCommand : public ::testing::Test {
+  protected:
+    SurveyCommand() {
+        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
+        folder_ = mkdtemp(name.data());
+    }
+    ~SurveyCommand() override { std::filesystem::remove_all(folder_); }
+
+    int vibrig(const std::string& arguments) {
+        const std::string command =
+            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
+        const int status = std::system(command.c_str());
+        out = text_of("out");
+        error = text_of("error");
+        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    }
+    SurveyJson json() const { return SurveyJson::parse(out); }
+    std::string path(const std::string& name) const { return (folder_ / name).string(); }
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+    std::string text_of(const std::string& name) const {
+        std::ostringstream text;
+        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
+        return text.str();
+    }
+    bool refuses(const std::string& plan, const std::string& words) {
+        write("bad.json", plan);
+        try {
+            static_cast<void>(vibrig::plan::read_plan(path("bad.json"), 1));
+        } catch (const vibrig::plan::PlanFileError& refusal) {
+            error = refusal.what();
+            return error.find(words) != std::string::npos;
+        }
+        return false;
+    }
+
+    std::filesystem::path folder_;
+    std::string out;
+    std::string error;
+};
+
+TEST_F(SurveyCommand, PlansTheSurveyOf63Dwells) {
+    // WHEN a survey is planned for the hard mount
+    ASSERT_EQ(vibrig("plan --frequencies 15,25,35 --highest 125 --mount hard --json -o plan.json"),
+              0)
+        << error;
+    const SurveyJson plan = json();
+    // THEN each of seven frequencies has its dwells, at 6 g, off what 40 samples/s forbid
+    std::map<double, int> dwells;
+    for (const auto& run : plan["runs"]) {
+        const int count = run["count"].get<int>();
+        if (!run.contains("frequency_hz")) {
+            EXPECT_EQ(run["level_g"], 0.0);
+            dwells[0] += count;
+            continue;
+        }
+        EXPECT_EQ(run["level_g"], 6.0);
+        EXPECT_EQ(run["table_g"], 6.0);
+        EXPECT_FALSE(spectrum::forbidden(run["frequency_hz"], 40, 10, spectrum::kHarmonicsPlanned));
+        dwells[run["frequency_hz"].get<double>()] += count;
+    }
+    EXPECT_EQ(plan["run_count"], 63);
+    ASSERT_EQ(dwells.size(), 8U);
+    EXPECT_EQ(dwells[0], 7);
+    EXPECT_EQ(dwells[15.1], 14);
+    EXPECT_EQ(dwells[125.1], 7);
+    EXPECT_EQ(plan["rank"], 10);
+    EXPECT_EQ(plan["survey"]["mount"], "hard");
+    EXPECT_EQ(plan["survey"]["frequencies"].size(), 7U);
+    EXPECT_EQ(plan["survey"]["highest_hz"], 125.1);
+    // 2.8 h with gaps
+    EXPECT_NEAR(plan["duration_s"].get<double>() / 3600, 2.1, 0.8);
+    // AND vibrigd's reader takes the file
+    const auto runs = vibrig::plan::read_plan(path("plan.json"), 1);
+    ASSERT_EQ(runs.size(), plan["runs"].size());
+    for (std::size_t i = 0; i < runs.size(); ++i)
+        EXPECT_EQ(runs[i].frequency_hz, plan["runs"][i].value("frequency_hz", 0.0)) << i;
+    // AND judged from its file it is the same plan
+    write("hard.toml", "spectrum.mount = \"hard\"\n");
+    ASSERT_EQ(vibrig("plan --evaluate plan.json --config hard.toml --json"), 0) << error;
+    EXPECT_EQ(json()["runs"], plan["runs"]);
+    EXPECT_NEAR(json()["duration_s"], plan["duration_s"].get<double>(), 1e-6);
+}
+
+TEST_F(SurveyCommand, SaysWhatIsMovedAndWhatTheLimitsLeave) {
+    ASSERT_EQ(vibrig("plan --frequencies 15,60 --mount isolated --order list"), 0) << error;
+    EXPECT_NE(out.find("60 Hz is forbidden at 40 samples/s: the nearest free frequency, 60.2 Hz"),
+              std::string::npos)
+        << out;
+    EXPECT_NE(out.find("frequencies above 30 Hz want the hard mount"), std::string::npos) << out;
+    EXPECT_EQ(vibrig("plan --frequencies 10.3,60"), 2);
+    EXPECT_NE(error.find("found 10.3 Hz, expected 12.98"), std::string::npos) << error;
+}
+
+TEST_F(SurveyCommand, APlanForAProfileReachesItsHighestFrequencyOrSaysSo) {
+    write("top.toml", "spectrum.highest_hz = 125\nspectrum.mount = \"hard\"\n");
+    ASSERT_EQ(vibrig("plan --profile truck --attitude 45,0,90 --config top.toml --order list "
+                     "--json"),
+              0)
+        << error;
+    const SurveyJson plan = json();
+    EXPECT_EQ(plan["survey"]["profile"], "truck");
+    EXPECT_GT(plan["survey"]["predicted_u_deg_h"], 0.0);
+    EXPECT_NEAR(plan["survey"]["frequencies"].back()["hz"], 125.1, 1e-9);
+    EXPECT_NE(plan["warnings"].dump().find("reaches to 500 Hz, the plan to 125 Hz"),
+              std::string::npos)
+        << plan["warnings"];
+    EXPECT_EQ(vibrig("plan --profile lorry"), 2);
+    EXPECT_NE(error.find("found 'lorry', expected a JSON file or one of"), std::string::npos)
+        << error;
+}
+
+TEST_F(SurveyCommand, BadInputIsNamed) {
+    const std::map<std::string, std::string> told{
+        {"plan --frequencies 15,35 --highest 20", "found 20 Hz, expected 35 Hz at least"},
+        {"plan --frequencies 15,35 --levels 2,6", "expected one level with --frequencies"},
+        {"plan --frequencies 15,35 --runs 30 --mount hard", "--runs: found 30"},
+        {"plan --frequencies 15,15.1 --mount hard", "2 % above"},
+        {"plan --mount hard", "--frequencies, --highest or --profile with it"},
+        {"plan --frequencies 15,nan", "expected a finite number"},
+        {"plan --frequencies 15,35 --evaluate plan.json", "--evaluate"}};
+    for (const auto& [arguments, words] : told) {
+        EXPECT_EQ(vibrig(arguments), 2) << arguments;
+        EXPECT_NE(error.find(words), std::string::npos) << arguments << ": " << error;
+    }
+}
+
+TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
+    const std::string at = R"({"runs":[{"position":[0,0,0],"level_g":6)";
+    EXPECT_TRUE(refuses(at + R"(,"frequency_hz":"x"}]})", "runs[0].frequency_hz: found \"x\""))
+        << error;
+    EXPECT_TRUE(refuses(at + R"(,"frequency_hz":-3}]})", "runs[0].frequency_hz: found -3"))
+        << error;
+    EXPECT_TRUE(refuses(at + R"(,"profile":"truck"}]})", "runs[0].profile: found \"truck\""))
+        << error;
+    EXPECT_TRUE(refuses(at + R"(,"sweep":{"s":9}}]})", "runs[0].sweep: found")) << error;
+    EXPECT_TRUE(refuses(at + R"(,"role":"test"}]})", "\"identify\" or \"verify\"")) << error;
+    write("plan.csv",
+          "alpha_deg,beta_deg,gamma_deg,level_g,frequency_hz\n0,0,0,6,35.1\n0,0,45,0,0\n");
+    const auto runs = vibrig::plan::read_plan(path("plan.csv"), 1);
+    ASSERT_EQ(runs.size(), 2U);
+    EXPECT_EQ(runs[0].frequency_hz, 35.1);
+    EXPECT_EQ(runs[1].frequency_hz, 0);
+}
+
+}  // namespace
