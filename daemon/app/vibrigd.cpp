@@ -14,10 +14,12 @@
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/daemon.hpp"
 #include "daemon/app/rig_lock.hpp"
+#include "daemon/app/start_checks.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/configuration/forms.hpp"
 #include "daemon/domain/upgrade.hpp"
 #include "daemon/log/log_sink.hpp"
+#include "daemon/rt/real_time.hpp"
 #include "daemon/serve/openapi.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
@@ -59,8 +61,8 @@ void insist(const vibrig::CampaignForecast& forecast) {
 void check_again(const std::string& path) {
     try {
         const auto loaded = vibrig::configuration::load(path, true);
-        vibrig::Daemon::check_bindings(loaded);
-        vibrig::Daemon::check_results(loaded.configuration);
+        vibrig::check_bindings(loaded);
+        vibrig::check_results(loaded.configuration);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -214,6 +216,7 @@ constexpr std::initializer_list<vibrig::proto::Exit> kExits{
 
 // NOLINTNEXTLINE(bugprone-exception-escape): before anything runs only memory can be short
 int main(int argc, char** argv) {
+    vibrig::rt::give_large_blocks_back();
     CLI::App app{"Acquisition and identification daemon for vibration rigs", "vibrigd"};
     app.footer("Example: vibrigd --config /etc/vibrig/vibrigd.toml --check");
     app.set_version_flag("--version", vibrig::kVersion);
@@ -256,8 +259,8 @@ int main(int argc, char** argv) {
         }
         auto loaded = vibrig::configuration::load(path, true);
         if (check) {
-            vibrig::Daemon::check_bindings(loaded);
-            vibrig::Daemon::check_results(loaded.configuration);
+            vibrig::check_bindings(loaded);
+            vibrig::check_results(loaded.configuration);
             std::cout << vibrig::configuration::format_effective(loaded);
             // As comments: what stands above reads back as a configuration.
             const auto forecast = vibrig::forecast_campaign(loaded.configuration);
@@ -265,7 +268,7 @@ int main(int argc, char** argv) {
             for (std::string line; std::getline(words, line);) {
                 std::cout << "# " << line << '\n';
             }
-            for (const std::string& line : vibrig::Daemon::check_plan(loaded.configuration)) {
+            for (const std::string& line : vibrig::check_plan(loaded.configuration)) {
                 std::cerr << "warning: campaign: " << line << '\n';
             }
             insist(forecast);

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,7 +12,7 @@
 #include <cstring>
 #include <thread>
 
-extern char** environ;  // NOLINT(readability-redundant-declaration)
+#include "drivers/base/process_group.hpp"
 
 namespace vibrig::archive {
 
@@ -39,50 +38,6 @@ struct Pipe {
         if (end[which] >= 0) ::close(end[which]);
         end[which] = -1;
     }
-};
-
-/// posix_spawn, as its actions and attributes want to be made and unmade.
-class Program {
-  public:
-    Program() noexcept {
-        ::posix_spawn_file_actions_init(&actions_);
-        ::posix_spawnattr_init(&attributes_);
-    }
-    ~Program() {
-        ::posix_spawn_file_actions_destroy(&actions_);
-        ::posix_spawnattr_destroy(&attributes_);
-    }
-    Program(const Program&) = delete;
-    Program& operator=(const Program&) = delete;
-
-    int start(const std::vector<std::string>& arguments, int out, int error, pid_t& leader) {
-        ::posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-        ::posix_spawn_file_actions_adddup2(&actions_, out, STDOUT_FILENO);
-        ::posix_spawn_file_actions_adddup2(&actions_, error, STDERR_FILENO);
-        // Sockets and journals are not for it.
-        ::posix_spawn_file_actions_addclosefrom_np(&actions_, STDERR_FILENO + 1);
-        sigset_t none, defaults;
-        ::sigemptyset(&none);
-        ::sigemptyset(&defaults);
-        for (const int signal : {SIGPIPE, SIGXFSZ, SIGINT, SIGTERM, SIGHUP})
-            ::sigaddset(&defaults, signal);
-        ::posix_spawnattr_setsigmask(&attributes_, &none);
-        ::posix_spawnattr_setsigdefault(&attributes_, &defaults);
-        ::posix_spawnattr_setpgroup(&attributes_, 0);
-        ::posix_spawnattr_setflags(
-            &attributes_, static_cast<short>(POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK |
-                                             POSIX_SPAWN_SETSIGDEF));
-        std::vector<std::string> words = arguments;
-        std::vector<char*> pointers;
-        for (auto& word : words) pointers.push_back(word.data());
-        pointers.push_back(nullptr);
-        return ::posix_spawn(&leader, words[0].c_str(), &actions_, &attributes_, pointers.data(),
-                             environ);
-    }
-
-  private:
-    posix_spawn_file_actions_t actions_{};
-    posix_spawnattr_t attributes_{};
 };
 
 /// False: the end of it.
@@ -125,7 +80,9 @@ Run run_child(const std::vector<std::string>& arguments, double limit_s,
         run.error = std::string("no pipe: ") + std::strerror(errno);
         return run;
     }
-    if (const int why = Program().start(arguments, out.end[1], error.end[1], leader); why != 0) {
+    if (const int why =
+            drivers::start_process_group(arguments, -1, out.end[1], error.end[1], leader);
+        why != 0) {
         run.error = arguments[0] + ": cannot be started: " + std::strerror(why);
         return run;
     }

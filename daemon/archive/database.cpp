@@ -4,6 +4,7 @@
 #include <soci/sqlite3/soci-sqlite3.h>
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <mutex>
 
@@ -114,6 +115,9 @@ void Database::rethrow() const {
     } catch (const std::exception& error) {
         std::string words = error.what();
         while (!words.empty() && (words.back() == '\n' || words.back() == '.')) words.pop_back();
+        // libpq's words come on several lines.
+        std::ranges::replace(words, '\n', ' ');
+        std::erase(words, '\t');
         if (words.find(kPlugin) != std::string::npos)
             words += "; the package libsoci-postgresql4.0 brings it";
         // SOCI adds the statement, which says nothing to whoever reads it.

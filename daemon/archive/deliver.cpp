@@ -150,6 +150,8 @@ std::string host_name() {
 }
 
 std::vector<std::string> campaign_folders(const std::string& folder) {
+    if (!fs::is_directory(folder))
+        throw ArchiveError(folder + ": found no such folder, expected a campaign's or one of them");
     if (!record::part_files(folder).empty()) return {folder};
     std::vector<std::string> found;
     for (const auto& entry : fs::directory_iterator(folder)) {

@@ -217,8 +217,11 @@ std::vector<Unit> Index::units() {
                     "coalesce((SELECT n.verdict FROM result n JOIN campaign d ON d.key = "
                     "n.campaign WHERE n.unit_serial = r.unit_serial AND n.superseded = 0 ORDER BY "
                     "d.started_utc_ns DESC LIMIT 1), '') FROM result r JOIN campaign c ON c.key = "
-                    "r.campaign WHERE r.superseded = 0 GROUP BY r.unit_serial ORDER BY "
-                    "r.unit_serial",
+                    "r.campaign WHERE r.superseded = 0 AND r.unit_serial IN (SELECT q.unit_serial "
+                    "FROM (SELECT m.unit_serial, b.started_utc_ns FROM campaign b JOIN result m "
+                    "ON m.campaign = b.key ORDER BY b.started_utc_ns DESC LIMIT " +
+                        std::to_string(kOfNewest) +
+                        ") q) GROUP BY r.unit_serial ORDER BY r.unit_serial",
              into(one.serial), into(one.type), into(one.campaigns), into(one.last_utc_ns),
              into(one.verdict));
         ask.execute();

@@ -44,6 +44,9 @@ class Index {
     [[nodiscard]] std::vector<Entry> results(const Filter& filter, bool covariance = false);
     /// One with everything; nothing: there is none of that key.
     [[nodiscard]] std::optional<Entry> campaign(const std::string& key);
+    /// Those with a campaign among the newest kOfNewest: of a million all of them are not looked
+    /// at.
+    static constexpr std::size_t kOfNewest = 2000;
     [[nodiscard]] std::vector<Unit> units();
     [[nodiscard]] std::vector<File> files(const std::string& key);
     /// Campaigns that a recorder noted as ended and nobody has read the result of.

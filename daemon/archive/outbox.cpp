@@ -57,10 +57,10 @@ void be_last() {
 
 }  // namespace
 
-Outbox::Outbox(Settings settings, std::string recordings, std::string serial, Event event)
+Outbox::Outbox(Settings settings, std::string recordings, Unit unit, Event event)
     : settings_(std::move(settings)),
       recordings_(std::move(recordings)),
-      serial_(std::move(serial)),
+      unit_(std::move(unit)),
       program_(program_beside()),
       event_(std::move(event)) {
     status_.folder = settings_.folder;
@@ -106,6 +106,11 @@ std::string Outbox::history() const {
     return history_;
 }
 
+Outbox::TypeKnown Outbox::type_known() const {
+    const std::lock_guard lock(mutex_);
+    return type_known_;
+}
+
 void Outbox::show(const std::function<void(ArchiveStatus&)>& change) {
     const std::lock_guard lock(mutex_);
     change(status_);
@@ -131,6 +136,7 @@ std::vector<std::string> Outbox::command(std::vector<std::string> words) const {
 
 void Outbox::loop() {
     be_last();
+    ask_type();  // the first campaign may begin soon
     ask_history();
     double retry_s = kFirstRetry_s;
     while (!stop_.load()) {
@@ -150,6 +156,7 @@ void Outbox::loop() {
             if (!good && ++failed >= kFewFailures && !done) break;
         }
         if (done && !stop_.load()) ask_history();
+        if (done || type_known().json.empty()) ask_type();
         campaigns = scan();
         if (failed == 0) make_room(campaigns);
         const auto waiting = std::ranges::count(campaigns, false, &Campaign::delivered);
@@ -264,11 +271,26 @@ void Outbox::tell_moved(const std::string& line) {
 }
 
 void Outbox::ask_history() {
-    if (serial_.empty()) return;
-    const Run run = run_child(command({"trend", serial_}), kPatience_s, stop_);
+    if (unit_.serial.empty()) return;
+    const Run run = run_child(command({"trend", unit_.serial}), kPatience_s, stop_);
     if (run.status != 0) return;  // a new unit, or an archive that does not answer
     const std::lock_guard lock(mutex_);
     history_ = run.out;
+}
+
+void Outbox::ask_type() {
+    if (unit_.type.empty() || stop_.load()) return;
+    std::vector<std::string> words{"archive", "type", unit_.type};
+    if (!unit_.serial.empty()) words.insert(words.end(), {"--without", unit_.serial});
+    if (unit_.simulated) words.emplace_back("--simulated");
+    const Run run = run_child(command(std::move(words)), kPatience_s, stop_);
+    const std::lock_guard lock(mutex_);
+    // What is known stays known while the archive does not answer.
+    if (run.status == 0) {
+        type_known_ = {run.out, ""};
+    } else if (type_known_.json.empty()) {
+        type_known_.why_not = run.error;
+    }
 }
 
 /// The mark is on the disk before anything that rests on it happens.

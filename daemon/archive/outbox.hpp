@@ -22,9 +22,14 @@ namespace vibrig::archive {
 class Outbox {
   public:
     using Event = std::function<void(Severity, const std::string&)>;
-    /// `recordings`: the folder of campaigns' folders; `serial`: of the unit on the rig, ""
-    /// without. `event` is called in its thread.
-    Outbox(Settings settings, std::string recordings, std::string serial, Event event);
+    /// The unit on the rig.
+    struct Unit {
+        std::string serial;  ///< empty: not known
+        std::string type;    ///< empty: nothing is asked of its type
+        bool simulated = false;
+    };
+    /// `recordings`: the folder of campaigns' folders. `event` is called in its thread.
+    Outbox(Settings settings, std::string recordings, Unit unit, Event event);
     ~Outbox();
     Outbox(const Outbox&) = delete;
     Outbox& operator=(const Outbox&) = delete;
@@ -36,6 +41,12 @@ class Outbox {
     [[nodiscard]] ArchiveStatus status() const;
     /// The unit's earlier campaigns, as `vibrig trend SERIAL --json` prints them; empty: not known.
     [[nodiscard]] std::string history() const;
+    /// What the archive knows of the unit's type, as `vibrig archive type --json` prints it.
+    struct TypeKnown {
+        std::string json;     ///< empty: nothing
+        std::string why_not;  ///< empty as well: not asked yet
+    };
+    [[nodiscard]] TypeKnown type_known() const;
 
   private:
     /// A campaign's folder, over.
@@ -50,6 +61,7 @@ class Outbox {
     bool deliver(const Campaign& campaign);
     void tell_moved(const std::string& line);
     void ask_history();
+    void ask_type();
     void make_room(const std::vector<Campaign>& campaigns);
     void mark(const Campaign& campaign) const;
     void wait(double seconds);
@@ -57,7 +69,9 @@ class Outbox {
     void show(const std::function<void(ArchiveStatus&)>& change);
 
     const Settings settings_;
-    const std::string recordings_, serial_, program_;
+    const std::string recordings_;
+    const Unit unit_;
+    const std::string program_;
     const Event event_;
     std::map<std::string, int> failed_;  ///< campaigns that could not be delivered, and how often
     std::string told_;                   ///< why the newest could not
@@ -67,6 +81,7 @@ class Outbox {
     bool look_ = false;
     ArchiveStatus status_;
     std::string history_;
+    TypeKnown type_known_;
     std::thread thread_;
 };
 

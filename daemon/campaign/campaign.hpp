@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/campaign/pace.hpp"
+#include "daemon/campaign/ports.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/domain/status.hpp"
@@ -44,80 +45,13 @@ struct StageTimes {
 [[nodiscard]] StageTimes stage_times(const Settings& settings);
 [[nodiscard]] rt::StageFeedSettings stage_feed_settings(const Settings& settings);
 
-/// What an adaptive campaign does next.
-struct Next {
-    bool more = false;  ///< else it ends
-    Stop stop;
-    std::size_t left = 0;  ///< runs, this one included, to be expected
-    std::string words;
-};
-
-/// A stop that is made to happen, by order or by not feeding the watchdog: the amplitude may fall
-/// as it likes, and the controller may say fault.
-enum class Proving : std::uint8_t { nothing, stop, watchdog };
-
-/// What a campaign acts on and reports to. All calls come from the control thread.
-struct Ports {
-    drivers::Gimbal& gimbal;
-    drivers::Shaker& shaker;
-    std::function<drivers::PlatformStatus()> platform;
-    std::function<bool(const rt::DwellOrder&)> order_dwell;
-    std::function<void(rt::Guard)> guard;    ///< what the interlock has to watch
-    std::function<bool()> estimator_free;    ///< no dwell is with the estimator
-    std::function<void()> begin;             ///< a new campaign: forget earlier dwells
-    std::function<void(bool complete)> end;  ///< write what there is
-    std::function<void(Severity, const std::string&)> event;
-    /// Adaptive campaigns: what to do next, at these gimbal angles, after so many s of campaign.
-    /// Nothing while it is thought over: to be asked again.
-    std::function<std::optional<Next>(const std::array<double, 3>& here_deg, double elapsed_s)>
-        next = {};
-    /// What the table is to do (0: nothing, or on its way) and where the gimbals are to be, deg.
-    std::function<void(double table_g, const std::array<double, 3>& position_deg)> commanded = {};
-    /// A position is done, its data with the estimator.
-    std::function<void(const estimator::DwellInfo&, const estimator::DwellSummary&,
-                       const StopDone&)>
-        position_done = {};
-    /// Before an interrupted campaign goes on: why not, else empty.
-    std::function<std::string()> resume_gate = {};
-    /// It goes on, by this person: take the filter as it was.
-    std::function<void(const std::string& by)> resume = {};
-    /// What levelling and zeroing act on and are fed from; null: no such stage.
-    drivers::Torquer* torquer = nullptr;
-    rt::StageFeed* feed = nullptr;
-    /// A position was levelled, and this is what was torqued out.
-    std::function<void(const LevelDrift&)> levelled = {};
-    /// A loop check has its verdict; empty: all in band.
-    std::function<void(const std::string& by, const std::string& out_of_band)> loop_checked = {};
-    /// The table is told this, as it is told.
-    std::function<void(const rt::Ramp&)> ramping = {};
-    /// Platform over table as a loop check in band has measured it.
-    std::function<void(double)> transmission = {};
-    /// What the accelerometers measure; none: nothing is ever at rest.
-    StopMonitor::Rest rest = {};
-    /// A stop was not obeyed in its time; or was, and all is at rest.
-    std::function<void(bool)> disobeyed = {};
-    /// The table moves though nothing was asked for.
-    std::function<void()> uncommanded = {};
-    /// What is being proved by making it happen.
-    std::function<void(Proving)> proving = {};
-    /// A proof is over, passed or not.
-    std::function<void(const ProofRecord&)> proved = {};
-    std::function<std::int64_t()> utc_ns = {};
-    /// Why what is measured is not fit to arm on; empty: it is.
-    std::function<std::string()> unfit = {};
-    /// The newest second of force and angles.
-    std::function<rt::MeanMotion()> second = {};
-    /// CLOCK_MONOTONIC, whatever clock the rig has: an arming expires in people's time.
-    std::function<drivers::Time()> wall = rt::wall_clock;
-};
-
 /// The campaign as a state machine: zeros of the accelerometers, then for each run and position
 /// slew, level, ramp, settle, record, rest; in the end the zeros again.
 /// Moved on by step(), which never waits. The shaker moves only between a named person's arm() and
 /// the end of that campaign; gimbals slew only while it is at rest. Control thread only.
 class Campaign {
   public:
-    Campaign(const Settings& settings, Ports ports);
+    Campaign(const Settings& settings, const Ports& ports);
 
     /// Before the first step(): positions that an interrupted campaign has done. Nothing moves
     /// until a person arms and resumes it. False if they are not the first of the list; of an
@@ -159,6 +93,7 @@ class Campaign {
     void fill(StatusData& status, drivers::Time now) const;
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
+    [[nodiscard]] const SafetyProof& proof() const { return proof_; }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that
@@ -203,7 +138,14 @@ class Campaign {
         int run = 1, position = 1;
     };
 
+    struct StateRow;
+    [[nodiscard]] static const StateRow& row_of(CampaignState state);
     drivers::Time step_once(drivers::Time now);
+    // One for each state; each returns when to be called next at the latest.
+    drivers::Time stand_by(drivers::Time now);
+    drivers::Time wait(drivers::Time now);
+    drivers::Time pause(drivers::Time now);
+    drivers::Time give_way(drivers::Time now);
     drivers::Time wait_for_platform(drivers::Time now);
     drivers::Time slew(drivers::Time now);
     drivers::Time zeroing(drivers::Time now);
@@ -233,7 +175,7 @@ class Campaign {
     void conclude_proof(const std::string& why);
     [[nodiscard]] std::string suspect_unit() const;
     void proving(Proving what);
-    [[nodiscard]] std::int64_t utc_ns() const { return ports_.utc_ns ? ports_.utc_ns() : 0; }
+    [[nodiscard]] std::int64_t utc_ns() const { return ports_.log.utc_ns(); }
     /// Gimbals slew only at rest; why not, else empty.
     [[nodiscard]] std::string may_slew() const;
     void make_stages();
@@ -293,6 +235,7 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
+    CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
@@ -327,8 +270,10 @@ class Campaign {
     /// Of the dwell that is being done.
     [[nodiscard]] estimator::DwellInfo dwell_info() const {
         return {here().run, here().position, table_g(),
-                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_))};
+                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_)),
+                power_lost_ && positions_done_ > 0};
     }
+    void watch_power();
     void take_over_origin();
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
@@ -379,6 +324,7 @@ class Campaign {
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;
+    bool power_lost_ = false;  ///< the gyros were seen run down since the dwell done last
     std::vector<estimator::DwellSummary> dwells_;
     std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made
@@ -402,6 +348,7 @@ class Campaign {
     /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
     enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
     drivers::Time pressed_at_ = 0;  ///< when that began
+    drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
     bool press_felt_ = false;       ///< by the controller, too
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell

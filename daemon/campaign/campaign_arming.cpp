@@ -49,7 +49,7 @@ std::string Campaign::begin_commissioning(const std::string& by, Time now) {
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (auto why = platform_lacks(now); !why.empty()) return why;
     if (auto why = may_slew(); !why.empty()) return why;
-    ports_.gimbal.forget_position();
+    ports_.rig.gimbal.forget_position();
     reason_ = by;
     enter(State::commissioning, now);
     return {};
@@ -65,7 +65,7 @@ std::string Campaign::not_fit_to_acknowledge(Time now) const {
     if (stop_.disobeyed() && stop_.stopping())
         return "a stop was not obeyed, not at rest yet: " + stop_.what_moves(now) +
                ": press the emergency stop";
-    const auto shaker = ports_.shaker.reading();
+    const auto shaker = ports_.rig.shaker.reading();
     const bool changed = shaker.watchdog == drivers::WatchdogTimeout::changed;
     const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
     if (latched && shaker.emergency_stop_open)
@@ -106,10 +106,10 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
 /// Nobody started it: whoever armed may long have gone home.
 void Campaign::watch_arming(Time now) {
     if (state_ != State::armed ||
-        ports_.wall() - armed_wall_ < drivers::from_seconds(settings_.arming_valid_s)) {
+        ports_.log.wall() - armed_wall_ < drivers::from_seconds(settings_.arming_valid_s)) {
         return;
     }
-    ports_.event(
+    ports_.log.event(
         Severity::warning,
         fmt::format("the arming by {} has expired: not started within {}",
                     std::exchange(armed_by_, {}), duration_text(settings_.arming_valid_s)));

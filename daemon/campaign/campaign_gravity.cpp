@@ -24,10 +24,10 @@ constexpr Time kVibrationOff = 2 * kSecond;
 }  // namespace
 
 void Campaign::watch_gravity() {
-    if (!ports_.second || !active() || state_ == State::slewing || state_ == State::zeroing ||
-        opening())
+    const auto newest = ports_.rig.second();
+    if (!newest || !active() || state_ == State::slewing || state_ == State::zeroing || opening())
         return;
-    const rt::MeanMotion second = ports_.second();
+    const rt::MeanMotion& second = *newest;
     // What began before the state may still be of a slew.
     if (second.from == second_from_ || second.from < entered_) return;
     if (!second.good) {
@@ -49,11 +49,11 @@ void Campaign::watch_gravity() {
     } else if (second.to - vibration_off_since_ >= kVibrationOff) {
         const bool first = vibration_off_.empty();
         vibration_off_ = gravity_->vibration_words();
-        if (first) ports_.event(Severity::alarm, vibration_off_);
+        if (first) ports_.log.event(Severity::alarm, vibration_off_);
     }
     if (std::exchange(gravity_told_, verdict.told) == verdict.told) return;
-    ports_.event(verdict.told ? Severity::alarm : Severity::info,
-                 verdict.told ? gravity_->words() : "gravity is where the encoders say again");
+    ports_.log.event(verdict.told ? Severity::alarm : Severity::info,
+                     verdict.told ? gravity_->words() : "gravity is where the encoders say again");
 }
 
 bool Campaign::vibration_was_off(Time now) {
@@ -63,7 +63,7 @@ bool Campaign::vibration_was_off(Time now) {
 }
 
 bool Campaign::gravity_holds(Time now) {
-    if (!ports_.second) return true;
+    if (!ports_.rig.second()) return true;
     if (second_from_ < entered_) {
         if (now - entered_ > kStillTimeout)
             pause_at_rest("no still second before the ramp: force or angles are missing or move",
@@ -97,7 +97,7 @@ void Campaign::pause_at_rest(const std::string& why, Time now) {
     pause_asked_ = true;
     enter(State::paused, now);
     reason_ = why;
-    ports_.event(Severity::alarm, "paused at rest, resume when it is put right: " + why);
+    ports_.log.event(Severity::alarm, "paused at rest, resume when it is put right: " + why);
 }
 
 }  // namespace vibrig::campaign

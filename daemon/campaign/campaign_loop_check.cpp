@@ -1,7 +1,9 @@
 // The loop check and the safe-state proof: about a minute at a small level, its own arming.
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
@@ -30,7 +32,7 @@ std::string Campaign::not_fit_to_check(Time now) const {
     if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (state_ == State::armed) return "armed for a campaign: abort that first";
-    if (ports_.feed == nullptr) return "no samples to look at";
+    if (ports_.rig.feed == nullptr) return "no samples to look at";
     if (auto why = not_fit_to_excite(now); !why.empty()) return why;
     if (auto why = platform_lacks(now); !why.empty()) return why;
     if (torquing()) return "the platform is torqued, expected free drift";
@@ -38,25 +40,36 @@ std::string Campaign::not_fit_to_check(Time now) const {
 }
 
 CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now) {
-    if (!request.argument.empty() && request.argument != "emergency_stop")
+    constexpr std::string_view kPress = "emergency_stop";
+    const bool press = request.argument.starts_with(kPress);
+    std::string button;
+    if (press && request.argument.size() > kPress.size() + 1)
+        button = request.argument.substr(kPress.size() + 1);
+    const auto& buttons = settings_.proof.buttons;
+    if (!press && !request.argument.empty())
         return {false,
                 "selftest: found \"" + request.argument + "\", expected nothing or emergency_stop"};
+    if (!button.empty() && std::ranges::find(buttons, button) == buttons.end())
+        return {false, "selftest: found the button \"" + button +
+                           "\", expected one of commission.buttons"};
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
     armed_by_ = request.by;
     armed_for_ = arming_text(request);
-    armed_under_ = ports_.shaker.stops();
+    armed_under_ = ports_.rig.shaker.stops();
     reason_.clear();
     loop_->begin(request.by);
     proof_.begin(request.by, settings_.loop.table_g);
-    press_wanted_ = request.argument == "emergency_stop";
+    press_wanted_ = press;
+    // There is but one.
+    proof_.record().button = press && button.empty() && buttons.size() == 1 ? buttons[0] : button;
     pressed_ = Pressed::no;
-    ports_.feed->order(rt::StageFeed::Mode::samples);
+    ports_.rig.feed->order(rt::StageFeed::Mode::samples);
     last_motion_ = now;
     check_ = Check::look;
     enter(State::checking, now);
     const std::string text =
         fmt::format("loop check and safe-state proof at {:g} g", settings_.loop.table_g);
-    ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+    ports_.log.event(Severity::info, fmt::format("{} by {}", text, request.by));
     return {true, text};
 }
 
@@ -69,15 +82,15 @@ void Campaign::go_on_to(Check part, Time now) {
     proving(part == Check::stop || part == Check::clear ? Proving::stop
             : part == Check::watchdog                   ? Proving::watchdog
                                                         : Proving::nothing);
-    if (ports_.commanded) ports_.commanded(steady ? settings_.loop.table_g : 0, excited_deg_);
-    ports_.guard(rt::Guard::excitation);
+    ports_.rig.commanded(steady ? settings_.loop.table_g : 0, excited_deg_);
+    ports_.rig.guard(rt::Guard::excitation);
 }
 
 Time Campaign::check_loop(Time now) {
     rt::Motion motion;
     while (take_motion(motion, now)) loop_->add(motion);
     const Time since = now - entered_;
-    const auto reading = ports_.shaker.reading();
+    const auto reading = ports_.rig.shaker.reading();
     if (now - last_motion_ > kCheckSilence) {
         abort("samples ceased", now);
     } else if (auto why = platform_lacks(now); !why.empty()) {
@@ -111,10 +124,10 @@ Time Campaign::check_loop(Time now) {
         prove_refusals(now);
     } else if (check_ == Check::measure && since >= from_seconds(settings_.loop.measure_s)) {
         loop_->finish(reading.measured_g);
-        if (ports_.loop_checked) ports_.loop_checked(armed_by_, loop_->out_of_band());
+        ports_.log.loop_checked(armed_by_, loop_->out_of_band());
         if (loop_->out_of_band().empty()) {
             proof_.record().transmission = loop_->transmission();
-            if (ports_.transmission) ports_.transmission(loop_->transmission());
+            ports_.rig.transmission(loop_->transmission());
         }
         proof_.row("loop check in band", loop_->out_of_band().empty());
         for (const auto& row : loop_->status().rows) {  // the ratios
@@ -141,12 +154,12 @@ void Campaign::ramp_for_check(Check then, Time now) {
     if (!requested_) {
         requested_ = ask_level(settings_.loop.table_g, now);
         if (!requested_) abort("the shaker takes no set-point", now);
-    } else if (!ports_.shaker.busy() &&
-               vibrating_as_commanded(ports_.shaker.reading(), settings_.loop.table_g)) {
+    } else if (!ports_.rig.shaker.busy() &&
+               vibrating_as_commanded(ports_.rig.shaker.reading(), settings_.loop.table_g)) {
         go_on_to(then, now);
     } else if (now - entered_ > from_seconds(settings_.ramp_s) + kRampGrace) {
         abort(fmt::format("shaker: measured {:.3f} g, expected {:g} g",
-                          ports_.shaker.reading().measured_g, settings_.loop.table_g),
+                          ports_.rig.shaker.reading().measured_g, settings_.loop.table_g),
               now);
     }
 }
@@ -159,15 +172,16 @@ void Campaign::conclude_loop_check(Time now) {
     enter(State::idle, now);
     const auto& found = loop_->status();
     for (const auto& row : found.rows) {
-        ports_.event(Severity::info, fmt::format("loop check: {} {:.4g}{}{}, band {:.4g} to {:.4g}",
-                                                 row.name, row.value, *row.unit == '\0' ? "" : " ",
-                                                 row.unit, row.low, row.high));
+        ports_.log.event(
+            Severity::info,
+            fmt::format("loop check: {} {:.4g}{}{}, band {:.4g} to {:.4g}", row.name, row.value,
+                        *row.unit == '\0' ? "" : " ", row.unit, row.low, row.high));
     }
     if (found.message.empty()) {
-        ports_.event(Severity::info, "loop check in band");
+        ports_.log.event(Severity::info, "loop check in band");
     } else {
-        ports_.event(Severity::alarm,
-                     "loop check out of band, no campaign is armed: " + found.message);
+        ports_.log.event(Severity::alarm,
+                         "loop check out of band, no campaign is armed: " + found.message);
     }
 }
 

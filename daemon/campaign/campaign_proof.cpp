@@ -17,10 +17,10 @@ using drivers::Time;
 using drivers::to_seconds;
 
 namespace {
-// How long a person has to press the emergency stop, and then to close its chain again.
+// A person's time, not the rig's: how long there is to press the emergency stop, and then to close
+// its chain again.
 constexpr Time kPress = 60 * drivers::kSecond;
-// From the fall of the table to the register, and how long nothing may start with the chain closed.
-constexpr double kSeen_s = 0.5;
+// How long nothing may start with the chain closed.
 constexpr Time kClosed = 3 * drivers::kSecond;
 // What is called rest has to be so many times the noise.
 constexpr double kNoises = 6;
@@ -45,7 +45,7 @@ void StopTimes::look(const drivers::ShakerReading& reading, const rt::Rest& rest
 }
 
 std::string Campaign::may_slew() const {
-    const auto reading = ports_.shaker.reading();
+    const auto reading = ports_.rig.shaker.reading();
     if (!reading.at_rest() || stop_.stopping())
         return fmt::format(
             "gimbals slew at rest only: the shaker is in state {}, measured {:.3f} g",
@@ -71,11 +71,12 @@ void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
     stop_.pads(proof_.pads());
     // The witnesses go on with what was measured; a key that has changed since asks for a new one.
     const auto transmission = proof_.transmission();
-    if (!transmission || !ports_.transmission) return;
-    ports_.transmission(*transmission);
-    ports_.event(Severity::info, fmt::format("transmission {:.4g}, as the loop check of the newest "
-                                             "proof measured it",
-                                             *transmission));
+    if (!transmission) return;
+    ports_.rig.transmission(*transmission);
+    ports_.log.event(Severity::info,
+                     fmt::format("transmission {:.4g}, as the loop check of the newest "
+                                 "proof measured it",
+                                 *transmission));
 }
 
 void Campaign::order_proved_stop(Time now) {
@@ -88,9 +89,9 @@ void Campaign::order_proved_stop(Time now) {
 
 /// Rest by order: when all who can tell have said so, or the stop monitor has given up.
 void Campaign::prove_stop(Time now) {
-    stop_times_.look(ports_.shaker.reading(), stop_.rest(now));
+    stop_times_.look(ports_.rig.shaker.reading(), stop_.rest(now));
     if (stop_.disobeyed()) return abort("a stop was not obeyed in its time", now);
-    if (const auto reading = ports_.shaker.reading();
+    if (const auto reading = ports_.rig.shaker.reading();
         reading.valid && reading.time > stop_times_.from() && reading.fault != 0) {
         return abort(fmt::format("the order to stop was not obeyed: the controller has stopped by "
                                  "itself with fault {:#06x}, its watchdog is not fed meanwhile",
@@ -117,20 +118,18 @@ std::string Campaign::suspect_unit() const {
     return suspect.empty() ? "" : fmt::format("; {:.2f} times the command: {}", ratio, suspect);
 }
 
-void Campaign::proving(Proving what) {
-    if (ports_.proving) ports_.proving(what);
-}
+void Campaign::proving(Proving what) { ports_.rig.proving(what); }
 
 /// The one fault that is made on purpose: the watchdog is not fed.
 void Campaign::prove_watchdog(Time now) {
     if (!std::exchange(requested_, true)) {
-        ports_.event(Severity::warning,
-                     fmt::format("proof: the watchdog is not fed now; the table has to stop by "
-                                 "itself within {:g} s",
-                                 settings_.watchdog_timeout_s + settings_.stop.deadline_s));
+        ports_.log.event(Severity::warning,
+                         fmt::format("proof: the watchdog is not fed now; the table has to stop by "
+                                     "itself within {:g} s",
+                                     settings_.watchdog_timeout_s + settings_.stop.deadline_s));
         stop_times_.begin(now);
     }
-    const auto reading = ports_.shaker.reading();
+    const auto reading = ports_.rig.shaker.reading();
     const auto rest = stop_.rest(now);
     stop_times_.look(reading, rest);
     const double waited_s = to_seconds(now - stop_times_.from());
@@ -159,7 +158,7 @@ void Campaign::prove_watchdog(Time now) {
 }
 
 void Campaign::prove_clearing(Time now) {
-    const auto reading = ports_.shaker.reading();
+    const auto reading = ports_.rig.shaker.reading();
     const bool cleared =
         !stop_.stopping() && reading.time > entered_ && reading.at_rest() && reading.fault == 0;
     if (!cleared && now - entered_ <= from_seconds(2 * stop_.longest_s(settings_.loop.table_g)))
@@ -170,11 +169,13 @@ void Campaign::prove_clearing(Time now) {
 
 /// The hard-wired stop. Its opening trips as ever; on_trip() finds it here.
 void Campaign::prove_emergency_stop(Time now) {
-    if (!std::exchange(requested_, true))
-        ports_.event(Severity::warning, fmt::format("proof: press the emergency stop now, within "
-                                                    "{:.0f} s",
-                                                    to_seconds(kPress)));
-    if (now - entered_ > kPress) abort("nobody pressed the emergency stop", now);
+    if (!std::exchange(requested_, true)) {
+        asked_wall_ = ports_.log.wall();
+        ports_.log.event(Severity::warning,
+                         fmt::format("proof: press the emergency stop{} now, within {:.0f} s",
+                                     proof_.named_button(), to_seconds(kPress)));
+    }
+    if (ports_.log.wall() - asked_wall_ > kPress) abort("nobody pressed the emergency stop", now);
 }
 
 /// The opened chain has tripped: whether it was seen in time, by the table's own fall.
@@ -186,13 +187,14 @@ void Campaign::begin_pressed(Time now) {
     press_felt_ = false;
     stop_times_.begin(now);
     const Time fell = loop_->last_at_half();
-    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0, kSeen_s);
+    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0,
+               settings_.proof.seen_s);
 }
 
 /// After the trip: those who can tell, the button's own latch, and that closing the chain starts
 /// nothing.
 void Campaign::await_pressed(Time now) {
-    const auto reading = ports_.shaker.reading();
+    const auto reading = ports_.rig.shaker.reading();
     const auto rest = stop_.rest(now);
     if (pressed_ == Pressed::rest) {
         stop_times_.look(reading, rest);
@@ -207,12 +209,12 @@ void Campaign::await_pressed(Time now) {
         proof_.row("emergency stop, the controller says fault", press_felt_);
         proof_.record().emergency_stop = true;
         pressed_ = Pressed::open;
-        pressed_at_ = now;
+        asked_wall_ = ports_.log.wall();
         if (reading.emergency_stop_open)
-            ports_.event(Severity::warning, "proof: close the emergency-stop chain again");
+            ports_.log.event(Severity::warning, "proof: close the emergency-stop chain again");
     }
     if (pressed_ == Pressed::open) {
-        if (now - pressed_at_ > kPress)
+        if (ports_.log.wall() - asked_wall_ > kPress)
             return end_pressed("nobody closed the emergency-stop chain again");
         if (!reading.valid || reading.emergency_stop_open) return;
         pressed_ = Pressed::closed;
@@ -243,7 +245,7 @@ void Campaign::prove_refusals(Time now) {
     const auto tried = command({CommandRequest::Kind::arm, proof_.record().by, ""}, now);
     proof_.row("arming is refused while it moves", !tried.accepted);
     proof_.row("a slew is refused while it moves", !may_slew().empty());
-    const bool taken = ports_.shaker.request(
+    const bool taken = ports_.rig.shaker.request(
         {settings_.frequency_hz + 1, settings_.loop.table_g, settings_.ramp_s}, armed_under_);
     proof_.row("another frequency is refused while it moves", !taken);
 }
@@ -253,17 +255,17 @@ void Campaign::conclude_proof(const std::string& why) {
     const auto& record = proof_.conclude(utc_ns(), why);
     if (record.passed) stop_.pads(record.pads);
     for (const auto& row : record.rows) {
-        ports_.event(
+        ports_.log.event(
             row.passed() ? Severity::info : Severity::alarm,
             fmt::format("proof: {} {:.4g}{}{}, expected {:.4g} to {:.4g}", row.name, row.value,
                         row.unit.empty() ? "" : " ", row.unit, row.low, row.high));
     }
-    ports_.event(record.passed ? Severity::info : Severity::alarm,
-                 record.passed ? "the safe state is proved"
-                               : "the safe state is not proved: " + record.message);
+    ports_.log.event(record.passed ? Severity::info : Severity::alarm,
+                     record.passed ? "the safe state is proved"
+                                   : "the safe state is not proved: " + record.message);
     if (const auto trend = proof_.trend(); !trend.empty())
-        ports_.event(Severity::warning, "proof: " + trend);
-    if (ports_.proved) ports_.proved(record);
+        ports_.log.event(Severity::warning, "proof: " + trend);
+    ports_.log.proved(record);
 }
 
 }  // namespace vibrig::campaign

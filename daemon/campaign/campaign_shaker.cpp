@@ -15,10 +15,10 @@ using State = CampaignState;
 
 /// A stop of this thread's own does not end the arming.
 void Campaign::stop_shaker() {
-    ports_.shaker.stop_now();
+    ports_.rig.shaker.stop_now();
     ++armed_under_;
     asked_g_ = 0;
-    tell_ramp(0, ports_.shaker.reading().time);
+    tell_ramp(0, ports_.rig.shaker.reading().time);
 }
 
 double Campaign::highest_level() const {
@@ -28,7 +28,8 @@ double Campaign::highest_level() const {
 
 bool Campaign::ask_level(double table_g, Time now) {
     stop_.excited(table_g);
-    if (!ports_.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s}, armed_under_))
+    if (!ports_.rig.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s},
+                                   armed_under_))
         return false;
     tell_ramp(table_g, now);
     return true;
@@ -37,15 +38,14 @@ bool Campaign::ask_level(double table_g, Time now) {
 void Campaign::tell_ramp(double table_g, Time now) {
     const double start_g = std::exchange(asked_g_, table_g);
     asked_at_ = now;
-    if (!ports_.ramping) return;
     const RigFrame frame(settings_.rig);
-    ports_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
-                    state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
+    ports_.rig.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
+                        state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
 }
 
 void Campaign::order_stop(const std::string& by) {
     stopped_by_ = by;
-    ports_.shaker.stop_now();
+    ports_.rig.shaker.stop_now();
 }
 
 void Campaign::watch_stop(Time now) {
@@ -57,30 +57,30 @@ void Campaign::watch_stop(Time now) {
         case StopMonitor::News::none:
             return;
         case StopMonitor::News::uncommanded:
-            ports_.event(Severity::trip, "motion without a command: " + stop_.what_moves(now));
-            if (ports_.uncommanded) ports_.uncommanded();
+            ports_.log.event(Severity::trip, "motion without a command: " + stop_.what_moves(now));
+            ports_.rig.uncommanded();
             return;
         case StopMonitor::News::confirmed:
-            if (ports_.disobeyed) ports_.disobeyed(false);
-            return ports_.event(Severity::info,
-                                fmt::format("stop confirmed: rest measured {:.2f} s after the "
-                                            "order ({})",
-                                            stop_.took_s(), stopped_by_));
+            ports_.rig.disobeyed(false);
+            return ports_.log.event(Severity::info,
+                                    fmt::format("stop confirmed: rest measured {:.2f} s after the "
+                                                "order ({})",
+                                                stop_.took_s(), stopped_by_));
         case StopMonitor::News::disobeyed: {
             const auto what =
                 fmt::format("stop not obeyed within {:.1f} s ({}): {}: press the emergency stop",
                             stop_.took_s(), stopped_by_, stop_.what_moves(now));
-            ports_.event(Severity::trip, what);
+            ports_.log.event(Severity::trip, what);
             if (state_ == State::tripped) reason_ += "; " + what;
-            if (ports_.disobeyed) ports_.disobeyed(true);
+            ports_.rig.disobeyed(true);
         }
     }
 }
 
 /// Ramps down; true once rest is measured.
 bool Campaign::come_to_rest(Time now) {
-    const auto reading = ports_.shaker.reading();
-    if (!ports_.shaker.busy() && !stop_.stopping() && reading.at_rest() &&
+    const auto reading = ports_.rig.shaker.reading();
+    if (!ports_.rig.shaker.busy() && !stop_.stopping() && reading.at_rest() &&
         reading.time > entered_ && stop_.rest(now).measured_since(entered_)) {
         stop_.at_rest();
         return true;
@@ -98,7 +98,7 @@ bool Campaign::come_to_rest(Time now) {
         now - entered_ > from_seconds(settings_.ramp_s + settings_.stop.deadline_s)) {
         stop_sent_ = true;
         if (shutting_down_) {
-            ports_.event(Severity::alarm, "shaker did not come to rest in time: stop ordered");
+            ports_.log.event(Severity::alarm, "shaker did not come to rest in time: stop ordered");
             order_stop("the ramp down took too long");
         } else {
             abort("the shaker did not come to rest in time", now);

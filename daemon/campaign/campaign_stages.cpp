@@ -75,7 +75,7 @@ StageTimes stage_times(const Settings& settings) {
         const double before_s = 180 / settings.zero.slew_deg_per_s + times.levelling_s;
         times.closing_s =
             ZeroingStage(settings.zero, settings.rig, settings.sample_s).expected_s() +
-            (settings.zero.both_ways ? 2 : 1) * before_s;
+            static_cast<double>(ways_of(settings.zero).size()) * before_s;
     }
     return times;
 }
@@ -96,17 +96,17 @@ void Campaign::make_stages() {
     gravity_ = std::make_shared<GravityWatch>(
         settings_.rig, GravityLimits{.refused_deg = settings_.gravity_refused_deg});
     loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
-    if (settings_.levelling && ports_.torquer != nullptr && ports_.feed != nullptr) {
+    if (settings_.levelling && ports_.rig.torquer != nullptr && ports_.rig.feed != nullptr) {
         level_ = std::make_shared<LevellingStage>(settings_.level, settings_.rig,
-                                                  settings_.sample_s, ports_.torquer->limit());
+                                                  settings_.sample_s, ports_.rig.torquer->limit());
     }
-    if (settings_.zeroing && ports_.feed != nullptr)
+    if (settings_.zeroing && ports_.rig.feed != nullptr)
         zero_ = std::make_shared<ZeroingStage>(settings_.zero, settings_.rig, settings_.sample_s);
     make_opening();
 }
 
 std::string Campaign::platform_lacks(Time now) const {
-    const auto platform = ports_.platform();
+    const auto platform = ports_.rig.platform();
     if (platform_is_silent(platform, now)) return "no platform status on the bus";
     if (platform.fault) return "platform fault";
     if (!platform.ready || !platform.gyros_at_speed) return "platform not ready";
@@ -115,7 +115,7 @@ std::string Campaign::platform_lacks(Time now) const {
 }
 
 Time Campaign::wait_for_platform(Time now) {
-    const auto platform = ports_.platform();
+    const auto platform = ports_.rig.platform();
     if (temperatures_.empty() || platform.time > temperatures_.back().first) {
         if (platform.time > 0) temperatures_.emplace_back(platform.time, platform.temperature_c);
     }
@@ -142,61 +142,62 @@ Time Campaign::wait_for_platform(Time now) {
 }
 
 bool Campaign::take_motion(rt::Motion& motion, Time now) {
-    if (!ports_.feed->pop(motion)) return false;
+    if (!ports_.rig.feed->pop(motion)) return false;
     last_motion_ = now;
     return true;
 }
 
 bool Campaign::torquing() const {
-    return ports_.feed != nullptr && ports_.feed->knows_torque() && ports_.feed->torque().torquing;
+    return ports_.rig.feed != nullptr && ports_.rig.feed->knows_torque() &&
+           ports_.rig.feed->torque().torquing;
 }
 
 void Campaign::leave_stage() {
-    if (ports_.feed != nullptr) ports_.feed->order(rt::StageFeed::Mode::off);
-    if (ports_.torquer != nullptr && !ports_.torquer->zero())
-        static_cast<void>(ports_.torquer->command({}));
+    if (ports_.rig.feed != nullptr) ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    if (ports_.rig.torquer != nullptr && !ports_.rig.torquer->zero())
+        static_cast<void>(ports_.rig.torquer->command({}));
 }
 
 void Campaign::insist_on_zero_torque(Time now) {
-    if (ports_.torquer == nullptr || state_ == State::levelling) return;
-    if (ports_.torquer->zero() && !(active() && torquing())) return;
+    if (ports_.rig.torquer == nullptr || state_ == State::levelling) return;
+    if (ports_.rig.torquer->zero() && !(active() && torquing())) return;
     if (now - torque_sent_ < kStagePoll) return;
     torque_sent_ = now;
-    static_cast<void>(ports_.torquer->command({}));
+    static_cast<void>(ports_.rig.torquer->command({}));
 }
 
 void Campaign::begin_zeroing(bool at_end, Time now) {
     zeroing_ = at_end ? Zeroing::end : Zeroing::start;
     part_ = Part::go;
     zero_->begin();
-    ports_.event(Severity::info,
-                 at_end ? "accelerometer zeros again" : "accelerometer zeros by azimuth slews");
+    ports_.log.event(Severity::info,
+                     at_end ? "accelerometer zeros again" : "accelerometer zeros by azimuth slews");
     enter(State::zeroing, now);
 }
 
 Time Campaign::zeroing(Time now) {
-    if (!ports_.shaker.reading().at_rest()) {
+    if (!ports_.rig.shaker.reading().at_rest()) {
         abort("the shaker left rest while the accelerometer zeros were taken", now);
         return now;
     }
     if (part_ == Part::go) {
-        ports_.gimbal.slew_to(zero_->target_deg(), now);
+        ports_.rig.gimbal.slew_to(zero_->target_deg(), now);
         part_ = Part::slew;
     }
-    const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
+    const auto gimbal = ports_.rig.gimbal.update(ports_.rig.platform(), now);
     if (gimbal == drivers::GimbalState::timed_out || gimbal == drivers::GimbalState::no_status) {
         return fail_zeroing(fmt::format("gimbals: {}", drivers::name_of(gimbal)), now);
     }
     const bool there = gimbal == drivers::GimbalState::in_position;
     if (part_ == Part::slew && there && level_ && !zero_->levelled()) {
-        ports_.gimbal.release(now);
+        ports_.rig.gimbal.release(now);
         part_ = Part::go;
         enter(State::levelling, now);
     } else if (part_ == Part::slew && there) {
-        ports_.feed->order(rt::StageFeed::Mode::increments);
+        ports_.rig.feed->order(rt::StageFeed::Mode::increments);
         last_motion_ = now;
         zero_->arrived();
-        ports_.gimbal.slew_to(zero_->target_deg(), now, true);
+        ports_.rig.gimbal.slew_to(zero_->target_deg(), now, true);
         part_ = Part::measure;
     } else if (part_ == Part::measure) {
         rt::Motion motion;
@@ -208,15 +209,15 @@ Time Campaign::zeroing(Time now) {
         }
         if (there) {
             zero_->arrived();
-            ports_.gimbal.slew_to(zero_->target_deg(), now, true);
+            ports_.rig.gimbal.slew_to(zero_->target_deg(), now, true);
         }
     }
-    return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
+    return std::min(ports_.rig.gimbal.next_deadline(), now + kStagePoll);
 }
 
 Time Campaign::end_zeroing(Time now) {
     if (zero_->another()) {
-        ports_.feed->order(rt::StageFeed::Mode::off);
+        ports_.rig.feed->order(rt::StageFeed::Mode::off);
         zero_->begin_other_way();
         part_ = Part::go;
         return now;
@@ -224,7 +225,7 @@ Time Campaign::end_zeroing(Time now) {
     leave_stage();
     if (const auto failure = zero_->finish(zeroing_ == Zeroing::end); !failure.empty())
         return fail_zeroing(failure, now);
-    ports_.event(Severity::info, zero_->words());
+    ports_.log.event(Severity::info, zero_->words());
     if (zeroing_ == Zeroing::end) {
         mark_ = zero_->status().mark;
         leave_zeroing(now);
@@ -250,8 +251,8 @@ Time Campaign::fail_zeroing(const std::string& why, Time now) {
 void Campaign::leave_zeroing(Time now) {
     zeroing_ = Zeroing::none;
     leave_stage();
-    ports_.gimbal.release(now);
-    if (!mark_.empty()) ports_.event(Severity::alarm, "campaign marked: " + mark_);
+    ports_.rig.gimbal.release(now);
+    if (!mark_.empty()) ports_.log.event(Severity::alarm, "campaign marked: " + mark_);
     finish(now);
 }
 
@@ -263,21 +264,21 @@ Time Campaign::fail_levelling(const std::string& why, Time now) {
 }
 
 Time Campaign::levelling(Time now) {
-    if (!ports_.shaker.reading().at_rest()) {
+    if (!ports_.rig.shaker.reading().at_rest()) {
         abort("the shaker left rest while the platform was levelled", now);
         return now;
     }
-    const auto gimbal = ports_.gimbal.update(ports_.platform(), now);
+    const auto gimbal = ports_.rig.gimbal.update(ports_.rig.platform(), now);
     if (part_ == Part::go) {
         if (gimbal == drivers::GimbalState::commanding)
-            return std::min(ports_.gimbal.next_deadline(), now + kStagePoll);
+            return std::min(ports_.rig.gimbal.next_deadline(), now + kStagePoll);
         if (gimbal != drivers::GimbalState::idle) {
             return fail_levelling(fmt::format("gimbals not released: {}", drivers::name_of(gimbal)),
                                   now);
         }
         level_->begin(for_zeroing() ? zero_->target_deg() : here().stop.position_deg,
                       zero_ ? zero_->status() : ZeroStatus{});
-        ports_.feed->order(rt::StageFeed::Mode::force);
+        ports_.rig.feed->order(rt::StageFeed::Mode::force);
         last_motion_ = now;
         part_ = Part::measure;
     }
@@ -293,28 +294,28 @@ Time Campaign::levelling(Time now) {
         if (const auto why = level_->failure(); !why.empty()) return fail_levelling(why, now);
         if (level_->done()) {
             leave_stage();
-            ports_.event(Severity::info, level_->words());
-            if (ports_.levelled && !for_zeroing()) {
+            ports_.log.event(Severity::info, level_->words());
+            if (!for_zeroing()) {
                 auto drift = level_->drift(level_angle_rad_);
                 drift.run = here().run;
                 drift.position = here().position;
-                ports_.levelled(drift);
+                ports_.dwells.levelled(drift);
             }
             part_ = Part::zero;
             torque_sent_ = zero_since_ = now;
             return now + kStagePoll;
         }
-        if (any) static_cast<void>(ports_.torquer->command(rate));
+        if (any) static_cast<void>(ports_.rig.torquer->command(rate));
         if (now - last_motion_ > kSilence)
             return fail_levelling("no specific force on the bus for 1 s", now);
         return now + kStagePoll;
     }
     // A dwell is free drift: it begins only when the platform itself says that nothing is torqued.
-    const auto torque = ports_.feed->torque();
+    const auto torque = ports_.rig.feed->torque();
     const bool confirmed =
-        !ports_.feed->knows_torque() ||
-        (torque.time > zero_since_ && !torque.torquing && torque.echo == ports_.torquer->counter());
-    if (ports_.torquer->zero() && confirmed) {
+        !ports_.rig.feed->knows_torque() || (torque.time > zero_since_ && !torque.torquing &&
+                                             torque.echo == ports_.rig.torquer->counter());
+    if (ports_.rig.torquer->zero() && confirmed) {
         if (for_zeroing()) zero_->levelled_at(level_angle_rad_);
         part_ = Part::go;
         enter(for_zeroing() ? State::zeroing : State::ramping, now);
@@ -326,7 +327,7 @@ Time Campaign::levelling(Time now) {
     }
     if (now - torque_sent_ >= kStagePoll) {
         torque_sent_ = now;
-        static_cast<void>(ports_.torquer->command({}));
+        static_cast<void>(ports_.rig.torquer->command({}));
     }
     return now + kStagePoll / 2;
 }

@@ -20,11 +20,11 @@ void Campaign::fill(StatusData& status, Time now) const {
     status.armed_by = armed_by_;
     status.started_by = started_by_;
     status.armed_for = armed_by_.empty() ? std::string() : armed_for_;
-    status.arming_left_s =
-        state_ == State::armed
-            ? std::max(settings_.arming_valid_s - drivers::to_seconds(ports_.wall() - armed_wall_),
-                       1e-3)
-            : 0;
+    status.arming_left_s = state_ == State::armed
+                               ? std::max(settings_.arming_valid_s -
+                                              drivers::to_seconds(ports_.log.wall() - armed_wall_),
+                                          1e-3)
+                               : 0;
     status.resume_offer = resume_offer();
     status.runs = static_cast<int>(runs());
     status.positions = static_cast<int>(positions());
@@ -39,8 +39,8 @@ void Campaign::fill(StatusData& status, Time now) const {
     fill_stages(status);
     proof_.fill(status.proof, utc_ns());
     const bool press = state_ == State::checking && check_ == Check::press && requested_;
-    const bool close = pressed_ == Pressed::open && ports_.shaker.reading().emergency_stop_open;
-    status.proof.asks = press   ? "press the emergency stop now"
+    const bool close = pressed_ == Pressed::open && ports_.rig.shaker.reading().emergency_stop_open;
+    status.proof.asks = press   ? "press the emergency stop" + proof_.named_button() + " now"
                         : close ? "close the emergency-stop chain again"
                                 : "";
     fill_rest(status, now);

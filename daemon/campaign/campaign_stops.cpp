@@ -91,9 +91,9 @@ bool Campaign::repeat_stop(std::size_t of, const std::string& why) {
     const int number = static_cast<int>(stops_.size()) + 1;
     stops_.insert(stops_.begin() + static_cast<std::ptrdiff_t>(at_), {stop.stop, stop.run, number});
     expected_ = stops_.size();
-    ports_.event(Severity::warning,
-                 fmt::format("run {} position {} is repeated, as position {}: {}", stop.run,
-                             stop.position, number, why));
+    ports_.log.event(Severity::warning,
+                     fmt::format("run {} position {} is repeated, as position {}: {}", stop.run,
+                                 stop.position, number, why));
     return true;
 }
 
@@ -104,11 +104,12 @@ void Campaign::repeat_doubted() {
         return stop.run == doubt.run && stop.position == doubt.position;
     });
     if (named - stops_.begin() >= static_cast<std::ptrdiff_t>(at_)) {
-        ports_.event(Severity::warning, "it goes on, there is no dwell to repeat: " + doubt.why);
+        ports_.log.event(Severity::warning,
+                         "it goes on, there is no dwell to repeat: " + doubt.why);
     } else if (!repeat_stop(static_cast<std::size_t>(named - stops_.begin()), doubt.why)) {
-        ports_.event(Severity::warning,
-                     fmt::format("it goes on, run {} position {} was repeated before: {}",
-                                 doubt.run, doubt.position, doubt.why));
+        ports_.log.event(Severity::warning,
+                         fmt::format("it goes on, run {} position {} was repeated before: {}",
+                                     doubt.run, doubt.position, doubt.why));
     }
 }
 
@@ -133,16 +134,16 @@ Campaign::Choice Campaign::choose_next(Time now) {
     if (poor && repeats_ < kMostRepeats && in_time) {
         ++repeats_;
         const Stop again = stops_[at_ - 1].stop;
-        ports_.event(Severity::warning, "flagged dwell: the position is repeated");
+        ports_.log.event(Severity::warning, "flagged dwell: the position is repeated");
         add_stop(again);
         expected_ = std::max(expected_, stops_.size());
         return Choice::more;
     }
     const auto here = begun ? stops_[at_ - 1].stop.position_deg : std::array<double, 3>{};
-    const auto next = ports_.next(here, used_s(now));
+    const auto next = ports_.dwells.next(here, used_s(now));
     if (!next) return Choice::thinking;
     repeats_ = 0;
-    ports_.event(Severity::info, next->words);
+    ports_.log.event(Severity::info, next->words);
     if (!next->more) {
         expected_ = stops_.size();
         return Choice::end;
@@ -154,17 +155,15 @@ Campaign::Choice Campaign::choose_next(Time now) {
 CommandReply Campaign::resume_interrupted(const CommandRequest& request, Time now) {
     if (state_ != State::armed) return {false, "not armed: a named person arms it first"};
     if (const auto why = not_fit_to_excite(now); !why.empty()) return {false, why};
-    if (!ports_.estimator_free()) return {false, "the last dwell is still being closed"};
-    if (ports_.resume_gate) {
-        if (const auto why = ports_.resume_gate(); !why.empty())
-            return {false, "not consistent with the campaign so far: " + why};
-    }
+    if (!ports_.dwells.free()) return {false, "the last dwell is still being closed"};
+    if (const auto why = ports_.dwells.resume_gate(); !why.empty())
+        return {false, "not consistent with the campaign so far: " + why};
     const std::string what = resume_offer();
-    if (ports_.resume) ports_.resume(request.by);
+    ports_.dwells.resume(request.by);
     begin(request.by, now);
     const std::string text =
         "campaign resumed: " + what + (started_by_ == armed_by_ ? "" : ", armed by " + armed_by_);
-    ports_.event(Severity::info, fmt::format("{} by {}", text, request.by));
+    ports_.log.event(Severity::info, fmt::format("{} by {}", text, request.by));
     return {true, text};
 }
 
@@ -183,6 +182,13 @@ void Campaign::take_over_origin() {
     const Time least = drivers::from_seconds(settings_.dwell_s);
     const Time since = dwell_utc_ns_ - offered_last_->begun_utc_ns;
     *origin_ -= before + std::max(since, least);
+}
+
+/// Gyros run down when they lose their power, between two dwells or while the daemon is away: what
+/// the bias does then no walk tells.
+void Campaign::watch_power() {
+    const auto platform = ports_.rig.platform();
+    power_lost_ = power_lost_ || (platform.time > 0 && !platform.gyros_at_speed);
 }
 
 bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops) {

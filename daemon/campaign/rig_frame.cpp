@@ -41,21 +41,25 @@ std::array<Vector, 2> RigFrame::north_east_at_deg(const Vector& encoder_deg) con
     return axes;
 }
 
-double RigFrame::azimuth(const Vector& encoder_rad) const {
+double RigFrame::azimuth(const Vector& encoder_rad, int upright) const {
     const estimator::Kinematics kinematics(settings_);
     const auto pose = kinematics.pose(kinematics.gimbal_angles(encoder_rad));
     // North is the axis before `up`, east the one after it; turning `up` over turns east over too.
-    const int axis = settings_.up.axis;
+    const int axis = settings_.up.axis, row = (upright + 1) % 3;
     const double elevation = kRadPerDeg * settings_.elevation_deg;
-    const double north = std::cos(elevation) * pose.c(0, (axis + 2) % 3) -
-                         std::sin(elevation) * settings_.up.sign * pose.c(0, axis);
-    const double east = settings_.up.sign * pose.c(0, (axis + 1) % 3);
+    const double north = std::cos(elevation) * pose.c(row, (axis + 2) % 3) -
+                         std::sin(elevation) * settings_.up.sign * pose.c(row, axis);
+    const double east = settings_.up.sign * pose.c(row, (axis + 1) % 3);
     const double from_north = std::atan2(east, north) + kRadPerDeg * settings_.azimuth_deg;
     return std::remainder(0.5 * estimator::kPi - from_north, 2 * estimator::kPi);
 }
 
 Vector RigFrame::azimuth_vertical_deg(double azimuth_deg, bool down) const {
     return estimator::azimuth_upright_deg(settings_, azimuth_deg, down);
+}
+
+Vector RigFrame::inner_vertical_deg(double inner_deg, bool down) const {
+    return estimator::inner_upright_deg(settings_, inner_deg, down);
 }
 
 Vector RigFrame::force(const Vector& raw, double one) const {

@@ -20,11 +20,14 @@ class RigFrame {
     [[nodiscard]] Vector up_at_deg(const Vector& encoder_deg) const;
     /// The rig's north and east axes in platform axes at these encoder angles.
     [[nodiscard]] std::array<Vector, 2> north_east_at_deg(const Vector& encoder_deg) const;
-    /// Azimuth of platform x from true east, positive about up, rad.
-    [[nodiscard]] double azimuth(const Vector& encoder_rad) const;
+    /// Azimuth from true east, positive about up, rad, of the platform axis after the `upright`
+    /// one: of x where z is upright.
+    [[nodiscard]] double azimuth(const Vector& encoder_rad, int upright = 2) const;
     /// Encoder angles with the azimuth axis vertical, platform z up or down, and this turn of the
     /// azimuth gimbal. Throws estimator::SettingsError where the gimbals cannot do that.
     [[nodiscard]] Vector azimuth_vertical_deg(double azimuth_deg, bool down) const;
+    /// The same with the inner gimbal's axis vertical, platform y up or down.
+    [[nodiscard]] Vector inner_vertical_deg(double inner_deg, bool down) const;
 
     /// Raw specific force to platform axes, the configuration's zeros taken off in proportion to
     /// `one` (1 for a force in g).

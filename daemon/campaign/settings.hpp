@@ -54,6 +54,8 @@ struct ZeroingSettings {
     /// z down too: the zeros apart from what an accelerometer shows of 1 g along z, by misalignment
     /// or scale.
     bool both_ways = true;
+    /// Platform y up and down too, slewed by the inner gimbal: the same where z cannot be down.
+    bool second_axis = false;
     double scale_factor = 1e-4;  ///< of the accelerometers, not known better, 1 sigma
     /// How still the platform stands, 1 sigma at most.
     double velocity_reference_mps = 0.005, position_reference_m = 0.01;
@@ -117,6 +119,7 @@ struct Settings {
     double target_linear = 0;     ///< deg/h/g
     double target_quadratic = 0;  ///< deg/h/g^2
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
+    bool type_prior = false;      ///< it starts from what the archive knows of the unit's type
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
     /// Before the first position; empty: no opening check.

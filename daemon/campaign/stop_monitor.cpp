@@ -85,7 +85,8 @@ bool StopMonitor::late(Time now) const {
     if (waited_s <= settings_.deadline_s) return false;
     const auto measured = rest(now);
     if (controller_moves(shaker_.reading())) return true;
-    if (excited() ? not_at_rest(measured.table) : moves(measured.table)) return true;
+    const bool table_tells = excited() && !measured.table.doubted;
+    if (table_tells ? not_at_rest(measured.table) : moves(measured.table)) return true;
     if (waited_s <= longest_s(level_g_)) return false;
     return excited() ? not_at_rest(measured.platform) : moves(measured.platform);
 }
@@ -114,7 +115,9 @@ std::string StopMonitor::what_moves(Time now) const {
         if (witness.verdict == RestVerdict::moving)
             add(fmt::format("{} {:.3f} g rms", name, witness.rms_g));
         if (witness.verdict == RestVerdict::unknown)
-            add(fmt::format("no good accelerometer on the {}", name));
+            add(witness.doubted
+                    ? fmt::format("accelerometer on the {} is doubted, and does not move", name)
+                    : fmt::format("no good accelerometer on the {}", name));
     };
     tell("table", measured.table);
     tell("platform", measured.platform);

@@ -8,6 +8,7 @@
 
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
+#include "estimator/zeros/together.hpp"
 
 namespace vibrig::campaign {
 
@@ -21,17 +22,40 @@ constexpr double kSureness = 3;  // standard deviations
 // The gimbals take the shorter way round, and of half a turn neither way is the shorter: what a
 // slew ends beside its target would decide. 2 deg short of it at either end, it is decided.
 const std::vector<double> kAzimuths_deg{0, 88, -88, 88};
+// The inner gimbal stays well away from where its axis and the outer one's fall together with the
+// azimuth's, at 90 deg.
+const std::vector<double> kInner_deg{0, 60, -60, 60};
 
 }  // namespace
 
-zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
+std::vector<zeros::Way> ways_of(const ZeroingSettings& settings) {
+    std::vector<zeros::Way> ways{{2, false}};
+    if (settings.both_ways) ways.push_back({2, true});
+    if (settings.second_axis) ways.insert(ways.end(), {{1, false}, {1, true}});
+    return ways;
+}
+
+std::vector<Vector> slews_of(const zeros::Way& way, const RigFrame& frame) {
+    std::vector<Vector> slews;
+    if (way.upright == 2) {
+        for (const double angle : kAzimuths_deg)
+            slews.push_back(frame.azimuth_vertical_deg(angle, way.down));
+    } else {
+        for (const double angle : kInner_deg)
+            slews.push_back(frame.inner_vertical_deg(angle, way.down));
+    }
+    return slews;
+}
+
+zeros::CalibrationSettings ZeroingStage::plan(const zeros::Way& way) const {
     zeros::CalibrationSettings s;
     s.site.latitude_rad = kRadian * rig_.latitude_deg;
     s.site.gravity_mps2 = rig_.gravity_mps2;
-    s.plan.targets_deg = kAzimuths_deg;
+    s.plan.targets_deg = way.upright == 2 ? kAzimuths_deg : kInner_deg;
     s.plan.rate_deg_s = settings_.slew_deg_per_s;
     s.plan.duration_s = settings_.duration_s;
-    s.inverted = down;
+    s.upright = way.upright;
+    s.inverted = way.down;
     s.noise.scale_factor = settings_.scale_factor;
     s.noise.misalignment = 0;
     for (const auto& of_axes : rig_.uncertainty.accelerometer_cross)
@@ -51,14 +75,16 @@ zeros::CalibrationSettings ZeroingStage::plan(bool down) const {
 
 ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig,
                            double sample_s)
-    : settings_(settings), rig_(rig), sample_s_(sample_s), frame_(rig) {
-    static_cast<void>(frame_.azimuth_vertical_deg(0, false));
-    const auto s = plan(false);
-    zeros::check_observable(s.plan, s.site);
+    : settings_(settings), rig_(rig), sample_s_(sample_s), frame_(rig), ways_(ways_of(settings)) {
+    for (const zeros::Way& way : ways_) {
+        static_cast<void>(slews_of(way, frame_));
+        const auto s = plan(way);
+        zeros::check_observable(s.plan, s.site);
+    }
 }
 
 std::string ZeroingStage::refusal() const {
-    const auto s = plan(false);
+    const auto s = plan();
     const double sweep_s = s.plan.sweep_s();
     if (sweep_s > settings_.duration_s) {
         return fmt::format(
@@ -104,34 +130,34 @@ std::string ZeroingStage::refusal() const {
 }
 
 void ZeroingStage::begin() {
-    up_result_.reset();
-    start_run(false);
+    results_.clear();
+    way_ = 0;
+    start_run();
 }
 
 void ZeroingStage::begin_other_way() {
-    up_result_ = calibration_->result();
-    start_run(true);
+    results_.push_back(calibration_->result());
+    ++way_;
+    start_run();
 }
 
-void ZeroingStage::start_run(bool down) {
-    down_ = down;
+void ZeroingStage::start_run() {
+    slews_ = slews_of(ways_[way_], frame_);
     target_ = 0;
     level_deg_.reset();
     first_time_ = last_time_ = 0;
     failure_.clear();
-    calibration_.emplace(plan(down));
+    calibration_.emplace(plan(ways_[way_]));
     present_.running = true;
 }
 
 Vector ZeroingStage::target_deg() const {
-    const auto& targets = kAzimuths_deg;
-    const std::size_t n = targets.size();
+    const std::size_t n = slews_.size();
     const std::size_t k = target_ < n ? target_ : n - 2 + (target_ - n) % 2;
-    Vector target = frame_.azimuth_vertical_deg(targets[k], down_);
-    if (level_deg_) {
-        target[0] = (*level_deg_)[0];
-        target[1] = (*level_deg_)[1];
-    }
+    if (!level_deg_) return slews_[k];
+    const std::size_t turning = ways_[way_].upright == 2 ? 2 : 1;
+    Vector target = *level_deg_;
+    target[turning] = slews_[k][turning];
     return target;
 }
 
@@ -148,7 +174,7 @@ void ZeroingStage::add(const rt::Motion& motion) {
     in.time_s = drivers::to_seconds(motion.time);
     in.turn_rad = motion.turn;
     in.velocity_mps = frame_.force(motion.force, rig_.gravity_mps2 * dt);
-    in.azimuth_rad = frame_.azimuth(motion.angle);
+    in.azimuth_rad = frame_.azimuth(motion.angle, ways_[way_].upright);
     if (!motion.good) in.turn_rad[0] = std::nan("");
     static_cast<void>(calibration_->add(in));
 }
@@ -160,34 +186,30 @@ bool ZeroingStage::over() const {
 double ZeroingStage::time_s() const { return drivers::to_seconds(last_time_ - first_time_); }
 
 std::string ZeroingStage::finish(bool at_end) {
-    result_ = calibration_->result();
+    results_.push_back(calibration_->result());
     present_.running = false;
-    const auto problems = [](const zeros::CalibrationResult& r) {
-        std::string text;
-        for (const auto& problem : r.problems) text += (text.empty() ? "" : "; ") + problem;
-        return text;
-    };
-    if (up_result_ && !up_result_->valid) return failure_ = problems(*up_result_);
-    if (!result_.valid) return failure_ = problems(result_);
-    const zeros::CalibrationResult& r = up_result_ ? *up_result_ : result_;
+    for (const zeros::CalibrationResult& run : results_) {
+        if (run.valid) continue;
+        for (const auto& problem : run.problems)
+            failure_ += (failure_.empty() ? "" : "; ") + problem;
+        return failure_;
+    }
     Found found;
     ZeroStatus now;
-    now.covariance_mg2 = r.covariance_mg2;
+    const auto apart = zeros::together(results_);
+    const bool several = results_.size() > 1;
+    found.zero_mg = apart.zero_mg;
+    now.covariance_mg2 = apart.covariance_mg2;
     for (std::size_t i = 0; i < 3; ++i) {
-        found.zero_mg[i] = r.axis[i].zero_mg;
-        found.filter_sigma_mg[i] = r.axis[i].filter_sigma_mg;
-        now.sigma_mg[i] = r.axis[i].sigma_mg;
+        now.sigma_mg[i] = std::sqrt(apart.covariance_mg2[i][i]);
+        // What one run does not tell apart is the same at the end.
+        found.filter_sigma_mg[i] = several ? now.sigma_mg[i] : results_[0].axis[i].filter_sigma_mg;
     }
-    if (up_result_) {
-        const auto apart = zeros::separate(*up_result_, result_);
-        found.zero_mg = apart.zero_mg;
-        now.covariance_mg2 = apart.covariance_mg2;
-        for (std::size_t i = 0; i < 3; ++i)
-            found.filter_sigma_mg[i] = now.sigma_mg[i] = std::sqrt(apart.covariance_mg2[i][i]);
-        now.misalignment = {apart.share[0], apart.share[1]};
-        now.misalignment_sigma = {apart.share_sigma[0], apart.share_sigma[1]};
-        now.scale_z = apart.share[2];
-        now.scale_z_sigma = apart.share_sigma[2];
+    if (several) {
+        now.misalignment = {apart.share[0][2], apart.share[1][2]};
+        now.misalignment_sigma = {apart.share_sigma[0][2], apart.share_sigma[1][2]};
+        now.scale_z = apart.share[2][2];
+        now.scale_z_sigma = apart.share_sigma[2][2];
     }
     now.zero_mg = found.zero_mg;
     now.known = true;
@@ -224,14 +246,15 @@ std::string ZeroingStage::words() const {
         text += fmt::format("{} {} {:+.4f} mg (sigma {:.4f})", i == 0 ? "" : ",", "xyz"[i],
                             last_.zero_mg[i], last_.sigma_mg[i]);
     }
-    if (up_result_) {
+    if (results_.size() > 1) {
         text += fmt::format(
             "; apart from them: misalignment {:+.1f} and {:+.1f} arcsec, scale of z {:+.1f} ppm",
             last_.misalignment[0] / kArcsec, last_.misalignment[1] / kArcsec, 1e6 * last_.scale_z);
     } else {
         text += "; x and y: zero + 1 g x misalignment; z: zero + 1 g x scale error";
     }
-    for (const auto& note : result_.notes) text += "; " + note;
+    for (const auto& run : results_)
+        for (const auto& note : run.notes) text += "; " + note;
     return text;
 }
 
@@ -254,7 +277,7 @@ void ZeroingStage::fill(ZeroStatus& status) const {
     status.message = failure_;
     if (present_.running && calibration_) {
         const auto& trace = calibration_->trace();
-        if (!trace.empty() && !present_.known) {
+        if (!trace.empty() && !present_.known && ways_[way_].upright == 2) {
             status.zero_mg = trace.back().zero_mg;
             status.sigma_mg = trace.back().sigma_mg;
         }

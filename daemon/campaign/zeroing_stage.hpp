@@ -9,8 +9,14 @@
 #include "daemon/domain/status.hpp"
 #include "daemon/rt/stage_feed.hpp"
 #include "estimator/zeros/calibration.hpp"
+#include "estimator/zeros/observability.hpp"
 
 namespace vibrig::campaign {
+
+/// In which the zeros are taken one after the other.
+[[nodiscard]] std::vector<estimator::zeros::Way> ways_of(const ZeroingSettings& settings);
+/// Encoder angles in deg at which the slews of a way end, in turn; the last two are repeated.
+[[nodiscard]] std::vector<Vector> slews_of(const estimator::zeros::Way& way, const RigFrame& frame);
 
 /// One calibration of the accelerometers' zeros by azimuth slews: where the gimbals go next, what
 /// the filter makes of the increments, and the comparison of the end with the start. Control thread
@@ -25,7 +31,8 @@ class ZeroingStage {
     /// none. Runs a simulated unit.
     [[nodiscard]] std::string refusal() const;
     /// What the filter is told of the unit, the slews and the noise.
-    [[nodiscard]] estimator::zeros::CalibrationSettings plan(bool down) const;
+    [[nodiscard]] estimator::zeros::CalibrationSettings plan(
+        const estimator::zeros::Way& way = {}) const;
     void reset() { first_.reset(), present_ = {}; }  ///< a new campaign
     void begin();
     /// Encoder angles to slew to, deg; after the last one of the plan there and back again.
@@ -37,8 +44,8 @@ class ZeroingStage {
     void add(const rt::Motion& motion);
     /// The planned time is over, or the filter has given up.
     [[nodiscard]] bool over() const;
-    /// A second run with z down is to follow.
-    [[nodiscard]] bool another() const { return settings_.both_ways && !down_; }
+    /// A further run is to follow.
+    [[nodiscard]] bool another() const { return way_ + 1 < ways_.size(); }
     void begin_other_way();
     /// Takes the result over; the reason why it is not to be used, else empty.
     [[nodiscard]] std::string finish(bool at_end);
@@ -52,24 +59,24 @@ class ZeroingStage {
     [[nodiscard]] double level_sigma(const Vector& encoder_deg) const;
     void fill(ZeroStatus& status) const;
     [[nodiscard]] double expected_s() const {
-        return settings_.duration_s * (settings_.both_ways ? 2 : 1);
+        return settings_.duration_s * static_cast<double>(ways_.size());
     }
 
   private:
     struct Found {
         Vector zero_mg{}, filter_sigma_mg{};
     };
-    void start_run(bool down);
+    void start_run();
 
     ZeroingSettings settings_;
     estimator::Settings rig_;
     double sample_s_;
     RigFrame frame_;
     std::optional<estimator::zeros::Calibration> calibration_;
-    std::optional<estimator::zeros::CalibrationResult> up_result_;
-    estimator::zeros::CalibrationResult result_;
-    bool down_ = false;
-    std::size_t target_ = 0;
+    std::vector<estimator::zeros::CalibrationResult> results_;  ///< of the runs that are over
+    std::vector<estimator::zeros::Way> ways_;
+    std::vector<Vector> slews_;  ///< of this run
+    std::size_t way_ = 0, target_ = 0;
     std::optional<Vector> level_deg_;  ///< encoder angles of this run
     drivers::Time first_time_ = 0, last_time_ = 0;
     std::optional<Found> first_;  ///< of the campaign's start

@@ -224,13 +224,25 @@ void to_readings(Configuration& c) {
     for (auto& stop : c.campaign.stops) convert(stop.position_deg);
 }
 
-/// A default that depends on another key: zeros both ways where the outer gimbal turns that far.
-void take_the_ways_of_zeroing(Configuration& c) {
+/// Defaults that depend on another key: zeros both ways where the outer gimbal turns that far, else
+/// about a second axis where inner and azimuth gimbal do.
+void take_the_ways_of_zeroing(Configuration& c, bool second_axis_stated) {
     if (!c.campaign.zeroing || c.estimator.up.axis == 0) return;  // refused elsewhere
-    const auto& travel = c.gimbal.travel_deg[0];
-    const double outer_deg = estimator::azimuth_upright_deg(c.estimator, 0, true)[0];
-    c.campaign.zero.both_ways =
-        travel[1] - travel[0] >= 360 || drivers::within_travel(outer_deg, travel).has_value();
+    const auto within = [&c](const std::array<double, 3>& angles, std::size_t gimbals) {
+        for (std::size_t i = 0; i < gimbals; ++i) {
+            const auto& travel = c.gimbal.travel_deg[i];
+            if (travel[1] - travel[0] < 360 && !drivers::within_travel(angles[i], travel))
+                return false;
+        }
+        return true;
+    };
+    auto& zero = c.campaign.zero;
+    zero.both_ways = within(estimator::azimuth_upright_deg(c.estimator, 0, true), 1);
+    if (second_axis_stated || zero.both_ways) return;
+    const auto y = [&](double inner_deg, bool down) {
+        return within(estimator::inner_upright_deg(c.estimator, inner_deg, down), 3);
+    };
+    zero.second_axis = y(60, false) && y(-60, false) && y(60, true) && y(-60, true);
 }
 
 /// Where the opening check looks, as far as the travel allows it: the azimuth axis upright this way
@@ -310,7 +322,8 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     Problems problems;
     Reader reader(c, problems);
     reader.read(table, "");
-    if (!reader.places().contains("zeroing.both_ways")) take_the_ways_of_zeroing(c);
+    if (!reader.places().contains("zeroing.both_ways"))
+        take_the_ways_of_zeroing(c, reader.places().contains("zeroing.second_axis"));
     take_mount(c, reader.places());
     loaded.effective = effective_of(c, name, reader.places());
     if (!c.profiles.empty()) take_profiles(c, name, reader.places().at("profile"), problems);

@@ -226,6 +226,14 @@ void CrossCheck::onlookers() {
 }
 
 void CrossCheck::adaptive() {
+    if (sound({"campaign.prior", "campaign.adaptive"}) && c_.campaign.type_prior) {
+        const char* const missing = !c_.campaign.adaptive            ? "campaign.adaptive = true"
+                                    : c_.archive.folder.empty()      ? "archive.folder"
+                                    : c_.paperwork.unit_type.empty() ? "unit.type"
+                                                                     : nullptr;
+        if (missing != nullptr)
+            refuse({"campaign.prior"}, "\"type\"", std::string(missing) + " with it");
+    }
     if (!sound({"campaign.adaptive"}) || !c_.campaign.adaptive) return;
     if (!c_.campaign.plan.empty()) {
         refuse({"campaign.adaptive", "campaign.plan"}, "an adaptive campaign with a plan file",

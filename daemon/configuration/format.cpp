@@ -12,8 +12,29 @@ namespace {
 
 constexpr std::size_t kWidestColumn = 44;
 
+// Of the list of all keys: a terminal's 100 columns hold each line.
+constexpr std::size_t kWidest = 98, kKeyColumn = 34, kInside = 4;
+
 std::string padded(const std::string& text, std::size_t width) {
     return text.size() < width ? text + std::string(width - text.size(), ' ') : text;
+}
+
+/// In lines of `kWidest` at most, broken at blanks; what goes on stands a little further in. What
+/// has no blank is broken where the line ends.
+std::string wrapped(std::string text, std::size_t in) {
+    std::string lines;
+    for (bool first = true; !text.empty(); first = false) {
+        const std::size_t indent = first ? in : in + kInside, room = kWidest - indent;
+        std::size_t end = text.size();
+        if (end > room) {
+            const auto blank = text.rfind(' ', room);
+            end = blank == std::string::npos || blank < room / 2 ? room : blank;
+        }
+        lines += std::string(indent, ' ') + text.substr(0, end) + "\n";
+        text.erase(0, std::max(end, text.find_first_not_of(' ', end)));
+        if (text.find_first_not_of(' ') == std::string::npos) break;
+    }
+    return lines;
 }
 
 /// Rows of text in columns, two blanks apart; one long cell (a list of positions) does not push all
@@ -54,21 +75,28 @@ std::string format_effective(const Loaded& loaded) {
 }
 
 std::string format_schema() {
-    std::vector<std::vector<std::string>> rows{
-        {"key", "type", "unit", "default", "bounds", "meaning"}};
+    std::string text = wrapped("KEY  TYPE, UNIT, BOUNDS", 0) + wrapped("= default", kInside) +
+                       wrapped("meaning", kInside);
     Configuration defaults;
+    std::string section;
     for (const Key& key : schema()) {
+        if (const auto in = key.name.substr(0, key.name.find('.')); in != section) {
+            section = in;
+            text += "\n[" + section + "]\n";
+        }
         std::string value = key.write(defaults);
         if (key.type == "positions") {
             value = "(table 1)";
         } else if (key.type == "tables") {
             value = "(see --check)";
         }
-        rows.push_back({key.name, key.type, key.unit.empty() ? "-" : key.unit,
-                        value.empty() ? "-" : value, key.bounds.empty() ? "-" : key.bounds,
-                        key.doc});
+        std::string what = padded(key.name + "  ", kKeyColumn) + key.type;
+        for (const std::string& more : {key.unit, key.bounds})
+            what += more.empty() ? "" : ", " + more;
+        text += wrapped(what, 0) + wrapped(value.empty() ? "" : "= " + value, kInside) +
+                wrapped(key.doc, kInside);
     }
-    return columns(rows);
+    return text;
 }
 
 }  // namespace vibrig::configuration

@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "daemon/configuration/key.hpp"
 #include "daemon/configuration/rules.hpp"
+#include "drivers/sample/channels.hpp"
 
 namespace vibrig::configuration {
 
@@ -56,20 +59,6 @@ void add_signal_keys(std::vector<Key>& keys) {
     };
     using S = SignalBindings;
     static constexpr Row kRows[] = {
-        {"sync_count", &S::sync_count, "full counter, one count per sample"},
-        {"outer", &S::outer, "outer gimbal, deg"},
-        {"inner", &S::inner, "inner gimbal, deg"},
-        {"azimuth", &S::azimuth, "azimuth gimbal, deg"},
-        {"outer_valid", &S::outer_valid, "1: the angle is valid"},
-        {"inner_valid", &S::inner_valid, "1: the angle is valid"},
-        {"azimuth_valid", &S::azimuth_valid, "1: the angle is valid"},
-        {"accel_x", &S::accel_x, "specific force, g"},
-        {"accel_y", &S::accel_y, "specific force, g"},
-        {"accel_z", &S::accel_z, "specific force, g"},
-        {"accel_x_valid", &S::accel_x_valid, "1: the specific force is valid"},
-        {"accel_y_valid", &S::accel_y_valid, "1: the specific force is valid"},
-        {"accel_z_valid", &S::accel_z_valid, "1: the specific force is valid"},
-        {"table_accel", &S::table_accel, "table accelerometer, g"},
         {"loop_closed", &S::loop_closed, "1: stabilisation loop closed"},
         {"gyros_at_speed", &S::gyros_at_speed, "1: gyro wheels at speed"},
         {"ready", &S::ready, "1: platform ready"},
@@ -86,10 +75,25 @@ void add_signal_keys(std::vector<Key>& keys) {
     const auto at = [](std::string S::*member) -> At<std::string> {
         return [member](C& c) -> std::string& { return c.assembler.bindings.*member; };
     };
-    for (const Row& row : kRows) {
-        keys.push_back(text(std::string("can.signals.") + row.name, "\"Message.Signal\" or empty",
-                            row.doc, binding_rule, at(row.member)));
+    const auto add = [&](const std::string& name, std::string S::*member, const char* doc) {
+        keys.push_back(text("can.signals." + name, "\"Message.Signal\" or empty", doc, binding_rule,
+                            at(member)));
+    };
+    add("sync_count", &S::sync_count, "full counter, one count per sample");
+    // What is of one kind stands together: first the values, then whether they are valid.
+    const auto kind_ends = [](auto row) {
+        return std::find_if(row, drivers::kChannelTable.end(), [row](const drivers::ChannelRow& r) {
+            return std::string_view(r.valid_help) != row->valid_help;
+        });
+    };
+    for (auto row = drivers::kChannelTable.begin(); row != drivers::kChannelTable.end();) {
+        const auto end = kind_ends(row);
+        for (auto r = row; r != end; ++r) add(r->name, r->signal, r->help);
+        for (; row != end; ++row)
+            if (row->valid != nullptr)
+                add(row->name + std::string("_valid"), row->valid, row->valid_help);
     }
+    for (const Row& row : kRows) add(row.name, row.member, row.doc);
     keys.push_back(text("can.signals.message_sync_signal", "a signal name or empty",
                         "in any message with a channel: low bits of its sync count",
                         identifier_or_empty_rule, at(&S::message_sync_signal)));

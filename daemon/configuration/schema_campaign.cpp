@@ -63,6 +63,10 @@ void add_zeroing_keys(std::vector<Key>& keys) {
                            "platform z down too: zeros apart from misalignment and scale error; "
                            "default: where gimbal.travel_deg lets it",
                            [](C& c) -> bool& { return c.campaign.zero.both_ways; }));
+    keys.push_back(boolean("zeroing.second_axis",
+                           "platform y up and down too, slewed by the inner gimbal 0, 60, -60, 60 "
+                           "deg; default: where z cannot be down and gimbal.travel_deg lets it",
+                           [](C& c) -> bool& { return c.campaign.zero.second_axis; }));
     zero("scale_factor", "", {0, 0.1}, "of the accelerometers, not known better, 1 sigma",
          &Z::scale_factor);
     zero("velocity_reference_mps", "m/s", {1e-6, 1}, "how still the platform stands, 1 sigma",
@@ -166,6 +170,11 @@ void add_campaign_keys(std::vector<Key>& keys) {
     keys.push_back(number("campaign.time_limit_s", "s", {0, 1e7},
                           "an adaptive campaign ends before it; 0: none",
                           [](C& c) -> double& { return c.campaign.time_limit_s; }));
+    keys.push_back(choice<bool>(
+        "campaign.prior", {{"none", false}, {"type", true}},
+        "type: an adaptive campaign starts from what the archive knows of the unit's type, while "
+        "the unit passes for one of it; results are given without and with it",
+        [](C & c) -> auto& { return c.campaign.type_prior; }));
     keys.push_back(boolean("campaign.levelling",
                            "the platform is levelled before each position; see [levelling]",
                            [](C& c) -> bool& { return c.campaign.levelling; }));

@@ -451,7 +451,8 @@ struct CommandRequest {
         abort,
         acknowledge,
         selftest,
-        commission  ///< argument: what, as JSON
+        commission,  ///< argument: what, as JSON
+        certificate  ///< one was issued; argument: number, campaign and hashes, as JSON
     } kind = Kind::abort;
     std::string by;        ///< named person
     std::string argument;  ///< what is acknowledged

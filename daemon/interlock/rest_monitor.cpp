@@ -10,9 +10,20 @@ using drivers::Time;
 namespace {
 
 constexpr Time kStale = 200 * drivers::kMillisecond;
+// A window is summed up no more often: at 1 kHz it is of 500 samples.
+constexpr Time kJudgeEvery = 5 * drivers::kMillisecond;
 constexpr Time kFewest = 8;  // samples that an rms rests on
 // Of the samples of a window so many have to be there: now and then one is lost.
 constexpr double kShare = 0.75;
+constexpr double kLivesCounts = 2;  // more than the flicker of one that is stuck
+
+/// Stillness of one that is doubted says nothing; its motion does.
+void take_back(RestWitness& witness, const Doubt& doubt) noexcept {
+    if (!doubt.open() || witness.verdict == RestVerdict::moving) return;
+    witness.verdict = RestVerdict::unknown;
+    witness.rms_g = 0;
+    witness.doubted = true;
+}
 
 }  // namespace
 
@@ -57,22 +68,54 @@ RestWitness RestWindow::judge(double limit_g) const noexcept {
     return witness;
 }
 
-RestMonitor::RestMonitor(const RestSettings& settings, Time sample_period)
+bool Doubt::settled_by(Time time, std::span<const double> values,
+                       std::span<const double> counts_g) noexcept {
+    if (!open_) return false;
+    const bool anew = from_ == 0 || time - from_ > window_ || time < from_;
+    if (anew) from_ = time;
+    bool all_move = true;
+    for (std::size_t i = 0; i < values.size() && i < kMost; ++i) {
+        low_[i] = anew ? values[i] : std::fmin(low_[i], values[i]);
+        high_[i] = anew ? values[i] : std::fmax(high_[i], values[i]);
+        all_move = all_move && high_[i] - low_[i] > kLivesCounts * counts_g[i];
+    }
+    open_ = !all_move;
+    return all_move;
+}
+
+RestMonitor::RestMonitor(const RestSettings& settings, Time sample_period, const Counts& counts_g)
     : limit_g_(settings.limit_g),
+      counts_g_(counts_g),
       stale_after_(std::max(kStale, 3 * sample_period)),
       platform_(drivers::from_seconds(settings.window_s), sample_period),
-      table_(drivers::from_seconds(settings.window_s), sample_period) {}
+      table_(drivers::from_seconds(settings.window_s), sample_period),
+      platform_doubt_(std::max(drivers::from_seconds(settings.window_s), kFewest * sample_period)),
+      table_doubt_(platform_doubt_) {}
+
+void RestMonitor::doubt(drivers::Channel channel) noexcept {
+    (channel == drivers::Channel::table_accel ? table_doubt_ : platform_doubt_).begin();
+}
 
 void RestMonitor::add(const drivers::Sample& sample) noexcept {
-    Rest rest;
+    const std::span<const double, 4> counts(counts_g_);
     if (sample.force_good()) {
         const auto& f = sample.force;
+        if (platform_doubt_.settled_by(sample.time, f, counts.first<3>())) platform_.clear();
         platform_.add(sample.time, std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]));
     }
-    rest.platform = platform_.judge(limit_g_);
     const auto quality = sample.of(drivers::Channel::table_accel);
-    if (quality == drivers::Quality::good) table_.add(sample.time, sample.table_accel);
+    if (quality == drivers::Quality::good) {
+        const double along = sample.table_accel;
+        if (table_doubt_.settled_by(sample.time, {&along, 1}, counts.last<1>())) table_.clear();
+        table_.add(sample.time, along);
+    }
+    Rest rest = view_.read();
+    const Time judged = std::max(rest.platform.to, rest.table.to);
+    if (sample.time > judged && sample.time < judged + kJudgeEvery) return;
+    rest.platform = platform_.judge(limit_g_);
     rest.table = table_.judge(limit_g_);
+    take_back(rest.platform, platform_doubt_);
+    take_back(rest.table, table_doubt_);
     if (quality == drivers::Quality::unbound) rest.table = {RestVerdict::absent};
     view_.publish(rest);
 }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "drivers/base/snapshot.hpp"
@@ -31,19 +33,22 @@ struct RestWitness {
     double rms_g = 0;        ///< over the window; 0 while unknown
     drivers::Time from = 0;  ///< first and last sample of the window
     drivers::Time to = 0;
+    bool doubted = false;  ///< unknown because it has not been seen to move since it was doubted
 };
 
 /// What all accelerometers say at one moment.
 struct Rest {
     RestWitness platform, table;
-    [[nodiscard]] bool measured() const noexcept {
-        return platform.verdict == RestVerdict::still &&
-               (table.verdict == RestVerdict::still || table.verdict == RestVerdict::absent);
-    }
-    /// Measured, and by nothing that was before `moment`.
+    [[nodiscard]] bool measured() const noexcept { return measured_since(0); }
+    /// Measured, and by nothing that was before `moment`. One that is doubted is no witness: the
+    /// other alone decides, and where there is none nobody does.
     [[nodiscard]] bool measured_since(drivers::Time moment) const noexcept {
-        return measured() && platform.from >= moment &&
-               (table.verdict == RestVerdict::absent || table.from >= moment);
+        const auto still = [moment](const RestWitness& witness) {
+            return witness.verdict == RestVerdict::still && witness.from >= moment;
+        };
+        if (platform.doubted) return still(table);
+        return still(platform) &&
+               (still(table) || table.doubted || table.verdict == RestVerdict::absent);
     }
     [[nodiscard]] bool moving() const noexcept {
         return platform.verdict == RestVerdict::moving || table.verdict == RestVerdict::moving;
@@ -57,6 +62,7 @@ class RestWindow {
     /// g. What is not later than the newest is left out.
     void add(drivers::Time time, double value) noexcept;
     [[nodiscard]] RestWitness judge(double limit_g) const noexcept;
+    void clear() noexcept { count_ = 0; }
 
   private:
     struct Entry {
@@ -71,21 +77,47 @@ class RestWindow {
     std::size_t first_ = 0, count_ = 0;
 };
 
+/// Whether readings that are doubted move by more than two counts within a window. The noise of one
+/// that works is enough for that, where it has more than half a count.
+class Doubt {
+  public:
+    explicit Doubt(drivers::Time window) : window_(window) {}
+    void begin() noexcept { open_ = true, from_ = 0; }
+    [[nodiscard]] bool open() const noexcept { return open_; }
+    /// True: that has ended it, all of them have moved.
+    bool settled_by(drivers::Time time, std::span<const double> values,
+                    std::span<const double> counts_g) noexcept;
+
+  private:
+    static constexpr std::size_t kMost = 3;
+    drivers::Time window_, from_ = 0;
+    std::array<double, kMost> low_{}, high_{};
+    bool open_ = false;
+};
+
 /// Rest as a measurement: the rms of the norm of the specific force less its mean, and of the table
 /// accelerometer where there is one. The norm, not the axes: a slow tilt is no vibration.
 class RestMonitor {
   public:
-    RestMonitor(const RestSettings& settings, drivers::Time sample_period);
+    /// Resolution of accelerometers x, y, z and the table's, g; 0: not known.
+    using Counts = std::array<double, 4>;
+    RestMonitor(const RestSettings& settings, drivers::Time sample_period,
+                const Counts& counts_g = {});
 
     /// Acquisition thread; neither allocates, locks nor logs.
     void add(const drivers::Sample& sample) noexcept;
+    /// Acquisition thread, or before it starts: an accelerometer has contradicted what the table
+    /// was told. Its body's stillness is no rest until it is seen to move, or to be noisy.
+    void doubt(drivers::Channel channel) noexcept;
     /// Any thread. What is too old by `now` is unknown.
     [[nodiscard]] Rest rest(drivers::Time now) const noexcept;
 
   private:
     double limit_g_;
+    Counts counts_g_;
     drivers::Time stale_after_;
     RestWindow platform_, table_;
+    Doubt platform_doubt_, table_doubt_;
     Snapshot<Rest> view_;
 };
 

@@ -140,6 +140,7 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     each_part(dwell.stop, [&bytes](auto value) { put(bytes, value); });
     put(bytes, dwell.stop.begin_s);
     put(bytes, dwell.stop.begun_utc_ns);
+    bytes.push_back(dwell.info.power_lost ? 1 : 0);
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -200,6 +201,9 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
         if (reader.good() && dwell.stop.begin_s < 0) return "corrupt: time of the beginning";
     }
     dwell.info.begin_s = dwell.stop.begin_s;
+    char power_lost = 0;
+    if (version >= 5) reader.get(power_lost);
+    dwell.info.power_lost = power_lost != 0;
     std::uint64_t count = 0;
     reader.get(count);
     if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())

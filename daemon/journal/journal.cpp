@@ -38,6 +38,8 @@ const char* word_of(CommandRequest::Kind kind) {
             return "selftest";
         case Kind::commission:
             return "commission";
+        case Kind::certificate:
+            return kCertificate;
     }
     return "unknown";
 }
@@ -144,9 +146,9 @@ void Journal::proved(const std::string& by, const std::string& record) {
     put(Proved{by, record, utc_now()});
 }
 void Journal::event(const EventRecord& event) { put(event); }
-void Journal::command(const CommandRequest& request, const CommandReply& reply,
-                      std::int64_t utc_ns) {
-    put(Commanded{request, reply, utc_ns});
+std::uint64_t Journal::command(const CommandRequest& request, const CommandReply& reply,
+                               std::int64_t utc_ns) {
+    return put(Commanded{request, reply, utc_ns});
 }
 
 JournalStatus Journal::status() const {

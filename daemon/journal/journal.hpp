@@ -39,6 +39,7 @@ struct Recovery {
     std::string assumed;              ///< of what an older version did not keep; empty: nothing
     std::string out_of_band;          ///< what the newest loop check found so; empty: nothing
     std::vector<std::string> proofs;  ///< of the safe state, as they were kept, oldest first
+    std::vector<std::string> certificates;  ///< numbers of those that were issued
     /// Not acknowledged; kDiedArmed among them if an arming had no end.
     std::vector<Latch> latches;
 };
@@ -86,7 +87,8 @@ class Journal {
     /// A proof of the safe state is over; `record` is kept as it is.
     void proved(const std::string& by, const std::string& record);
     void event(const EventRecord& event);
-    void command(const CommandRequest& request, const CommandReply& reply, std::int64_t utc_ns);
+    std::uint64_t command(const CommandRequest& request, const CommandReply& reply,
+                          std::int64_t utc_ns);
 
     [[nodiscard]] JournalStatus status() const;
     /// What was found missing or changed since this was last asked, in words; the file was put
@@ -137,6 +139,7 @@ class Journal {
     void recover();
     void recover_loop_check();
     void recover_proofs();
+    void recover_certificates();
     void recover_safety();
     void read_safety(Database& from);
     void follow(const Safety& safety);

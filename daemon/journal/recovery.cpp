@@ -23,6 +23,7 @@ std::string joined(const std::vector<std::string>& words) {
 void Journal::recover() {
     recover_loop_check();
     recover_proofs();
+    recover_certificates();
     recover_safety();
     const auto found = database().ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
@@ -52,6 +53,13 @@ void Journal::recover_proofs() {
     for (auto row = rows.rbegin(); row != rows.rend(); ++row)
         recovery_.proofs.push_back(row->texts.at(0));
     note_proof(database().ask("SELECT max(id) FROM proof").at(0).numbers.at(0));
+}
+
+void Journal::recover_certificates() {
+    for (const Row& row : database().ask("SELECT json_extract(argument, '$.number') FROM command "
+                                         "WHERE kind = ? AND accepted = 1",
+                                         {std::string_view(kCertificate)}))
+        recovery_.certificates.push_back(row.texts.at(0));
 }
 
 void Journal::note_proof(std::int64_t row) {

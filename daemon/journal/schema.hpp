@@ -23,6 +23,9 @@ inline constexpr const char* kLatched = "latched";
 inline constexpr const char* kFirst = "acknowledged by the first";
 inline constexpr const char* kOver = "acknowledged";
 
+/// What stands in the table command, as its kind.
+inline constexpr const char* kCertificate = "certificate";
+
 /// Those that are not there yet.
 void make_tables(Database& database);
 [[nodiscard]] bool has_table(Database& database, const char* name);

@@ -9,6 +9,7 @@
 
 #include "estimator/allan/edf.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/predicted_rate.hpp"
 
 namespace vibrig::noise {
@@ -184,6 +185,13 @@ bool NoiseMonitor::mean_has_stepped(const estimator::DwellSummary& dwell, const 
         DwellMonitorSettings{}.alpha /
         (2.0 * kNames.size() * static_cast<double>(DwellMonitor::tests_of(*angles[0].basis)));
     const double limit = normal_quantile(1 - tail);
+    // The coefficients are those of the dwell before; since then the bias has walked.
+    const double since_s =
+        blocks.back().time_s - blocks.front().time_s + estimator::kAssumedPause_s;
+    const double walk = settings_.drift.model == estimator::uncertainty::BiasModel::constant
+                            ? 0.0
+                            : settings_.drift.walk_deg_h_rt_h;
+    const double walked = walk * walk * since_s / 3600;
     // Variance of the slope for this N.
     const auto variance_of = [&](std::size_t j, double walk_deg_per_rt_h) {
         const double white =
@@ -205,7 +213,7 @@ bool NoiseMonitor::mean_has_stepped(const estimator::DwellSummary& dwell, const 
         const double believed = variance_of(j, in_force_.gyro_random_walk_deg_per_rt_h[j]);
         const FittedTerm& n = of(gyros_[j], Term::N);
         const double found = std::max(believed, n.detected ? variance_of(j, n.value) : 0.0);
-        const double variance = found + found / believed * predicted.covariance[j][j];
+        const double variance = walked + found + found / believed * predicted.covariance[j][j];
         double step = 0;
         for (std::size_t i = 0; i < blocks.size(); ++i)
             step += slope[i] * residual.angle_arcsec[j][i];
@@ -394,7 +402,7 @@ void NoiseMonitor::conclude(estimator::DwellSummary& dwell,
                             estimator::Identification& identification) {
     estimator::Estimate estimate;
     identification.estimate(estimate);
-    if (end_dwell(dwell, {estimate.value, identification.covariance()})) {
+    if (end_dwell(dwell, {estimate.value, identification.covariance_now()})) {
         dwell.flagged = true;
         dwell.reason = "noise is not that of the earlier dwells";
     }

@@ -78,13 +78,21 @@ void add_ranks(Reproduction& table) {
                           words("rank %d, %.2g: %.0f times smaller than at 5 deg/s", slow.rank,
                                 slow.singular[14], fast.singular[14] / slow.singular[14]),
                           {}});
-    const int one_way = rank_with_shares({0, 90, -90}, false, site);
-    const int both_ways = rank_with_shares({0, 90, -90}, true, site);
+    const int one_way = rank_with_shares({0, 90, -90}, {{2, false}}, site);
+    const int both_ways = rank_with_shares({0, 90, -90}, {{2, false}, {2, true}}, site);
     table.rows.push_back({"rank with 1 g x misalignment of x, y and x scale of z, z up only",
                           "-",
                           words("%d of 18: they are in the zeros", one_way),
                           {}});
-    table.rows.push_back({"the same, z down too", "-", words("%d of 18", both_ways), {}});
+    table.rows.push_back(
+        {"the same, z down too", "-", words("%d of 18", both_ways), both_ways == 18});
+    // A second axis brings shares of its own along, and tells them from the zeros only both ways.
+    const int y_up = rank_with_shares({0, 90, -90}, {{2, false}, {1, false}}, site);
+    const int second_axis =
+        rank_with_shares({0, 90, -90}, {{2, false}, {1, false}, {1, true}}, site);
+    table.rows.push_back({"z up only, slews about y up too", "-", words("%d of 21", y_up), {}});
+    table.rows.push_back({"z up only, slews about y up and y down too", "-",
+                          words("%d of 21", second_axis), second_axis == 21});
 }
 
 void add_residuals(Reproduction& table, std::size_t seeds) {

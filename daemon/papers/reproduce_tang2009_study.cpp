@@ -96,7 +96,7 @@ struct Follower {
         const estimator::Result result = identification.result();
         Outcome outcome;
         estimator::Estimate estimate;
-        identification.estimate(estimate);  // also of what is not determined
+        identification.solved(estimate);  // also of what is not determined
         outcome.value = estimate.value;
         outcome.sigma = estimate.sigma;
         outcome.nees = nees(result);

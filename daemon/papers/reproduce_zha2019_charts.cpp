@@ -114,7 +114,8 @@ plot::Chart hours_chart(double noise_mps) {
 }
 
 plot::Chart drive_chart(bool internal) {
-    plot::Chart chart = internal ? tilt_chart("The same drive without a reference velocity (eq. 1)")
+    plot::Chart chart = internal ? tilt_chart("The same drive without a reference velocity (eq. 1)",
+                                              "Internal damping, the subject of Figure 2.")
                                  : tilt_chart("A drive: external damping, gains as printed");
     for (const Way& way : kWays) {
         if (internal && way.network == Network::undamped) continue;

@@ -48,6 +48,9 @@ class Columns {
     std::vector<double> doubles_if_any(const char* name) {
         return file_.has(group_ + "/" + name) ? doubles(name) : std::vector<double>{};
     }
+    auto integers_if_any(const char* name) {
+        return file_.has(group_ + "/" + name) ? integers(name) : decltype(integers(name)){};
+    }
     std::vector<std::string> texts(const char* name) {
         auto found = file_.texts(group_ + "/" + name);
         rows_ = std::min(rows_, found.size());
@@ -110,6 +113,7 @@ void read_orders(const File& file, Campaign& to) {
     const auto table = c.doubles("table_g"), zero = c.doubles("zero_g", 3),
                level = c.doubles("level_sigma_g"), angle = c.doubles("noise_angle_arcsec"),
                walk = c.doubles("noise_walk", 3), begin = c.doubles_if_any("begin_s");
+    const auto power = c.integers_if_any("power_lost");
     for (std::size_t i = 0; i < c.rows(); ++i) {
         to.orders.push_back({announced[i],
                              from[i],
@@ -121,7 +125,8 @@ void read_orders(const File& file, Campaign& to) {
                              row<3>(zero, i),
                              level[i],
                              {angle[i], row<3>(walk, i)},
-                             i < begin.size() ? begin[i] : kNotKnown});
+                             i < begin.size() ? begin[i] : kNotKnown,
+                             i < power.size() && power[i] != 0});
     }
 }
 

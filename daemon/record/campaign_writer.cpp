@@ -35,7 +35,8 @@ std::vector<ColumnSpec> order_columns() {
             {"level_sigma_g", Type::f64, {}, "g", "of the vertical, by those zeros; 0: none"},
             {"noise_angle_arcsec", Type::f64, {}, "arcsec", "noise of a reading, for the filter"},
             {"noise_walk", Type::f64, {3}, "deg/sqrt(h)", "gyros' random walk, for the filter"},
-            {"begin_s", Type::f64, {}, "s", "of the dwell, since the campaign's first one"}};
+            {"begin_s", Type::f64, {}, "s", "of the dwell, since the campaign's first one"},
+            {"power_lost", Type::u8, {}, "", "1: the gyros were without power since the last"}};
 }
 
 std::vector<ColumnSpec> dwell_columns() {
@@ -311,7 +312,7 @@ void CampaignWriter::order(const Order& order) {
     put(*orders_, order.zero_g);
     orders_->put(order.level_sigma_g).put(order.noise.angle_arcsec);
     put(*orders_, order.noise.gyro_random_walk_deg_per_rt_h);
-    orders_->put(order.begin_s);
+    orders_->put(order.begin_s).put(byte(order.power_lost));
 }
 
 void CampaignWriter::dwell(const Dwell& dwell) {

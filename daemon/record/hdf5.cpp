@@ -102,7 +102,11 @@ Handle attribute_type(std::size_t size) {
     return type;
 }
 
-Handle access_list() {
+// Of a chunk's place in the file, read again by nobody but who reads the file. Bytes in the file;
+// in memory they are thrice as much, and a writer that may keep them does so for hours.
+constexpr std::size_t kWritersMetadata = 64 * 1024, kReadersMetadata = 1024 * 1024;
+
+Handle access_list(std::size_t metadata_bytes) {
     Handle list(H5Pcreate(H5P_FILE_ACCESS), close_list);
     H5Pset_libver_bounds(list.get(), H5F_LIBVER_LATEST, H5F_LIBVER_LATEST);
     // Of each column a chunk or two, the full ones given up first. The library's 1 MB would fill
@@ -110,12 +114,12 @@ Handle access_list() {
     // chunk is four dwells, a column of them would hold a thousand: it has room for a few.
     constexpr std::size_t kSlots = 7, kBytes = 32 * 1024;
     H5Pset_cache(list.get(), 0, kSlots, kBytes, 1.0);
-    // What stands in it is read again by nobody: it stays as large as it begins.
+    // It stays as large as it begins.
     H5AC_cache_config_t metadata{};
     metadata.version = H5AC__CURR_CACHE_CONFIG_VERSION;
     if (H5Pget_mdc_config(list.get(), &metadata) >= 0) {
         metadata.set_initial_size = true;
-        metadata.initial_size = metadata.min_size = metadata.max_size = 1024 * 1024;
+        metadata.initial_size = metadata.min_size = metadata.max_size = metadata_bytes;
         metadata.incr_mode = H5C_incr__off;
         metadata.flash_incr_mode = H5C_flash_incr__off;
         metadata.decr_mode = H5C_decr__off;
@@ -156,8 +160,9 @@ File File::create(const std::string& path) {
     quiet();
     File file;
     file.path_ = path;
-    file.file_ =
-        Handle(H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, access_list().get()), close_file);
+    file.file_ = Handle(
+        H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, access_list(kWritersMetadata).get()),
+        close_file);
     if (file.file_.get() < 0) file.fail("");
     return file;
 }
@@ -166,7 +171,7 @@ File File::open(const std::string& path, Mode mode) {
     quiet();
     File file;
     file.path_ = path;
-    const Handle list = access_list();
+    const Handle list = access_list(kReadersMetadata);
     const auto attempt = [&](unsigned flags) {
         file.file_ = Handle(H5Fopen(path.c_str(), flags, list.get()), close_file);
         return file.file_.get() >= 0;

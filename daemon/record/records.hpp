@@ -53,12 +53,18 @@ struct Order {
     estimator::NoiseLevels noise{};  ///< that the filter takes in it; angle 0: not known
     /// Since the campaign's first dwell, a restart included; NaN: not known.
     double begin_s = std::numeric_limits<double>::quiet_NaN();
+    bool power_lost = false;  ///< the gyros were without power since the dwell before
+    [[nodiscard]] estimator::DwellInfo dwell() const {
+        return {run, position, table_g, begin_s, power_lost};
+    }
 };
 
-/// dwells.csv beside the raw log: orders in the log's times. Older ones end before begin_s.
+/// dwells.csv beside the raw log: orders in the log's times. Older ones end before power_lost, or
+/// before begin_s.
 inline constexpr const char* kDwellsHeader =
     "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us,zero_x_g,zero_y_g,zero_z_g,"
-    "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z,begin_s";
+    "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z,begin_s,"
+    "power_lost";
 /// In it, with a number: the daemon was started again and went on after so many dwells.
 inline constexpr const char* kRestartLine = "# restart after dwells: ";
 

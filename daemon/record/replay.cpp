@@ -38,7 +38,7 @@ void set_noise(estimator::Identification& identification, const estimator::Noise
 
 void take_estimate(const estimator::Identification& identification, Dwell& to) {
     estimator::Estimate estimate;
-    identification.estimate(estimate);
+    identification.solved(estimate);
     to.value = estimate.value;
     to.sigma = estimate.sigma;
     to.observable = estimate.observable;
@@ -49,7 +49,7 @@ void take_estimate(const estimator::Identification& identification, Dwell& to) {
 void feed_as_it_is(estimator::Identification& identification, const Campaign& campaign,
                    const RecordedDwell& dwell, const OnStep& on_step) {
     const Order& order = *dwell.order;
-    identification.begin_dwell({order.run, order.position, order.table_g, order.begin_s});
+    identification.begin_dwell(order.dwell());
     for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
         const auto step =
             identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
@@ -228,8 +228,10 @@ void read_dwells(const std::string& path, Campaign& to) {
     std::ifstream file(path);
     std::string line;
     const std::string header = kDwellsHeader;
-    const std::string before_begin = header.substr(0, header.rfind(','));
-    if (!std::getline(file, line) || (line != header && line != before_begin))
+    const std::string before_power = header.substr(0, header.rfind(','));
+    const std::string before_begin = before_power.substr(0, before_power.rfind(','));
+    if (!std::getline(file, line) ||
+        (line != header && line != before_power && line != before_begin))
         throw std::runtime_error(path + ":1: found '" + proto::printable(line.substr(0, 80)) +
                                  "', expected the header " + kDwellsHeader);
     for (std::size_t number = 2; std::getline(file, line); ++number) {
@@ -265,8 +267,10 @@ void read_dwells(const std::string& path, Campaign& to) {
              {12, &walk[0]},
              {13, &walk[1]},
              {14, &walk[2]}}};
-        const bool dated = fields.size() == 16 && !fields[15].empty();
-        bool good = (fields.size() == 15 || fields.size() == 16) &&
+        const bool dated = fields.size() >= 16 && !fields[15].empty();
+        order.power_lost = fields.size() == 17 && fields[16] == "1";
+        bool good = fields.size() >= 15 && fields.size() <= 17 &&
+                    (fields.size() < 17 || fields[16] == "1" || fields[16] == "0") &&
                     (!dated || (proto::read_number(fields[15], order.begin_s) &&
                                 std::isfinite(order.begin_s))) &&
                     proto::read_number(fields[0], order.run) &&
@@ -388,8 +392,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
         order.from = dwell.order->from;
         order.to = dwell.order->to;
         order.zero_g = dwell.order->zero_g;
-        order.dwell = {dwell.order->run, dwell.order->position, dwell.order->table_g,
-                       dwell.order->begin_s};
+        order.dwell = dwell.order->dwell();
         player.order(order);
         const std::size_t end = dwell.first + dwell.count;
         play_until(end);

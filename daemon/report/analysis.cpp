@@ -101,7 +101,7 @@ Coefficients without(const Campaign& campaign, const estimator::Settings& settin
         record::feed(identification, campaign, dwell);
     }
     estimator::Estimate estimate;
-    identification.estimate(estimate);
+    identification.solved(estimate);
     return combined(
         estimator::uncertainty::assess(settings, identification.result()),
         {estimate.value, estimate.sigma, estimate.observable, identification.covariance()});
@@ -269,7 +269,7 @@ Coefficients recorded_coefficients(const Campaign& campaign) {
     if (!campaign.found) return final_coefficients(campaign.path, campaign.dwells);
     const auto anew = record::anew(campaign, settings_of(campaign), *campaign.found);
     estimator::Estimate estimate;
-    anew.identification().estimate(estimate);
+    anew.identification().solved(estimate);
     return {estimate.value, estimate.sigma, estimate.observable,
             anew.identification().covariance()};
 }

@@ -18,6 +18,7 @@
 #include "daemon/report/plan_section.hpp"
 #include "daemon/report/proof_section.hpp"
 #include "daemon/report/result_charts.hpp"
+#include "daemon/report/type_section.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/version.hpp"
 #include "estimator/filter/instruction_set.hpp"
@@ -37,6 +38,7 @@ constexpr double k95 = 1.959963984540054;
 constexpr std::array<const char*, 3> kGyro{"x", "y", "z"};
 constexpr std::array<Look, 3> kLooks{Look::line, Look::dashed, Look::dots};
 constexpr std::size_t kMostPoints = 300;
+constexpr std::size_t kApart = 24;  // dots that mark a curve
 
 std::string num(double value, int digits) {
     return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
@@ -242,9 +244,12 @@ void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
             // The best and the worst of a gyro; all between them.
             Curve curve;
             curve.name = std::string("gyro ") + kGyro[gyro];
-            // One term each is the same for all three, often: none may hide another.
+            // One term each is the same for all three, often: none may hide another, and dots stand
+            // far enough apart for the lines between them.
             if (group.of.size() == 1) curve.look = kLooks[gyro];
-            for (std::size_t i = 0; i < rows.size(); i += every) {
+            const std::size_t step =
+                curve.look == Look::dots ? std::max(every, rows.size() / kApart) : every;
+            for (std::size_t i = 0; i < rows.size(); i += step) {
                 double least = std::numeric_limits<double>::infinity(), most = 0, log_sum = 0;
                 for (const std::size_t k : group.of) {
                     const double s = rows[i].sigma[gyro * 10 + k];
@@ -463,6 +468,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     }
     if (told == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
 
+    add_type(page, campaign);
     if (!a.history_note.empty()) {
         page.section("history", "Earlier campaigns of the unit");
         page.paragraph(a.history_note);

@@ -6,6 +6,7 @@
 
 #include "daemon/results/assessment_json.hpp"
 #include "estimator/filter/instruction_set.hpp"
+#include "estimator/uncertainty/with_type.hpp"
 
 namespace vibrig::tool {
 
@@ -107,11 +108,39 @@ Json identified_anew(const dwells::Live& live) {
               {"sentence", live.assessed.verdict.sentence}}}};
 }
 
+/// The result together with the unit's type, beside `parameters`, which are without it.
+Json type_prior(const KnownType& type, const uncertainty::Assessment& assessed) {
+    const auto with = uncertainty::with_type(type.of, assessed);
+    Json root{{"type", type.name}, {"units", type.of.units}, {"campaigns", type.of.campaigns}};
+    if (!with.determined) {
+        root.update({{"distance", nullptr}, {"parameters", nullptr}});
+        return root;
+    }
+    root["distance"] = {{"squared", number_or_null(with.distance.squared)},
+                        {"dof", with.distance.dof},
+                        {"p", number_or_null(with.distance.p)},
+                        {"level", uncertainty::kOutsider},
+                        {"passes", !with.distance.outside()}};
+    Json list = Json::array();
+    for (std::size_t i = 0; i < estimator::kParameters; ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        list.push_back({{"name", estimator::parameter_names()[i]},
+                        {"value", number_or_null(with.value[i])},
+                        {"u", number_or_null(with.u[i])},
+                        {"unit", estimator::parameter_unit(i)},
+                        {"type_mean", type.of.mean(k)},
+                        {"type_sigma", std::sqrt(type.of.predicted(k, k))}});
+    }
+    root["parameters"] = std::move(list);
+    return root;
+}
+
 }  // namespace
 
 std::string result_json(const estimator::Result& result, const uncertainty::Assessment& assessed,
                         bool simulated, const uncertainty::MonteCarlo* drawn,
-                        const dwells::Live* live, const SpectrumResult* spectrum) {
+                        const dwells::Live* live, const SpectrumResult* spectrum,
+                        const KnownType* type) {
     Json root;
     root["parameters"] = parameters(result, assessed, drawn);
     root["covariance"] = covariance(result);
@@ -133,6 +162,7 @@ std::string result_json(const estimator::Result& result, const uncertainty::Asse
     if (drawn != nullptr) root["monte_carlo"] = monte_carlo_json(*drawn);
     if (live != nullptr) root["identified_anew"] = identified_anew(*live);
     if (spectrum != nullptr) add_spectrum(*spectrum, root);
+    if (type != nullptr) root["type_prior"] = type_prior(*type, assessed);
     root["instruction_set"] = estimator::instruction_set();
     root["compiler"] = estimator::compiler();
     root["simulated"] = simulated;

@@ -116,10 +116,21 @@ void Acquisition::on_time(Time now) noexcept {
 void Acquisition::on_sample(const drivers::Sample& sample) noexcept {
     if (to_.rest != nullptr) to_.rest->add(sample);
     to_.interlock.check(sample, assembler_.platform());
+    doubt_witness();
     if (to_.stages != nullptr) to_.stages->take(sample);
     shown_.rate.add(sample);
     batch_[batched_++] = sample;
     if (batched_ == batch_.size()) push_batch();
+}
+
+/// A trip that an accelerometer has told leaves two to be believed, the table and it: that it is
+/// still afterwards proves nothing.
+void Acquisition::doubt_witness() noexcept {
+    const Tripped trip = to_.interlock.latched();
+    if (trip == doubted_) return;
+    doubted_ = trip;
+    if (to_.rest != nullptr && trip.channel < drivers::kChannels)
+        to_.rest->doubt(static_cast<drivers::Channel>(trip.channel));
 }
 
 void Acquisition::push_batch() noexcept {

@@ -78,6 +78,7 @@ class Acquisition {
   private:
     void on_frames(std::span<const drivers::ReceivedFrame> frames) noexcept;
     void on_sample(const drivers::Sample& sample) noexcept;
+    void doubt_witness() noexcept;
     void record(const drivers::ReceivedFrame& frame, drivers::Time time) noexcept;
     void on_tick(const RigTimeLink::Tick& tick) noexcept;
     void feed(const drivers::ReceivedFrame& frame) noexcept;
@@ -99,6 +100,7 @@ class Acquisition {
     std::optional<RigTimeLink::Tick> unacknowledged_;
     boost::asio::posix::stream_descriptor rest_;
     boost::asio::steady_timer timer_;
+    Tripped doubted_;  ///< trip whose witness is doubted already
     std::array<drivers::Sample, 32> batch_{};
     std::size_t batched_ = 0;
     drivers::Time oldest_ = 0;     ///< stamp of the batch at work; 0: none, or the rig's time

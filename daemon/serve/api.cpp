@@ -132,8 +132,9 @@ std::string asked_by(const ApiRequest& request) {
 }
 
 const char* word_of(CommandRequest::Kind kind) {
-    constexpr std::array<const char*, 8> kNames{"arm",   "start",       "pause",    "resume",
-                                                "abort", "acknowledge", "selftest", "commission"};
+    constexpr std::array<const char*, 9> kNames{"arm",      "start",      "pause",
+                                                "resume",   "abort",      "acknowledge",
+                                                "selftest", "commission", "certificate"};
     return kNames[static_cast<std::size_t>(kind)];
 }
 

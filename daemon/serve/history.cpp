@@ -40,6 +40,7 @@ std::array<double, History::kChannels.size()> values_of(
     const bool filters = s.estimate.samples > 0;
     return {s.shaker.valid ? s.shaker.measured_g : kNone,
             s.command_table_g,
+            s.shaker.valid ? s.shaker.amplitude_g : kNone,
             s.shaker.valid ? s.shaker.frequency_hz : kNone,
             s.platform.time != 0 ? s.platform.temperature_c : kNone,
             filters ? s.estimate.innovation_arcsec[0] : kNone,

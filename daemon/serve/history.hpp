@@ -20,8 +20,9 @@ class History {
         const char* name;
         const char* unit;
     };
-    static constexpr std::array<Channel, 14> kChannels{{{"measured_g", "g"},
+    static constexpr std::array<Channel, 15> kChannels{{{"measured_g", "g"},
                                                         {"command_g", "g"},
+                                                        {"set_point_g", "g"},
                                                         {"frequency_hz", "Hz"},
                                                         {"temperature_c", "degC"},
                                                         {"innovation_x_arcsec", "arcsec"},

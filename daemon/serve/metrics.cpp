@@ -14,8 +14,6 @@ using prometheus::MetricFamily;
 using prometheus::MetricType;
 using Labels = std::vector<ClientMetric::Label>;
 
-constexpr std::array<const char*, drivers::kChannels> kChannelLabels{
-    "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
 constexpr std::array<const char*, 3> kAxisLabels{"x", "y", "z"};
 constexpr std::array kChannelStates{ChannelState::good,    ChannelState::missing,
                                     ChannelState::flagged, ChannelState::out_of_range,
@@ -213,7 +211,7 @@ void add_acquisition(Families& to, const StatusData& s) {
     std::vector<std::pair<Labels, double>> ages, good;
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         if (s.channel(c) == ChannelState::unbound) continue;
-        const Labels channel{{"channel", kChannelLabels[c]}};
+        const Labels channel{{"channel", name_of(static_cast<drivers::Channel>(c))}};
         if (s.channel_age_s[c] >= 0) ages.emplace_back(channel, s.channel_age_s[c]);
         for (const ChannelState state : kChannelStates) {
             Labels labels = channel;

@@ -13,8 +13,6 @@ namespace {
 
 constexpr std::array<const char*, 5> kLinkWords{"absent", "connecting", "running", "degraded",
                                                 "fault"};
-constexpr std::array<const char*, drivers::kChannels> kChannelWords{
-    "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
 
 std::string seconds(double value) {
     std::array<char, 32> text{};
@@ -88,8 +86,8 @@ Readiness readiness(const StatusData& status) {
         const auto state = status.channel(c);
         const double age_s = status.channel_age_s[c];
         if (state == ChannelState::unbound || state == ChannelState::good) continue;
-        bad += (bad.empty() ? "" : ", ") + std::string(kChannelWords[c]) + ' ' + name_of(state) +
-               (age_s < 0 ? "" : ", last good " + seconds(age_s) + " ago");
+        bad += (bad.empty() ? "" : ", ") + std::string(name_of(static_cast<drivers::Channel>(c))) +
+               ' ' + name_of(state) + (age_s < 0 ? "" : ", last good " + seconds(age_s) + " ago");
     }
     add("channels", bad.empty(), bad.empty() ? "all good" : bad);
     add("clock", status.clock_misfit.empty(),

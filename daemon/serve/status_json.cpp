@@ -79,12 +79,14 @@ CommandRequest::Kind kind_of(v1::Command::Kind kind) {
             return CommandRequest::Kind::selftest;
         case v1::Command::commission:
             return CommandRequest::Kind::commission;
+        case v1::Command::certificate:
+            return CommandRequest::Kind::certificate;
         default:
             break;
     }
     throw std::invalid_argument(
         "kind: missing or unknown, expected arm, start, pause, resume, abort, acknowledge, "
-        "selftest or commission");
+        "selftest, commission or certificate");
 }
 
 /// As to_json(), the campaign's dwells one by one: protobuf makes an object of every field before
@@ -216,9 +218,10 @@ CommandRequest parse_command(const std::string& json) {
         throw std::invalid_argument("by: empty, expected the name of the person who commands");
     }
     check_line("by", request.by, kLongestName);
-    // Of commissioning it is a script's answers, too.
-    const bool script = request.kind == CommandRequest::Kind::commission;
-    check_line("argument", request.argument, script ? kLongestScript : kLongestArgument);
+    // Of commissioning it is a script's answers, too; of a certificate its hashes.
+    const bool json_inside = request.kind == CommandRequest::Kind::commission ||
+                             request.kind == CommandRequest::Kind::certificate;
+    check_line("argument", request.argument, json_inside ? kLongestScript : kLongestArgument);
     if (request.kind == CommandRequest::Kind::acknowledge && request.argument.empty()) {
         throw std::invalid_argument("argument: empty, expected what is acknowledged");
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/sample/channels.hpp"
 #include "estimator/identification/result.hpp"
 #include "proto/vibrig.pb.h"
 
@@ -23,8 +24,6 @@ static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault
 static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);
 
 constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
-constexpr std::array<const char*, drivers::kChannels> kChannelNames{
-    "outer", "inner", "azimuth", "accel_x", "accel_y", "accel_z", "table_accel"};
 
 /// Sets an optional field only with a number that JSON can carry.
 template <typename Message>
@@ -231,12 +230,6 @@ v1::Channel::Quality wire_state(ChannelState state) {
     return v1::Channel::never;
 }
 
-double channel_value(const drivers::Sample& sample, std::size_t channel) {
-    if (channel < 3) return sample.angle[channel] * kDegreesPerRadian;
-    if (channel < 6) return sample.force[channel - 3];
-    return sample.table_accel;
-}
-
 void fill(v1::Sample& out, const StatusData& status) {
     const drivers::Sample& sample = status.sample;
     out.set_time_s(drivers::to_seconds(sample.time));
@@ -245,12 +238,13 @@ void fill(v1::Sample& out, const StatusData& status) {
     if (status.sample_rate_hz > 0) set(out, &v1::Sample::set_rate_hz, status.sample_rate_hz);
     for (std::size_t i = 0; i < drivers::kChannels; ++i) {
         v1::Channel& channel = *out.add_channels();
-        channel.set_name(kChannelNames[i]);
+        const drivers::ChannelRow& row = drivers::kChannelTable[i];
+        channel.set_name(row.name);
         channel.set_quality(wire_state(status.channel(i)));
         if (status.channel(i) == ChannelState::good) {
-            set(channel, &v1::Channel::set_value, channel_value(sample, i));
+            set(channel, &v1::Channel::set_value, row.value(sample));
         }
-        channel.set_unit(i < 3 ? "deg" : "g");
+        channel.set_unit(row.unit);
         if (status.channel_age_s[i] >= 0) {
             set(channel, &v1::Channel::set_age_s, status.channel_age_s[i]);
         }

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,6 +10,8 @@
 #include <array>
 #include <cerrno>
 #include <system_error>
+
+#include "drivers/base/process_group.hpp"
 
 namespace vibrig::drivers {
 
@@ -35,48 +36,6 @@ namespace {
     return ends[0];
 }
 
-/// posix_spawn, as its actions and attributes want to be made and unmade.
-class Spawn {
-  public:
-    Spawn() noexcept {
-        ::posix_spawn_file_actions_init(&actions_);
-        ::posix_spawnattr_init(&attributes_);
-    }
-    ~Spawn() {
-        ::posix_spawn_file_actions_destroy(&actions_);
-        ::posix_spawnattr_destroy(&attributes_);
-    }
-    Spawn(const Spawn&) = delete;
-    Spawn& operator=(const Spawn&) = delete;
-
-    [[nodiscard]] int run(const std::string& path, int input, pid_t& leader) noexcept {
-        ::posix_spawn_file_actions_adddup2(&actions_, input, STDIN_FILENO);
-        for (const int output : {STDOUT_FILENO, STDERR_FILENO})
-            ::posix_spawn_file_actions_addopen(&actions_, output, "/dev/null", O_WRONLY, 0);
-        // Sockets and journals are not for it, whoever forgot to mark them.
-        ::posix_spawn_file_actions_addclosefrom_np(&actions_, STDERR_FILENO + 1);
-        sigset_t none, defaults;
-        ::sigemptyset(&none);
-        ::sigemptyset(&defaults);
-        for (const int signal : {SIGPIPE, SIGXFSZ, SIGINT, SIGTERM, SIGHUP})
-            ::sigaddset(&defaults, signal);
-        ::posix_spawnattr_setsigmask(&attributes_, &none);
-        ::posix_spawnattr_setsigdefault(&attributes_, &defaults);
-        ::posix_spawnattr_setpgroup(&attributes_, 0);
-        ::posix_spawnattr_setflags(
-            &attributes_, static_cast<short>(POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK |
-                                             POSIX_SPAWN_SETSIGDEF));
-        std::string name = path;
-        std::array<char*, 2> arguments{name.data(), nullptr};
-        return ::posix_spawn(&leader, path.c_str(), &actions_, &attributes_, arguments.data(),
-                             environ);
-    }
-
-  private:
-    posix_spawn_file_actions_t actions_{};
-    posix_spawnattr_t attributes_{};
-};
-
 }  // namespace
 
 PageCommand::PageCommand(std::string path, Time limit) : path_(std::move(path)), limit_(limit) {}
@@ -95,7 +54,7 @@ std::string PageCommand::start(const std::string& text, Time now) {
         return path_ + ": no pipe: " + words_of(errno);
     }
     Run run{-1, now + limit_};
-    const int error = Spawn().run(path_, input, run.leader);
+    const int error = start_process_group({path_}, input, -1, -1, run.leader);
     ::close(input);
     if (error != 0) {
         ++counters_.failed;

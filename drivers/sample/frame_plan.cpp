@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/sample/channels.hpp"
 #include "drivers/sample/signal_binding.hpp"
 
 namespace vibrig::drivers {
@@ -26,27 +27,13 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
         has_count_ = true;
     }
 
-    struct ChannelName {
-        Channel channel;
-        const char* key;
-        const std::string& value;
-        const char* valid_key;
-        const std::string& valid;
-    };
     const std::string none;
-    const std::array<ChannelName, kChannels> channels{{
-        {Channel::outer, "outer", names.outer, "outer_valid", names.outer_valid},
-        {Channel::inner, "inner", names.inner, "inner_valid", names.inner_valid},
-        {Channel::azimuth, "azimuth", names.azimuth, "azimuth_valid", names.azimuth_valid},
-        {Channel::accel_x, "accel_x", names.accel_x, "accel_x_valid", names.accel_x_valid},
-        {Channel::accel_y, "accel_y", names.accel_y, "accel_y_valid", names.accel_y_valid},
-        {Channel::accel_z, "accel_z", names.accel_z, "accel_z_valid", names.accel_z_valid},
-        {Channel::table_accel, "table_accel", names.table_accel, "", none},
-    }};
-    for (const ChannelName& c : channels) {
+    for (const ChannelRow& c : kChannelTable) {
         const auto index = static_cast<std::size_t>(c.channel);
-        const BoundSignal value = bind(c.key, c.value);
-        const BoundSignal valid = bind(c.valid_key, c.valid);
+        const BoundSignal value = bind(c.name, names.*c.signal);
+        const BoundSignal valid =
+            c.valid == nullptr ? BoundSignal{}
+                               : bind((c.name + std::string("_valid")).c_str(), names.*c.valid);
         if (!value) continue;
         bound_[index] = true;
         plan_for(*value.message).channels.push_back({index, value.signal, false});

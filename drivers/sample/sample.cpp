@@ -1,25 +1,12 @@
 #include "drivers/sample/sample.hpp"
 
+#include "drivers/sample/channels.hpp"
+
 namespace vibrig::drivers {
 
 const char* name_of(Channel channel) noexcept {
-    switch (channel) {
-        case Channel::outer:
-            return "outer";
-        case Channel::inner:
-            return "inner";
-        case Channel::azimuth:
-            return "azimuth";
-        case Channel::accel_x:
-            return "accel_x";
-        case Channel::accel_y:
-            return "accel_y";
-        case Channel::accel_z:
-            return "accel_z";
-        case Channel::table_accel:
-            return "table_accel";
-    }
-    return "?";
+    const auto index = static_cast<std::size_t>(channel);
+    return index < kChannels ? kChannelTable[index].name : "?";
 }
 
 const char* name_of(Quality quality) noexcept {

@@ -59,6 +59,12 @@ void DriftFilter::begin_dwell() noexcept {
     gated_in_a_row_ = 0;
 }
 
+void DriftFilter::begin_dwell_after_walk(double variance) noexcept {
+    static_assert(internal_index(kDt, 0) == 0 && internal_index(kDt, 2) == 2);
+    if (variance > 0) filter_.let_first_move(variance);
+    begin_dwell();
+}
+
 Eigen::Vector3d DriftFilter::angles() const noexcept {
     const UdFilter::Vector3 a = filter_.angles();
     return Eigen::Vector3d(a[0], a[1], a[2]) / kArcsecPerRad;

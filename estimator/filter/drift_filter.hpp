@@ -33,6 +33,9 @@ class DriftFilter {
     void set_noise(const FilterNoise& noise) noexcept { noise_ = noise; }
     /// The next sample starts the angles afresh.
     void begin_dwell() noexcept;
+    /// The biases have walked since the last dwell, by this variance, (deg/h)^2; and the next
+    /// sample starts the angles afresh.
+    void begin_dwell_after_walk(double variance) noexcept;
     /// One reading at `time_s`, later than the one before.
     StepResult step(double time_s, const Eigen::Vector3d& angles_rad,
                     const VibrationMoment& vibration) noexcept;

@@ -99,6 +99,15 @@ std::array<double, 3> azimuth_upright_deg(const Settings& settings, double azimu
     return encoder;
 }
 
+std::array<double, 3> inner_upright_deg(const Settings& settings, double inner_deg, bool down) {
+    // A quarter of a turn of the outer gimbal takes z up to y up.
+    const auto z_up = gimbal_deg(settings, azimuth_upright_deg(settings, 0, false));
+    std::array<double, 3> encoder =
+        encoder_deg(settings, {z_up[0] - 90, inner_deg, down ? 180.0 : 0.0});
+    for (double& angle : encoder) angle = std::remainder(angle, 360.0);
+    return encoder;
+}
+
 Pose Kinematics::pose(const Eigen::Vector3d& angles_rad) const noexcept {
     const double ca = std::cos(angles_rad[0]), sa = std::sin(angles_rad[0]);
     const double cb = std::cos(angles_rad[1]), sb = std::sin(angles_rad[1]);

@@ -21,6 +21,7 @@ struct DwellInfo {
     double table_g = -1;  ///< commanded peak at the table; negative: not known (a CSV recording)
     /// When its measurements' time is 0, on a clock common to all dwells, s; NaN: there is none.
     double begin_s = std::numeric_limits<double>::quiet_NaN();
+    bool power_lost = false;  ///< the gyros were without power since the dwell before
 };
 
 enum class StepOutcome : std::uint8_t {

@@ -23,6 +23,27 @@ void UdFilter::start_angles(const Vector3& angles, double variance) noexcept {
     }
 }
 
+void UdFilter::let_first_move(double variance) noexcept {
+    constexpr std::size_t kFirst = 3;
+    for (std::size_t moved = 0; moved < kFirst; ++moved) {
+        std::array<double, kFirst> a{};
+        a[moved] = 1.0;
+        double c = variance;
+        for (std::size_t j = moved + 1; j-- > 0;) {
+            const double d = memory_.d_constant[j] + c * a[j] * a[j];
+            if (!(d > 0)) continue;
+            const double share = c * a[j] / d;
+            for (std::size_t k = 0; k < j; ++k) {
+                double& u = memory_.column[j][k];
+                a[k] -= a[j] * u;
+                u += share * a[k];
+            }
+            c *= memory_.d_constant[j] / d;
+            memory_.d_constant[j] = d;
+        }
+    }
+}
+
 UdFilter::Matrix3 UdFilter::angle_covariance() const noexcept {
     Matrix3 p{};
     for (std::size_t i = 0; i < kAngles; ++i) {

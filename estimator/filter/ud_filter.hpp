@@ -27,6 +27,10 @@ class UdFilter {
 
     /// The angles start afresh at `angles`; constants keep mean and covariance.
     void start_angles(const Vector3& angles, double variance) noexcept;
+    /// The first three constants have moved, each by itself with this variance: U and d of their
+    /// block by Agee and Turner's rank-one update. start_angles() has to follow, since what the
+    /// angles have in common with them is not kept.
+    void let_first_move(double variance) noexcept;
     void predict(const Transition& transition) noexcept { kernel_->predict(memory_, transition); }
 
     struct Update {

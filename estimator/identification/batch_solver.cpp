@@ -171,23 +171,40 @@ bool BatchSolver::row(DwellRow& out) noexcept {
     return out.variance.allFinite() && out.ramp_variance.allFinite();
 }
 
-void BatchSolver::end_dwell(bool keep) noexcept {
+void BatchSolver::end_dwell(bool keep, double walked) noexcept {
     if (in_block_ > 0) add_block();
-    if (keep) kept_ += of_dwell();
+    if (keep) {
+        if (walked > 0) let_biases_walk(walked);
+        kept_ += of_dwell();
+        kept_now_ += of_dwell();
+    }
     begin_dwell();
 }
 
-bool BatchSolver::solve(ParameterArray& value, Covariance& covariance) const noexcept {
+/// Of the biases before the walk nothing is asked any more: they are integrated out, N - N_D
+/// (1/q + N_DD)^-1 N_D' with all columns, which is least squares with the walk's kernel.
+void BatchSolver::let_biases_walk(double variance) noexcept {
+    static_assert(internal_index(kDt, 0) == 0 && internal_index(kDt, 2) == 2);
+    const Eigen::Matrix3d core =
+        kept_now_.topLeftCorner<3, 3>() + Eigen::Matrix3d::Identity() / variance;
+    const Eigen::LLT<Eigen::Matrix3d> factor(core);
+    const Eigen::Matrix<double, 3, kColumns> of_biases = kept_now_.topRows<3>();
+    const Eigen::Matrix<double, 3, kColumns> share = factor.solve(of_biases);
+    kept_now_ -= of_biases.transpose().lazyProduct(share);
+}
+
+bool BatchSolver::solve(ParameterArray& value, Covariance& covariance, Bias bias) const noexcept {
+    const Sums& kept = bias == Bias::now ? kept_now_ : kept_;
     using Vector = Eigen::Matrix<double, kParameters, 1>;
     constexpr auto n = static_cast<Eigen::Index>(kParameters);
-    if (!kept_.allFinite()) return false;
+    if (!kept.allFinite()) return false;
     // In units of the prior, which adds the unit matrix.
     const Eigen::Map<const Vector> scale(prior_.data());
     const Covariance information =
         Covariance::Identity() +
-        Covariance(scale.asDiagonal() * kept_.topLeftCorner<n, n>() * scale.asDiagonal());
+        Covariance(scale.asDiagonal() * kept.topLeftCorner<n, n>() * scale.asDiagonal());
     const Covariance normalised = linear_algebra::covariance_inverse(information);
-    const Vector right = scale.cwiseProduct(kept_.col(kColumns - 1).head<n>());
+    const Vector right = scale.cwiseProduct(kept.col(kColumns - 1).head<n>());
     Eigen::Map<Vector>(value.data()) = scale.cwiseProduct(Vector(normalised * right));
     covariance = scale.asDiagonal() * normalised * scale.asDiagonal();
     return covariance.allFinite();

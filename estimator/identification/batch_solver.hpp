@@ -29,11 +29,15 @@ class BatchSolver {
     /// What of a row the sums of the dwell tell: rates, ramps and their regressors; those of the
     /// gyros' own coefficients. False if they do not determine them. Before end_dwell().
     [[nodiscard]] bool row(DwellRow& out) noexcept;
-    void end_dwell(bool keep) noexcept;
+    /// `walked`: variance of what the biases moved by since the dwell kept before, (deg/h)^2.
+    void end_dwell(bool keep, double walked = 0) noexcept;
     void set_noise(const FilterNoise& noise) noexcept { noise_ = noise; }
 
+    /// Whether the biases stood still, or are those of the last dwell kept after their walk.
+    enum class Bias : std::uint8_t { constant, now };
     /// Over the dwells kept, filter order; false if the sums are not finite.
-    [[nodiscard]] bool solve(ParameterArray& value, Covariance& covariance) const noexcept;
+    [[nodiscard]] bool solve(ParameterArray& value, Covariance& covariance,
+                             Bias bias = Bias::constant) const noexcept;
 
   private:
     /// Coefficients, a drift of each gyro that grows along the dwell, the angles.
@@ -44,6 +48,7 @@ class BatchSolver {
     using Sums = Eigen::Matrix<double, kColumns, kColumns>;
 
     void add_block() noexcept;
+    void let_biases_walk(double variance) noexcept;
     [[nodiscard]] Sums of_dwell() const noexcept;
 
     const NormalSums* kernel_ = &normal_sums();
@@ -65,6 +70,8 @@ class BatchSolver {
     std::size_t in_block_ = 0;  ///< readings
     alignas(64) double of_dwell_[NormalSums::kColumns][NormalSums::kColumns]{};
     Sums kept_ = Sums::Zero();
+    /// The same, as far as it tells of the biases as they are now.
+    Sums kept_now_ = Sums::Zero();
 };
 
 }  // namespace vibrig::estimator

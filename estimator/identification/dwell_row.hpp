@@ -7,6 +7,9 @@
 
 namespace vibrig::estimator {
 
+/// Between two dwells whose times have no clock in common, s.
+inline constexpr double kAssumedPause_s = 60;
+
 /// All that one dwell says of the coefficients and of what the model leaves out: the mean drift of
 /// each gyro about its input axis, Earth rate taken out, and how it changes along the dwell.
 struct DwellRow {
@@ -16,6 +19,7 @@ struct DwellRow {
     double table_g = -1;  ///< commanded; negative: not known
     double middle_s = 0;  ///< on the clock of DwellInfo::begin_s, or of the dwell without one
     bool common_clock = false;
+    bool after_power_loss = false;  ///< the gyros were without power since the row before
     double duration_s = 0;
     Eigen::Vector3d angles = Eigen::Vector3d::Zero();  ///< gimbals, mean over the dwell, rad
     VibrationMoment vibration;

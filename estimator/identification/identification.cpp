@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/filter/settings_check.hpp"
 #include "estimator/identification/identification_impl.hpp"
@@ -19,6 +20,27 @@ constexpr auto kBufferCapacity =
 const Settings& checked(const Settings& settings) {
     check(settings);
     return settings;
+}
+
+ParameterArray sigma_of(const Solution& solution) noexcept {
+    ParameterArray sigma{};
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        sigma[i] = std::sqrt(std::max(0.0, solution.covariance(k, k)));
+    }
+    return sigma;
+}
+
+std::vector<double> in_rows(const Covariance& covariance) {
+    std::vector<double> rows;
+    rows.reserve(kParameters * kParameters);
+    for (std::size_t i = 0; i < kParameters; ++i) {
+        for (std::size_t j = 0; j < kParameters; ++j) {
+            rows.push_back(covariance(static_cast<Eigen::Index>(internal_of(i)),
+                                      static_cast<Eigen::Index>(internal_of(j))));
+        }
+    }
+    return rows;
 }
 
 template <class Container>
@@ -96,6 +118,8 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     sync_.clear();
     saturation_.clear();
     bad_times_in_a_row_ = 0;
+    walked_.reset();
+    power_lost_ = power_lost_ || dwell.power_lost;
     active_ = filter_of(dwell.run);
     if (active_ == nullptr) {
         refused_run = true;
@@ -221,6 +245,7 @@ StepResult Identification::Impl::replay() noexcept {
     if (primed_) {
         // A few samples tell no level that could be compared with another.
         if (buffer_.full()) record_.note_level(level_.kappa());
+        if (!walked_) let_biases_walk();
         for (const Reading& reading : buffer_.readings()) step = through_filter(reading);
     } else {
         step.outcome = StepOutcome::bad_force;
@@ -228,6 +253,21 @@ StepResult Identification::Impl::replay() noexcept {
     }
     buffer_.clear();
     return step;
+}
+
+/// From the beginning of the dwell kept before to that of this one; the two-step route, which is
+/// the paper's, has constant biases.
+void Identification::Impl::let_biases_walk() noexcept {
+    walk_begin_s_ = record_.info.begin_s + buffer_.readings().front().time_s;
+    walked_ = 0.0;
+    if (!walked_from_ || settings.method != Method::joint ||
+        settings.drift.model == uncertainty::BiasModel::constant)
+        return;
+    double elapsed_s = walk_begin_s_ - walked_from_->first;
+    if (!(elapsed_s > 0)) elapsed_s = walked_from_->second + kAssumedPause_s;
+    const double walk = settings.drift.walk_deg_h_rt_h;
+    walked_ = walk * walk * elapsed_s / 3600.0;
+    active_->filter.begin_dwell_after_walk(*walked_);
 }
 
 void Identification::Impl::to_level(const Reading& reading) noexcept {
@@ -321,6 +361,7 @@ void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
     row.run = summary.run;
     row.position = summary.position;
     row.table_g = record_.info.table_g;
+    row.after_power_loss = std::exchange(power_lost_, false);
     row.common_clock = std::isfinite(record_.info.begin_s);
     if (row.common_clock) row.middle_s += record_.info.begin_s;
     row.vibration = summary.vibration();
@@ -348,7 +389,9 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             verdict.summary.amplitude_g = paper_.amplitude_g();
         }
         if (!verdict.rejected) keep_row(verdict.summary);
-        active_->batch.end_dwell(!verdict.rejected);
+        active_->batch.end_dwell(!verdict.rejected, walked_.value_or(0.0));
+        if (!verdict.rejected && walked_)
+            walked_from_.emplace(walk_begin_s_, last_time_s_ - dwell_begin_s_);
         if (verdict.rejected) {
             active_->filter.restore(active_->saved);
         } else {
@@ -380,6 +423,10 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
     return verdict.summary;
 }
 
+void Identification::Impl::solved(Estimate& out) const noexcept {
+    tell(solution.value, sigma_of(solution), out);
+}
+
 void Identification::Impl::estimate(Estimate& out) const noexcept {
     ParameterArray value{}, sigma{};
     if (settings.method == Method::joint || !two_runs()) {
@@ -388,11 +435,13 @@ void Identification::Impl::estimate(Estimate& out) const noexcept {
         state.sigma(sigma);
     } else {
         value = solution.value;
-        for (std::size_t i = 0; i < kParameters; ++i) {
-            const auto k = static_cast<Eigen::Index>(i);
-            sigma[i] = std::sqrt(std::max(0.0, solution.covariance(k, k)));
-        }
+        sigma = sigma_of(solution);
     }
+    tell(value, sigma, out);
+}
+
+void Identification::Impl::tell(const ParameterArray& value, const ParameterArray& sigma,
+                                Estimate& out) const noexcept {
     for (std::size_t i = 0; i < kParameters; ++i) {
         out.value[i] = value[internal_of(i)];
         out.sigma[i] = sigma[internal_of(i)];
@@ -436,16 +485,17 @@ Result Identification::result() const { return impl_->result(); }
 
 const std::vector<DwellRow>& Identification::rows() const noexcept { return impl_->rows; }
 
+void Identification::solved(Estimate& out) const noexcept { impl_->solved(out); }
+
 std::vector<double> Identification::covariance() const {
-    std::vector<double> rows;
-    rows.reserve(kParameters * kParameters);
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        for (std::size_t j = 0; j < kParameters; ++j) {
-            rows.push_back(impl_->solution.covariance(static_cast<Eigen::Index>(internal_of(i)),
-                                                      static_cast<Eigen::Index>(internal_of(j))));
-        }
-    }
-    return rows;
+    return in_rows(impl_->solution.covariance);
+}
+
+std::vector<double> Identification::covariance_now() const {
+    if (impl_->settings.method != Method::joint) return covariance();
+    Covariance covariance;
+    impl_->filters[0].filter.state().covariance(covariance.data());
+    return in_rows(covariance);
 }
 
 }  // namespace vibrig::estimator

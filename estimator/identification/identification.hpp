@@ -66,7 +66,11 @@ class Identification {
     void begin_dwell(const DwellInfo& dwell) noexcept;
     StepResult add(const Measurement& measurement) noexcept;
     DwellSummary end_dwell() noexcept;
+    /// By the filter: each D_F as it is now, after its walk from dwell to dwell.
     void estimate(Estimate& out) const noexcept;
+    /// After the last ended dwell, as with constant biases: values and sigmas of result(), also of
+    /// what is not determined one by one.
+    void solved(Estimate& out) const noexcept;
     /// In place of the settings' noise, from the next dwell on; between dwells only.
     void set_noise(const NoiseLevels& levels) noexcept;
     [[nodiscard]] const NoiseLevels& noise() const noexcept;
@@ -74,9 +78,11 @@ class Identification {
     [[nodiscard]] Result result() const;
     /// Those of result(), without a copy.
     [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
-    /// Of the coefficients after the last ended dwell, 30 x 30 row-major in the order of
-    /// parameter_names(), whether or not they are observable. Allocates.
+    /// Of solved(), 30 x 30 row-major in the order of parameter_names(), whether or not they are
+    /// observable. Allocates.
     [[nodiscard]] std::vector<double> covariance() const;
+    /// The same of estimate(); between dwells only.
+    [[nodiscard]] std::vector<double> covariance_now() const;
 
   private:
     struct Impl;

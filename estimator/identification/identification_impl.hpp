@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "estimator/filter/drift_filter.hpp"
@@ -48,6 +50,7 @@ struct Identification::Impl {
     StepResult add(const Measurement& measurement) noexcept;
     DwellSummary end_dwell() noexcept;
     void estimate(Estimate& out) const noexcept;
+    void solved(Estimate& out) const noexcept;
     [[nodiscard]] Result result() const;
 
     void solve(Solution& out) const noexcept;
@@ -60,7 +63,7 @@ struct Identification::Impl {
     ParameterArray prior;  ///< standard deviations, filter order
     std::array<RunFilter, 2> filters;
     NoiseLevels noise;  ///< that the filters take
-    Solution solution;  ///< after the last ended dwell
+    Solution solution;  ///< after the last ended dwell, as with constant biases
     std::vector<DwellSummary> dwells;
     std::vector<DwellRow> rows;
     std::size_t dwells_not_kept = 0;  ///< summaries beyond max_dwells
@@ -78,7 +81,11 @@ struct Identification::Impl {
     StepResult through_filter(const Reading& reading) noexcept;
     void to_level(const Reading& reading) noexcept;
     void refresh_vibration() noexcept;
+    void let_biases_walk() noexcept;
     void note_shape(double weight) noexcept;
+    /// Values and sigmas, filter order, with the counts.
+    void tell(const ParameterArray& value, const ParameterArray& sigma,
+              Estimate& out) const noexcept;
     void end_stretch() noexcept;
     void keep_row(const DwellSummary& summary) noexcept;
 
@@ -102,8 +109,14 @@ struct Identification::Impl {
     std::vector<PaperStart> paper_starts_;
     RunFilter* active_ = nullptr;
     DwellRecord record_;
+    bool power_lost_ = false;  ///< since the row kept last
     bool in_dwell_ = false;
     bool primed_ = false;  ///< the level of this stretch is known
+    /// Of the biases' walk since the dwell kept before, (deg/h)^2; none: not in the filter yet.
+    std::optional<double> walked_;
+    double walk_begin_s_ = 0;  ///< of this dwell's readings, on the dwells' clock if there is one
+    /// The dwell kept last: its readings begin and last so long.
+    std::optional<std::pair<double, double>> walked_from_;
     double last_time_s_ = 0, stretch_begin_s_ = 0, dwell_begin_s_ = 0;
     double period_s_ = 0;  ///< of the newest stretch with two readings or more; 0: none yet
     int bad_times_in_a_row_ = 0;

@@ -129,7 +129,8 @@ void Identification::Impl::solve(Solution& out) const noexcept {
         filter.state().covariance(covariance.data());
     };
     if (settings.method == Method::joint) {
-        take(filters[0].filter, out.value, out.covariance);
+        if (!filters[0].batch.solve(out.value, out.covariance))
+            take(filters[0].filter, out.value, out.covariance);
         out.found = observability(out.covariance, prior, filters[0].kappa);
         return;
     }
@@ -154,7 +155,8 @@ void Identification::Impl::solve(Solution& out) const noexcept {
 
 bool Identification::Impl::batch_solution(RunSolution& out) const noexcept {
     if (settings.method == Method::joint) {
-        return filters[0].kappa.dwells > 0 && filters[0].batch.solve(out.value, out.covariance);
+        return filters[0].kappa.dwells > 0 &&
+               filters[0].batch.solve(out.value, out.covariance, BatchSolver::Bias::now);
     }
     RunSolution first, second;
     first.kappa = filters[0].kappa.mean;
@@ -167,6 +169,15 @@ CrossCheck Identification::Impl::cross_check(const std::vector<Combination>& com
     CrossCheck check;
     RunSolution batch;
     if (!batch_solution(batch)) return check;
+    // What the filter says: of biases that walk, as they are now.
+    RunSolution mine;
+    mine.value = solution.value;
+    mine.covariance = solution.covariance;
+    if (settings.method == Method::joint) {
+        const UdFilter& state = filters[0].filter.state();
+        std::copy_n(state.constants(), kParameters, mine.value.begin());
+        state.covariance(mine.covariance.data());
+    }
     const auto compare = [&check](const std::string& name, double difference, double sigma) {
         // Written so that what is not a number is the largest difference there is.
         const double in_sigma = std::abs(difference) / sigma;
@@ -179,17 +190,19 @@ CrossCheck Identification::Impl::cross_check(const std::vector<Combination>& com
         const std::size_t a = internal_of(i);
         if (!solution.found.observable[a]) continue;
         const auto k = static_cast<Eigen::Index>(a);
-        compare(parameter_names()[i], batch.value[a] - solution.value[a],
-                std::sqrt(solution.covariance(k, k)));
+        compare(parameter_names()[i], batch.value[a] - mine.value[a],
+                std::sqrt(mine.covariance(k, k)));
     }
     for (const Combination& combination : combinations) {
-        double value = 0;
+        double difference = 0;
         for (const auto& [name, weight] : combination.weights) {
             for (std::size_t i = 0; i < kParameters; ++i) {
-                if (name == parameter_names()[i]) value += weight * batch.value[internal_of(i)];
+                const std::size_t a = internal_of(i);
+                if (name == parameter_names()[i])
+                    difference += weight * (batch.value[a] - mine.value[a]);
             }
         }
-        compare(combination.weights.front().first, value - combination.value, combination.sigma);
+        compare(combination.weights.front().first, difference, combination.sigma);
     }
     return check;
 }

@@ -28,19 +28,31 @@ VectorXd prior_information(const Settings& settings) {
     return information;
 }
 
-/// Dwells after which a power cut is likely: each change of run, if the power goes with it. An
-/// order that returns to a run mixes the levels, and nobody switches the gyros off at each change
-/// of level.
-std::vector<std::size_t> breaks_of(const DwellTable& table, const Drift& drift) {
-    std::vector<std::size_t> breaks;
-    if (drift.power != Power::per_run) return breaks;
+/// Dwells after which each run of a plain order ends. An order that returns to a run mixes the
+/// levels, and nobody switches the gyros off at each change of level.
+std::vector<std::size_t> ends_of_runs(const DwellTable& table) {
+    std::vector<std::size_t> ends;
     std::set<int> begun;
     for (std::size_t k = 0; k < table.rows.size(); ++k) {
         if (k > 0 && table.rows[k].run == table.rows[k - 1].run) continue;
         if (!begun.insert(table.rows[k].run).second) return {};
-        if (k > 0) breaks.push_back(k);
+        if (k > 0) ends.push_back(k);
     }
-    return breaks;
+    return ends;
+}
+
+/// Dwells after which a power cut is likely: where one was seen, and at each end of a run if the
+/// power goes with it.
+std::vector<std::size_t> breaks_of(const DwellTable& table, const Drift& drift) {
+    if (drift.power == Power::unbroken) return {};
+    std::set<std::size_t> breaks;
+    if (drift.power == Power::per_run) {
+        for (const std::size_t k : ends_of_runs(table)) breaks.insert(k);
+    }
+    for (std::size_t k = 1; k < table.rows.size(); ++k) {
+        if (table.rows[k].after_power_loss) breaks.insert(k);
+    }
+    return {breaks.begin(), breaks.end()};
 }
 
 std::array<GyroRates, 3> gyros_of(const DwellTable& table, const Settings& settings) {

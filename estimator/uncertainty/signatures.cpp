@@ -11,7 +11,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double kArcmin = kPi / 180.0 / 60.0;
-constexpr double kBetween_s = 60.0;  ///< of two dwells without a clock
 
 constexpr std::array<const char*, 3> kGyro{"x", "y", "z"};
 constexpr std::array<const char*, 3> kGimbalName{"outer", "inner", "azimuth"};
@@ -108,7 +107,7 @@ DwellTable dwell_table(std::span<const DwellRow> rows) {
     double at = 0;
     for (std::size_t k = 0; k < rows.size(); ++k) {
         const double before = k > 0 ? rows[k - 1].duration_s : 0;
-        if (k > 0) at += 0.5 * (before + rows[k].duration_s) + kBetween_s;
+        if (k > 0) at += 0.5 * (before + rows[k].duration_s) + kAssumedPause_s;
         table.time_h[static_cast<Index>(k)] =
             (table.times_assumed ? at : rows[k].middle_s - rows[0].middle_s) / 3600.0;
     }

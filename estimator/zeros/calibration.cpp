@@ -20,7 +20,17 @@ constexpr double kSlowest_deg_s = 0.1;  // below it the read-out's noise hides t
 constexpr double kLargestZero_mg = 10;
 constexpr std::size_t kBlock = 60;
 constexpr double kLargestGain = 0.02;  // of a gyro; beyond it is another fault
-constexpr std::array kAxisNames{"x", "y", "z"};
+/// Inside, axes are in the order level, level, upright: that of the platform, begun after the
+/// upright axis.
+std::size_t platform_axis(int upright, std::size_t place) {
+    return (static_cast<std::size_t>(upright) + 1 + place) % 3;
+}
+
+Triple in_order(int upright, const Triple& platform) {
+    Triple turned{};
+    for (std::size_t i = 0; i < 3; ++i) turned[i] = platform[platform_axis(upright, i)];
+    return turned;
+}
 
 /// Wilson and Hilferty; z in standard deviations.
 double chi_square(double freedom, double z) {
@@ -33,6 +43,7 @@ void check_settings(const CalibrationSettings& s) {
         if (!good) throw ZeroError(text("%s: %g, expected %s", name, value, expected));
     };
     s.plan.check();
+    require(s.upright >= 0 && s.upright < 3, "upright axis", s.upright, "0 (x), 1 (y) or 2 (z)");
     require(std::abs(s.site.latitude_rad) < 89 * kDeg, "latitude", s.site.latitude_rad / kDeg,
             "degrees, -89 to 89");
     require(s.site.gravity_mps2 > 0 && std::isfinite(s.site.gravity_mps2), "gravity",
@@ -70,6 +81,7 @@ void check_settings(const CalibrationSettings& s) {
 
 struct Calibration::Impl {
     explicit Impl(const CalibrationSettings& s) : settings(s) {
+        settings.lever_arm_m = in_order(s.upright, s.lever_arm_m);
         const Observability seen = observability(s.plan.segments_deg(), s.site);
         for (std::size_t i = 0; i < 3; ++i)
             told_apart[i] = seen.degree[static_cast<std::size_t>(kAccelerometer) + i] > 0;
@@ -107,6 +119,9 @@ struct Calibration::Impl {
     Eigen::Matrix<double, 6, 1> ratio_sum = Eigen::Matrix<double, 6, 1>::Zero();
     std::size_t in_block = 0;
 
+    [[nodiscard]] char name(std::size_t place) const {
+        return "xyz"[platform_axis(settings.upright, place)];
+    }
     [[nodiscard]] double to_mg() const { return 1e3 / settings.site.gravity_mps2; }
 
     bool give_up(std::string why) {
@@ -131,14 +146,14 @@ struct Calibration::Impl {
     [[nodiscard]] std::string fault_of(const Increment& in, double dt) const {
         for (std::size_t i = 0; i < 3; ++i) {
             if (!std::isfinite(in.turn_rad[i])) {
-                return text("gyro %s is not a number at %.3f s", kAxisNames[i], in.time_s);
+                return text("gyro %c is not a number at %.3f s", name(i), in.time_s);
             }
             if (!std::isfinite(in.velocity_mps[i])) {
-                return text("accelerometer %s is not a number at %.3f s", kAxisNames[i], in.time_s);
+                return text("accelerometer %c is not a number at %.3f s", name(i), in.time_s);
             }
             if (period_s > 0 && std::abs(in.velocity_mps[i]) >=
                                     settings.saturation_g * settings.site.gravity_mps2 * dt) {
-                return text("accelerometer %s saturated (%.4g g) at %.3f s", kAxisNames[i],
+                return text("accelerometer %c saturated (%.4g g) at %.3f s", name(i),
                             in.velocity_mps[i] / dt / settings.site.gravity_mps2, in.time_s);
             }
         }
@@ -215,10 +230,10 @@ struct Calibration::Impl {
         // The start of a slew shakes once, on the border of two intervals; a shaker goes on.
         shaken = level > settings.vibration_limit_g ? shaken + 1 : 0;
         if (shaken < 3) return true;
-        return give_up(text(
-            "shaker must be off during zero calibration: vibration of %.3g g (1 "
-            "sigma) on %s at %.3f s, limit %.3g g",
-            level, kAxisNames[static_cast<std::size_t>(worst)], now_s, settings.vibration_limit_g));
+        return give_up(
+            text("shaker must be off during zero calibration: vibration of %.3g g (1 "
+                 "sigma) on %c at %.3f s, limit %.3g g",
+                 level, name(static_cast<std::size_t>(worst)), now_s, settings.vibration_limit_g));
     }
 
     [[nodiscard]] static bool outside(const InnovationStatistic& v) {
@@ -276,9 +291,9 @@ struct Calibration::Impl {
         for (std::size_t i = 0; i < 3; ++i) {
             if (point.sigma_mg[i] < 1 && std::abs(point.zero_mg[i]) > kLargestZero_mg) {
                 return give_up(
-                    text("zero of accelerometer %s is %.4g mg, outside the small-error range of "
+                    text("zero of accelerometer %c is %.4g mg, outside the small-error range of "
                          "%.0f mg: level first",
-                         kAxisNames[i], point.zero_mg[i], kLargestZero_mg));
+                         name(i), point.zero_mg[i], kLargestZero_mg));
             }
         }
         interval_s = turned_rad = 0;
@@ -363,15 +378,15 @@ struct Calibration::Impl {
         }
         for (std::size_t i = 0; !given_up && i < 3; ++i) {
             if (r.axis[i].converged_s) continue;
-            const bool sigma = trace.back().sigma_mg[i] >= settings.target_mg[i];
+            const double sigma_mg = r.axis[i].filter_sigma_mg;
             r.problems.push_back(text(
-                "%s has not converged after %.0f s: standard deviation %.3g mg, moved %.3g mg "
+                "%c has not converged after %.0f s: standard deviation %.3g mg, moved %.3g mg "
                 "within the last sweep, target %.3g mg; %s",
-                kAxisNames[i], r.time_s, trace.back().sigma_mg[i], r.axis[i].movement_mg,
-                settings.target_mg[i],
-                sigma ? "lengthen the run by more sweeps"
-                      : "lengthen the run until a whole sweep has passed, and wait for the unit to "
-                        "be warm"));
+                name(i), r.time_s, sigma_mg, r.axis[i].movement_mg, settings.target_mg[i],
+                sigma_mg >= settings.target_mg[i]
+                    ? "lengthen the run by more sweeps"
+                    : "lengthen the run until a whole sweep has passed, and wait for the unit to "
+                      "be warm"));
         }
         if (!given_up && gain && std::abs(gain->value()) > kLargestGain) {
             r.problems.push_back(text(
@@ -455,24 +470,33 @@ Calibration::~Calibration() = default;
 Calibration::Calibration(Calibration&&) noexcept = default;
 Calibration& Calibration::operator=(Calibration&&) noexcept = default;
 
-bool Calibration::add(const Increment& increment) { return impl_->add(increment); }
+bool Calibration::add(const Increment& increment) {
+    const int upright = impl_->settings.upright;
+    if (upright == 2) return impl_->add(increment);
+    Increment turned = increment;
+    turned.turn_rad = in_order(upright, increment.turn_rad);
+    turned.velocity_mps = in_order(upright, increment.velocity_mps);
+    return impl_->add(turned);
+}
 bool Calibration::given_up() const noexcept { return impl_->given_up; }
-CalibrationResult Calibration::result() const { return impl_->result(); }
-const std::vector<CalibrationTrace>& Calibration::trace() const noexcept { return impl_->trace; }
-
-ZerosApart separate(const CalibrationResult& up, const CalibrationResult& down) noexcept {
-    // Up shows b + s g, down b - s g.
-    ZerosApart r;
+CalibrationResult Calibration::result() const {
+    const CalibrationResult found = impl_->result();
+    CalibrationResult r = found;
+    r.upright = impl_->settings.upright;
+    r.inverted = impl_->settings.inverted;
     for (std::size_t i = 0; i < 3; ++i) {
-        r.zero_mg[i] = 0.5 * (up.axis[i].zero_mg + down.axis[i].zero_mg);
-        r.share[i] = 0.5e-3 * (up.axis[i].zero_mg - down.axis[i].zero_mg);
+        const std::size_t to = platform_axis(r.upright, i);
+        r.axis[to] = found.axis[i];
+        r.gyro_bias_deg_h[to] = found.gyro_bias_deg_h[i];
+        r.gyro_sigma_deg_h[to] = found.gyro_sigma_deg_h[i];
         for (std::size_t j = 0; j < 3; ++j) {
-            r.covariance_mg2[i][j] =
-                0.25 * (up.filter_covariance_mg2[i][j] + down.filter_covariance_mg2[i][j]);
+            const std::size_t and_to = platform_axis(r.upright, j);
+            r.covariance_mg2[to][and_to] = found.covariance_mg2[i][j];
+            r.filter_covariance_mg2[to][and_to] = found.filter_covariance_mg2[i][j];
         }
-        r.share_sigma[i] = 1e-3 * std::sqrt(r.covariance_mg2[i][i]);
     }
     return r;
 }
+const std::vector<CalibrationTrace>& Calibration::trace() const noexcept { return impl_->trace; }
 
 }  // namespace vibrig::estimator::zeros

@@ -46,11 +46,12 @@ struct CalibrationSettings {
     Initial initial;
     Triple lever_arm_m{};  ///< from the azimuth axis to the unit, body axes
     double update_s = 1;
-    Triple target_mg{0.15, 0.05, 0.01};
-    double saturation_g = 10;         ///< of an accelerometer
-    double vibration_limit_g = 0.01;  ///< standard deviation within a second
-    bool inverted = false;            ///< platform z down instead of up
-    bool allow_unobservable = false;  ///< for a control run at rest
+    Triple target_mg{0.15, 0.05, 0.01};  ///< of the two level axes and of the upright one
+    double saturation_g = 10;            ///< of an accelerometer
+    double vibration_limit_g = 0.01;     ///< standard deviation within a second
+    int upright = 2;                     ///< platform axis about which it is turned
+    bool inverted = false;               ///< that axis down instead of up
+    bool allow_unobservable = false;     ///< for a control run at rest
 };
 
 /// Over the time since the last one.
@@ -64,7 +65,7 @@ struct Increment {
 };
 
 struct AxisResult {
-    double zero_mg = 0;   ///< x, y: zero plus misalignment, z: zero plus scale error, times 1 g
+    double zero_mg = 0;   ///< level: zero plus misalignment, upright: plus scale error, times 1 g
     double sigma_mg = 0;  ///< of what is called zero: with the share of what is not told apart
     double filter_sigma_mg = 0;
     double movement_mg = 0;  ///< of the estimate within the last sweep
@@ -79,6 +80,8 @@ struct InnovationStatistic {
 };
 
 struct CalibrationResult {
+    int upright = 2;        ///< as in the settings
+    bool inverted = false;  ///< as in the settings
     std::array<AxisResult, 3> axis;
     Triple gyro_bias_deg_h{};
     Triple gyro_sigma_deg_h{};
@@ -94,7 +97,8 @@ struct CalibrationResult {
     std::vector<std::string> notes;
 };
 
-/// A point of the history, one per update.
+/// A point of the history, one per update: the two level axes (after the upright one in turn), then
+/// the upright one; x, y, z where z is upright.
 struct CalibrationTrace {
     double time_s = 0;
     Triple zero_mg{};
@@ -120,18 +124,5 @@ class Calibration {
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
-
-/// Two runs, z up and z down: what an accelerometer shows of 1 g changes its sign, its zero does
-/// not.
-struct ZerosApart {
-    Triple zero_mg{};
-    std::array<Triple, 3> covariance_mg2{};
-    /// x, y: misalignment towards the axis of the slews as the gyros see it, rad; z: scale
-    /// error, 1.
-    Triple share{};
-    Triple share_sigma{};
-};
-[[nodiscard]] ZerosApart separate(const CalibrationResult& up,
-                                  const CalibrationResult& down) noexcept;
 
 }  // namespace vibrig::estimator::zeros

@@ -120,32 +120,42 @@ Observability observability(const std::vector<double>& azimuths_deg, const Site&
     return result;
 }
 
-int rank_with_shares(const std::vector<double>& azimuths_deg, bool both_ways, const Site& site) {
-    constexpr int kAll = kStates + 3;
-    using Square = Eigen::Matrix<double, kAll, kAll>;
-    Eigen::Matrix<double, kAll, 1> scale;
-    scale << scales(site), 1e-3, 1e-3, 1e-3;
-    Eigen::Matrix<double, 6, kAll> h = Eigen::Matrix<double, 6, kAll>::Zero();
+int rank_with_shares(const std::vector<double>& azimuths_deg, const std::vector<Way>& ways,
+                     const Site& site) {
+    std::array<int, 3> first{-1, -1, -1};
+    int all = kStates;
+    for (const Way& way : ways) {
+        int& at = first[static_cast<std::size_t>(way.upright)];
+        if (at >= 0) continue;
+        at = all;
+        all += 3;
+    }
+    Eigen::VectorXd scale = Eigen::VectorXd::Constant(all, 1e-3);
+    scale.head<kStates>() = scales(site);
+    Eigen::MatrixXd h = Eigen::MatrixXd::Zero(6, all);
     h.leftCols<kStates>() = measurement_matrix(site);
     h = (h * scale.asDiagonal()).eval();
-    const int ways = both_ways ? 2 : 1;
-    Eigen::MatrixXd som(6 * kAll * ways * static_cast<Eigen::Index>(azimuths_deg.size()), kAll);
+    Eigen::MatrixXd som(6 * all * static_cast<Eigen::Index>(ways.size() * azimuths_deg.size()),
+                        all);
     Eigen::Index row = 0;
-    for (int way = 0; way < ways; ++way) {
+    for (const Way& way : ways) {
         for (const double azimuth : azimuths_deg) {
             const double psi = azimuth * kPi / 180;
-            const double up = way == 0 ? 1 : -1;
+            const double up = way.down ? -1 : 1;
+            Eigen::Matrix3d level;  // columns: two level axes, the upright one
+            level << std::cos(psi), -up * std::sin(psi), 0, std::sin(psi), up * std::cos(psi), 0, 0,
+                0, up;
             Eigen::Matrix3d c;
-            c << std::cos(psi), -up * std::sin(psi), 0, std::sin(psi), up * std::cos(psi), 0, 0, 0,
-                up;
-            Square a = Square::Zero();
+            for (int i = 0; i < 3; ++i) c.col((way.upright + 1 + i) % 3) = level.col(i);
+            Eigen::MatrixXd a = Eigen::MatrixXd::Zero(all, all);
             a.topLeftCorner<kStates, kStates>() =
                 error_dynamics(c, {0, 0, site.gravity_mps2}, site);
-            a.block<3, 3>(kVelocity, kStates) = up * site.gravity_mps2 * c;
+            a.block<3, 3>(kVelocity, first[static_cast<std::size_t>(way.upright)]) =
+                up * site.gravity_mps2 * c;
             a = (kTimeScale_s * (scale.cwiseInverse().asDiagonal() * a * scale.asDiagonal()))
                     .eval();
-            Eigen::Matrix<double, 6, kAll> power = h;
-            for (int i = 0; i < kAll; ++i) {
+            Eigen::MatrixXd power = h;
+            for (int i = 0; i < all; ++i) {
                 som.middleRows<6>(row) = power;
                 row += 6;
                 power = (power * a).eval();
@@ -154,7 +164,7 @@ int rank_with_shares(const std::vector<double>& azimuths_deg, bool both_ways, co
     }
     const auto [s, v] = linear_algebra::right_singular(som);
     int rank = 0;
-    for (Eigen::Index i = 0; i < kAll; ++i) rank += s[i] > kRankLimit * s[0] ? 1 : 0;
+    for (Eigen::Index i = 0; i < all; ++i) rank += s[i] > kRankLimit * s[0] ? 1 : 0;
     return rank;
 }
 

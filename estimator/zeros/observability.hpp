@@ -31,11 +31,16 @@ struct Observability {
 /// Platform z up, standing at each of the azimuths in turn.
 [[nodiscard]] Observability observability(const std::vector<double>& azimuths_deg,
                                           const Site& site);
-/// Rank of the 15 states together with what each accelerometer shows of 1 g along z, by
-/// misalignment or scale: 18 at most. Standing at each of the azimuths with z up, and with z down
-/// too.
-[[nodiscard]] int rank_with_shares(const std::vector<double>& azimuths_deg, bool both_ways,
-                                   const Site& site);
+/// A platform axis along the vertical.
+struct Way {
+    int upright = 2;
+    bool down = false;
+};
+/// Rank of the 15 states together with what each accelerometer shows of 1 g along each axis that is
+/// upright in one of the ways, by misalignment or scale: 18 at most with one axis, 21 with two.
+/// Standing at each of the azimuths in each way.
+[[nodiscard]] int rank_with_shares(const std::vector<double>& azimuths_deg,
+                                   const std::vector<Way>& ways, const Site& site);
 /// Throws ZeroError naming rank or weakest singular value, and the states in question.
 void check_observable(const SlewPlan& plan, const Site& site);
 

@@ -32,7 +32,11 @@ struct UnitSimulation::Impl {
             turned.col(1) *= -1;
             turned.col(2) *= -1;
         }
-        return turned;
+        if (settings.upright == 2) return turned;
+        // The columns are the two level axes and the upright one: in the platform's order.
+        Eigen::Matrix3d platform;
+        for (int i = 0; i < 3; ++i) platform.col((settings.upright + 1 + i) % 3) = turned.col(i);
+        return platform;
     }
     /// Of the unit at its lever arm. At the instant in which the azimuth turns round that is the
     /// velocity it came with, as it is for the filter, whose rate is that of the last increment.

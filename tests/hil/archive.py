@@ -6,11 +6,14 @@ usage: archive.py PROGRAMS [--seed N]
 """
 import concurrent.futures
 import glob
+import importlib.machinery
+import importlib.util
 import json
 import os
 import random
 import shutil
 import signal
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -18,88 +21,13 @@ import time
 import urllib.error
 import urllib.request
 
-import h5py
-import numpy
-
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import recording_faults  # noqa: E402
 import rig as r  # noqa: E402
+import server_load  # noqa: E402
+from archive_parts import POSTGRES, Archive, Postgres, SickArchive, asked, clone, result_in, without_role  # noqa: E402
 
 CAMPAIGN = {"name": "unit", "identify": "what-it-can", "dwell_s": 2.0}
-DAY_NS = 86_400 * 10**9
-POSTGRES = sorted(glob.glob("/usr/lib/postgresql/*/bin"))[-1:]
-
-
-class SickArchive(recording_faults.SickDisk):
-    """A folder that is as large as one likes."""
-
-    def __init__(self, folder):
-        self.folder, self.control = os.path.join(folder, "disk"), os.path.join(folder, "control")
-        self.library = os.path.join(folder, "sick_disk.so")
-        os.makedirs(self.folder)
-        self.set("-")
-        subprocess.run(["c++", "-shared", "-fPIC", "-O1", "-o", self.library,
-                        os.path.join(os.path.dirname(os.path.abspath(__file__)), "sick_disk.cpp")], check=True)
-
-
-class Archive:
-    def __init__(self, programs, folder, index=""):
-        self.program, self.folder, self.index = os.path.join(programs, "vibrig"), folder, index
-        os.makedirs(folder, exist_ok=True)
-
-    def where(self):
-        return ["--archive", self.folder] + (["--index", self.index] if self.index else [])
-
-    def run(self, *words, environment=None, timeout=60):
-        return subprocess.run([self.program, *words, *self.where()], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                              timeout=timeout, env={**os.environ, **(environment or {})})
-
-    def add(self, folder, rig, **more):
-        return self.run("archive", "add", folder, "--rig", rig, **more)
-
-    def campaigns(self, *words):
-        run = self.run("list", "--json", *words)
-        return json.loads(run.stdout)["campaigns"] if run.returncode == 0 else None
-
-    def verify(self, *words):
-        run = self.run("archive", "verify", "--json", *words)
-        return json.loads(run.stdout or "{}").get("findings", [{"what": "error", "text": run.stderr}])
-
-    def half(self):
-        """Folders that look like a campaign and are not whole, by their own manifests."""
-        wrong = []
-        for folder in glob.glob(os.path.join(self.folder, "*", "*")):
-            try:
-                with open(os.path.join(folder, "archive.json"), encoding="utf-8") as file:
-                    wanted = {f["name"]: f["bytes"] for f in json.load(file)["files"]}
-            except (OSError, ValueError) as error:
-                wrong.append(f"{folder}: {error}")
-                continue
-            there = {name: os.path.getsize(os.path.join(folder, name)) for name in os.listdir(folder) if name != "archive.json"}
-            if there != wanted:
-                wrong.append(f"{folder}: {there}, {wanted}")
-        return wrong
-
-
-def clone(campaign, to, days, serial=None, shift=None):
-    """The same recording as of another day: of another unit, with the first coefficient elsewhere."""
-    shutil.copytree(campaign, to, ignore=shutil.ignore_patterns("raw-*"))
-    with h5py.File(os.path.join(to, "campaign.h5"), "r+") as file:
-        for name in ("started_utc_ns", "ended_utc_ns"):
-            file.attrs[name] += days * DAY_NS
-        file.attrs["campaign"] = numpy.bytes_(os.path.basename(to))
-        if serial:
-            replace(file, "configuration", file["configuration"][()].decode().replace('"0017"', f'"{serial}"'))
-        if shift is not None:
-            result = json.loads(file["result"][()])
-            result["parameters"][0]["value"] += shift
-            replace(file, "result", json.dumps(result))
-    return to
-
-
-def replace(file, name, text):
-    del file[name]
-    file[name] = numpy.bytes_(text.encode())   # of fixed length, as vibrigd writes it
 
 
 def configure(rig, archive_folder, serial):
@@ -129,9 +57,7 @@ def outbox(checks, programs, folder, seed):
     status = rig.wait_for(lambda s: number(s, "waiting") == 1 and number(s, "failures") > 1, 20)
     checks.check(number(status, "waiting") == 1 and not status["archive"].get("good", False),
                  "without the archive's folder the campaign waits, and the status says so", status.get("archive"))
-    losses = [number(status["recorder"], "samples_lost", top=True), number(status["recorder"], "frames_lost", top=True),
-              number(status["can"], "kernel_dropped", top=True), number(status["estimator_ring"], "dropped", top=True)]
-    checks.equal(losses, [0, 0, 0, 0], "and nothing of the measurement is lost")
+    checks.equal(losses(status), [0, 0, 0, 0], "and nothing of the measurement is lost")
     checks.check("cannot be delivered, it is kept" in rig.tool("events").stdout, "and an event")
     return rig, lab, disk
 
@@ -228,6 +154,187 @@ def browsed(checks, lab, folder):
     checks.equal(server.end(), 0, "it ends when it is told")
 
 
+def served_remotely(checks, lab, folder, serial="0017"):
+    """The archive's door to elsewhere: certificates on both sides, and roles, as at the rig's."""
+    pki, other = os.path.join(folder, "pki"), os.path.join(folder, "other-pki")
+    for where, names in ((pki, ["--operator", "ada", "--viewer", "wall", "--viewer", "old"]), (other, ["--viewer", "wall"])):
+        run = subprocess.run([lab.program, "pki", "init", "--folder", where, "--host", "127.0.0.1", *names], capture_output=True, text=True)
+        checks.check(run.returncode == 0, "vibrig pki init makes certificates", run.stderr)
+    for end in (".crt", ".key"):   # whoever has it keeps it
+        shutil.copy(os.path.join(pki, "old" + end), os.path.join(pki, "gone" + end))
+    subprocess.run([lab.program, "pki", "revoke", "--folder", pki, "old"], check=True, capture_output=True)
+    without_role(pki)
+    door = {"--certificate": "server.crt", "--key": "server.key", "--clients-ca": "authority.crt", "--revoked": "revoked.crl"}
+    options = [word for option, name in door.items() for word in (option, os.path.join(pki, name))]
+    serve = [lab.program, "archive", "serve", *lab.where(), "--remote", "127.0.0.1:0"]
+    for left_out in ("--certificate", "--key", "--clients-ca"):
+        at = options.index(left_out)
+        run = subprocess.run([*serve, *options[:at], *options[at + 2:]], capture_output=True, text=True, timeout=30)
+        checks.check(run.returncode == 2 and len(run.stderr.strip().splitlines()) == 1, f"without {left_out} it does not open that door",
+                     f"{run.returncode} {run.stderr}")
+    run = subprocess.run([*serve, *options[:-1], os.path.join(pki, "nothing.crl")], capture_output=True, text=True, timeout=30)
+    checks.check(run.returncode == 2 and "nothing.crl" in run.stderr, "a list that is not there is named", f"{run.returncode} {run.stderr}")
+    server = r.Child("serve-remotely", [*serve, *options], folder)
+    end = time.monotonic() + 30
+    while "with certificates: " not in server.text() and server.running() and time.monotonic() < end:
+        time.sleep(0.05)
+    checks.check("with certificates: https://" in server.text(), "archive serve --remote says where it is", server.text())
+    port = int(server.text().split("with certificates: ")[-1].strip().rstrip("/").rsplit(":", 1)[1])
+    key = (lab.campaigns("--serial", serial) or [{"hash": "", "campaign": ""}])[0]
+    with open(os.path.join(lab.folder, key["campaign"], "campaign.h5"), "rb") as file:
+        recording = file.read()
+    for name in ("ada", "wall"):
+        status, page = asked(port, pki, name, "/")
+        checks.check(status == 200 and f"/unit?serial={serial}".encode() in page, f"{name} sees the units over TLS", str(status))
+        checks.check(asked(port, pki, name, f"/file?hash={key['hash']}&name=campaign.h5") == (200, recording), f"{name} takes a recording")
+        checks.equal(asked(port, pki, name, "/api/v1/commands", "POST")[0], 405, f"{name} can command nothing")
+    checks.equal(asked(port, pki, "guest", "/")[0], 403, "a certificate without a role sees nothing")
+    for what, name, more in (("without a certificate", None, {}), ("with one that is revoked", "gone", {}),
+                             ("with one of another authority", os.path.join(other, "wall"), {}),
+                             ("in TLS 1.1", "ada", {"version": ssl.TLSVersion.TLSv1_1})):
+        status, page = asked(port, pki, name, "/", **more)
+        checks.check(not isinstance(status, int) and not page, f"{what} nobody comes in", f"{status} {page[:100]}")
+    status, _ = asked(port, pki, "ada", "/", authority=os.path.join(other, "authority.crt"))
+    checks.check("SSL" in str(status), "whoever trusts another authority sees that it is not its server", str(status))
+    checks.check("guest" in server.text(), "who was refused is said", server.text()[-500:])
+    checks.equal(server.end(), 0, "it ends when it is told")
+
+
+def adaptive_by_type(checks, rig, lab, base, seed):
+    """A unit among twelve others of its type, which an adaptive campaign starts from; and without an archive."""
+    chance = random.Random(seed)
+    others = os.path.join(rig.folder, "others")
+    for i in range(12):
+        clone(base, os.path.join(others, f"other-{i}"), -100 + i, serial=f"type-{i}", scatter=lambda u: chance.gauss(0, 3 * u))
+    run = lab.run("archive", "type", "GP-3", "--simulated")
+    checks.check(run.returncode == 1 and "expected at least 10 units" in run.stderr, "of few units nothing is said about their type",
+                 run.stdout + run.stderr)
+    run = lab.add(others, "rig-7")
+    checks.check(run.returncode == 0, "twelve other units are added", run.stderr)
+    run = lab.run("archive", "type", "GP-3", "--simulated", "--without", "0019", "--json")
+    known = json.loads(run.stdout or '{"units": 0, "coefficients": []}')
+    checks.check(known["units"] >= 12 and len(known["coefficients"]) == 30, "vibrig archive type knows them", run.stderr)
+    checks.equal(lab.run("archive", "type", "GP-3").returncode, 1, "those on simulated rigs say nothing about real ones")
+    u = [p["u"] for p in result_in(base)["parameters"]]
+    rig.daemon.end()
+    targets = {"bias": 4 * max(u[::10]), "linear": 4 * max(u[1:4]), "quadratic": 4 * max(u[4:10])}
+    rig.configure({"name": "typed", "identify": "what-it-can", "dwell_s": 2.0, "adaptive": True, "prior": "type", "table_g": [9.0, 0.0],
+                   "targets": targets}, unit={"type": "GP-3", "serial": "0019"}, server={"page": "127.0.0.1:0"},
+                  archive={"folder": lab.folder, "rig": "rig-7", "retry_max_s": 1.0})
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
+    end = time.monotonic() + 60   # it is asked when nobody else wants the processor
+    while time.monotonic() < end:
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "test")
+        rig.wait_for_state(("recording", "slewing", "ramping", "settling", "finished"), 60)
+        if "has not answered yet" not in rig.tool("events").stdout:
+            break
+        rig.tool("abort", "--by", "test")
+        rig.wait_for_state(("aborted", "tripped"), 60)
+        rig.daemon.end()
+        rig.start_daemon()
+        rig.wait_for(r.measuring, 60)
+        time.sleep(5)
+    status = rig.wait_for_state(("finished", "aborted", "tripped"), 240)
+    events = rig.tool("events").stdout
+    checks.equal(r.state_of(status), "finished", "an adaptive campaign with prior = \"type\" finishes")
+    checks.check(f"starts from {known['units']} units of type GP-3" in events, "it says what it starts from", events[-1500:])
+    rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
+    campaign = sorted(glob.glob(os.path.join(rig.results, "typed-*")), key=os.path.getmtime)[-1]
+    result = result_in(campaign)
+    typed = result.get("type_prior", {"parameters": []})
+    checks.check(len(typed["parameters"]) == 30 and typed["units"] == known["units"] and
+                 all(with_type["u"] < without["u"] for with_type, without in zip(typed["parameters"], result["parameters"])),
+                 "the result is there without and with the type, which makes it narrower", json.dumps(typed)[:500])
+    report = os.path.join(rig.folder, "typed.html")
+    run = subprocess.run([lab.program, "report", campaign, "-o", report], capture_output=True, text=True, timeout=120)
+    with open(report, encoding="utf-8") as file:
+        checks.check("With the unit" in file.read(), "and in the report", run.stderr)
+
+
+def losses(status):
+    return [number(status["recorder"], "samples_lost", top=True), number(status["recorder"], "frames_lost", top=True),
+            number(status["can"], "kernel_dropped", top=True), number(status["estimator_ring"], "dropped", top=True)]
+
+
+def latencies(rig, looks=5, look_s=2):
+    """How long frames wait: of some looks the class that holds 99 %, ms, and the mean. A machine that is busy for one look is not
+    for all of them; what hangs, hangs in each."""
+    found = []
+    control = server_load.Control(rig.socket)
+    before = control.status()
+    for _ in range(looks):
+        time.sleep(look_s)
+        after = control.status()
+        mean, bound, count = server_load.latency(before, after)
+        found += [(bound, mean)] if count > 0 else []
+        before = after
+    return min(found), before["acquisition_latency"]["bounds_ms"]
+
+
+def felt(checks, programs, folder, server, lab, recorded):
+    """On the real clock: the same rig beside no archive, and beside one that hangs while it delivers to it."""
+    found = {}
+    for what in ("without an archive", "beside one that hangs"):
+        rig = r.Rig(programs, "seqpacket", "real", os.path.join(folder, "felt-" + what.split()[0]))
+        rig.start_plant()
+        rig.be_punctual()
+        archive = {"folder": lab.folder, "index": server.url, "rig": "rig-9", "retry_max_s": 1.0}
+        rig.configure({"name": "felt", "identify": "what-it-can"}, **({"archive": archive} if "hangs" in what else {}))
+        if "hangs" in what:
+            shutil.copytree(recorded, os.path.join(rig.results, "waits"))
+        rig.start_daemon()
+        rig.wait_for(r.measuring, 60)
+        if "hangs" in what:
+            status = rig.wait_for(lambda s: s["archive"].get("delivering") or number(s, "failures") > 0, 60)
+            checks.check(status["archive"].get("delivering") or number(status, "failures") > 0, "a delivery hangs", status["archive"])
+        found[what], classes = latencies(rig)
+        checks.equal(losses(rig.status()), [0, 0, 0, 0], f"{what}, in real time: nothing is lost")
+        r.check_balance(checks, rig, what)
+        if "hangs" in what:
+            checks.equal(number(rig.status(), "delivered"), 0, "and nothing was delivered meanwhile")
+        rig.stop()
+    quiet, beside = found.values()
+    # A class more is chance: where the classes' border lies in the midst of what is usual.
+    allowed = min([bound for bound in classes if bound > quiet[0]], default=float("inf"))
+    checks.check(beside[0] <= allowed, f"99 % of the frames wait {beside[0]:g} ms at most (mean {beside[1]:.3f}), without an archive "
+                 f"{quiet[0]:g} ms (mean {quiet[1]:.3f})")
+
+
+def hanging(checks, programs, folder, seed):
+    """A server that stands still: a campaign is measured beside a delivery that hangs on it, and is delivered once it goes on."""
+    server = Postgres(os.path.join(folder, "standing"))
+    server.start()
+    lab = Archive(programs, os.path.join(folder, "standing-lab"), server.url)
+    rig = r.Rig(programs, "seqpacket", "rig", os.path.join(folder, "beside-standing"))
+    rig.start_plant("--seed", str(seed))
+    rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": "0020"},
+                  archive={"folder": lab.folder, "index": server.url, "rig": "rig-8", "retry_max_s": 1.0})
+    server.process.send_signal(signal.SIGSTOP)
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
+    for round_ in range(2):   # the second beside the delivery of the first
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "test")
+        rig.wait_for_state(("recording", "slewing", "ramping", "settling"), 30)
+        status = rig.wait_for_state(("finished", "aborted", "tripped"), 180)
+        checks.equal(r.state_of(status), "finished", f"campaign {round_ + 1} finishes beside a server that stands")
+        status = rig.wait_for(lambda s: not s["recorder"].get("recording", False) and number(s, "waiting") >= 1, 30)
+        checks.check(number(status, "waiting") >= 1 and number(status, "delivered") == 0, "meanwhile nothing could be delivered",
+                     status["archive"])
+    checks.equal(losses(status), [0, 0, 0, 0], "and nothing of the measurement is lost")
+    r.check_balance(checks, rig, "beside a server that stands")
+    felt(checks, programs, folder, server, lab, glob.glob(os.path.join(rig.results, "unit-*"))[0])
+    server.process.send_signal(signal.SIGCONT)
+    status = rig.wait_for(lambda s: number(s, "delivered") >= 2 and number(s, "waiting") == 0, 120)
+    checks.equal(number(status, "waiting"), 0, "the server goes on: all is delivered")
+    checks.equal((len(lab.campaigns("--rig", "rig-8") or []), [f for f in lab.verify() if "rig-8" in f["campaign"]]), (2, []),
+                 "whole, each once")
+    rig.stop()
+    server.kill(signal.SIGQUIT)
+
+
 def kills(checks, programs, folder, base, seed):
     """SIGKILL before the n-th call that writes; each into an archive of its own, and then on from where it was."""
     library, at = os.path.join(folder, "die_at.so"), os.path.join(folder, "die-at")
@@ -259,6 +366,29 @@ def kills(checks, programs, folder, base, seed):
                  "\n".join(wrong[:10]))
 
 
+def grows(checks, programs, folder):
+    """What is asked of many campaigns costs by what is said of them, not by how many there are. As ratios of processor time; the
+    figures are tests/bench/archive's."""
+    path = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "bench", "archive")
+    loader = importlib.machinery.SourceFileLoader("bench_archive", path)
+    bench = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(bench)
+    vibrig, cost = os.path.join(programs, "vibrig"), {}
+    for n in (1000, 10_000):
+        lab = os.path.join(folder, f"of-{n}")
+        os.makedirs(lab)
+        bench.make_sqlite(vibrig, lab, n)
+        for words in (("list", "--newest", "20"), ("list", "--serial", "unit-1"), ("trend", "unit-1", "--json"), ("list", "--json")):
+            cost[(n, *words)] = bench.look([vibrig, *words, "--archive", lab])
+    for words in (("list", "--newest", "20"), ("list", "--serial", "unit-1"), ("trend", "unit-1", "--json")):
+        few, many = cost[(1000, *words)][0], cost[(10_000, *words)][0]
+        checks.check(many < 3 * few, f"vibrig {' '.join(words)}: {many / few:.1f} times the processor time of ten times the campaigns",
+                     f"{few:.3f} s, {many:.3f} s")
+    few, many = cost[(1000, "list", "--json")], cost[(10_000, "list", "--json")]
+    checks.check(many[0] < 15 * few[0] and many[2] > 9 * few[2],
+                 f"vibrig list --json of 10 000: {many[0] / few[0]:.1f} times the processor time of 1000", f"{few}, {many}")
+
+
 def full_archive(checks, programs, folder, base):
     disk = recording_faults.SickDisk(folder)
     if disk.refused:
@@ -286,40 +416,6 @@ def sick_archive(checks, lab, disk, base):
     disk.set("-")
     run = lab.add(base, "rig-9", environment=disk.environment())
     checks.check(run.returncode == 0 and not lab.half(), "healthy again it takes it", run.stderr)
-
-
-class Postgres:
-    """A server of its own in a folder, as an unprivileged user where this one is root."""
-
-    def __init__(self, folder):
-        self.folder, self.process = folder, None
-        self.data, self.bin = os.path.join(folder, "data"), POSTGRES[0]
-        os.makedirs(folder)
-        self.user = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.getuid() == 0 else []
-        if self.user:
-            os.chown(folder, 65534, 65534)
-        self.run("initdb", "-D", self.data, "-U", "vibrig", "--auth=trust", "--no-sync", "--locale=C", "-E", "UTF8")
-        self.url = f"postgresql://vibrig@/postgres?host={folder}"
-
-    def run(self, program, *words):
-        subprocess.run([*self.user, os.path.join(self.bin, program), *words], check=True, capture_output=True, timeout=60, cwd=self.folder)
-
-    def start(self):
-        self.process = subprocess.Popen([*self.user, os.path.join(self.bin, "postgres"), "-D", self.data, "-k", self.folder, "-c",
-                                         "listen_addresses=", "-c", "fsync=off"], stdin=subprocess.DEVNULL,
-                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder,
-                                        preexec_fn=r.die_with_parent)
-        end = time.monotonic() + 20
-        while time.monotonic() < end:
-            if subprocess.run([os.path.join(self.bin, "pg_isready"), "-q", "-h", self.folder]).returncode == 0:
-                return
-            time.sleep(0.1)
-        raise RuntimeError("postgres does not start")
-
-    def kill(self, number=signal.SIGKILL):
-        self.process.send_signal(number)
-        self.process.wait()
-        time.sleep(0.3)   # its children see that they are alone
 
 
 def until_delivered(lab, folder, rig):
@@ -378,15 +474,19 @@ def main():
         base = glob.glob(os.path.join(rig.results, "unit-*"))[0]
         small = clone(base, os.path.join(folder, "small"), 0)
         moves(checks, rig, lab, base)
+        adaptive_by_type(checks, rig, lab, base, seed)
         rig.daemon.end()
         rig.plant.end()
         browsed(checks, lab, folder)
+        served_remotely(checks, lab, folder)
         sick_archive(checks, lab, disk, clone(base, os.path.join(folder, "another"), 3))
         os.mkdir(os.path.join(folder, "full"))
         full_archive(checks, programs, os.path.join(folder, "full"), small)
         kills(checks, programs, folder, small, seed)
+        grows(checks, programs, folder)
         if POSTGRES:
             shared(checks, programs, folder, small)
+            hanging(checks, programs, folder, seed)
         else:
             checks.check(False, "there is a PostgreSQL (tests/packages test)")
     return checks.end()

@@ -187,6 +187,32 @@ def check_injection(checks, rig, address):
     checks.check(not any(line.startswith("2026-01-01") for line in rig.daemon.text().split("\n")), "no line is faked", rig.logs())
 
 
+def check_dashboards(checks, folder):
+    """Against the schema that Grafana itself is built with."""
+    def faults(*files):
+        run = subprocess.run(["node", os.path.join(ROOT, "tests", "browser", "grafana_schema.mjs"), *files], capture_output=True, text=True)
+        return run.returncode, run.stdout + run.stderr
+    shipped = [os.path.join(ROOT, "systemd", "prometheus", name) for name in ("vibrig-dashboard.json", "vibrig-fleet-dashboard.json")]
+    code, said = faults(*shipped)
+    checks.check(code == 0 and said.startswith("2 dashboards"), "Grafana's own schema has nothing against the dashboards", said)
+    with open(shipped[0], encoding="utf-8") as file:
+        good = file.read()
+    spoilt = []
+    for what, spoil in {"absolutely": lambda d: d["panels"][1]["fieldConfig"]["defaults"].update(thresholds={"mode": "absolutely", "steps": []}),
+                        "gridpos": lambda d: d["panels"][0].update(gridpos={}),
+                        "graphmode": lambda d: d["panels"][2].setdefault("options", {}).update(graphmode="none"),
+                        "graphh": lambda d: d["panels"][0].update(type="graphh"),
+                        "schemaVersion": lambda d: d.update(schemaVersion="39")}.items():
+        dashboard = json.loads(good)
+        spoil(dashboard)
+        spoilt.append((what, os.path.join(folder, what + "-dashboard.json")))
+        with open(spoilt[-1][1], "w", encoding="utf-8") as file:
+            json.dump(dashboard, file)
+    code, said = faults(*(file for _, file in spoilt))
+    for what, file in spoilt:
+        checks.check(code == 1 and any(line.startswith(file) and what in line for line in said.splitlines()), f"a wrong one is found: {what}", said)
+
+
 def check_prometheus(checks, address, folder, seen):
     """`seen`: the metrics while a campaign was recording."""
     _, _, text = get(address, "/metrics")
@@ -474,6 +500,7 @@ def main():
             page = Page()
             seen = check_page(checks, rig, page, address, "https://" + remote, pki)
             check_prometheus(checks, address, folder, seen)
+            check_dashboards(checks, folder)
         finally:
             if page is not None:
                 page.end()

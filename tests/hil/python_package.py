@@ -4,11 +4,14 @@ docs/python.md with their pictures; a certificate. On the seqpacket bus and the 
 
 usage: python_package.py PROGRAMS      PROGRAMS: build/PRESET/bin
 """
+import contextlib
+import hashlib
 import json
 import os
 import random
 import re
 import shutil
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -203,6 +206,18 @@ def check_examples(checks, campaign):
                      run.stderr[-1500:])
 
 
+def post(client_socket, command):
+    """A command as it would be typed: the package commands nothing."""
+    body = json.dumps(command)
+    with socket.socket(socket.AF_UNIX) as link:
+        link.settimeout(20)
+        link.connect(client_socket)
+        link.sendall((f"POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: application/json\r\n"
+                      f"Content-Length: {len(body)}\r\n\r\n{body}").encode())
+        answer = b"".join(iter(lambda: link.recv(65536), b"")).decode()
+    return int(answer.split()[1]), answer
+
+
 def check_certificate(checks, rig, campaign):
     paper = os.path.join(rig.folder, "C-17.toml")
     text = """number = "C-17"
@@ -218,7 +233,7 @@ high = 2.0
     with open(paper, "w", encoding="utf-8") as file:
         file.write(text)
     issue = ["--paper", paper, "--by", "A. Person", "-o", "C-17"]
-    made = tool(rig, "certificate", str(campaign.folder), *issue)
+    made = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket)
     path = str(campaign.parts[0])
     shutil.copy(path, path + ".kept")
     result = json.loads(json.dumps(campaign.result))
@@ -233,18 +248,27 @@ high = 2.0
                  "with the results and a statement", str(certificate)[:500])
     content = open(page, encoding="utf-8").read()
     checks.check("Customer &amp; Sons" in content and ">SIMULATED<" in content and "last bit" in content, "and on its page")
-    import hashlib
     digest = hashlib.sha256(open(pdf, "rb").read()).hexdigest()
-    with sqlite3.connect(os.path.join(rig.results, "certificates.sqlite3")) as journal:
-        rows = journal.execute("SELECT number, person, pdf_sha256 FROM certificate").fetchall()
-    checks.equal(rows, [("C-17", "A. Person", digest)], "the register has the PDF's SHA-256")
+    whole = json.loads(tool(rig, "journal", "verify", os.path.join(rig.results, "journal.sqlite3"), "--json").stdout)
+    with contextlib.closing(sqlite3.connect(os.path.join(rig.results, "journal.sqlite3"))) as journal:
+        rows = journal.execute("SELECT person, argument, accepted FROM command WHERE kind = 'certificate'").fetchall()
+    entry = json.loads(rows[0][1]) if rows else {}
+    checks.check(len(rows) == 1 and rows[0][0].startswith("A. Person (") and rows[0][2] == 1 and entry.get("number") == "C-17" and
+                 entry.get("pdf_sha256") == digest and whole["whole"], "the rig's signed journal has the PDF's SHA-256", f"{rows} {whole}")
+    checks.check(digest in made.stdout and not [name for name in os.listdir(rig.folder) if "unfinished" in name], "which is said, too", made.stdout)
     printed = len(re.findall(rb"/Type */Page\b", open(pdf, "rb").read()))
     checks.check(1 < printed <= 5, "it is a few pages, its budget among them", f"{printed} pages")
-    again = tool(rig, "certificate", str(campaign.folder), *issue)
-    checks.check(again.returncode == 2 and "issued already" in again.stderr, "a number is given once", again.stderr)
+    again = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", rig.socket)
+    checks.check(again.returncode == 1 and "issued already" in again.stderr, "a number is given once", again.stderr)
+    checks.equal(hashlib.sha256(open(pdf, "rb").read()).hexdigest(), digest, "and the one that has it stays as it is")
+    nobody = tool(rig, "certificate", str(campaign.folder), *issue, "--socket", os.path.join(rig.folder, "nobody"))
+    checks.check(nobody.returncode == 2 and "--no-journal" in nobody.stderr, "without its daemon none is issued", nobody.stderr)
+    for wrong in ("{}", "text", json.dumps({**entry, "number": "C-18", "pdf_sha256": digest.upper()}), json.dumps({**entry, "number": ""})):
+        said = post(rig.socket, {"kind": "certificate", "by": "A", "argument": wrong})
+        checks.check(said[0] == 409 and "expected" in said[1] or "no JSON object" in said[1], f"no entry: {wrong[:40]}", str(said))
     result["verdict"] = {"word": "not valid", "reasons": [{"text": "the fit contradicts"}]}
     with_result(result)
-    no = tool(rig, "certificate", str(campaign.folder), "--paper", paper, "--by", "A", "--no-register", "-o", "no")
+    no = tool(rig, "certificate", str(campaign.folder), "--paper", paper, "--by", "A", "--no-journal", "-o", "no")
     checks.check(no.returncode == 1 and "the fit contradicts" in no.stderr and not os.path.exists(os.path.join(rig.folder, "no.pdf")),
                  "what is not valid is refused", no.stderr)
     for wrong, words in ((text.replace("C-17", ""), "number"), (text.replace("D_Fx", "D_t"), "expected one such as D_Fx"),
@@ -252,7 +276,7 @@ high = 2.0
                          ("number = ", "C-17.toml:1"), (text.replace("[customer]", "[costumer]"), "unknown key costumer")):
         with open(paper, "w", encoding="utf-8") as file:
             file.write(wrong)
-        bad = tool(rig, "certificate", str(campaign.folder), *issue, "--no-register")
+        bad = tool(rig, "certificate", str(campaign.folder), *issue, "--no-journal")
         checks.check(bad.returncode == 2 and words in bad.stderr, f"a paper that is wrong is named: {words}", bad.stderr)
     shutil.move(path + ".kept", path)
 
@@ -280,13 +304,14 @@ def main():
             rig.last = rig.wait_for_state(("finished", "aborted", "tripped"), 300)
             checks.check(rig.last is not None and rig.last["campaign"]["state"] == "finished", "the campaign finishes",
                          r.state_of(rig.last) + rig.logs())
-            rig.stop()
+            rig.wait_for(lambda s: not s["recorder"].get("recording"), 60)
             recording = next(os.path.join(rig.results, name) for name in os.listdir(rig.results) if name.startswith("python-"))
+            check_certificate(checks, rig, vibrig.open(recording))
+            rig.stop()
             campaign = check_recording(checks, rig, recording)
             check_cycle_times(checks, campaign)
             check_octave(checks, rig, campaign)
             check_examples(checks, campaign)
-            check_certificate(checks, rig, campaign)
         finally:
             rig.stop()
     return checks.end()

@@ -121,6 +121,27 @@ def both_ways(checks, programs):
     checks.check(zeros["repeated_at_end"] and not zeros.get("mark"), "nothing has moved at the end", zeros)
 
 
+def second_axis(checks, programs):
+    """An outer gimbal that cannot turn z down: y is taken up and down instead, and the zeros are as pure."""
+    zero_g, cross = [0.004, -0.003, 0.002], [100, -50]
+    matrix = [[1.0 if i == k else 0.0 for k in range(3)] for i in range(3)]
+    for i, arcsec in enumerate(cross):
+        matrix[i][2] = -math.radians(arcsec / 3600)
+    run = Run(programs, {**LEVELLING, "zeroing": True, "positions_deg": [[0, 0, 0]]},
+              {"platform": {"slew_error_deg": 0.2}, "accelerometer": {"zero_g": zero_g, "matrix": matrix}},
+              gimbal={"travel_deg": [[-80.0, 95.0], [-65.0, 65.0], [-180.0, 180.0]]})
+    if not run.ended(checks, "finished", "a campaign with z up, y up and y down finishes"):
+        return
+    # each run levelled first, at the start and at the end, and the position
+    checks.equal(len(run.events("level after")), 7, "each of the three runs was levelled")
+    zeros = run.last["campaign"]["zeros"]
+    off = [abs(z - 1e3 * b) / s for z, b, s in zip(zeros["zero_mg"], zero_g, zeros["sigma_mg"])]
+    checks.check(max(off) <= 5 and max(zeros["sigma_mg"]) <= 0.02, "the zeros come out, without misalignment", zeros)
+    found = zip(zeros["misalignment_arcsec"], cross, zeros["misalignment_sigma_arcsec"])
+    checks.check(all(abs(m - c) <= 5 * s <= 10 for m, c, s in found), "and the misalignments of x and y", zeros)
+    checks.check(zeros["repeated_at_end"] and not zeros.get("mark"), "nothing has moved at the end", zeros)
+
+
 def seeds(checks, programs, count):
     """Whatever the slews end at and however the accelerometers are mounted, campaigns with both stages finish, and the
     zeros are as sure as they say."""
@@ -278,6 +299,7 @@ def main():
     levelling(checks, programs)
     zero_failures(checks, programs)
     both_ways(checks, programs)
+    second_axis(checks, programs)
     seeds(checks, programs, given.seeds)
     effect(checks, programs, coefficients(programs))
     return checks.end()

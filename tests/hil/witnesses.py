@@ -62,6 +62,39 @@ def honest(checks, programs):
         checks.check("gravity" not in run.text, "and nobody speaks of gravity", run.text[-2000:])
 
 
+def only_witness(checks, programs):
+    """The one accelerometer that sees the table is stuck, and the controller says that it has stopped: nobody knows, which is
+    no rest, in this life and in the next. Once the accelerometer lives again, that the table shakes on is seen."""
+    with tempfile.TemporaryDirectory() as folder:
+        rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+        disobeyed = lambda s: s["shaker"].get("rest") == "stop not obeyed"
+        try:
+            rig.start_plant("--seed", "5", "--warm-up", "2", "--speed", "40")
+            rig.configure({**CAMPAIGN, "positions_deg": [[0, 0, 0]]}, **{"can.signals": {"table_accel": ""}})
+            rig.start_daemon()
+            rig.wait_for(r.measuring, 30)
+            said = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+            status = rig.wait_for_state(("recording", *ENDS), 60)
+            checks.equal(r.state_of(status), "recording", f"one witness only: it shakes {[c.stderr for c in said]}")
+            for fault in ("stuck:y", "stuck-contactor"):
+                rig.order("fault " + fault)
+            for life in ("that life", "the next life"):
+                status = rig.wait_for(disobeyed, 60)
+                found = f"{status['shaker']}\n{rig.logs()}"
+                checks.check(disobeyed(status), f"the only witness is stuck: in {life} no stop is confirmed", found)
+                checks.check("is doubted" in rig.tool("events").stdout, f"in {life} the event says why", found)
+                if life == "that life":
+                    checks.equal(rig.daemon.end(timeout=60), 1, "and it ends with status 1")
+                    rig.start_daemon()
+            rig.order("clear")
+            rig.order("fault stuck-contactor")
+            status = rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest", 60)
+            checks.check("stop confirmed" in rig.tool("events").stdout, "an accelerometer that lives again confirms it",
+                         f"{status['shaker']}\n{rig.logs()}")
+        finally:
+            rig.stop()
+
+
 def wrong_keys(checks, programs):
     for key, value, names in (("encoder_sign", [1, -1, 1], "encoder_sign of the inner"),
                               ("encoder_zero_deg", [0.0, 0.0, 5.0], "encoder_zero_deg of the azimuth")):
@@ -142,6 +175,7 @@ def main():
     for channel in "xyz":
         lying(checks, programs, f"accelerometer {channel} stuck while it shakes", [], "stuck",
               f"accel_{channel}", during=f"stuck:{channel}")
+    only_witness(checks, programs)
     wrong_keys(checks, programs)
     wrong_rate(checks, programs)
     silent(checks, programs)

@@ -25,7 +25,7 @@ const Draw = (() => {
     switch (name) {
       case 'amplitude': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [0, Math.max(1, hi * 1.05)]}},
         axes: [minutes, {...axis, size: 40}],
-        series: [{label: 'min'}, none, none, none, none, line(1, {dash: [6, 4], label: 'commanded, g'}), line(0, {label: 'measured, g'})],
+        series: [{label: 'min'}, none, none, none, none, line(1, {dash: [6, 4], label: 'commanded, g'}), line(2, {dash: [2, 3], label: 'set point read back, g'}), line(0, {label: 'measured, g'})],
         bands: [{series: [2, 1], fill: css('--alarm')}, {series: [4, 3], fill: css('--abort')}]};
       case 'temperature': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [Math.min(lo, (lo + hi) / 2 - .5), Math.max(hi, (lo + hi) / 2 + .5)]}},
         axes: [minutes, {...axis, size: 54}], series: [{label: 'min'}, line(0, {label: '°C'})]};

@@ -148,7 +148,7 @@
     const v = s.estimate.innovation || {}, n = x => (x === undefined ? null : x);
     history.t.push(t);
     history.rows.push([...band('alarm'), ...band('abort'), command, n(s.shaker.measured_g),
-      n(v.x_arcsec), n(v.y_arcsec), n(v.z_arcsec), ...worst.map(w => w || null), n((s.platform || {}).temperature_c)]);
+      n(v.x_arcsec), n(v.y_arcsec), n(v.z_arcsec), ...worst.map(w => w || null), n((s.platform || {}).temperature_c), n(s.shaker.amplitude_g)]);
     if (history.t.length > kKept) {   // every other one of the older half: the beginning stays
       const thin = list => list.filter((_, i) => i > kKept / 2 || i % 2 === 0);
       history.t = thin(history.t);
@@ -157,18 +157,18 @@
   }
   // What was before this page came: means of the steps, and of the innovations what was farthest from zero.
   const kHistory = ['measured_g', 'command_g', 'innovation_x_arcsec', 'innovation_y_arcsec', 'innovation_z_arcsec',
-    'sigma_over_target_bias', 'sigma_over_target_linear', 'sigma_over_target_quadratic', 'temperature_c'];
+    'sigma_over_target_bias', 'sigma_over_target_linear', 'sigma_over_target_quadratic', 'temperature_c', 'set_point_g'];
   async function getHistory() {
     try {
       const past = await (await fetch('/api/v1/history?channel=' + kHistory.join(','))).json();
-      const [measured, command, x, y, z, bias, linear, quadratic, temperature] = past.channels;
+      const [measured, command, x, y, z, bias, linear, quadratic, temperature, point] = past.channels;
       const farthest = c => c.max.map((most, i) => (most === null ? null : most > -c.min[i] ? most : c.min[i]));
       const around = [x, y, z].map(farthest), rows = (status && status.interlock.rows || []).filter(r => r.condition === 'amplitude_off_command' && r.limit !== undefined);
       const factor = reaction => { const row = rows.find(r => r.reaction === reaction); return row ? 10 ** (row.limit / 20) : null; };
       const old = past.time_s.map((t, i) => [t, [...['alarm', 'abort'].flatMap(reaction => {
         const f = factor(reaction), g = command.min[i];
         return f && g > 0 ? [g / f, g * f] : [null, null];
-      }), command.mean[i], measured.mean[i], ...around.map(a => a[i]), ...[bias, linear, quadratic].map(c => c.mean[i] || null), temperature.mean[i]]])
+      }), command.mean[i], measured.mean[i], ...around.map(a => a[i]), ...[bias, linear, quadratic].map(c => c.mean[i] || null), temperature.mean[i], point.mean[i]]])
         .filter(([t]) => history.t.length === 0 || t < history.t[0]);
       history.t.unshift(...old.map(([t]) => t));
       history.rows.unshift(...old.map(([, row]) => row));
@@ -213,7 +213,7 @@
   function charts(s) {
     if (history.t.length === 0) return;
     const start = history.t[0], t = history.t.map(s => (s - start) / 60);
-    Draw.chart('amplitude', [t, ...[0, 1, 2, 3, 4, 5].map(column)]);
+    Draw.chart('amplitude', [t, ...[0, 1, 2, 3, 4, 13, 5].map(column)]);
     Draw.chart('innovations', [t, ...[6, 7, 8].map(column)]);
     Draw.chart('sigma', [t, ...[9, 10, 11].map(column), t.map(() => 1)]);
     Draw.chart('temperature', [t, column(12)]);

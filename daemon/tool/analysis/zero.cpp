@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -23,6 +24,7 @@
 #include "daemon/tool/commands.hpp"
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
+#include "estimator/zeros/together.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::zero_command {
@@ -46,7 +48,7 @@ struct Options {
     bool json = false;
     std::string plot;
     std::string file;
-    std::string down;  ///< the same with z down
+    std::string down, y_up, y_down;  ///< the same this way up
     std::string azimuth = "azimuth_deg";
     // simulate
     std::vector<double> zero_mg{5, -5, 5};
@@ -55,7 +57,7 @@ struct Options {
     double period_s = 0.01;
     double vibration_g = 0;
     std::uint64_t seed = 1;
-    bool both_ways = false;
+    bool both_ways = false, second_axis = false;
     std::string write;
 };
 
@@ -172,49 +174,78 @@ std::string result_table(const zeros::CalibrationResult& r, const zeros::Observa
     return out;
 }
 
+/// What accelerometer i shows of 1 g along axis k.
+struct Share {
+    std::string key;    ///< of JSON
+    std::string words;  ///< of the table
+    double unit = 1;
+    const char* unit_name = "";
+};
+
+Share share_of(std::size_t i, std::size_t k) {
+    if (i == k) return {"scale_ppm", "scale error", 1e-6, "ppm"};
+    // Towards z, the axis that every calibration has, it has no more of a name.
+    const std::string to = k == 2 ? "" : std::string("_to_") + kAxisLetters[k];
+    return {"misalignment" + to + "_arcsec",
+            k == 2 ? "misalignment" : std::string("towards ") + kAxisLetters[k], kArcsec, "arcsec"};
+}
+
 Json apart_json(const zeros::ZerosApart& apart) {
     Json json = Json::array();
     for (std::size_t i = 0; i < 3; ++i) {
-        const double unit = i == 2 ? 1e-6 : kArcsec;
-        const std::string share = i == 2 ? "scale_ppm" : "misalignment_arcsec";
-        json.push_back({{"axis", kAxisLetters[i]},
-                        {"what", "zero"},
-                        {"observable", true},
-                        {"zero_mg", apart.zero_mg[i]},
-                        {"sigma_mg", std::sqrt(apart.covariance_mg2[i][i])},
-                        {share, apart.share[i] / unit},
-                        {share + "_sigma", apart.share_sigma[i] / unit}});
+        Json axis{{"axis", kAxisLetters[i]},
+                  {"what", "zero"},
+                  {"observable", true},
+                  {"zero_mg", apart.zero_mg[i]},
+                  {"sigma_mg", std::sqrt(apart.covariance_mg2[i][i])}};
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (apart.share_sigma[i][k] <= 0) continue;
+            const Share share = share_of(i, k);
+            axis[share.key] = apart.share[i][k] / share.unit;
+            axis[share.key + "_sigma"] = apart.share_sigma[i][k] / share.unit;
+        }
+        json.push_back(std::move(axis));
     }
     return json;
 }
 
 std::string apart_table(const zeros::ZerosApart& apart) {
-    std::string out = "with z down as well\n";
+    std::string out = "zeros apart from misalignment and scale\n";
     for (std::size_t i = 0; i < 3; ++i) {
-        const double unit = i == 2 ? 1e-6 : kArcsec;
-        out += printed("%-4s zero %.5f +- %.5f mg, %s %.3f +- %.3f %s\n", kAxisLetters[i],
-                       apart.zero_mg[i], std::sqrt(apart.covariance_mg2[i][i]),
-                       i == 2 ? "scale error" : "misalignment", apart.share[i] / unit,
-                       apart.share_sigma[i] / unit, i == 2 ? "ppm" : "arcsec");
+        out += printed("%-4s zero %.5f +- %.5f mg", kAxisLetters[i], apart.zero_mg[i],
+                       std::sqrt(apart.covariance_mg2[i][i]));
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (apart.share_sigma[i][k] <= 0) continue;
+            const Share share = share_of(i, k);
+            out +=
+                printed(", %s %.3f +- %.3f %s", share.words.c_str(), apart.share[i][k] / share.unit,
+                        apart.share_sigma[i][k] / share.unit, share.unit_name);
+        }
+        out += '\n';
     }
     return out;
 }
 
-int report(const Options& options, const zeros::Calibration& run,
-           const std::optional<zeros::Calibration>& down) {
+/// Of the first calibration, and of all of them together.
+int report(const Options& options, const std::vector<zeros::Calibration>& runs) {
     const zeros::CalibrationSettings s = settings_of(options);
-    zeros::CalibrationResult result = run.result();
-    std::optional<zeros::ZerosApart> apart;
-    if (down) {
-        const zeros::CalibrationResult below = down->result();
-        apart = zeros::separate(result, below);
-        result.valid = result.valid && below.valid;
-        for (const std::string& problem : below.problems)
-            result.problems.push_back("z down: " + problem);
+    zeros::CalibrationResult result = runs.front().result();
+    std::vector<zeros::CalibrationResult> results{result};
+    for (std::size_t k = 1; k < runs.size(); ++k) {
+        results.push_back(runs[k].result());
+        const zeros::CalibrationResult& other = results.back();
+        result.valid = result.valid && other.valid;
+        for (const std::string& problem : other.problems) {
+            result.problems.push_back(
+                std::string(kAxisLetters[static_cast<std::size_t>(other.upright)]) +
+                (other.inverted ? " down: " : " up: ") + problem);
+        }
     }
+    std::optional<zeros::ZerosApart> apart;
+    if (results.size() > 1) apart = zeros::together(results);
     const zeros::Observability seen = zeros::observability(s.plan.segments_deg(), s.site);
     if (!options.plot.empty()) {
-        plot::write_file(options.plot, chart_of(run.trace()).svg());
+        plot::write_file(options.plot, chart_of(runs.front().trace()).svg());
     }
     if (options.json) {
         Json json = result_json(result, seen);
@@ -231,9 +262,11 @@ int report(const Options& options, const zeros::Calibration& run,
     return result.valid ? 0 : kNo;
 }
 
-zeros::Calibration calibration_of(const Options& options, const std::string& file, bool down) {
+zeros::Calibration calibration_of(const Options& options, const std::string& file,
+                                  const zeros::Way& way) {
     zeros::CalibrationSettings settings = settings_of(options);
-    settings.inverted = settings.inverted || down;
+    settings.upright = way.upright;
+    settings.inverted = way.down;
     // Of a file the reference is zero: how still the unit may have stood, not a measured noise.
     settings.noise.reference_is_bound = true;
     zeros::Calibration calibration(settings);
@@ -266,10 +299,15 @@ int run_file(const Options& options) {
     if (options.file.empty()) {
         throw std::invalid_argument("zero: FILE or `simulate` expected");
     }
-    const zeros::Calibration up = calibration_of(options, options.file, false);
-    std::optional<zeros::Calibration> down;
-    if (!options.down.empty()) down = calibration_of(options, options.down, true);
-    return report(options, up, down);
+    std::vector<zeros::Calibration> runs;
+    runs.push_back(calibration_of(options, options.file,
+                                  {options.calibration.upright, options.calibration.inverted}));
+    using Of = std::pair<const std::string&, zeros::Way>;
+    for (const auto& [file, way] : {Of{options.down, {2, true}}, Of{options.y_up, {1, false}},
+                                    Of{options.y_down, {1, true}}}) {
+        if (!file.empty()) runs.push_back(calibration_of(options, file, way));
+    }
+    return report(options, runs);
 }
 
 void write_increments(const Options& options, const zeros::CalibrationSettings& s,
@@ -313,13 +351,16 @@ int run_simulate(const Options& options) {
         write_increments(options, s, errors);
         return 0;
     }
-    const zeros::Calibration up = zeros::simulate(s, errors, options.period_s, options.seed);
-    std::optional<zeros::Calibration> down;
-    if (options.both_ways) {
-        s.inverted = true;
-        down = zeros::simulate(s, errors, options.period_s, options.seed + 1);
+    std::vector<zeros::Way> ways{{s.upright, s.inverted}};
+    if (options.both_ways) ways.push_back({2, true});
+    if (options.second_axis) ways.insert(ways.end(), {{1, false}, {1, true}});
+    std::vector<zeros::Calibration> runs;
+    for (const zeros::Way& way : ways) {
+        s.upright = way.upright;
+        s.inverted = way.down;
+        runs.push_back(zeros::simulate(s, errors, options.period_s, options.seed + runs.size()));
     }
-    return report(options, up, down);
+    return report(options, runs);
 }
 
 void add_common(CLI::App& command, Options& o) {
@@ -336,7 +377,10 @@ void add_common(CLI::App& command, Options& o) {
         ->check(proto::finite(proto::kAboveZero, 86400));
     command.add_flag("--static", s.allow_unobservable,
                      "go on with a plan that cannot tell zeros from tilt");
-    command.add_flag("--inverted", s.inverted, "platform z down");
+    command.add_option("--upright", s.upright, "platform axis turned about, y or z (z)")
+        ->transform(CLI::Transformer(std::map<std::string, int>{{"y", 1}, {"z", 2}}))
+        ->check(CLI::Range(1, 2));
+    command.add_flag("--inverted", s.inverted, "that axis down");
     command.add_option("--lever-arm", o.lever_arm, "from the azimuth axis, body axes, m (0,0,0)")
         ->expected(3)
         ->delimiter(',')
@@ -389,9 +433,17 @@ void add_zero(CLI::App& app, int& exit_code) {
                      "the same unit with platform z down, a second file: zeros apart from "
                      "misalignment and scale error")
         ->excludes("--inverted");
+    for (const auto& [name, file] :
+         {std::pair{"--y-up", &options->y_up}, std::pair{"--y-down", &options->y_down}}) {
+        command
+            ->add_option(name, *file,
+                         "the same unit with platform y vertical, turned about it; azimuth of z")
+            ->excludes("--inverted");
+    }
     command->footer(
         "Example: vibrig zero increments.csv --slews 0,90,-90,90 --rate 5 --plot zeros.svg\n"
         "         vibrig zero up.csv --down down.csv\n"
+        "         vibrig zero up.csv --y-up y_up.csv --y-down y_down.csv\n"
         "Exit codes: 0 valid, 1 not valid (says why), 2 bad usage or input.");
     CLI::App* simulate = command->add_subcommand("simulate", "A simulated unit instead of a file");
     add_common(*simulate, *options);
@@ -416,6 +468,8 @@ void add_zero(CLI::App& app, int& exit_code) {
     simulate->add_option("--seed", options->seed, "of the noise (1)")->check(proto::whole());
     simulate->add_flag("--both-ways", options->both_ways,
                        "a second run with z down, for zeros apart from misalignment and scale");
+    simulate->add_flag("--second-axis", options->second_axis,
+                       "two more runs, about y up and y down: the same where z cannot be down");
     simulate->add_option("--write", options->write,
                          "write the increments to this CSV file instead");
     simulate->footer("Example: vibrig zero simulate --scale 0,0,100 --both-ways");

@@ -14,6 +14,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/archive_serve.hpp"
+#include "daemon/tool/recordings/archive_type.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::tool {
@@ -143,6 +144,8 @@ int verify(const VerifyOptions& o, const ArchiveOptions& options) {
 
 void add_archive(CLI::App& app, int& exit_code) {
     CLI::App* group = app.add_subcommand("archive", "Campaigns of all rigs in one place");
+    group->footer(
+        "Example: vibrig archive add /var/lib/vibrig/demo-20260301T080000Z --archive /lab/archive");
     group->require_subcommand(1);
     auto where = std::make_shared<ArchiveOptions>();
 
@@ -170,6 +173,7 @@ void add_archive(CLI::App& app, int& exit_code) {
     });
 
     add_archive_serve(*group, where, exit_code);
+    add_archive_type(*group, where, exit_code);
 
     auto to_verify = std::make_shared<VerifyOptions>();
     CLI::App* verifying = group->add_subcommand(

@@ -1,9 +1,13 @@
 #include "daemon/tool/recordings/archive_pages.hpp"
 
+#include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "daemon/archive/trend.hpp"
 #include "daemon/plot/xml_text.hpp"
@@ -51,6 +55,24 @@ std::string in_link(const std::string& text) {
         std::array<char, 4> hex{};
         std::snprintf(hex.data(), hex.size(), "%%%02X", byte);
         out += hex.data();
+    }
+    return out;
+}
+
+/// Back; nothing: it is no such text.
+std::optional<std::string> out_of_link(std::string_view text) {
+    std::string out;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] != '%') {
+            out += text[i];
+            continue;
+        }
+        unsigned byte = 0;
+        const char* const end = text.data() + std::min(i + 3, text.size());
+        const auto [at, error] = std::from_chars(text.data() + i + 1, end, byte, 16);
+        if (error != std::errc{} || at != text.data() + i + 3) return {};
+        out += static_cast<char>(byte);
+        i += 2;
     }
     return out;
 }
@@ -103,8 +125,7 @@ std::vector<archive::Entry> of_unit(archive::Index& index, const std::string& se
     return index.results(filter);
 }
 
-serve::Document chart(archive::Index& index, const std::string& serial, std::string_view name) {
-    const auto trend = archive::trend_of(of_unit(index, serial), archive::kShutdownAfterH);
+serve::Document chart(const archive::Trend& trend, std::string_view name) {
     for (const auto& of : trend.coefficients)
         if (estimator::parameter_names()[of.position] == name)
             return {200, "image/svg+xml", trend_chart(trend, of)};
@@ -122,16 +143,20 @@ std::string ArchivePages::front(archive::Index& index) const {
                  "</td></tr>";
     archive::Filter filter;
     filter.newest = kNewest;
-    return page("Archive of campaigns",
-                "<h2>Units</h2><div class=\"scroll\"><table id=\"units\"><thead><tr><th>serial "
-                "number</th><th>type</th><th class=\"number\">campaigns</th><th>newest, UTC</th>"
-                "<th>its verdict</th></tr></thead><tbody>" +
-                    units + "</tbody></table></div><h2>Newest campaigns</h2>" +
-                    campaign_rows(index.campaigns(filter)));
+    return page(
+        "Archive of campaigns",
+        "<h2>Units</h2><p class=\"note\">Those of the newest " +
+            std::to_string(archive::Index::kOfNewest) +
+            " campaigns; any other is at /unit?serial=NUMBER.</p><div class=\"scroll\"><table "
+            "id=\"units\"><thead><tr><th>serial "
+            "number</th><th>type</th><th class=\"number\">campaigns</th><th>newest, UTC</th>"
+            "<th>its verdict</th></tr></thead><tbody>" +
+            units + "</tbody></table></div><h2>Newest campaigns</h2>" +
+            campaign_rows(index.campaigns(filter)));
 }
 
-std::string ArchivePages::unit(archive::Index& index, const std::string& serial) const {
-    const auto campaigns = of_unit(index, serial);
+std::string ArchivePages::unit(const std::vector<archive::Entry>& campaigns) const {
+    const std::string& serial = campaigns.front().unit_serial;
     const auto trend = archive::trend_of(campaigns, archive::kShutdownAfterH);
     std::string rows, charts, outliers;
     for (const auto& of : trend.coefficients) {
@@ -233,18 +258,15 @@ serve::Document ArchivePages::answer(std::string_view path, std::string_view que
         return {200, "text/html; charset=utf-8", campaign(index, *entry)};
     }
     if (path == "/unit" || path == "/chart" || path == "/api/v1/trend") {
-        const auto wanted = serve::query_value(query, "serial");
-        for (const auto& one : index.units()) {
-            if (one.serial.empty() || in_link(one.serial) != wanted) continue;
-            if (path == "/chart")
-                return chart(index, one.serial, serve::query_value(query, "coefficient"));
-            if (path == "/unit") return {200, "text/html; charset=utf-8", unit(index, one.serial)};
-            const auto trend =
-                archive::trend_of(of_unit(index, one.serial), archive::kShutdownAfterH);
-            return {200, "application/json",
-                    trend_json(one.serial, trend, archive::kShutdownAfterH).dump()};
-        }
-        return {404, "", "no such unit in the archive"};
+        const auto serial = out_of_link(serve::query_value(query, "serial"));
+        auto campaigns =
+            serial && !serial->empty() ? of_unit(index, *serial) : std::vector<archive::Entry>{};
+        if (campaigns.empty()) return {404, "", "no such unit in the archive"};
+        if (path == "/unit") return {200, "text/html; charset=utf-8", unit(campaigns)};
+        const auto trend = archive::trend_of(std::move(campaigns), archive::kShutdownAfterH);
+        if (path == "/chart") return chart(trend, serve::query_value(query, "coefficient"));
+        return {200, "application/json",
+                trend_json(*serial, trend, archive::kShutdownAfterH).dump()};
     }
     return {404, "", "no such page"};
 }

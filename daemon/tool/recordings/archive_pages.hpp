@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "daemon/archive/deliver.hpp"
 #include "daemon/serve/documents.hpp"
@@ -18,7 +19,7 @@ class ArchivePages {
 
   private:
     [[nodiscard]] std::string front(archive::Index& index) const;
-    [[nodiscard]] std::string unit(archive::Index& index, const std::string& serial) const;
+    [[nodiscard]] std::string unit(const std::vector<archive::Entry>& campaigns) const;
     [[nodiscard]] std::string campaign(archive::Index& index, const archive::Entry& entry) const;
     [[nodiscard]] serve::Document file(const archive::Entry& entry, std::string_view name) const;
 

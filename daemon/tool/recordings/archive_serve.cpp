@@ -55,6 +55,14 @@ int serve_archive(ServeOptions o, const ArchiveOptions& where) {
                                 {&o.revoked, &server.revoked}})
             if (to->empty()) *to = *from;
     }
+    if (!o.remote.empty())
+        for (const auto& [option, value] : {std::pair{"--certificate", &o.certificate},
+                                            {"--key", &o.key},
+                                            {"--clients-ca", &o.clients_ca}})
+            if (value->empty())
+                throw std::runtime_error(std::string(option) +
+                                         ": found nothing, expected a PEM file with --remote, or "
+                                         "--config that names it");
     if (o.page.empty() && o.remote.empty()) o.page = "127.0.0.1:8091";
     sigset_t signals;
     ::sigemptyset(&signals);

@@ -5,6 +5,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -16,13 +17,13 @@
 #include <sstream>
 #include <string>
 
-#include "daemon/journal/certificates.hpp"
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/report/analysis.hpp"
 #include "daemon/report/certificate.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "daemon/tool/recordings/print_pdf.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -34,9 +35,12 @@ namespace {
 namespace fs = std::filesystem;
 using report::Issue;
 
+constexpr std::array kKinds{".html", ".json", ".pdf"};
+
 struct CertificateArguments {
-    std::string campaign, paper, output = "certificate", by, entered_in;
-    bool no_register = false;
+    std::string campaign, paper, output = "certificate", by;
+    serve::Address at;
+    bool no_journal = false;
 };
 
 [[noreturn]] void refuse(const std::string& file, const toml::node& node, const std::string& what) {
@@ -152,27 +156,50 @@ Issue read_paper(const std::string& file) {
     return issue;
 }
 
-/// Beside the campaigns' folders. Not the daemon's journal: that one is signed, and whoever else
-/// writes into it breaks its chain.
-std::string register_of(const CertificateArguments& arguments, const record::Campaign& campaign) {
-    if (arguments.no_register) return {};
-    if (!arguments.entered_in.empty()) return arguments.entered_in;
-    return (fs::absolute(campaign.folder).lexically_normal().parent_path() / "certificates.sqlite3")
-        .string();
+/// What the rig's daemon is asked to keep in its signed journal, which nobody else writes. Returns
+/// why it refuses; empty: number and hashes are on disk.
+std::string enter_in_journal(const CertificateArguments& arguments, const Issue& issue,
+                             const std::string& campaign, const std::string& unfinished) {
+    const nlohmann::json entry{{"number", issue.number},
+                               {"campaign", campaign},
+                               {"pdf_sha256", record::sha256_of_file(unfinished + ".pdf")},
+                               {"json_sha256", record::sha256_of_file(unfinished + ".json")}};
+    const nlohmann::json command{
+        {"kind", "certificate"}, {"by", issue.by}, {"argument", entry.dump()}};
+    serve::Client client(arguments.at);
+    const serve::Reply reply = client.post("/api/v1/commands", command.dump());
+    if (reply.status == 200) return {};
+    if (is_no(reply.status)) return problem_of(reply);
+    throw serve::ClientError("vibrigd: " + problem_of(reply));
+}
+
+/// Whether there is a daemon that will be asked, before a long replay.
+void look_for_daemon(const CertificateArguments& arguments) {
+    try {
+        serve::Client client(arguments.at);
+        static_cast<void>(ask_status(client));
+    } catch (const serve::ClientError& error) {
+        throw std::runtime_error(
+            std::string(error.what()) +
+            ": number and hashes go into the rig's signed journal, which vibrigd writes; "
+            "--no-journal issues without");
+    }
 }
 
 int certify(const CertificateArguments& arguments) {
     Issue issue = read_paper(arguments.paper);
     issue.by = arguments.by;
+    try {
+        static_cast<void>(nlohmann::json(issue.by).dump());
+    } catch (const nlohmann::json::exception&) {
+        throw std::runtime_error("--by: found bytes that are not UTF-8, expected a name");
+    }
     issue.utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                        std::chrono::system_clock::now().time_since_epoch())
                        .count();
-    keep_recordings(arguments.output + ".html");
+    for (const char* kind : kKinds) keep_recordings(arguments.output + kind);
+    if (!arguments.no_journal) look_for_daemon(arguments);
     const auto campaign = read_named_campaign(arguments.campaign);
-    const std::string entered_in = register_of(arguments, campaign);
-    if (!entered_in.empty() && journal::certificate_issued(entered_in, issue.number))
-        throw std::runtime_error(entered_in + ": found certificate " + issue.number +
-                                 " issued already, expected a new number");
     const auto result = nlohmann::ordered_json::parse(campaign.result_json, nullptr, false);
     record::ReplayResult replayed;
     {
@@ -190,19 +217,29 @@ int certify(const CertificateArguments& arguments) {
         std::cerr << "refused: " << why.what() << '\n';
         return kNo;
     }
-    const std::string json = arguments.output + ".json", html = arguments.output + ".html",
-                      pdf = arguments.output + ".pdf";
-    plot::write_file(json, certificate.dump(2) + "\n");
-    plot::write_file(html, report::certificate_page(certificate));
-    print_pdf(html, pdf);
-    if (!entered_in.empty())
-        journal::note_certificate(entered_in,
-                                  {issue.utc_ns, issue.number, campaign.head.campaign, issue.by,
-                                   record::sha256_of_file(pdf), record::sha256_of_file(json)});
-    const std::string word = certificate["verdict"]["word"];
+    // They have their names once the journal knows them.
+    const std::string unfinished = arguments.output + ".unfinished";
+    plot::write_file(unfinished + ".json", certificate.dump(2) + "\n");
+    plot::write_file(unfinished + ".html", report::certificate_page(certificate));
+    print_pdf(unfinished + ".html", unfinished + ".pdf");
+    const std::string refused =
+        arguments.no_journal
+            ? ""
+            : enter_in_journal(arguments, issue, campaign.head.campaign, unfinished);
+    for (const char* kind : kKinds) {
+        if (refused.empty())
+            fs::rename(unfinished + kind, arguments.output + kind);
+        else
+            fs::remove(unfinished + kind);
+    }
+    if (!refused.empty()) {
+        std::cerr << "refused: " << refused << '\n';
+        return kNo;
+    }
+    const std::string word = certificate["verdict"]["word"], pdf = arguments.output + ".pdf";
     std::cout << pdf << ": certificate " << issue.number << ", " << word << ", SHA-256 "
-              << record::sha256_of_file(pdf) << (entered_in.empty() ? ", in no register" : "")
-              << '\n';
+              << record::sha256_of_file(pdf)
+              << (arguments.no_journal ? ", in no journal" : ", in the rig's journal") << '\n';
     return 0;
 }
 
@@ -220,13 +257,14 @@ void add_certificate(CLI::App& app, int& exit_code) {
     command->add_option("--by", arguments->by, "named person who issues it")->required();
     command->add_option("-o,--output", arguments->output,
                         "files to write, without .html, .pdf, .json (default certificate)");
-    command->add_option("--register", arguments->entered_in,
-                        "the register of certificates, where the number and the PDF's hash go "
-                        "(default: certificates.sqlite3 beside the campaign's folder)");
-    command->add_flag("--no-register", arguments->no_register, "enter it nowhere");
+    add_socket(*command, arguments->at);
+    command->add_flag("--no-journal", arguments->no_journal,
+                      "do not enter number and hashes in the rig's journal");
     command->footer(
         "Example: vibrig certificate demo-20260301T080000Z --paper C-17.toml --by \"A. Person\"\n"
-        "A result that is not valid is refused, a doubtful one marked.\n"
+        "A result that is not valid is refused, a doubtful one marked. The SHA-256 of PDF and "
+        "JSON go\ninto the signed journal of the rig's daemon (--socket or --host), each number "
+        "once.\n"
         "Exit codes: 0 issued, 1 refused, 2 bad usage or input.");
     command->callback(
         [arguments, &exit_code] { exit_code = guarded([&] { return certify(*arguments); }); });

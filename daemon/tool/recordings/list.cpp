@@ -115,7 +115,8 @@ void add_list(CLI::App& app, int& exit_code) {
     command->add_option("--until", options->until, "begun before this day, UTC");
     command->add_option("--verdict", options->verdict, "with this verdict")
         ->check(CLI::IsMember({"valid", "doubtful", "not valid", "not-valid"}));
-    command->add_option("--newest", options->newest, "at most so many, the newest");
+    command->add_option("--newest", options->newest, "at most so many, the newest")
+        ->check(CLI::Range(1, 1'000'000'000));
     command->add_flag("--superseded", options->superseded,
                       "also what was delivered before the campaign went on");
     command->add_flag("--json", options->json, "print them as JSON");

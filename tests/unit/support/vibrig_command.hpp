@@ -35,6 +35,12 @@ class VibrigCommand : public ::testing::Test {
         return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     }
 
+    /// Bad usage or input: exit code 2 and a message with these words.
+    void expect_refusal(const std::string& arguments, const std::string& words) {
+        EXPECT_EQ(vibrig(arguments), 2) << arguments << "\n" << out << error;
+        EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
+    }
+
     std::filesystem::path folder_;
     std::string out;
     std::string error;

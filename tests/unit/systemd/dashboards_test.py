@@ -3,8 +3,8 @@
 
 usage: dashboards_test.py ROOT      exit status 77: promtool is not there
 
-Grafana itself is no Debian package. What is checked is what it needs of a dashboard's JSON model: its refusals of
-foreign kinds of panels and units, and what it would take silently and show wrongly (overlaps, unknown variables).
+Grafana itself is no Debian package. Its own schema (@grafana/schema) is asked by tests/hil/live_page.py; here is what that
+does not say and Grafana would take silently and show wrongly: overlaps, unknown variables and units, refIds.
 """
 import glob
 import itertools

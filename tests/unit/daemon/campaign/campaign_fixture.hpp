@@ -58,39 +58,50 @@ struct CampaignTest : testing::Test {
     Time now = kSecond;
     std::unique_ptr<Campaign> campaign;
 
+    struct TestRig final : Rig {
+        explicit TestRig(CampaignTest& t) : Rig(t.gimbal, t.shaker), test(t) {}
+        CampaignTest& test;
+        drivers::PlatformStatus platform() const override { return test.platform; }
+        rt::Rest rest(Time at) const override { return test.accelerometers.monitor.rest(at); }
+        std::optional<rt::MeanMotion> second() const override {
+            if (!test.second) return {};
+            // Nothing is asked for before there is a campaign.
+            return test.campaign ? test.second() : rt::MeanMotion{};
+        }
+        void guard(rt::Guard level) override { test.guard = level; }
+        void disobeyed(bool now_so) override { test.disobeyed = test.disobeyed || now_so; }
+    } rig_port{*this};
+    struct TestDwells final : Dwells {
+        explicit TestDwells(CampaignTest& t) : test(t) {}
+        CampaignTest& test;
+        bool order(const rt::DwellOrder& o) override {
+            test.orders.push_back(o);
+            return true;
+        }
+        std::optional<Next> next(const std::array<double, 3>& here, double elapsed_s) override {
+            return test.think(here, elapsed_s);
+        }
+        std::string resume_gate() const override { return test.gate; }
+        void end(bool c) override {
+            ++test.ends;
+            test.complete = c;
+        }
+    } dwell_port{*this};
+    struct TestLog final : Log {
+        explicit TestLog(CampaignTest& t) : test(t) {}
+        CampaignTest& test;
+        void event(Severity, const std::string& text) override { test.events.push_back(text); }
+        void position_done(const estimator::DwellInfo&, const estimator::DwellSummary&,
+                           const StopDone& stop) override {
+            ++test.positions_done;
+            test.stops_done.push_back(stop);
+        }
+        std::int64_t utc_ns() const override { return test.utc_ns; }
+        Time wall() const override { return test.wall_clock ? test.wall_clock() : Log::wall(); }
+    } log_port{*this};
+
     void make() {
-        Ports ports{gimbal,
-                    shaker,
-                    [this] { return platform; },
-                    [this](const rt::DwellOrder& o) {
-                        orders.push_back(o);
-                        return true;
-                    },
-                    [this](rt::Guard g) { guard = g; },
-                    [] { return true; },
-                    [] {},
-                    [this](bool c) {
-                        ++ends;
-                        complete = c;
-                    },
-                    [this](Severity, const std::string& text) { events.push_back(text); },
-                    [this](const std::array<double, 3>& here, double elapsed_s) {
-                        return think(here, elapsed_s);
-                    },
-                    {},
-                    [this](const estimator::DwellInfo&, const estimator::DwellSummary&,
-                           const StopDone& stop) {
-                        ++positions_done;
-                        stops_done.push_back(stop);
-                    },
-                    [this] { return gate; },
-                    {}};
-        ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
-        ports.utc_ns = [this] { return utc_ns; };
-        if (wall_clock) ports.wall = wall_clock;
-        if (second) ports.second = second;
-        ports.disobeyed = [this](bool now_so) { disobeyed = disobeyed || now_so; };
-        campaign = std::make_unique<Campaign>(settings, ports);
+        campaign = std::make_unique<Campaign>(settings, Ports{rig_port, dwell_port, log_port});
     }
 
     CampaignTest() {

@@ -447,6 +447,39 @@ TEST_F(CampaignTest, GoesOnWithWhatIsLeftOfAnotherOrder) {
                 1e-9);
 }
 
+TEST_F(CampaignTest, TellsTheFirstDwellAfterThePowerOfTheGyrosWasLost) {
+    for (const bool lost : {false, true}) {
+        SCOPED_TRACE(lost);
+        orders.clear();
+        stops_done.clear();
+        make();
+        // GIVEN a restart after two of four dwells, and gyros that are found run down, or not
+        ASSERT_TRUE(campaign->offer(done(2)));
+        platform.gyros_at_speed = !lost;
+        run_for(5);
+        platform.gyros_at_speed = true;
+        // WHEN it is resumed
+        ASSERT_TRUE(command(Kind::arm).accepted);
+        ASSERT_TRUE(command(Kind::resume).accepted);
+        ASSERT_TRUE(run_until(CampaignState::finished, 300));
+        // THEN the dwell that comes first is told so, no other
+        ASSERT_EQ(orders.size(), 2U);
+        EXPECT_EQ(orders[0].dwell.power_lost, lost);
+        EXPECT_FALSE(orders[1].dwell.power_lost);
+    }
+}
+
+TEST_F(CampaignTest, TakesNoRunUpBeforeTheFirstDwellForAPowerLoss) {
+    platform.gyros_at_speed = false;
+    run_for(5);
+    platform.gyros_at_speed = true;
+    ASSERT_TRUE(command(Kind::arm).accepted);
+    ASSERT_TRUE(command(Kind::start).accepted);
+    ASSERT_TRUE(run_until(CampaignState::finished, 400));
+    ASSERT_FALSE(orders.empty());
+    for (const auto& order : orders) EXPECT_FALSE(order.dwell.power_lost);
+}
+
 /// As the journal has kept them, with what they repeat.
 std::vector<StopDone> stops_of(const Settings& settings,
                                const std::vector<estimator::DwellSummary>& dwells) {

@@ -57,6 +57,38 @@ struct WatchedCampaign : testing::Test {
     drivers::Time now = drivers::kSecond;
     std::unique_ptr<Campaign> campaign;
 
+    struct WatchedRig final : Rig {
+        explicit WatchedRig(WatchedCampaign& t) : Rig(t.gimbal, t.shaker), test(t) {}
+        WatchedCampaign& test;
+        drivers::PlatformStatus platform() const override { return test.platform; }
+        rt::Rest rest(drivers::Time at) const override {
+            return test.accelerometers.monitor.rest(at);
+        }
+        std::optional<rt::MeanMotion> second() const override {
+            // Nothing is asked for before there is a campaign.
+            if (!test.watched) return {};
+            return test.campaign ? test.second() : rt::MeanMotion{};
+        }
+        std::string unfit() const override { return test.unfit; }
+        void guard(rt::Guard) override {}
+        void ramping(const rt::Ramp& ramp) override {  // else: it rests
+            if (ramp.start_g > 0 || ramp.target_g > 0) test.ramps.push_back(ramp);
+        }
+    } rig_port{*this};
+    struct WatchedDwells final : Dwells {
+        explicit WatchedDwells(WatchedCampaign& t) : test(t) {}
+        WatchedCampaign& test;
+        bool order(const rt::DwellOrder& order) override {
+            if (!order.cancel) test.orders.push_back(order);
+            return true;
+        }
+    } dwell_port{*this};
+    struct WatchedLog final : Log {
+        explicit WatchedLog(WatchedCampaign& t) : test(t) {}
+        WatchedCampaign& test;
+        void event(Severity, const std::string& text) override { test.events.push_back(text); }
+    } log_port{*this};
+
     WatchedCampaign() {
         settings.sample_s = 0.025;
         settings.proof.demanded = false;
@@ -69,25 +101,7 @@ struct WatchedCampaign : testing::Test {
         make();
     }
     void make() {
-        Ports ports{gimbal,
-                    shaker,
-                    [this] { return platform; },
-                    [this](const rt::DwellOrder& order) {
-                        if (!order.cancel) orders.push_back(order);
-                        return true;
-                    },
-                    [](rt::Guard) {},
-                    [] { return true; },
-                    [] {},
-                    [](bool) {},
-                    [this](Severity, const std::string& text) { events.push_back(text); }};
-        ports.ramping = [this](const rt::Ramp& ramp) {
-            if (ramp.start_g > 0 || ramp.target_g > 0) ramps.push_back(ramp);  // else: it rests
-        };
-        ports.rest = [this](drivers::Time at) { return accelerometers.monitor.rest(at); };
-        ports.unfit = [this] { return unfit; };
-        if (watched) ports.second = [this] { return second(); };
-        campaign = std::make_unique<Campaign>(settings, std::move(ports));
+        campaign = std::make_unique<Campaign>(settings, Ports{rig_port, dwell_port, log_port});
     }
     CommandReply command(Kind kind) { return campaign->command({kind, "Ada", ""}, now); }
     StatusData status() const {

@@ -51,12 +51,14 @@ class RigAtRest {
         return stage.failure();
     }
 
-    /// Both ways, where the stage asks for them; begun before.
+    /// All ways that the stage asks for; begun before.
     std::string zero_all(ZeroingStage& stage, LevellingStage* levelling) {
         auto why = zero(stage, levelling);
-        if (!why.empty() || !stage.another()) return why;
-        stage.begin_other_way();
-        return zero(stage, levelling);
+        while (why.empty() && stage.another()) {
+            stage.begin_other_way();
+            why = zero(stage, levelling);
+        }
+        return why;
     }
 
     /// One run, begun before.

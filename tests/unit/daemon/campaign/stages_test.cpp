@@ -57,6 +57,29 @@ struct StagesTest : testing::Test, drivers::CanPort {
     drivers::PlatformStatus platform;
     std::unique_ptr<rt::StageFeed> feed;
     std::unique_ptr<Campaign> campaign;
+
+    struct StagedRig final : Rig {
+        explicit StagedRig(StagesTest& t) : Rig(t.gimbal, t.shaker), test(t) {}
+        StagesTest& test;
+        drivers::PlatformStatus platform() const override { return test.platform; }
+        rt::Rest rest(Time at) const override { return test.accelerometers.monitor.rest(at); }
+        void guard(rt::Guard level) override { test.guard = level; }
+    } rig_port{*this};
+    struct StagedDwells final : Dwells {
+        explicit StagedDwells(StagesTest& t) : test(t) {}
+        StagesTest& test;
+        bool order(const rt::DwellOrder& o) override {
+            test.orders.push_back(o);
+            test.tilt_when_ordered = std::hypot(test.up[0], test.up[2]);
+            return true;
+        }
+        void levelled(const LevelDrift& found) override { test.drifts.push_back(found); }
+    } dwell_port{*this};
+    struct StagedLog final : Log {
+        explicit StagedLog(StagesTest& t) : test(t) {}
+        StagesTest& test;
+        void event(Severity, const std::string& text) override { test.events.push_back(text); }
+    } log_port{*this};
     std::vector<rt::DwellOrder> orders;
     std::vector<LevelDrift> drifts;
     std::vector<std::string> events;
@@ -110,24 +133,9 @@ struct StagesTest : testing::Test, drivers::CanPort {
         platform.ready = platform.loop_closed = platform.gyros_at_speed = true;
         shaker.now.valid = true;
         feed = std::make_unique<rt::StageFeed>(dbc, stage_feed_settings(settings), nullptr);
-        Ports ports{gimbal,
-                    shaker,
-                    [this] { return platform; },
-                    [this](const rt::DwellOrder& o) {
-                        orders.push_back(o);
-                        tilt_when_ordered = std::hypot(up[0], up[2]);
-                        return true;
-                    },
-                    [this](rt::Guard g) { guard = g; },
-                    [] { return true; },
-                    [] {},
-                    [](bool) {},
-                    [this](Severity, const std::string& text) { events.push_back(text); }};
-        ports.torquer = &torquer;
-        ports.rest = [this](Time at) { return accelerometers.monitor.rest(at); };
-        ports.feed = feed.get();
-        ports.levelled = [this](const LevelDrift& found) { drifts.push_back(found); };
-        campaign = std::make_unique<Campaign>(settings, ports);
+        rig_port.torquer = &torquer;
+        rig_port.feed = feed.get();
+        campaign = std::make_unique<Campaign>(settings, Ports{rig_port, dwell_port, log_port});
         for (int i = 0; campaign->stopping() && i < 40; ++i) tick();
         ASSERT_TRUE(campaign->command({Kind::arm, "Ada", ""}, now).accepted);
         ASSERT_TRUE(campaign->command({Kind::start, "Ada", ""}, now).accepted);
@@ -478,7 +486,7 @@ TEST(ZeroingStage, TakesTheNoiseOfOneSampleAsADensityAtItsOwnRate) {
     rig.accelerometer_g = 1e-3;
     for (const double rate_hz : {40.0, 100.0, 1000.0}) {
         // white noise of sigma per sample has the density sigma sqrt(period)
-        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan(false).noise.velocity_random_walk,
+        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan().noise.velocity_random_walk,
                          1e-3 / std::sqrt(rate_hz));
     }
 }

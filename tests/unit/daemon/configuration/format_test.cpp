@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <set>
+#include <sstream>
 
 #include "daemon/configuration/schema.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
@@ -114,9 +115,23 @@ TEST(Schema, DefaultsLieWithinTheBounds) {
 
 TEST(Schema, ShowsTypeUnitDefaultBoundsAndDoc) {
     const std::string text = format_schema();
-    EXPECT_THAT(text, ContainsRegex("site.latitude_deg +number +deg +45.75 +-90 to 90 +latitude"));
-    EXPECT_THAT(text, ContainsRegex("shaker.transport +choice +- +\"tcp\" +\"tcp\" . \"rtu\""));
+    EXPECT_THAT(text, HasSubstr("site.latitude_deg                 number, deg, -90 to 90\n"
+                                "    = 45.75\n"
+                                "    latitude of the rig\n"));
+    EXPECT_THAT(text, ContainsRegex("shaker.transport +choice, \"tcp\" . \"rtu\"\n +. \"tcp\"\n"));
     EXPECT_THAT(text, ContainsRegex("shaker.registers.watchdog.address +integer"));
+}
+
+TEST(Schema, IsNoWiderThanATerminalAndHasEveryKey) {
+    const std::string text = format_schema();
+    std::istringstream lines(text);
+    std::set<std::string> first;
+    for (std::string line; std::getline(lines, line);) {
+        EXPECT_LE(line.size(), 100u) << line;
+        EXPECT_TRUE(line.empty() || line.back() != ' ') << line;
+        first.insert(line.substr(0, line.find(' ')));
+    }
+    for (const Key& key : schema()) EXPECT_TRUE(first.contains(key.name)) << key.name;
 }
 
 }  // namespace

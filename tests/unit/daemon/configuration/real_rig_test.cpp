@@ -169,6 +169,31 @@ TEST(Zeroing, IsBothWaysWhereTheOuterGimbalTurnsThatFar) {
     EXPECT_FALSE(of("zeroing.both_ways = false"));
 }
 
+TEST(Zeroing, TakesASecondAxisWhereZCannotBeDown) {
+    const auto of = [](const std::string& more) {
+        return accepted(
+                   "campaign = { zeroing = true, positions_deg = [[0, 0, 0]], identify = "
+                   "\"what-it-can\" }\n" +
+                       more,
+                   true)
+            .campaign.zero.second_axis;
+    };
+    EXPECT_FALSE(of(""));
+    // z down is out of reach, y is not: the inner gimbal has its 60 deg, the azimuth its half turn
+    EXPECT_TRUE(of("gimbal.travel_deg = [[-80, 95], [-65, 65], [-180, 180]]"));
+    EXPECT_FALSE(of("gimbal.travel_deg = [[-80, 95], [-55, 65], [-180, 180]]"));
+    EXPECT_FALSE(of("gimbal.travel_deg = [[-80, 95], [-65, 65], [-175, 175]]"));
+    // AND as the encoders count
+    EXPECT_TRUE(
+        of("gimbal.travel_deg = [[-60, 115], [-65, 65], [-180, 180]]\n"
+           "platform.encoder_zero_deg = [20, 0, 0]"));
+    // BUT what is stated holds
+    EXPECT_FALSE(
+        of("gimbal.travel_deg = [[-80, 95], [-65, 65], [-180, 180]]\n"
+           "zeroing.both_ways = false"));
+    EXPECT_TRUE(of("zeroing.second_axis = true"));
+}
+
 TEST(OpeningCheck, IsOfRigsThatAreArmedByTheRecord) {
     const auto of = [](const std::string& text) {
         return parse(text, "rig.toml", true).configuration.campaign.opening;

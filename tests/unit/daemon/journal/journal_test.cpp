@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "daemon/journal/database.hpp"
+#include "daemon/journal/verify.hpp"
 #include "estimator/identification/result.hpp"
 
 namespace vibrig::journal {
@@ -204,6 +205,30 @@ TEST_F(JournalTest, KeepsEventsAndWhoCommandedWhat) {
     EXPECT_EQ(command.numbers[2], 0);
 }
 
+TEST_F(JournalTest, KnowsAfterARestartWhichCertificatesWereIssued) {
+    {
+        Journal journal(path, kHash);
+        EXPECT_THAT(journal.recovery().certificates, IsEmpty());
+        journal.start();
+        const auto issue = [&journal](const char* argument, bool accepted) {
+            EXPECT_NE(journal.command({CommandRequest::Kind::certificate, "Ada", argument},
+                                      {accepted, ""}, 7),
+                      0U);
+        };
+        issue(R"({"number":"C-17 \"a\"","pdf_sha256":"00"})", true);
+        issue(R"({"number":"C-18"})", false);
+        issue("no JSON", false);
+        journal.command({CommandRequest::Kind::arm, "Ada", ""}, {true, ""}, 7);
+        journal.stop();
+    }
+    // THEN the refused ones are free, and each is an entry of the signed chain
+    EXPECT_THAT(Journal(path, kHash).recovery().certificates, testing::ElementsAre("C-17 \"a\""));
+    EXPECT_THAT(verify_file(path).found, IsEmpty());
+    static_cast<void>(
+        ask("UPDATE command SET argument = replace(argument, '00', '01') WHERE id = 1"));
+    EXPECT_THAT(verify_file(path).found, testing::Contains(testing::HasSubstr("command 1")));
+}
+
 TEST_F(JournalTest, KeepsTheVerdictOfTheNewestLoopCheck) {
     const auto after = [this](const std::vector<std::string>& verdicts) {
         Journal journal(path, kHash);
@@ -361,18 +386,29 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
     }
 }
 
-/// As version 1 wrote it: without the four noise levels, position, repeats, time used and times of
-/// the beginning.
+/// As version 1 wrote it: without the four noise levels, position, repeats, time used, times of
+/// the beginning and whether power was lost.
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers, (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t));
+    bytes.erase(numbers,
+                (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 1);
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(
         ::crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
     bytes.append(reinterpret_cast<const char*>(&sum), sizeof sum);
     return bytes;
+}
+
+TEST_F(JournalTest, KnowsAfterWhichRestartThePowerWasLost) {
+    estimator::Identification filter{estimator::Settings{}};
+    for (const bool lost : {false, true}) {
+        DwellCheckpoint one = dwell(filter, 1), read;
+        one.info.power_lost = lost;
+        ASSERT_EQ(decode(encode(one, kHash), kHash, read), "");
+        EXPECT_EQ(read.info.power_lost, lost);
+    }
 }
 
 TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {

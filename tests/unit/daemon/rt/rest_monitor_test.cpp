@@ -17,7 +17,8 @@ using drivers::Time;
 /// Feeds a monitor with samples at 40 Hz, platform and table as the test wants them.
 struct RestMonitorTest : testing::Test {
     static constexpr Time kPeriod = 25 * kMillisecond;
-    RestMonitor monitor{{}, kPeriod};
+    static constexpr double kCount_g = 3.8e-6;
+    RestMonitor monitor{{}, kPeriod, {kCount_g, kCount_g, kCount_g, kCount_g}};
     Time now = 10 * kSecond;
     double platform_g = 0, table_g = 0;  ///< peak, at 15 Hz
     double tilt_deg_per_s = 0, noise_g = 1e-4;
@@ -135,6 +136,108 @@ TEST_F(RestMonitorTest, RestSinceAMomentRestsOnNothingBeforeIt) {
     const Time stopped = now;
     EXPECT_FALSE(run(0.4).measured_since(stopped));
     EXPECT_TRUE(run(0.2).measured_since(stopped));
+}
+
+struct DoubtedWitnessTest : RestMonitorTest {
+    DoubtedWitnessTest() { table_bound = false; }
+    /// Of an accelerometer along y that is stuck, or flickers by a count.
+    Rest run_stuck(double seconds, double flicker_g = 0) {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += kPeriod;
+            drivers::Sample stuck = sample();
+            stuck.force[1] = 1 + (now / kPeriod % 2 == 0 ? flicker_g : 0);
+            monitor.add(stuck);
+        }
+        return monitor.rest(now);
+    }
+};
+
+TEST_F(DoubtedWitnessTest, AnAccelerometerThatIsStuckDoesNotConfirmRest) {
+    // GIVEN one along the vertical that sticks while the table shakes: the norm stands still
+    platform_g = 3;
+    ASSERT_TRUE(run(1).moving());
+    ASSERT_TRUE(run_stuck(2).measured()) << "or this shows nothing";
+    // WHEN the trip that it made says that it contradicts the command
+    monitor.doubt(drivers::Channel::accel_y);
+    // THEN its stillness is no rest, though it may flicker by a count
+    for (const double flicker_g : {0.0, kCount_g}) {
+        const Rest rest = run_stuck(20, flicker_g);
+        EXPECT_EQ(rest.platform.verdict, RestVerdict::unknown);
+        EXPECT_TRUE(rest.platform.doubted);
+        EXPECT_FALSE(rest.measured());
+    }
+}
+
+TEST_F(DoubtedWitnessTest, OneThatLivesIsBelievedByItsNoise) {
+    run(1);
+    monitor.doubt(drivers::Channel::accel_y);
+    const Time doubted = now;
+    EXPECT_FALSE(run(kPeriod * 1e-9).measured());
+    const Rest rest = run(0.7);
+    EXPECT_TRUE(rest.measured_since(doubted)) << "seed " << kSeed;
+    EXPECT_FALSE(rest.platform.doubted);
+}
+
+TEST_F(DoubtedWitnessTest, OneThatMovesIsNeverUnknown) {
+    platform_g = 1;
+    run(1);
+    monitor.doubt(drivers::Channel::accel_x);
+    EXPECT_TRUE(run(0.025).moving());
+}
+
+TEST_F(DoubtedWitnessTest, OneThatComesBackHasToShowAWholeWindowOfRest) {
+    run(1);
+    monitor.doubt(drivers::Channel::accel_y);
+    ASSERT_FALSE(run_stuck(3).measured());
+    const Time back = now;
+    EXPECT_FALSE(run(0.4).measured());
+    EXPECT_TRUE(run(0.3).measured_since(back));
+}
+
+TEST_F(DoubtedWitnessTest, WhereAnotherIsThereThatOneAloneDecides) {
+    // GIVEN a table with an accelerometer of its own, and the platform's stuck
+    table_bound = true;
+    run(1);
+    monitor.doubt(drivers::Channel::accel_y);
+    // THEN the table's says rest, and motion
+    EXPECT_TRUE(run_stuck(1).measured());
+    table_g = 1;
+    Rest rest = run_stuck(1);
+    EXPECT_TRUE(rest.moving());
+    EXPECT_FALSE(rest.measured());
+    // WHEN the table's is doubted, too, and sticks THEN nobody says rest
+    table_g = noise_g = 0;
+    monitor.doubt(drivers::Channel::table_accel);
+    rest = run_stuck(3);
+    EXPECT_TRUE(rest.table.doubted && rest.platform.doubted);
+    EXPECT_FALSE(rest.measured());
+    // WHEN the platform's lives again THEN it decides
+    noise_g = 1e-4;
+    table_valid = false;
+    EXPECT_TRUE(run(1).measured());
+}
+
+TEST_F(RestMonitorTest, AtAKilohertzMotionIsSeenAsSoon) {
+    // GIVEN 1 kHz, where not each sample sums the window up anew
+    RestMonitor fast({}, drivers::kMillisecond);
+    const auto feed = [&](double seconds) {
+        for (const Time end = now + drivers::from_seconds(seconds); now < end;) {
+            now += drivers::kMillisecond;
+            fast.add(sample());
+        }
+    };
+    feed(0.6);
+    ASSERT_TRUE(fast.rest(now).measured());
+    // WHEN it begins to shake THEN that is seen within 25 ms: of 1 g at 15 Hz a quarter of a period
+    table_g = platform_g = 1;
+    feed(0.025);
+    EXPECT_TRUE(fast.rest(now).moving());
+    table_g = platform_g = 0;
+    feed(0.49);
+    EXPECT_FALSE(fast.rest(now).measured());
+    feed(0.03);
+    EXPECT_TRUE(fast.rest(now).measured());
+    EXPECT_LE(now - fast.rest(now).platform.to, 5 * drivers::kMillisecond);
 }
 
 TEST_F(RestMonitorTest, SlowSamplesGetAWindowOfEight) {

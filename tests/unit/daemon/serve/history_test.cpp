@@ -67,6 +67,23 @@ TEST(History, GivesWhatCameAfterAMoment) {
     EXPECT_EQ(answer["channels"][0]["unit"], "g");
 }
 
+TEST(History, TellsTheCommandFromWhatTheControllerReadsBack) {
+    History history;
+    StatusData status = at(1, 6.9);
+    status.command_table_g = 7.5;
+    status.shaker.amplitude_g = 7.0;
+    history.add(status);
+    status = at(1.5, 0);
+    status.shaker.valid = false;  // the link is gone: nothing old goes on
+    history.add(status);
+    const Json answer = Json::parse(history.json("command_g,set_point_g,measured_g", 0));
+    EXPECT_EQ(answer["channels"][0]["mean"][0], 7.5);
+    EXPECT_EQ(answer["channels"][1]["mean"][0], 7.0);
+    EXPECT_EQ(answer["channels"][1]["unit"], "g");
+    EXPECT_EQ(answer["channels"][2]["mean"][0], 6.9);
+    EXPECT_TRUE(answer["channels"][1]["mean"][1].is_null());
+}
+
 TEST(History, BeginsWithTheCampaign) {
     History history;
     for (double t = 0; t < 50; t += 0.5) history.add(at(t, 0, CampaignState::idle));

@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <zlib.h>
 
 #include <cmath>
@@ -11,34 +10,14 @@
 #include <sstream>
 
 #include "tests/unit/estimator/allan/support.hpp"
+#include "tests/unit/support/vibrig_command.hpp"
 
 namespace {
 
 using Json = nlohmann::json;
 
-std::string content_of(const std::filesystem::path& path) {
-    std::ostringstream text;
-    text << std::ifstream(path, std::ios::binary).rdbuf();
-    return text.str();
-}
-
-/// Runs the real program in a folder of its own.
-class AllanCommand : public ::testing::Test {
+class AllanCommand : public vibrig::test::VibrigCommand {
   protected:
-    AllanCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~AllanCommand() override { std::filesystem::remove_all(folder_); }
-
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = content_of(folder_ / "out");
-        error = content_of(folder_ / "error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
     void write(const std::string& name, const std::string& text) {
         std::ofstream(folder_ / name, std::ios::binary) << text;
     }
@@ -61,10 +40,6 @@ class AllanCommand : public ::testing::Test {
             EXPECT_NE(error.find(word), std::string::npos) << word << " not in: " << error;
         }
     }
-
-    std::filesystem::path folder_;
-    std::string out;
-    std::string error;
 };
 
 TEST_F(AllanCommand, PrintsTheHandbookNumbersAsJson) {
@@ -148,7 +123,7 @@ TEST_F(AllanCommand, FitNamesWhatIsNotDetected) {
     const Json fit = Json::parse(out)["fit"];
     EXPECT_NEAR(fit["N"]["value"], 0.001, 5e-5);
     EXPECT_TRUE(fit["Q"]["value"].is_null() || fit["Q"]["value"] < 0.02) << fit.dump();
-    EXPECT_EQ(content_of(folder_ / "plot.svg").substr(0, 4), "<svg");
+    EXPECT_EQ(content("plot.svg").substr(0, 4), "<svg");
     // The same record in rad/s
     ASSERT_EQ(vibrig("allan white.txt --tau0 1 --fit --json --unit rad/s"), 0) << error;
     EXPECT_NEAR(Json::parse(out)["fit"]["N"]["value"], 0.001 * 206264.806, 11);
@@ -261,7 +236,7 @@ TEST_F(AllanCommand, ChartAndWordsSayTheSame) {
         write("walk.txt", text.str());
         ASSERT_EQ(vibrig("allan walk.txt --tau0 1 --fit --json --plot plot.svg"), 0) << error;
         const Json result = Json::parse(out);
-        const std::string chart = content_of(folder_ / "plot.svg");
+        const std::string chart = content("plot.svg");
         ASSERT_EQ(vibrig("allan walk.txt --tau0 1 --fit"), 0) << error;
         const Json& slow = result["slow_noise"];
         if (step == 0 || step > 1e-3) {
@@ -323,7 +298,7 @@ TEST_F(AllanCommand, LiveShowsTheSurfaceOnAPage) {
     ASSERT_EQ(vibrig("allan - --tau0 1 --dynamic 500 --live --plot live.html <quiet.txt"), 0)
         << error;
     // THEN there is a page with surface and coefficients, which loads itself again
-    const std::string page = content_of(folder_ / "live.html");
+    const std::string page = content("live.html");
     for (const char* part : {"http-equiv=\"refresh\"", "Dynamic Allan deviation", "</html>"})
         EXPECT_NE(page.find(part), std::string::npos) << part;
     std::size_t charts = 0;

@@ -1,52 +1,20 @@
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
+
+#include "tests/unit/support/vibrig_command.hpp"
 
 namespace {
 
 using Json = nlohmann::json;
 
-std::string content_of(const std::filesystem::path& path) {
-    std::ostringstream text;
-    text << std::ifstream(path, std::ios::binary).rdbuf();
-    return text.str();
-}
-
-/// Runs the real program in a folder of its own.
-class LevelCommand : public ::testing::Test {
+class LevelCommand : public vibrig::test::VibrigCommand {
   protected:
-    LevelCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~LevelCommand() override { std::filesystem::remove_all(folder_); }
-
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = content_of(folder_ / "out");
-        error = content_of(folder_ / "error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
     Json json(const std::string& arguments, int code) {
         EXPECT_EQ(vibrig(arguments + " --json"), code) << arguments << ": " << error << out;
         return Json::parse(out, nullptr, false);
     }
-    void expect_refusal(const std::string& arguments, const std::string& words) {
-        EXPECT_EQ(vibrig(arguments), 2) << arguments << "\n" << out << error;
-        EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
-    }
-
-    std::filesystem::path folder_;
-    std::string out;
-    std::string error;
 };
 
 TEST_F(LevelCommand, DesignsGainsWithTheirNoise) {
@@ -62,7 +30,7 @@ TEST_F(LevelCommand, DesignsGainsWithTheirNoise) {
     EXPECT_NEAR(result["noise"]["mean_force_arcmin"],
                 std::hypot(result["noise"]["total_arcmin"].get<double>(), 0.034378), 1e-5);
     EXPECT_EQ(vibrig("level design --plot response.svg"), 0) << error;
-    EXPECT_NE(content_of(folder_ / "response.svg").find("<svg"), std::string::npos);
+    EXPECT_NE(content("response.svg").find("<svg"), std::string::npos);
     EXPECT_NE(out.find("Routh"), std::string::npos);
     // A tolerance below the noise says no.
     EXPECT_EQ(vibrig("level design --accelerometer-noise 1e-2 --tolerance 0.05"), 1);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <iostream>
 #include <random>
 
 #include "estimator/filter/parameters.hpp"
@@ -190,10 +191,39 @@ TEST(Campaigns, PowerPerRunIsABreakWhereALevelEndsButNotAtEachChangeOfAMixedOrde
               weight_of_a_step(plain, Power::unknown) + 0.3);
 }
 
+/// A step of gyro x after dwell 9 of a clean campaign, what the assessment makes of it.
+DriftAverage stepped(double size, bool power_lost, Power power) {
+    Settings settings;
+    settings.drift.power = power;
+    Rows rows = estimator::testing::theory_rows(settings, balanced(kFirst, kSecond));
+    Random random(16);
+    add_noise(rows, random);
+    rows[9].after_power_loss = power_lost;
+    for (std::size_t k = 9; k < rows.size(); ++k) rows[k].rate[0] += size;
+    return assess(settings, estimator::testing::result_of(rows)).drift[0];
+}
+
+TEST(Campaigns, ARestartWithPowerLostIsABreakWhereAStepIsAsLikelyAsNot) {
+    // GIVEN rows of which one is the first after a power loss WHEN nothing stepped
+    const auto none = stepped(0, true, Power::unknown), unknown = stepped(0, false, Power::unknown);
+    // THEN a step there is believed more than without, but less than its prior's half
+    EXPECT_GT(none.weights.step, unknown.weights.step);
+    EXPECT_LT(none.weights.step, 0.5);
+    // WHEN a step of 2.5 sigma of a dwell is there, THEN it is placed where the power was lost
+    const double size = 2.5 * std::sqrt(estimator::testing::kRateVariance);
+    const auto lost = stepped(size, true, Power::unknown);
+    EXPECT_EQ(lost.step.after_dwell, 9);
+    EXPECT_GT(lost.step.weight, stepped(size, false, Power::unknown).step.weight + 0.2);
+    // AND whoever states that the power was on all the time is believed
+    EXPECT_DOUBLE_EQ(stepped(size, true, Power::unbroken).step.weight,
+                     stepped(size, false, Power::unbroken).step.weight);
+}
+
 TEST(CampaignsSoak, OfAThousandCleanOnesTenAreNotValidAtMost) {
     const std::uint64_t seed = 14;
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Tally tally = campaigns(balanced(kFirst, kSecond), {}, 1000, seed);
+    std::cout << "1000 clean campaigns, seed " << seed << ": " << tally << '\n';
     EXPECT_LE(tally.doubtful + tally.not_valid, 10) << tally;
     EXPECT_NEAR(tally.rms, 0.94, 0.05) << tally;
 }

@@ -17,10 +17,6 @@ class ZeroCommand : public vibrig::test::VibrigCommand {
         EXPECT_EQ(vibrig(arguments + " --json"), code) << arguments << ": " << error << out;
         return Json::parse(out, nullptr, false);
     }
-    void expect_refusal(const std::string& arguments, const std::string& words) {
-        EXPECT_EQ(vibrig(arguments), 2) << arguments << "\n" << out << error;
-        EXPECT_NE(error.find(words), std::string::npos) << words << " not in: " << error;
-    }
 };
 
 TEST_F(ZeroCommand, AFileGivesWhatTheSimulatedUnitGave) {
@@ -127,6 +123,34 @@ TEST_F(ZeroCommand, ReproducesTheTable) {
     const Json result = json("reproduce accelerometer --seeds 2", 0)["reproductions"][0];
     EXPECT_TRUE(result["agrees"].get<bool>()) << out;
     EXPECT_GT(result["rows"].size(), 12U);
+}
+
+TEST_F(ZeroCommand, ASecondAxisBothWaysTellsZerosFromMisalignmentAsZDownDoes) {
+    const std::string unit = "zero simulate --zero 3,-2,1 --misalignment 100,-50 --scale 0,0,200 ";
+    const auto expect_pure = [](const Json& result) {
+        const std::array<double, 3> zero{3, -2, 1}, share{100, -50, 200};
+        for (std::size_t i = 0; i < 3; ++i) {
+            const Json& axis = result["apart"][i];
+            const double sigma = axis["sigma_mg"];
+            EXPECT_LT(sigma, 0.01);
+            EXPECT_NEAR(axis["zero_mg"], zero[i], 5 * sigma);
+            const std::string name = i == 2 ? "scale_ppm" : "misalignment_arcsec";
+            EXPECT_NEAR(axis[name], share[i], 5 * axis[name + "_sigma"].get<double>());
+        }
+        const Json& x = result["apart"][0];
+        EXPECT_NEAR(x["misalignment_to_y_arcsec"], 0,
+                    5 * x["misalignment_to_y_arcsec_sigma"].get<double>());
+    };
+    expect_pure(json(unit + "--second-axis", 0));
+    EXPECT_EQ(vibrig(unit + "--second-axis"), 0);
+    EXPECT_NE(out.find("towards y"), std::string::npos) << out;
+    // AND so do three files
+    ASSERT_EQ(vibrig(unit + "--write up.csv"), 0) << error;
+    ASSERT_EQ(vibrig(unit + "--upright y --seed 2 --write y_up.csv"), 0) << error;
+    ASSERT_EQ(vibrig(unit + "--upright y --seed 3 --inverted --write y_down.csv"), 0) << error;
+    expect_pure(json("zero up.csv --y-up y_up.csv --y-down y_down.csv", 0));
+    expect_refusal("zero simulate --upright x", "--upright");
+    expect_refusal("zero up.csv --y-up none.csv", "none.csv");
 }
 
 }  // namespace

@@ -1,8 +1,11 @@
 // Commands, and what of them outlives the daemon: armings and latches go into the journal first,
 // and end there by name.
+#include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/app/daemon.hpp"
+#include <chrono>
+
+#include "daemon/app/control_loop.hpp"
 #include "daemon/configuration/cross_checks.hpp"
 
 namespace vibrig {
@@ -17,7 +20,7 @@ constexpr Time kDiskPatience = 2 * drivers::kSecond;
 
 }  // namespace
 
-void Daemon::take_commands(Time now) {
+void ControlLoop::take_commands(Time now) {
     std::deque<WaitingCommand> taken;
     {
         const std::lock_guard lock(mutex_);
@@ -25,12 +28,15 @@ void Daemon::take_commands(Time now) {
     }
     finish_arming(now);
     finish_acknowledging(false);
+    finish_certificates(false);
     for (auto& waiting : taken) {
         if (waiting.abandoned->exchange(true)) continue;
         const auto kind = waiting.request.kind;
         if (kind == CommandRequest::Kind::abort) give_up_arming("aborted by " + waiting.request.by);
         if (kind == CommandRequest::Kind::commission) {
             commission(std::move(waiting), now);
+        } else if (kind == CommandRequest::Kind::certificate) {
+            begin_certificate(std::move(waiting));
         } else if (kind == CommandRequest::Kind::arm || kind == CommandRequest::Kind::selftest) {
             begin_arming(std::move(waiting), now);
         } else if (kind == CommandRequest::Kind::acknowledge) {
@@ -42,28 +48,29 @@ void Daemon::take_commands(Time now) {
                 acknowledging_.push_back({std::move(waiting), std::move(reply),
                                           entry_of_acknowledgement_, rt::wall_clock()});
         } else {
-            const auto guarded = guard_refuses(waiting.request);
+            const auto guarded = outside_.refuses(waiting.request);
             answer(waiting, guarded.empty() ? campaign_.command(waiting.request, now)
                                             : CommandReply{false, guarded});
         }
     }
 }
 
-void Daemon::answer(WaitingCommand& waiting, const CommandReply& reply) {
+void ControlLoop::answer(WaitingCommand& waiting, const CommandReply& reply) {
     const CommandRequest& request = waiting.request;
     const bool started = reply.accepted && request.kind == CommandRequest::Kind::start;
+    const auto resumed = dwells_.take_resumed();
     if (journal_) {
         journal_->command(request, reply, utc_now());
         if (started) journal_->campaign_begun(configuration_.campaign.name, request.by);
     }
-    if (started) record_begin(request.by, 0);
+    if (started || resumed) record_begin(request.by, resumed.value_or(0));
     if (started && configuration_.simulated())
         log(Severity::info, "campaign",
             "SIMULATED: the rig is a program, nothing of this is a measurement");
     waiting.reply.set_value(reply);
 }
 
-std::string Daemon::not_fit_to_arm(const CommandRequest& request, Time now) const {
+std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now) const {
     // The adapter may have been plugged in since the configuration was read.
     if (const auto& can = configuration_.can;
         configuration_.commission.simulated &&
@@ -74,7 +81,7 @@ std::string Daemon::not_fit_to_arm(const CommandRequest& request, Time now) cons
     // First: what is proved of a rig that is not the one described says little.
     if (auto why = book_.refusal(utc_now()); !why.empty()) return why;
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
-    if (auto why = guard_refuses(request); !why.empty()) return why;
+    if (auto why = outside_.refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
         return changed->cause + ": vibrig ack journal";
     if (const auto why = journal_being_verified(); !why.empty()) return why;
@@ -85,7 +92,7 @@ std::string Daemon::not_fit_to_arm(const CommandRequest& request, Time now) cons
 }
 
 /// Until all of it was looked at nobody knows what it says of trips and proofs.
-std::string Daemon::journal_being_verified() const {
+std::string ControlLoop::journal_being_verified() const {
     if (!journal_) return {};
     const auto journal = journal_->status();
     if (journal.verified) return {};
@@ -94,7 +101,7 @@ std::string Daemon::journal_being_verified() const {
                        journal.not_watched.empty() ? "" : "; " + journal.not_watched);
 }
 
-void Daemon::begin_arming(WaitingCommand waiting, Time now) {
+void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
     if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty())
         return answer(waiting, {false, why});
     if (!journal_) {  // on the rig's clock
@@ -106,7 +113,7 @@ void Daemon::begin_arming(WaitingCommand waiting, Time now) {
     arming_.emplace(Arming{std::move(waiting), entry, rt::wall_clock()});
 }
 
-void Daemon::finish_arming(Time now) {
+void ControlLoop::finish_arming(Time now) {
     if (!arming_) return;
     if (!journal_->on_disk(arming_->entry)) {
         if (rt::wall_clock() - arming_->since_wall < kDiskPatience) return;
@@ -130,7 +137,7 @@ void Daemon::finish_arming(Time now) {
     answer(arming.waiting, reply);
 }
 
-void Daemon::give_up_arming(const std::string& why) {
+void ControlLoop::give_up_arming(const std::string& why) {
     if (!arming_) return;
     Arming arming = std::move(*arming_);
     arming_.reset();
@@ -138,7 +145,7 @@ void Daemon::give_up_arming(const std::string& why) {
     answer(arming.waiting, {false, why});
 }
 
-void Daemon::finish_acknowledging(bool at_once) {
+void ControlLoop::finish_acknowledging(bool at_once) {
     std::erase_if(acknowledging_, [&](Acknowledging& one) {
         if (!journal_->on_disk(one.entry)) {
             if (!at_once && rt::wall_clock() - one.since_wall < kDiskPatience) return false;
@@ -151,39 +158,27 @@ void Daemon::finish_acknowledging(bool at_once) {
     });
 }
 
-void Daemon::watch_arming() {
+void ControlLoop::watch_arming() {
     if (armed_by_.empty() || !campaign_.armed_by().empty()) return;
     StatusData status;
     campaign_.fill(status, clock_.now());
     end_arming(status.reason.empty() ? name_of(status.state) : status.reason);
 }
 
-void Daemon::end_arming(const std::string& why) {
+void ControlLoop::end_arming(const std::string& why) {
     if (armed_by_.empty()) return;
     if (journal_) journal_->disarmed(armed_by_, why);
     armed_by_.clear();
 }
 
-void Daemon::latch(Latch latch) {
+void ControlLoop::latch(Latch latch) {
     latch.utc_ns = utc_now();
     if (journal_) journal_->latched(latch);
     latches_.add(std::move(latch));
 }
 
-void Daemon::take_over_latches() {
-    for (const Latch& latch : journal_->recovery().latches) {
-        latches_.add(latch);
-        log(Severity::alarm, "journal",
-            fmt::format("not acknowledged: {}: {}", latch.name, latch.cause));
-    }
-    const auto& campaign = configuration_.campaign;
-    double level_g = campaign.loop.table_g;
-    for (const double g : campaign.table_g) level_g = std::max(level_g, g);
-    if (latches_.tripped()) campaign_.take_over_trip(latches_.causes(), level_g);
-}
-
 /// The stop at the start makes the controller forget its faults, which is nobody's acknowledgement.
-void Daemon::judge_first_reading(Time now) {
+void ControlLoop::judge_first_reading(Time now) {
     const auto& reading = first_reading_;
     // Whether it counts as old: the rig's clock may have jumped to the rig's time meanwhile.
     if (reading.fault == 0 && reading.state != drivers::kShakerFault) return;
@@ -199,12 +194,12 @@ void Daemon::judge_first_reading(Time now) {
            {},
            emergency && configuration_.campaign.second_person});
     campaign_.on_trip(latches_.causes(), now);
-    annunciator_->announce(drivers::HornPattern::abort, cause);
+    events_.announce(drivers::HornPattern::abort, cause);
 }
 
 /// The emergency stop comes after a trip, or where nothing is guarded, too: it is no interlock's
 /// then, and still wants its persons.
-void Daemon::watch_emergency_stop(Time now) {
+void ControlLoop::watch_emergency_stop(Time now) {
     const auto reading = shaker_->reading();
     if (!reading.valid || !first_reading_judged_) return;
     const bool open = reading.emergency_stop_open;
@@ -222,13 +217,13 @@ void Daemon::watch_emergency_stop(Time now) {
         if (armed_by.empty()) armed_by = latch.armed_by;
     const std::string text = rt::text_of(rt::Trip::emergency_stop);
     log(Severity::warning, "interlock", text + (tripped ? " after the trip" : ""));
-    annunciator_->announce(drivers::HornPattern::abort, text);
+    events_.announce(drivers::HornPattern::abort, text);
     latch({name, text, armed_by, {}, configuration_.campaign.second_person});
     if (tripped) return campaign_.take_over_trip(latches_.causes());
     campaign_.on_trip(latches_.causes(), now);
 }
 
-void Daemon::on_trip(const rt::Tripped& tripped, Time now) {
+void ControlLoop::on_trip(const rt::Tripped& tripped, Time now) {
     const std::string text = interlock_.text_of(tripped);
     latch({interlock_.name_of(tripped),
            text,
@@ -236,21 +231,21 @@ void Daemon::on_trip(const rt::Tripped& tripped, Time now) {
            {},
            tripped.cause == rt::Trip::emergency_stop && configuration_.campaign.second_person});
     campaign_.on_trip(text, now);
-    annunciator_->announce(drivers::HornPattern::abort, text);
+    events_.announce(drivers::HornPattern::abort, text);
     watch_arming();
     if (!pre_trip_) return;
     pre_trip_->tripped(
         {rt::condition_of(tripped.cause).name, interlock_.name_of(tripped), text, now, utc_now()});
 }
 
-CommandReply Daemon::acknowledge_alarm(const CommandRequest& request) {
+CommandReply ControlLoop::acknowledge_alarm(const CommandRequest& request) {
     if (request.by.empty() || !interlock_.acknowledge_alarm(request.argument)) return {};
     log(Severity::info, "interlock",
         fmt::format("alarm {} acknowledged by {}", request.argument, request.by));
     return {true, "acknowledged: " + request.argument};
 }
 
-std::string Daemon::unknown_to_acknowledge(const CommandRequest& request) const {
+std::string ControlLoop::unknown_to_acknowledge(const CommandRequest& request) const {
     const std::string& what = request.argument;
     if (what.empty() || what == "trip" || what == "shaker" || latches_.find(what) != nullptr ||
         what == interlock_.name_of(interlock_.latched()))
@@ -262,7 +257,7 @@ std::string Daemon::unknown_to_acknowledge(const CommandRequest& request) const 
         names.empty() ? "the name of an alarm that is raised, trip or shaker" : names + "or trip");
 }
 
-CommandReply Daemon::acknowledge(const CommandRequest& request, Time now) {
+CommandReply ControlLoop::acknowledge(const CommandRequest& request, Time now) {
     const rt::Tripped handled = interlock_.latched();
     if (const auto alarm = acknowledge_alarm(request); alarm.accepted) return alarm;
     if (const auto unknown = unknown_to_acknowledge(request); !unknown.empty())
@@ -292,11 +287,25 @@ CommandReply Daemon::acknowledge(const CommandRequest& request, Time now) {
     auto reply = campaign_.command(request, now);
     if (reply.accepted) {
         // First what would trip it again.
-        if (guard_link_) guard_link_->acknowledge(guard_link_->word().finding);
+        outside_.acknowledge();
         watch_outside();
         interlock_.acknowledge(handled);
     }
     return reply;
+}
+
+std::string ControlLoop::tell_overdue() {
+    std::string told;
+    const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    const std::string day = fmt::format("{:%Y-%m-%d}", fmt::gmtime(now));
+    for (const auto& instrument : configuration_.paperwork.instruments) {
+        if (!instrument.overdue(day)) continue;
+        const auto words = fmt::format("{} {}: certificate {} was due on {}", instrument.name,
+                                       instrument.serial, instrument.certificate, instrument.due);
+        log(Severity::warning, "paperwork", words);
+        told += "; warning: " + words;
+    }
+    return told;
 }
 
 }  // namespace vibrig

@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "daemon/app/daemon.hpp"
+#include "daemon/app/campaign_dwells.hpp"
 #include "daemon/journal/reread.hpp"
 
 namespace vibrig {
@@ -39,29 +39,31 @@ std::pair<int, int> dwell_named(const uncertainty::Assessment& assessed,
 
 }  // namespace
 
-Severity Daemon::severity_of(uncertainty::Level level) {
+Severity CampaignDwells::severity_of(uncertainty::Level level) {
     return level == uncertainty::Level::not_valid  ? Severity::alarm
            : level == uncertainty::Level::doubtful ? Severity::warning
                                                    : Severity::info;
 }
 
 /// Of the dwells so far, of all of them when the result is to be written.
-bool Daemon::verdict_wanted() {
+bool CampaignDwells::verdict_wanted() {
     if (to_write_ != ToWrite::nothing) return !std::exchange(concluding_, true);
     if (!std::exchange(verdict_due_, false)) return false;
-    const std::size_t dwells = identification_.rows().size();
+    const std::size_t dwells = with_.identification.rows().size();
     return dwells <= kEveryDwell || dwells % kAmongMany == 0;
 }
 
-std::optional<Daemon::Again> Daemon::again() const {
+std::optional<CampaignDwells::Again> CampaignDwells::again() const {
     const auto found = noise_monitor_.found();
     if (!found) return {};
-    return Again{*found, journal_ ? journal_->status().path : std::string(),
-                 journal::configuration_hash(result_configuration())};
+    return Again{*found, with_.journal ? with_.journal->status().path : std::string(),
+                 journal::configuration_hash(result_configuration(with_.loaded))};
 }
 
-Daemon::Judged Daemon::judge(const estimator::Settings& settings, const estimator::Result& result,
-                             const std::optional<Again>& again, uncertainty::Stage stage) {
+CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings,
+                                             const estimator::Result& result,
+                                             const std::optional<Again>& again,
+                                             uncertainty::Stage stage) {
     Judged out;
     if (again && !result.dwells.empty()) {
         dwells::Anew anew(settings, again->found, result.dwells.size());
@@ -95,39 +97,39 @@ Daemon::Judged Daemon::judge(const estimator::Settings& settings, const estimato
 }
 
 /// The result becomes what was identified anew.
-void Daemon::take_anew(const Judged& judged) {
+void CampaignDwells::take_anew(const Judged& judged, campaign::Campaign& campaign) {
     if (!judged.not_anew.empty()) {
         const auto words =
             "the noise found is not the configured one, and the campaign could not be identified "
             "anew with it: " +
             judged.not_anew;
-        log(Severity::warning, "campaign", words);
+        with_.events.log(Severity::warning, "campaign", words);
         const std::lock_guard lock(mutex_);
         result_.warnings.push_back(words);
     }
     if (!judged.anew) return;
     estimator::Result result = *judged.anew;
-    log(Severity::warning, "campaign", result.warnings.back());
-    campaign_.qualify(result);
+    with_.events.log(Severity::warning, "campaign", result.warnings.back());
+    campaign.qualify(result);
     keep(std::move(result));
 }
 
 /// Without the rows, which the identification has: they are most of what a long campaign holds.
-void Daemon::keep(estimator::Result result) {
+void CampaignDwells::keep(estimator::Result result) {
     std::vector<estimator::DwellRow>().swap(result.rows);  // = {} would keep the memory
     const std::lock_guard lock(mutex_);
     result_ = std::move(result);
 }
 
 /// While no dwell is with the estimator. Only this thread changes result_.
-estimator::Result Daemon::whole_result() const {
+estimator::Result CampaignDwells::whole_result() const {
     auto result = result_;
-    result.rows = identification_.rows();
+    result.rows = with_.identification.rows();
     return result;
 }
 
-void Daemon::take_verdict() {
-    if (dwells_with_estimator_ != 0) return;
+void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
+    if (with_estimator_ != 0) return;
     std::optional<Judged> judged;
     if (verdict_wanted()) {
         // In a thread of its own also where one may wait: what it has of memory, more with each
@@ -136,26 +138,27 @@ void Daemon::take_verdict() {
                            anew = concluding_ ? again() : std::nullopt,
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,
-                           trim = !memory_lock_.locked] {
+                           trim = !with_.memory_locked] {
             auto found = judge(settings, result, anew, stage);
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;
         };
         // The rig's clock waits for this thread: there a verdict takes no time.
-        if (rig_clock_) {
+        if (with_.at_once) {
             judged = assessing_.compute(work);
         } else {
             assessing_.ask(work);
         }
     }
-    if (!rig_clock_) judged = assessing_.take();
+    if (!with_.at_once) judged = assessing_.take();
     if (!judged) return;
-    tell_verdict(judged->assessed);
-    if (std::exchange(concluding_, false)) write_result(*judged);
+    tell_verdict(judged->assessed, campaign);
+    if (std::exchange(concluding_, false)) write_result(*judged, campaign);
 }
 
-void Daemon::tell_verdict(const uncertainty::Assessment& assessed) {
+void CampaignDwells::tell_verdict(const uncertainty::Assessment& assessed,
+                                  campaign::Campaign& campaign) {
     const bool enough = assessed.done && assessed.degrees >= kFewestDegrees;
     if (!enough && !concluding_) return;
     const auto& verdict = assessed.verdict;
@@ -164,10 +167,10 @@ void Daemon::tell_verdict(const uncertainty::Assessment& assessed) {
     if (enough && std::exchange(verdict_told_, told) != told) {
         const auto said =
             fmt::format("after {} dwells {}", assessed.rates.size(), verdict.sentence);
-        log(severity_of(verdict.level), "fit", said);
+        with_.events.log(severity_of(verdict.level), "fit", said);
         if (verdict.level == uncertainty::Level::not_valid) {
             const auto [run, position] = dwell_named(assessed, result_);
-            campaign_.doubted(said, run, position);
+            campaign.doubted(said, run, position);
         }
     }
     auto residuals = std::make_shared<std::vector<VerdictStatus::Residual>>();
@@ -181,13 +184,13 @@ void Daemon::tell_verdict(const uncertainty::Assessment& assessed) {
             residuals->push_back({r.run, r.position, r.time_h, r.residual, r.residual_sigma});
     }
     const std::lock_guard lock(mutex_);
-    campaign_status_.verdict = {static_cast<std::uint32_t>(assessed.rates.size()),
-                                static_cast<int>(verdict.level),
-                                uncertainty::word_of(verdict.level),
-                                verdict.sentence,
-                                assessed.widening,
-                                concluding_,
-                                std::move(residuals)};
+    verdict_ = {static_cast<std::uint32_t>(assessed.rates.size()),
+                static_cast<int>(verdict.level),
+                uncertainty::word_of(verdict.level),
+                verdict.sentence,
+                assessed.widening,
+                concluding_,
+                std::move(residuals)};
 }
 
 }  // namespace vibrig

@@ -1,4 +1,6 @@
 // What can be said of a configuration before anything is opened.
+#include "daemon/app/start_checks.hpp"
+
 #include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
@@ -8,14 +10,14 @@
 #include <cstring>
 #include <filesystem>
 
-#include "daemon/app/daemon.hpp"
 #include "daemon/campaign/rig_frame.hpp"
+#include "daemon/campaign/zeroing_stage.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
 
 namespace vibrig {
 
-proto::Dbc Daemon::load_dbc(const std::string& path) {
+proto::Dbc load_dbc(const std::string& path) {
     return path.empty() ? proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc")
                         : proto::read_dbc(path);
 }
@@ -26,10 +28,8 @@ namespace {
 void check_zeroing_travel(const configuration::Configuration& c) {
     if (!c.campaign.zeroing) return;
     const campaign::RigFrame frame(c.estimator);
-    for (const double azimuth_deg : {0.0, 90.0, -90.0}) {
-        for (const bool down : {false, true}) {
-            if (down && !c.campaign.zero.both_ways) continue;
-            const auto at = frame.azimuth_vertical_deg(azimuth_deg, down);
+    for (const auto& way : campaign::ways_of(c.campaign.zero)) {
+        for (const auto& at : campaign::slews_of(way, frame)) {
             for (std::size_t i = 0; i < 3; ++i) {
                 const auto& [low, high] = c.gimbal.travel_deg[i];
                 if (high - low >= 360 || drivers::within_travel(at[i], {low, high})) continue;
@@ -44,7 +44,7 @@ void check_zeroing_travel(const configuration::Configuration& c) {
 
 }  // namespace
 
-void Daemon::check_bindings(const configuration::Loaded& loaded) {
+void check_bindings(const configuration::Loaded& loaded) {
     const auto& configuration = loaded.configuration;
     const auto dbc = load_dbc(configuration.dbc);
     boost::asio::io_context io;
@@ -76,7 +76,7 @@ void Daemon::check_bindings(const configuration::Loaded& loaded) {
     check_zeroing_travel(configuration);
 }
 
-void Daemon::check_results(const configuration::Configuration& configuration) {
+void check_results(const configuration::Configuration& configuration) {
     const std::string& folder = configuration.results;
     if (folder.empty()) return;
     // It is made when it is not there: then what counts is the folder that it is made in.
@@ -94,7 +94,7 @@ void Daemon::check_results(const configuration::Configuration& configuration) {
                                             there.string() + ": " + std::strerror(errno));
 }
 
-std::vector<std::string> Daemon::check_plan(const configuration::Configuration& configuration) {
+std::vector<std::string> check_plan(const configuration::Configuration& configuration) {
     const campaign::Settings& campaign = configuration.campaign;
     std::vector<std::string> told;
     const auto& rig = configuration.estimator;

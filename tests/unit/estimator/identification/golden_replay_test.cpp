@@ -12,7 +12,8 @@
 #include "estimator/identification/identification.hpp"
 
 // A committed recording and what was once identified from it: when the numbers move, the review
-// shows it. To write them anew: VIBRIG_WRITE_GOLDEN=FILE estimator_test
+// shows it. golden_estimates.txt is with constant biases, golden_walking.txt with biases that walk
+// from dwell to dwell, the default. To write them anew: VIBRIG_WRITE_GOLDEN=FOLDER estimator_test
 // --gtest_filter=GoldenReplay.*
 
 namespace vibrig::estimator::testing {
@@ -20,14 +21,29 @@ namespace {
 
 const std::string kData = VIBRIG_TEST_DATA;
 
-struct GoldenReplay : ::testing::Test {
-    ~GoldenReplay() override { static_cast<void>(force_instruction_set("auto")); }
+struct Biases {
+    uncertainty::BiasModel model;
+    const char* file;
+    friend std::ostream& operator<<(std::ostream& out, const Biases& b) { return out << b.file; }
 };
 
+struct GoldenReplay : ::testing::TestWithParam<Biases> {
+    ~GoldenReplay() override { static_cast<void>(force_instruction_set("auto")); }
+};
+INSTANTIATE_TEST_SUITE_P(
+    , GoldenReplay,
+    ::testing::Values(Biases{uncertainty::BiasModel::constant, "/golden_estimates.txt"},
+                      Biases{uncertainty::BiasModel::automatic, "/golden_walking.txt"}),
+    [](const auto& tested) {
+        return tested.param.model == uncertainty::BiasModel::constant ? "Constant" : "Walking";
+    });
+
 /// The 14 positions at 9 and 7 g at the table, 2 s each; vibrig-plant record --seed 11 --dwell 2.
-Estimate replay(std::string_view set) {
+Estimate replay(std::string_view set, uncertainty::BiasModel biases) {
     EXPECT_TRUE(force_instruction_set(set));
-    Identification identification{Settings{}};
+    Settings settings;
+    settings.drift.model = biases;
+    Identification identification(settings);
     std::ifstream in(kData + "/golden_recording.csv");
     std::string line;
     std::getline(in, line);
@@ -64,9 +80,9 @@ struct Golden30 {
 };
 
 /// First line: the compiler. Then instruction set, coefficient, value, sigma; hexadecimal.
-std::map<std::string, Golden30> golden(std::string& made_by) {
+std::map<std::string, Golden30> golden(const char* file, std::string& made_by) {
     std::map<std::string, Golden30> all;
-    std::ifstream in(kData + "/golden_estimates.txt");
+    std::ifstream in(kData + file);
     std::getline(in, made_by);
     std::string set, name, value, sigma;
     while (in >> set >> name >> value >> sigma) {
@@ -80,11 +96,11 @@ std::map<std::string, Golden30> golden(std::string& made_by) {
 }
 
 #ifndef VIBRIG_SANITIZED  // instrumented code is other code: it may round otherwise
-void write_golden(const char* path) {
-    std::ofstream out(path);
+void write_golden(const std::string& folder, const Biases& biases) {
+    std::ofstream out(folder + biases.file);
     out << compiler() << '\n';
     for (const std::string_view set : instruction_sets()) {
-        const Estimate estimate = replay(set);
+        const Estimate estimate = replay(set, biases.model);
         for (std::size_t i = 0; i < kParameters; ++i) {
             std::array<char, 160> line{};
             std::snprintf(line.data(), line.size(), "%s %s %a %a\n", std::string(set).c_str(),
@@ -94,10 +110,10 @@ void write_golden(const char* path) {
     }
 }
 
-TEST_F(GoldenReplay, IsBitIdenticalWithTheSameCompilerAndInstructionSet) {
-    if (const char* path = std::getenv("VIBRIG_WRITE_GOLDEN")) write_golden(path);
+TEST_P(GoldenReplay, IsBitIdenticalWithTheSameCompilerAndInstructionSet) {
+    if (const char* folder = std::getenv("VIBRIG_WRITE_GOLDEN")) write_golden(folder, GetParam());
     std::string made_by;
-    const auto all = golden(made_by);
+    const auto all = golden(GetParam().file, made_by);
     ASSERT_FALSE(all.empty());
     if (made_by != compiler()) {
         GTEST_SKIP() << "made by " << made_by << ", this is " << compiler();
@@ -109,7 +125,7 @@ TEST_F(GoldenReplay, IsBitIdenticalWithTheSameCompilerAndInstructionSet) {
         const auto found = all.find(std::string(set));
         if (found == all.end()) continue;
         SCOPED_TRACE(std::string(set));
-        const Estimate estimate = replay(set);
+        const Estimate estimate = replay(set, GetParam().model);
         for (std::size_t i = 0; i < kParameters; ++i) {
             EXPECT_EQ(estimate.value[i], found->second.value[i]) << parameter_names()[i];
             EXPECT_EQ(estimate.sigma[i], found->second.sigma[i]) << parameter_names()[i];
@@ -118,12 +134,12 @@ TEST_F(GoldenReplay, IsBitIdenticalWithTheSameCompilerAndInstructionSet) {
 }
 #endif
 
-TEST_F(GoldenReplay, IsWithinABillionthOfASigmaWithAnyCompilerAndInstructionSet) {
+TEST_P(GoldenReplay, IsWithinABillionthOfASigmaWithAnyCompilerAndInstructionSet) {
     std::string made_by;
-    for (const auto& [made_with, expected] : golden(made_by)) {
+    for (const auto& [made_with, expected] : golden(GetParam().file, made_by)) {
         for (const std::string_view set : instruction_sets()) {
             SCOPED_TRACE(made_with + " against " + std::string(set));
-            const Estimate estimate = replay(set);
+            const Estimate estimate = replay(set, GetParam().model);
             for (std::size_t i = 0; i < kParameters; ++i) {
                 EXPECT_LT(std::abs(estimate.value[i] - expected.value[i]), 1e-9 * expected.sigma[i])
                     << parameter_names()[i];

@@ -1,0 +1,277 @@
+// What becomes of a dwell. The verdict on them: campaign_verdict.cpp.
+#include "daemon/app/campaign_dwells.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "daemon/app/campaign_forecast.hpp"
+#include "daemon/app/start_checks.hpp"
+#include "daemon/results/result_json.hpp"
+
+namespace vibrig {
+
+std::string result_configuration(const configuration::Loaded& loaded) {
+    std::string text;
+    for (const auto& value : loaded.effective) {
+        const auto section = value.key.substr(0, value.key.find('.'));
+        if (section == "server" || section == "log" || section == "threads" ||
+            section == "journal" || section == "archive" || section == "mqtt" ||
+            section == "clock" || section == "guard" || section == "annunciator" ||
+            section == "record" || section == "unit" || section == "instrument" ||
+            section == "selftest" || section == "commission" || value.key == "campaign.results" ||
+            value.key == "campaign.arming_valid_s" || value.key == "campaign.second_person")
+            continue;
+        text += value.key + " = " + value.value + "\n";
+    }
+    return text;
+}
+
+CampaignDwells::CampaignDwells(const With& with)
+    : with_(with),
+      configuration_(with.loaded.configuration),
+      noise_monitor_(configuration_.estimator,
+                     [this](Severity severity, const std::string& text) {
+                         with_.events.log(severity, "noise", text);
+                     }),
+      adaptive_(adaptive_plan(configuration_)) {}
+
+void CampaignDwells::begin() {
+    planning_.abandon();  // of a campaign that was aborted
+    assessing_.abandon();
+    with_.identification = estimator::Identification(configuration_.estimator);
+    noise_monitor_.reset();
+    verdict_told_.clear();
+    take_type_prior();
+    const std::lock_guard lock(mutex_);
+    verdict_ = {};
+    result_ = {};
+    for (const std::string& line : check_plan(configuration_))
+        with_.events.log(Severity::warning, "campaign", line);
+}
+
+bool CampaignDwells::order(const rt::DwellOrder& order) {
+    const bool taken = with_.stage.order(order);
+    if (taken && !order.cancel) ++with_estimator_;
+    if (taken && with_.recorder)
+        with_.recorder->ordered(order, with_.clock.now(), with_.identification.noise());
+    return taken;
+}
+
+std::optional<campaign::Next> CampaignDwells::next(const std::array<double, 3>& here_deg,
+                                                   double elapsed_s) {
+    // Between two dwells the identification is this thread's; the shaker is at rest. It takes
+    // tenths of a second, on a busy machine more than this thread may be away. The rig's clock
+    // waits for this thread, so that there the time is none.
+    std::optional<plan::AdaptivePlan::Decision> decision;
+    const auto choose = [this, here_deg, elapsed_s, covariance = with_.identification.covariance(),
+                         result = whole_result(), prior = type_prior_] {
+        plan::Start start{plan::widened(covariance, configuration_.estimator, result), ""};
+        if (prior)
+            start = plan::start_of(*prior, std::move(start.covariance), configuration_.estimator,
+                                   result);
+        auto chosen = adaptive_->next(start.covariance, here_deg, elapsed_s, result.rows.size());
+        chosen.words += start.words;
+        return chosen;
+    };
+    if (with_.at_once) {
+        decision = choose();
+    } else if (planning_.asked()) {
+        decision = planning_.take();
+    } else {
+        planning_.ask(choose);
+    }
+    if (!decision) return {};
+    campaign::Next next;
+    next.more = decision->verdict == plan::AdaptivePlan::Verdict::go_on;
+    next.stop = {decision->run.position_deg, decision->run.table_g};
+    next.left = decision->left;
+    next.words = decision->words;
+    return next;
+}
+
+/// A campaign begins or goes on: what the archive knows of the unit's type by now.
+void CampaignDwells::take_type_prior() {
+    type_prior_.reset();
+    if (!configuration_.campaign.type_prior) return;
+    const archive::Outbox::TypeKnown known =
+        with_.outbox ? with_.outbox->type_known()
+                     : archive::Outbox::TypeKnown{"", "nothing is recorded, so nothing archived"};
+    try {
+        if (known.json.empty())
+            throw std::runtime_error(known.why_not.empty() ? "the archive has not answered yet"
+                                                           : known.why_not);
+        type_prior_ = std::make_shared<const plan::TypePrior>(plan::type_prior_of(known.json));
+        with_.events.log(Severity::info, "campaign",
+                         fmt::format("starts from {} units of type {} in the archive",
+                                     type_prior_->of.units, type_prior_->type));
+    } catch (const std::runtime_error& error) {
+        with_.events.log(
+            Severity::warning, "campaign",
+            std::string("is planned without its type, campaign.prior = \"type\": ") + error.what());
+    }
+}
+
+std::string CampaignDwells::resume_gate() const {
+    return interrupted_ ? with_.fitness.resume_gate() : "the filter as it was is gone";
+}
+
+void CampaignDwells::resume(const std::string& by) {
+    planning_.abandon();
+    take_type_prior();
+    with_.identification = std::move(interrupted_->identification);
+    noise_monitor_.continue_from(std::move(interrupted_->noise));
+    if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
+    interrupted_.reset();
+    auto result = with_.identification.result();
+    resumed_ = result.dwells.size();
+    keep(std::move(result));
+}
+
+void CampaignDwells::end(bool complete) {
+    to_write_ = complete ? ToWrite::complete : ToWrite::partial;
+    noise_monitor_.report();
+}
+
+void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
+                                      campaign::Campaign& campaign) {
+    Interrupted fresh{
+        estimator::Identification(configuration_.estimator),
+        noise::NoiseMonitor(configuration_.estimator, [](Severity, const std::string&) {}),
+        unfinished.id};
+    std::vector<estimator::DwellSummary> done;
+    std::string why = journal::replay(unfinished.dwells,
+                                      {fresh.identification, fresh.noise,
+                                       drivers::from_seconds(configuration_.campaign.dwell_s)});
+    std::vector<StopDone> stops;
+    for (const auto& dwell : unfinished.dwells) {
+        done.push_back(dwell.summary);
+        if (dwell.stop_known) stops.push_back(dwell.stop);
+    }
+    const std::size_t count = done.size();
+    if (why.empty() && !campaign.offer(std::move(done), std::move(stops)))
+        why = "its positions are not the first ones of this campaign";
+    if (!why.empty()) {
+        with_.events.log(
+            Severity::warning, "journal",
+            fmt::format("campaign {} ({}): {}: cold start", unfinished.id, unfinished.name, why));
+        return;
+    }
+    with_.events.log(
+        Severity::warning, "journal",
+        fmt::format("campaign {} ({}, started by {}) was interrupted with {} positions done: arm "
+                    "and resume it, or start anew",
+                    unfinished.id, unfinished.name, unfinished.started_by, count));
+    interrupted_ = std::move(fresh);
+    unfinished.dwells.clear();
+}
+
+/// The Identification is this thread's here: no dwell is with the estimator.
+void CampaignDwells::take_noise(estimator::DwellSummary& dwell) {
+    rt::BlockRecord block;
+    while (with_.stage.take_block(block)) noise_monitor_.add(block);
+    noise_monitor_.conclude(dwell, with_.identification);
+}
+
+void CampaignDwells::take_done(campaign::Campaign& campaign) {
+    rt::DwellDone done;
+    while (with_.stage.take_done(done)) {
+        if (--with_estimator_ == 0) take_noise(done.summary);
+        auto result = with_.identification.result();
+        record_dwell(done.summary, result);
+        campaign.on_dwell_done(done.summary);
+        campaign.qualify(result);
+        keep(std::move(result));
+        verdict_due_ = true;
+    }
+    take_verdict(campaign);
+}
+
+void CampaignDwells::record_dwell(const estimator::DwellSummary& summary,
+                                  const estimator::Result& result) {
+    if (!with_.recorder) return;
+    // The identification is this thread's: the dwell is over and no other is ordered.
+    estimator::Estimate estimate;
+    with_.identification.solved(estimate);
+    record::Dwell dwell;
+    dwell.time = with_.clock.now();
+    dwell.summary = summary;
+    dwell.reason = summary.reason;
+    dwell.value = estimate.value;
+    dwell.sigma = estimate.sigma;
+    dwell.observable = estimate.observable;
+    dwell.covariance = with_.identification.covariance();
+    if (!summary.left_out && !result.rows.empty() && result.rows.back().run == summary.run &&
+        result.rows.back().position == summary.position)
+        dwell.row = result.rows.back();
+    with_.recorder->dwell_done(std::move(dwell));
+}
+
+void CampaignDwells::write_out(campaign::Campaign& campaign) {
+    if (written() || with_estimator_ != 0) return;
+    assessing_.abandon();
+    write_result(judge(configuration_.estimator, whole_result(), again(),
+                       estimator::uncertainty::Stage::ended),
+                 campaign);
+}
+
+void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& campaign) {
+    const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
+    const auto& assessed = judged.assessed;
+    take_anew(judged, campaign);
+    if (!result_.dwells.empty())  // of no data nothing is to be said
+        with_.events.log(severity_of(assessed.verdict.level), "campaign",
+                         "result " + assessed.verdict.sentence);
+    std::string text;
+    {
+        const std::lock_guard lock(mutex_);
+        if (!campaign.mark().empty())
+            result_.warnings.push_back("campaign marked: " + campaign.mark());
+        std::optional<tool::KnownType> type;
+        if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
+        text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
+                                 judged.live.get(), nullptr, type ? &*type : nullptr);
+    }
+    StatusData ended;
+    campaign.fill(ended, with_.clock.now());
+    write_result_file(text, complete);
+    // The journal first: the recording is closed with a head of it.
+    if (with_.journal) with_.journal->campaign_ended(name_of(ended.state), ended.reason, text);
+    if (with_.recorder)
+        with_.recorder->campaign_ended(
+            {name_of(ended.state), ended.reason, campaign.mark(), text, utc_now()});
+}
+
+void CampaignDwells::write_result_file(const std::string& text, bool complete) {
+    if (configuration_.results.empty()) return;
+    // A partial result never takes the place of a complete one.
+    const auto path = std::filesystem::path(configuration_.results) /
+                      (complete ? "result.json" : "result-partial.json");
+    auto unfinished = path;
+    unfinished += ".new";
+    std::ofstream file(unfinished);
+    file << text;
+    file.close();
+    std::error_code error;
+    if (file) std::filesystem::rename(unfinished, path, error);
+    if (!file || error) {
+        with_.events.log(Severity::alarm, "campaign", "cannot write " + path.string());
+    } else {
+        with_.events.log(
+            Severity::info, "campaign",
+            fmt::format("{} result in {}", complete ? "complete" : "partial", path.string()));
+    }
+}
+
+estimator::Result CampaignDwells::result() const {
+    const std::lock_guard lock(mutex_);
+    return result_;
+}
+
+VerdictStatus CampaignDwells::verdict() const {
+    const std::lock_guard lock(mutex_);
+    return verdict_;
+}
+
+}  // namespace vibrig

@@ -1,0 +1,143 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "daemon/app/events.hpp"
+#include "daemon/app/fitness.hpp"
+#include "daemon/archive/outbox.hpp"
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/ports.hpp"
+#include "daemon/dwells/anew.hpp"
+#include "daemon/noise/noise_monitor.hpp"
+#include "daemon/plan/adaptive.hpp"
+#include "daemon/plan/aside.hpp"
+#include "daemon/plan/type_prior.hpp"
+#include "daemon/rt/estimator_stage.hpp"
+#include "daemon/rt/stirred_waiter.hpp"
+#include "estimator/identification/result.hpp"
+#include "estimator/uncertainty/assessment.hpp"
+
+namespace vibrig {
+
+/// What of the configuration results depend on; not where things are kept or how one talks to the
+/// daemon.
+[[nodiscard]] std::string result_configuration(const configuration::Loaded& loaded);
+
+/// What becomes of a dwell: the estimator's order, noise, verdict, an adaptive campaign's next one,
+/// the result. Control thread, except where it says any.
+class CampaignDwells final : public campaign::Dwells {
+  public:
+    /// Whom it works with; all of them outlive it.
+    struct With {
+        const configuration::Loaded& loaded;
+        const drivers::Clock& clock;
+        rt::StirredWaiter& control;  ///< woken when something was thought over
+        estimator::Identification& identification;
+        rt::EstimatorStage& stage;
+        const std::unique_ptr<record::Recorder>& recorder;  ///< null: nothing is recorded
+        const std::unique_ptr<journal::Journal>& journal;   ///< made by start(); null: none is kept
+        const std::unique_ptr<archive::Outbox>& outbox;     ///< likewise; null: no archive
+        const Fitness& fitness;
+        Events& events;
+        bool at_once;        ///< the rig's clock waits for this thread: no thought takes time
+        bool memory_locked;  ///< and is not given back
+    };
+    explicit CampaignDwells(const With& with);
+
+    void begin() override;
+    [[nodiscard]] bool order(const rt::DwellOrder& order) override;
+    [[nodiscard]] bool free() const override { return with_estimator_ == 0 && written(); }
+    void levelled(const LevelDrift& drift) override { noise_monitor_.levelled(drift); }
+    [[nodiscard]] std::optional<campaign::Next> next(const std::array<double, 3>& here_deg,
+                                                     double elapsed_s) override;
+    [[nodiscard]] std::string resume_gate() const override;
+    void resume(const std::string& by) override;
+    void end(bool complete) override;
+
+    /// Offers the campaign what an earlier life has left of it in the journal.
+    void offer_unfinished(journal::Unfinished& unfinished, campaign::Campaign& campaign);
+    /// Dwells before the interruption, once after each resume().
+    [[nodiscard]] std::optional<std::size_t> take_resumed() {
+        return std::exchange(resumed_, std::nullopt);
+    }
+    /// What the estimator is done with, and the verdict on all so far when it is there.
+    void take_done(campaign::Campaign& campaign);
+    /// Writes what is left to be written, now.
+    void write_out(campaign::Campaign& campaign);
+    /// No result waits to be written.
+    [[nodiscard]] bool written() const { return to_write_ == ToWrite::nothing; }
+    /// The campaign has ended, and its last verdict is being thought over.
+    [[nodiscard]] bool concluding() const { return concluding_ && to_write_ == ToWrite::complete; }
+    [[nodiscard]] NoiseStatus noise() const { return noise_monitor_.status(); }
+
+    // Any thread.
+    [[nodiscard]] estimator::Result result() const;  ///< without its rows
+    [[nodiscard]] VerdictStatus verdict() const;
+
+  private:
+    /// What is to be made of the dwells at the end: they are in the journal.
+    struct Again {
+        noise::Found found;
+        std::string journal;
+        std::uint64_t configuration_hash = 0;
+    };
+    /// What can be believed of the dwells, or of the same identified anew.
+    struct Judged {
+        estimator::uncertainty::Assessment assessed;
+        std::optional<estimator::Result> anew;
+        std::shared_ptr<const dwells::Live> live;  ///< what `anew` replaces
+        std::string not_anew;                      ///< why not, though it should be
+    };
+    [[nodiscard]] std::optional<Again> again() const;
+    [[nodiscard]] static Judged judge(const estimator::Settings& settings,
+                                      const estimator::Result& result,
+                                      const std::optional<Again>& again,
+                                      estimator::uncertainty::Stage stage);
+    [[nodiscard]] bool verdict_wanted();
+    void take_noise(estimator::DwellSummary& dwell);
+    void record_dwell(const estimator::DwellSummary& summary, const estimator::Result& result);
+    void take_type_prior();
+    void keep(estimator::Result result);
+    [[nodiscard]] estimator::Result whole_result() const;
+    /// What can be believed of the dwells so far; the verdict on all of them writes the result.
+    void take_verdict(campaign::Campaign& campaign);
+    [[nodiscard]] static Severity severity_of(estimator::uncertainty::Level level);
+    void tell_verdict(const estimator::uncertainty::Assessment& assessed,
+                      campaign::Campaign& campaign);
+    void write_result(const Judged& judged, campaign::Campaign& campaign);
+    void take_anew(const Judged& judged, campaign::Campaign& campaign);
+    void write_result_file(const std::string& text, bool complete);
+
+    const With with_;
+    const configuration::Configuration& configuration_;
+    noise::NoiseMonitor noise_monitor_;
+    /// As they were when the campaign was interrupted; until it is resumed.
+    struct Interrupted {
+        estimator::Identification identification;
+        noise::NoiseMonitor noise;
+        std::int64_t id = 0;
+    };
+    std::optional<Interrupted> interrupted_;
+    std::optional<std::size_t> resumed_;
+    std::optional<plan::AdaptivePlan> adaptive_;
+    std::shared_ptr<const plan::TypePrior> type_prior_;  ///< null: it is planned without
+    /// What the control thread may not wait for.
+    plan::Aside<plan::AdaptivePlan::Decision> planning_{[this] { with_.control.notify(); }};
+    /// Tens of milliseconds, with hundreds of dwells seconds.
+    plan::Aside<Judged> assessing_{[this] { with_.control.notify(); }};
+    int with_estimator_ = 0;    ///< ordered, not yet reported done
+    bool verdict_due_ = false;  ///< on the dwells so far
+    bool concluding_ = false;   ///< the last verdict is asked for
+    std::string verdict_told_;
+    enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
+
+    mutable std::mutex mutex_;  ///< guards what follows, which only this thread changes
+    estimator::Result result_;  ///< without its rows
+    VerdictStatus verdict_;
+};
+
+}  // namespace vibrig

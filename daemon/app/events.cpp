@@ -1,0 +1,46 @@
+#include "daemon/app/events.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+
+#include "daemon/serve/one_line.hpp"
+
+namespace vibrig {
+
+std::int64_t utc_now() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
+
+void Events::log(Severity severity, const std::string& source, const std::string& text) {
+    enter(severity, source, text);
+    // A pager that fails is not told so by itself; of a fit whoever looks in the morning reads.
+    if (severity == Severity::alarm && source != "annunciator" && source != "fit")
+        announce(drivers::HornPattern::alarm, text);
+}
+
+void Events::announce(drivers::HornPattern pattern, const std::string& text) {
+    if (drivers::Annunciator* const annunciator = annunciator_.load(); annunciator != nullptr)
+        annunciator->announce(pattern, text);
+}
+
+void Events::enter(Severity severity, const std::string& source, const std::string& text) {
+    EventRecord record;
+    record.utc_ns = utc_now();
+    record.time = clock_.now();
+    record.severity = severity;
+    record.source = source;
+    // Every event comes through here, and much of what they say comes from outside.
+    record.text = serve::one_line(text);
+    list_.append(record);
+    if (journal_ != nullptr) journal_->event(record);
+    if (recorder_ != nullptr) recorder_->event(record);
+    const auto level = severity == Severity::info      ? spdlog::level::info
+                       : severity == Severity::warning ? spdlog::level::warn
+                                                       : spdlog::level::err;
+    spdlog::log(level, "{}: {}", source, record.text);
+}
+
+}  // namespace vibrig

@@ -1,0 +1,190 @@
+// What the daemon watches because nobody else is there.
+#include "daemon/app/supervisor.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <chrono>
+#include <utility>
+
+namespace vibrig {
+
+using drivers::Time;
+
+namespace {
+// A stage that has made no progress for this long keeps the shaker's watchdog hungry.
+constexpr Time kProgressDeadline = drivers::kSecond;
+// A stage that makes no progress for this long, in wall time, is stuck.
+constexpr Time kPatience = 2 * drivers::kSecond;
+// The server waits for nobody longer than 0.1 s; on a busy machine it has its turn late.
+constexpr Time kServerPatience = 7 * drivers::kSecond;
+}  // namespace
+
+void Supervisor::look() {
+    tell_alarms();
+    tell_controller();
+    tell_watchdog();
+    if (journal_) tell_journal();
+    if (recorder_) tell_recorder();
+    watch_onlookers();
+    tell_log();
+}
+
+void Supervisor::check_balance(Time now) {
+    if (now - balance_checked_ < drivers::kSecond) return;
+    balance_checked_ = now;
+    const auto a = acquisition_.view();
+    const auto e = estimator_stage_.view();
+    std::string found;
+    const auto equal = [&found](const char* what, std::uint64_t left, std::uint64_t right) {
+        if (left != right) found += fmt::format("{}: {} is not {}; ", what, left, right);
+    };
+    equal("frames received", a.port.received,
+          a.port.delivered + a.port.own + a.port.error_frames + a.port.malformed);
+    equal("frames delivered", a.port.delivered,
+          a.assembler.received + a.rig_ticks + a.increments + a.in_hand);
+    equal("frames for samples", a.assembler.received,
+          a.assembler.used + a.assembler.unknown + a.assembler.duplicate + a.assembler.late +
+              a.assembler.wrong_length);
+    equal("samples offered", a.samples_offered, a.assembler.samples);
+    equal("samples taken", e.taken, e.in_dwell + e.idle);
+    if (log_queue_ != nullptr) {
+        const auto lines = log_queue_->counts();
+        equal("lines logged", lines.taken, lines.written + lines.dropped + lines.waiting);
+    }
+    if (!found.empty() && imbalance_.empty())
+        log(Severity::alarm, "balance", "received is not handled + dropped: " + found);
+    imbalance_ = found;
+}
+
+void Supervisor::tell_clock_misfit() {
+    auto found = fitness_.clock_misfit();
+    if (found == misfit_told_) return;
+    log(found.empty() ? Severity::info : Severity::alarm, "clock",
+        found.empty() ? "rig and daemon agree on the time" : found);
+    misfit_told_ = std::move(found);
+}
+
+std::string Supervisor::stuck_stage() {
+    tell_clock_misfit();
+    // In wall time. The simulated rig's clock may stand still, and with it all that waits on it.
+    if (!parts_.in_real_time()) return {};
+    const auto wall = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                          std::chrono::steady_clock::now().time_since_epoch())
+                          .count();
+    const auto acquired = acquisition_.view();
+    const auto ring = estimator_stage_.ring();
+    struct Stage {
+        const char* name;
+        std::uint64_t mark;  ///< changes as long as the stage goes on
+        bool may_rest;       ///< nothing to do
+        Time patience;
+    };
+    const auto& shaker = configuration_.shaker;
+    const std::array<Stage, 4> stages{
+        {{"acquisition", static_cast<std::uint64_t>(acquired.beat), false, kPatience},
+         {"estimator", ring.popped, ring.popped == ring.pushed, kPatience},
+         {"control", static_cast<std::uint64_t>(control_beat_.load()), false, kPatience},
+         // Connecting takes its time when nobody is there.
+         {"shaker link", shaker_->beats(), false,
+          2 * shaker.backoff_max + 8 * shaker.response_timeout}}};
+    std::string stuck;
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+        if (stages[i].may_rest || progress_[i].since_ns == 0 ||
+            progress_[i].mark != stages[i].mark) {
+            progress_[i] = {stages[i].mark, wall};
+        } else if (wall - progress_[i].since_ns > stages[i].patience) {
+            stuck += (stuck.empty() ? "" : ", ") + std::string(stages[i].name);
+        }
+    }
+    return stuck;
+}
+
+void Supervisor::tell_alarms() {
+    for (std::size_t i = 0; i < interlock_.rows(); ++i) {
+        const auto row = interlock_.row(i);
+        if (row.raised == raised_[i] || row.rule->reaction != rt::Reaction::alarm) continue;
+        raised_[i] = row.raised;
+        const auto& condition = rt::condition_of(row.rule->condition);
+        if (!row.raised) {
+            log(Severity::info, "interlock", fmt::format("{}: over", row.rule->name));
+        } else if (condition.has_limit()) {
+            log(Severity::alarm, "interlock",
+                fmt::format("{}: {}: {:.4g}, limit {:.4g} {}", row.rule->name, condition.text,
+                            row.value, row.rule->limit, condition.unit));
+        } else {
+            log(Severity::alarm, "interlock",
+                fmt::format("{}: {}", row.rule->name, condition.text));
+        }
+    }
+}
+
+void Supervisor::tell_controller() {
+    using drivers::ControllerState;
+    const auto now = port_->counters().controller;
+    if (std::exchange(controller_told_, now) == now) return;
+    log(now == ControllerState::active    ? Severity::info
+        : now == ControllerState::warning ? Severity::warning
+                                          : Severity::alarm,
+        "can", fmt::format("the controller's error state: {}", drivers::name_of(now)));
+}
+
+bool Supervisor::may_feed() const noexcept {
+    const auto reading = shaker_->reading();
+    if (rig_.starving() || campaign_.stopping() || (reading.running && !rig_.excitation()))
+        return false;
+    const Time now = clock_.now();
+    const Time oldest = std::min(
+        {acquisition_.view().beat, estimator_stage_.view().sample_time, control_beat_.load()});
+    return now - oldest <= kProgressDeadline;
+}
+
+void Supervisor::tell_watchdog() {
+    const auto reading = shaker_->reading();
+    if (!reading.valid) return;
+    const bool changed = reading.watchdog == drivers::WatchdogTimeout::changed;
+    if (std::exchange(watchdog_was_changed_, changed) == changed) return;
+    log(changed ? Severity::alarm : Severity::info, "shaker",
+        fmt::format("the controller's watchdog timeout reads {:g} s, {}",
+                    reading.watchdog_timeout_s,
+                    changed ? "not what was written: nobody is armed" : "as written"));
+}
+
+void Supervisor::watch_onlookers() {
+    const auto served = serving_wall_ns_.load();
+    interlock_.onlookers(recorder_ && recorder_->degraded(),
+                         served != 0 && rt::wall_clock() - served > kServerPatience);
+}
+
+void Supervisor::tell_log() {
+    if (log_queue_ == nullptr) return;
+    const auto lines = log_queue_->counts();
+    if (std::exchange(log_was_blocked_, lines.blocked) == lines.blocked) return;
+    log(Severity::warning, "log",
+        lines.blocked ? "nobody takes its lines: a stopped terminal, a full pipe or a dead disk; "
+                        "events and journal go on without it"
+                      : fmt::format("goes on; {} lines lost so far", lines.dropped));
+}
+
+void Supervisor::tell_journal() {
+    for (const std::string& found : journal_->take_found()) {
+        // In the new file it stands already.
+        latches_.add({journal::kJournalLatch, found, {}, {}, false, utc_now()});
+        log(Severity::alarm, "journal", found + ": vibrig ack journal");
+    }
+    const auto status = journal_->status();
+    if (std::exchange(journal_was_running_, status.running) == status.running) return;
+    log(status.running ? Severity::info : Severity::alarm, "journal",
+        status.running ? "writes again" : "entries wait: " + status.note);
+}
+
+void Supervisor::tell_recorder() {
+    const double stuck_s = recorder_->stuck_s();
+    const bool stuck = stuck_s > 0;
+    if (std::exchange(recorder_was_stuck_, stuck) == stuck) return;
+    log(stuck ? Severity::alarm : Severity::info, "recorder",
+        stuck ? "does not go on, as with a disk that does not answer: what comes meanwhile waits, "
+                "and is lost when there is no more room for it"
+              : "goes on again");
+}
+
+}  // namespace vibrig
