@@ -2,9 +2,11 @@
 // it finds goes into the record that arming demands.
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <utility>
 
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
@@ -121,7 +123,13 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const auto after = what.contains("after") && what["after"].is_number_unsigned()
                            ? what["after"].get<std::size_t>()
                            : 0;
-    const Json reply{{"record", book_.status(utc_now())},
+    Json record = book_.status(utc_now());
+    record["buttons_left"] = campaign_.proof().buttons_left();
+    record["lacking"] = Json::object();
+    if (what.contains("shaker"))  // why parts are not given: no business of a poll
+        for (const auto& [part, why] : shaker_parts({}).lacking)
+            record["lacking"][name_of(part)] = why;
+    const Json reply{{"record", record},
                      {"simulated", configuration_.simulated()},
                      {"configuration", loaded_.path},
                      {"procedure", procedure_ ? procedure_->state(after) : Json()}};
@@ -164,6 +172,68 @@ CommandReply ControlLoop::do_commission(const CommandRequest& request, const Jso
     return {true, word == "stop" ? "stopped" : "ended"};
 }
 
+commission::ShakerParts ControlLoop::shaker_parts(
+    const commission::AmplitudeWitness& witness) const {
+    std::vector<Json> proofs;
+    for (const auto& proof : campaign_.proof().with_these_keys())
+        proofs.push_back(Json::parse(campaign::to_json(proof)));
+    return commission::shaker_parts(proofs, campaign_.proof().buttons_left(), witness);
+}
+
+/// A proof was made: the record gets what it shows of the shaker.
+void ControlLoop::take_proof() {
+    const auto& proofs = campaign_.proof().history();
+    if (std::exchange(proofs_taken_, proofs.size()) == proofs.size()) return;
+    const auto& record = proofs.back();
+    if (!record.passed || !configuration_.record_demanded()) return;
+    try {
+        static_cast<void>(enter_shaker_parts(record.by, {}));
+    } catch (const std::exception& error) {
+        log(Severity::warning, "commissioning",
+            std::string("the proof is not in the record: ") + error.what());
+    }
+}
+
+/// Returns what was recorded, for a person. Throws std::runtime_error: why nothing was.
+std::string ControlLoop::enter_shaker_parts(const std::string& by,
+                                            const commission::AmplitudeWitness& witness) {
+    commission::PartRecord what;
+    what.by = {by};
+    what.utc_ns = utc_now();
+    what.version = kVersion;
+    if (const auto why = book_.not_proven_below_shaker(what.utc_ns); !why.empty())
+        throw std::runtime_error("the platform's part is to be proven before the shaker's: " + why);
+    std::string names;
+    const auto parts = shaker_parts(witness);
+    for (const auto& [part, evidence] : parts.proven) {
+        what.evidence = evidence;
+        book_.prove({part}, what, loaded_);
+        names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    }
+    auto text = fmt::format("{}{} recorded by {}", configuration_.simulated() ? "SIMULATED: " : "",
+                            names.empty() ? "nothing" : names, by);
+    for (const auto& [part, why] : parts.lacking)
+        text += fmt::format("; {} not: {}", name_of(part), why);
+    log(Severity::info, "commissioning", text);
+    return text;
+}
+
+CommandReply ControlLoop::state_units(const CommandRequest& request, const Json& what) {
+    commission::AmplitudeWitness witness;
+    witness.display = what.value("display", "");
+    if (what.contains("reference_g") && what["reference_g"].is_number())
+        witness.reference_g = what["reference_g"];
+    const auto units = commission::amplitude_units();
+    if (std::ranges::find(units, witness.display) == units.end() || !(witness.reference_g > 0))
+        return {false, fmt::format("units: found the display's unit \"{}\" and a reference of {} "
+                                   "g, expected one of g peak, g rms, g peak-peak, m/s2 peak, m/s2 "
+                                   "rms and a positive number",
+                                   witness.display, witness.reference_g)};
+    auto text = enter_shaker_parts(request.by, witness);
+    const bool stands = shaker_parts(witness).proven.contains(Part::units);
+    return {stands, std::move(text)};
+}
+
 CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, const Json& what,
                                               Time now) {
     if (auto why = outside_.refuses(request); !why.empty()) return {false, why};
@@ -175,17 +245,16 @@ CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, con
     if (!kept.again.empty() && !kept.why_not.empty())
         return {false, kept.why_not + ": there is nothing to ask again"};
     if (what.contains("answers") && !configuration_.simulated()) return {false, kNoScript};
-    auto fresh = make_procedure();
-    if (auto why = fresh->refusal(by_hand); !why.empty()) return {false, why};
     if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty())
         return {false, why};
-    procedure_ = std::move(fresh);
+    procedure_ = make_procedure();
     if (what.contains("answers")) procedure_->answer_all(what["answers"]);
     procedure_->attend(request.by, rt::wall_clock());
-    auto why = flag("resume") ? procedure_->begin_again(request.by, by_hand, kept, now)
-                              : procedure_->begin(request.by, by_hand, now);
+    if (flag("resume"))
+        procedure_->begin_again(request.by, by_hand, kept, now);
+    else
+        procedure_->begin(request.by, by_hand, now);
     if (!procedure_->active()) campaign_.end_commissioning(now);
-    if (!why.empty()) return {false, why};
     log(Severity::info, "commissioning",
         fmt::format("{} by {}", flag("resume") ? "taken up" : "begun", request.by));
     return {true, "begun"};
@@ -201,9 +270,10 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
                                    name_of(status.state))};
     const auto text = [&what](const char* key) { return what.value(key, std::string()); };
     try {
+        if (loaded_.path.empty()) return {false, "the daemon has no configuration file"};
+        if (text("part") == name_of(Part::units)) return state_units(request, what);
         const std::string second = text("second");
         if (auto why = commission::not_two(request.by, second); !why.empty()) return {false, why};
-        if (loaded_.path.empty()) return {false, "the daemon has no configuration file"};
         const auto file = configuration::load(loaded_.path, true);
         if (what["do"] == "accept") return accept_commissioning(request, second, file);
         if (text("part") != name_of(Part::gyros))

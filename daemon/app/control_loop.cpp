@@ -44,6 +44,7 @@ void ControlLoop::run() {
         // a campaign on the rig's clock depend on the machine's load.
         if (stirred || now >= next)
             next = std::min(campaign_.step(now), now + drivers::kSecond / 2);
+        take_proof();
         const Time commissioning = step_commissioning(now);
         dwells_.take_done(campaign_);
         watch_arming();
@@ -123,6 +124,7 @@ void ControlLoop::take_over() {
         }
     }
     campaign_.take_over_proofs(std::move(proofs));
+    proofs_taken_ = campaign_.proof().history().size();
     if (!book_.trouble().empty()) log(Severity::warning, "commissioning", book_.trouble());
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign)

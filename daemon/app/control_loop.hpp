@@ -15,6 +15,7 @@
 #include "daemon/app/supervisor.hpp"
 #include "daemon/commission/procedure.hpp"
 #include "daemon/commission/progress.hpp"
+#include "daemon/commission/shaker_parts.hpp"
 #include "daemon/journal/latches.hpp"
 
 namespace vibrig {
@@ -115,6 +116,13 @@ class ControlLoop {
                                             const std::vector<commission::Part>& parts,
                                             const commission::Json& evidence,
                                             const configuration::Loaded& as);
+    [[nodiscard]] commission::ShakerParts shaker_parts(
+        const commission::AmplitudeWitness& witness) const;
+    void take_proof();
+    [[nodiscard]] std::string enter_shaker_parts(const std::string& by,
+                                                 const commission::AmplitudeWitness& witness);
+    [[nodiscard]] CommandReply state_units(const CommandRequest& request,
+                                           const commission::Json& what);
     [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
     /// Returns when to be called next at the latest.
     [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);
@@ -143,6 +151,7 @@ class ControlLoop {
 
     commission::Book book_{loaded_};
     std::unique_ptr<commission::Procedure> procedure_;  ///< made when it is asked for
+    std::size_t proofs_taken_ = 0;                      ///< into the record, of the campaign's
     /// An arming that the journal is writing.
     struct Arming {
         WaitingCommand waiting;

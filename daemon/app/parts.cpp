@@ -23,7 +23,6 @@ bool rig_owns_time(const Configuration& configuration) {
 }
 
 rt::MemoryLock lock_memory(const Configuration& configuration) {
-    rt::give_large_blocks_back();
     if (rig_owns_time(configuration)) return {false, "not asked for: the rig owns the time"};
     if (!configuration.lock_memory) return {false, "not asked for: threads.lock_memory is false"};
     return rt::lock_memory();

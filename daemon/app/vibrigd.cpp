@@ -19,6 +19,7 @@
 #include "daemon/configuration/forms.hpp"
 #include "daemon/domain/upgrade.hpp"
 #include "daemon/log/log_sink.hpp"
+#include "daemon/rt/real_time.hpp"
 #include "daemon/serve/openapi.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/version.hpp"
@@ -215,6 +216,7 @@ constexpr std::initializer_list<vibrig::proto::Exit> kExits{
 
 // NOLINTNEXTLINE(bugprone-exception-escape): before anything runs only memory can be short
 int main(int argc, char** argv) {
+    vibrig::rt::give_large_blocks_back();
     CLI::App app{"Acquisition and identification daemon for vibration rigs", "vibrigd"};
     app.footer("Example: vibrigd --config /etc/vibrig/vibrigd.toml --check");
     app.set_version_flag("--version", vibrig::kVersion);

@@ -93,6 +93,7 @@ class Campaign {
     void fill(StatusData& status, drivers::Time now) const;
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
+    [[nodiscard]] const SafetyProof& proof() const { return proof_; }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that
@@ -234,6 +235,7 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_excite(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_arm(drivers::Time now) const;
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
+    CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
     [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
@@ -346,6 +348,7 @@ class Campaign {
     /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
     enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
     drivers::Time pressed_at_ = 0;  ///< when that began
+    drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
     bool press_felt_ = false;       ///< by the controller, too
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell

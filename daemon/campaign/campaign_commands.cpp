@@ -60,32 +60,8 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
                 order_stop("stopped by " + request.by);
             }
             return accept("stop sent");
-        case Kind::acknowledge: {
-            // One acknowledgement is for both: the controller latches its faults, too, and forgets
-            // them when it is told to stop at rest.
-            if (const auto why = not_fit_to_acknowledge(now); !why.empty()) return refuse(why);
-            const auto shaker = ports_.rig.shaker.reading();
-            const bool changed =
-                shaker.valid && shaker.watchdog == drivers::WatchdogTimeout::changed;
-            const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
-            std::string what;
-            // The stop writes the timeout again, too.
-            if (latched) {
-                what = shaker.fault != 0
-                           ? fmt::format("shaker fault {:#06x}", shaker.fault)
-                           : fmt::format("watchdog timeout of {:g} s", shaker.watchdog_timeout_s);
-            }
-            if (state_ == State::tripped) {
-                what = std::exchange(reason_, {}) + (latched ? "; " + what : "");
-                enter(State::idle, now);
-            }
-            stop_.acknowledge();
-            if (latched) {
-                stopped_by_ = "acknowledged by " + request.by;
-                stop_shaker();
-            }
-            return accept("acknowledged: " + what);
-        }
+        case Kind::acknowledge:
+            return acknowledge(request, now);
         case Kind::selftest:
             return begin_loop_check(request, now);
         case Kind::commission:  // the daemon's, by begin_commissioning()
@@ -93,6 +69,34 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             break;
     }
     return refuse("unknown command");
+}
+
+CommandReply Campaign::acknowledge(const CommandRequest& request, Time now) {
+    // One acknowledgement is for both: the controller latches its faults, too, and forgets
+    // them when it is told to stop at rest.
+    if (const auto why = not_fit_to_acknowledge(now); !why.empty()) return {false, why};
+    const auto shaker = ports_.rig.shaker.reading();
+    const bool changed = shaker.valid && shaker.watchdog == drivers::WatchdogTimeout::changed;
+    const bool latched = shaker.valid && (shaker.fault != 0 || changed) && !active();
+    std::string what;
+    // The stop writes the timeout again, too.
+    if (latched) {
+        what = shaker.fault != 0
+                   ? fmt::format("shaker fault {:#06x}", shaker.fault)
+                   : fmt::format("watchdog timeout of {:g} s", shaker.watchdog_timeout_s);
+    }
+    if (state_ == State::tripped) {
+        what = std::exchange(reason_, {}) + (latched ? "; " + what : "");
+        enter(State::idle, now);
+    }
+    stop_.acknowledge();
+    if (latched) {
+        stopped_by_ = "acknowledged by " + request.by;
+        stop_shaker();
+    }
+    what = "acknowledged: " + what;
+    ports_.log.event(Severity::info, fmt::format("{} by {}", what, request.by));
+    return {true, what};
 }
 
 std::string Campaign::not_fit_to_excite(Time now) const {

@@ -1,7 +1,9 @@
 // The loop check and the safe-state proof: about a minute at a small level, its own arming.
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
@@ -38,9 +40,18 @@ std::string Campaign::not_fit_to_check(Time now) const {
 }
 
 CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now) {
-    if (!request.argument.empty() && request.argument != "emergency_stop")
+    constexpr std::string_view kPress = "emergency_stop";
+    const bool press = request.argument.starts_with(kPress);
+    std::string button;
+    if (press && request.argument.size() > kPress.size() + 1)
+        button = request.argument.substr(kPress.size() + 1);
+    const auto& buttons = settings_.proof.buttons;
+    if (!press && !request.argument.empty())
         return {false,
                 "selftest: found \"" + request.argument + "\", expected nothing or emergency_stop"};
+    if (!button.empty() && std::ranges::find(buttons, button) == buttons.end())
+        return {false, "selftest: found the button \"" + button +
+                           "\", expected one of commission.buttons"};
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
     armed_by_ = request.by;
     armed_for_ = arming_text(request);
@@ -48,7 +59,9 @@ CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now)
     reason_.clear();
     loop_->begin(request.by);
     proof_.begin(request.by, settings_.loop.table_g);
-    press_wanted_ = request.argument == "emergency_stop";
+    press_wanted_ = press;
+    // There is but one.
+    proof_.record().button = press && button.empty() && buttons.size() == 1 ? buttons[0] : button;
     pressed_ = Pressed::no;
     ports_.rig.feed->order(rt::StageFeed::Mode::samples);
     last_motion_ = now;

@@ -17,10 +17,10 @@ using drivers::Time;
 using drivers::to_seconds;
 
 namespace {
-// How long a person has to press the emergency stop, and then to close its chain again.
+// A person's time, not the rig's: how long there is to press the emergency stop, and then to close
+// its chain again.
 constexpr Time kPress = 60 * drivers::kSecond;
-// From the fall of the table to the register, and how long nothing may start with the chain closed.
-constexpr double kSeen_s = 0.5;
+// How long nothing may start with the chain closed.
 constexpr Time kClosed = 3 * drivers::kSecond;
 // What is called rest has to be so many times the noise.
 constexpr double kNoises = 6;
@@ -169,12 +169,13 @@ void Campaign::prove_clearing(Time now) {
 
 /// The hard-wired stop. Its opening trips as ever; on_trip() finds it here.
 void Campaign::prove_emergency_stop(Time now) {
-    if (!std::exchange(requested_, true))
+    if (!std::exchange(requested_, true)) {
+        asked_wall_ = ports_.log.wall();
         ports_.log.event(Severity::warning,
-                         fmt::format("proof: press the emergency stop now, within "
-                                     "{:.0f} s",
-                                     to_seconds(kPress)));
-    if (now - entered_ > kPress) abort("nobody pressed the emergency stop", now);
+                         fmt::format("proof: press the emergency stop{} now, within {:.0f} s",
+                                     proof_.named_button(), to_seconds(kPress)));
+    }
+    if (ports_.log.wall() - asked_wall_ > kPress) abort("nobody pressed the emergency stop", now);
 }
 
 /// The opened chain has tripped: whether it was seen in time, by the table's own fall.
@@ -186,7 +187,8 @@ void Campaign::begin_pressed(Time now) {
     press_felt_ = false;
     stop_times_.begin(now);
     const Time fell = loop_->last_at_half();
-    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0, kSeen_s);
+    proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0,
+               settings_.proof.seen_s);
 }
 
 /// After the trip: those who can tell, the button's own latch, and that closing the chain starts
@@ -207,12 +209,12 @@ void Campaign::await_pressed(Time now) {
         proof_.row("emergency stop, the controller says fault", press_felt_);
         proof_.record().emergency_stop = true;
         pressed_ = Pressed::open;
-        pressed_at_ = now;
+        asked_wall_ = ports_.log.wall();
         if (reading.emergency_stop_open)
             ports_.log.event(Severity::warning, "proof: close the emergency-stop chain again");
     }
     if (pressed_ == Pressed::open) {
-        if (now - pressed_at_ > kPress)
+        if (ports_.log.wall() - asked_wall_ > kPress)
             return end_pressed("nobody closed the emergency-stop chain again");
         if (!reading.valid || reading.emergency_stop_open) return;
         pressed_ = Pressed::closed;

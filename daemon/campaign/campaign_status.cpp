@@ -40,7 +40,7 @@ void Campaign::fill(StatusData& status, Time now) const {
     proof_.fill(status.proof, utc_ns());
     const bool press = state_ == State::checking && check_ == Check::press && requested_;
     const bool close = pressed_ == Pressed::open && ports_.rig.shaker.reading().emergency_stop_open;
-    status.proof.asks = press   ? "press the emergency stop now"
+    status.proof.asks = press   ? "press the emergency stop" + proof_.named_button() + " now"
                         : close ? "close the emergency-stop chain again"
                                 : "";
     fill_rest(status, now);

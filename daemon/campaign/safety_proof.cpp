@@ -96,6 +96,7 @@ std::string to_json(const ProofRecord& r) {
                 {"table_g", r.table_g},
                 {"passed", r.passed},
                 {"emergency_stop", r.emergency_stop},
+                {"button", r.button},
                 {"message", r.message},
                 {"rows", rows},
                 {"pads",
@@ -119,6 +120,7 @@ std::optional<ProofRecord> proof_from_json(const std::string& text) {
         r.table_g = json.at("table_g");
         r.passed = json.at("passed");
         r.emergency_stop = json.at("emergency_stop");
+        r.button = json.value("button", "");  // earlier records have none
         r.message = json.at("message");
         for (const Json& row : json.at("rows"))
             r.rows.push_back(
@@ -165,6 +167,22 @@ const ProofRecord& SafetyProof::conclude(std::int64_t utc_ns, const std::string&
     record_.passed = record_.message.empty();
     history_.push_back(record_);
     return history_.back();
+}
+
+std::vector<ProofRecord> SafetyProof::with_these_keys() const {
+    std::vector<ProofRecord> some;
+    std::ranges::copy_if(history_, std::back_inserter(some), [this](const ProofRecord& one) {
+        return one.keys_sha256 == keys_sha256_;
+    });
+    return some;
+}
+
+std::vector<std::string> SafetyProof::buttons_left() const {
+    std::vector<std::string> left = settings_.buttons;
+    for (const auto& one : history_)
+        if (one.passed && one.emergency_stop && one.keys_sha256 == keys_sha256_)
+            std::erase(left, one.button);
+    return left;
 }
 
 const ProofRecord* SafetyProof::newest_passed() const {

@@ -15,7 +15,9 @@ namespace vibrig::campaign {
 struct ProofSettings {
     bool demanded = true;  ///< without one no campaign is armed
     double valid_h = 168;
-    double emergency_stop_days = 365;  ///< after so long its button is asked for
+    double emergency_stop_days = 365;                  ///< after so long its button is asked for
+    std::vector<std::string> buttons{"rack", "door"};  ///< of the emergency stop
+    double seen_s = 0.5;  ///< from the table's fall until its register shows one pressed
     /// What the proof covers, "key=value\n" each, sorted, values as --check prints them.
     std::string keys;
 };
@@ -34,6 +36,7 @@ struct ProofRecord {
     double table_g = 0;  ///< peak, at the table
     bool passed = false;
     bool emergency_stop = false;  ///< its button was pressed, and the rig obeyed
+    std::string button;           ///< which one was; empty: nobody said
     std::string message;          ///< why it did not pass
     std::vector<ProofRow> rows;
     PadRingDown pads;
@@ -82,6 +85,11 @@ class SafetyProof {
     /// The making is over; `why` it was not completed, else empty. Returns the record.
     const ProofRecord& conclude(std::int64_t utc_ns, const std::string& why);
 
+    /// " "rack"", where it was named which button is to be pressed.
+    [[nodiscard]] std::string named_button() const {
+        return record_.button.empty() ? "" : " \"" + record_.button + "\"";
+    }
+
     /// Why no campaign is armed; empty: as far as this goes it may be.
     [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
     /// What is to be told although nothing is refused: a button that nobody pressed for long.
@@ -94,6 +102,10 @@ class SafetyProof {
     [[nodiscard]] std::string recording_json() const;
     void fill(ProofStatus& status, std::int64_t utc_ns) const;
     [[nodiscard]] const std::vector<ProofRecord>& history() const { return history_; }
+    /// Of the keys as they are, oldest first.
+    [[nodiscard]] std::vector<ProofRecord> with_these_keys() const;
+    /// Of the emergency stop's buttons: none of those proofs that passed had them pressed.
+    [[nodiscard]] std::vector<std::string> buttons_left() const;
     /// As the newest loop check in band has measured it with the configuration as it is; nothing
     /// otherwise: then the configuration's holds.
     [[nodiscard]] std::optional<double> transmission() const;

@@ -26,7 +26,7 @@ struct Names {
 struct Stated {
     double latitude_deg = 0;
     double linear_sigma = 2;
-    bool simulated = false;  ///< the rig: only one such is moved by command
+    bool simulated = false;  ///< the rig: it cannot hurt, whatever its commands count in
 };
 
 /// A key and its value as the file has it, with what speaks for it.

@@ -46,19 +46,12 @@ Vec3 noise_of(const std::vector<Look>& samples) {
 
 }  // namespace
 
-std::string Procedure::begin(const std::string& by, bool by_hand, Time now) {
-    auto why = open(by, by_hand, now);
-    if (why.empty()) ports_.keep(log_);
-    return why;
+void Procedure::begin(const std::string& by, bool by_hand, Time now) {
+    open(by, by_hand, now);
+    ports_.keep(log_);
 }
 
-std::string Procedure::refusal(bool by_hand) const {
-    if (stated_.simulated || by_hand) return {};
-    return "this version moves no gimbal of a real rig by command: vibrig commission --by-hand";
-}
-
-std::string Procedure::open(const std::string& by, bool by_hand, Time now) {
-    if (auto why = refusal(by_hand); !why.empty()) return why;
+void Procedure::open(const std::string& by, bool by_hand, Time now) {
     Json script = std::move(script_);
     const Time attended = attended_;
     *this = Procedure(std::move(names_), stated_, std::move(ports_));
@@ -68,8 +61,7 @@ std::string Procedure::open(const std::string& by, bool by_hand, Time now) {
     by_hand_ = by_hand;
     now_ = now;
     ask_yes("power", "Is the shaker's power stage off?", "the shaker's power stage is on",
-            [this] { ask_travel(); });
-    return {};
+            [this] { ask_degrees(); });
 }
 
 void Procedure::attend(const std::string& by, Time wall) {

@@ -55,16 +55,12 @@ class Procedure {
     Procedure(Names names, Stated stated, Ports ports)
         : names_(std::move(names)), stated_(stated), ports_(std::move(ports)) {}
 
-    /// Why it cannot be begun so; empty: it can.
-    [[nodiscard]] std::string refusal(bool by_hand) const;
-    /// `by_hand`: a person moves the gimbals, and nothing is commanded. Why it is not begun; empty:
-    /// it is.
-    [[nodiscard]] std::string begin(const std::string& by, bool by_hand, drivers::Time now);
+    /// `by_hand`: a person moves the gimbals, and nothing is commanded.
+    void begin(const std::string& by, bool by_hand, drivers::Time now);
     /// The same, from where another one was, without moving: what it kept is answered and measured
     /// already. Nothing moves before a new permission, and the last position is measured anew
     /// first: where it is another, all begins anew.
-    [[nodiscard]] std::string begin_again(const std::string& by, bool by_hand, const Kept& kept,
-                                          drivers::Time now);
+    void begin_again(const std::string& by, bool by_hand, const Kept& kept, drivers::Time now);
     /// Answers by question, a list for one that comes again: what is asked is answered at once, so
     /// that a script's rig does not wait for a tool. Simulated rigs only.
     void answer_all(Json answers) { script_ = std::move(answers); }
@@ -101,7 +97,7 @@ class Procedure {
     using Then = std::function<void()>;
 
     // procedure.cpp: what asking, moving and averaging are
-    [[nodiscard]] std::string open(const std::string& by, bool by_hand, drivers::Time now);
+    void open(const std::string& by, bool by_hand, drivers::Time now);
     void ask(Question question, std::function<void(const std::string&)> then);
     void ask_yes(const std::string& id, const std::string& text, const std::string& no, Then then,
                  const std::string& usual = {});
@@ -137,6 +133,7 @@ class Procedure {
     [[nodiscard]] std::string moved_since() const;
 
     // steps.cpp: A to D
+    void ask_degrees();
     void ask_travel();
     void ask_stop_means();
     void look();

@@ -94,9 +94,8 @@ void Procedure::keep_mean() {
     keep(std::move(entry));
 }
 
-std::string Procedure::begin_again(const std::string& by, bool by_hand, const Kept& kept,
-                                   Time now) {
-    if (const auto why = open(by, by_hand, now); !why.empty()) return why;
+void Procedure::begin_again(const std::string& by, bool by_hand, const Kept& kept, Time now) {
+    open(by, by_hand, now);
     again_ = kept.again;
     std::string why_not = kept.why_not;
     try {
@@ -108,11 +107,10 @@ std::string Procedure::begin_again(const std::string& by, bool by_hand, const Ke
     replaying_ = false;
     if (why_not.empty()) {
         if (active()) permit_again();
-        return {};
+        return;
     }
-    const auto refused = begin(by, by_hand, now);
+    begin(by, by_hand, now);
     tell(why_not + ": it begins anew");
-    return refused;
 }
 
 void Procedure::replay(const Json& log) {
@@ -195,7 +193,7 @@ void Procedure::measure_again() {
     auto go_on = [this, to, was = std::move(*interrupted_), wanted = wanted_s_]() mutable {
         if (const auto moved = moved_since(); !moved.empty()) {
             const auto by = by_;
-            static_cast<void>(begin(by, by_hand_, now_));
+            begin(by, by_hand_, now_);
             return tell(moved + ": it begins anew");
         }
         if (waiting_)

@@ -24,6 +24,7 @@ constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 constexpr int kMeaning = 1;
 constexpr double kZeroMoved_g = 10e-3;  // `vibrig zero` may find so much anew
 constexpr const char* kDbc = "contents of can.dbc";
+constexpr const char* kLimits = "shaker.limits.";  // of the excitation alone
 constexpr const char* kZero = "accelerometer.zero_g";
 
 std::string dbc_of(const std::string& path) {
@@ -52,6 +53,14 @@ std::vector<std::string_view> own_keys(Part part) {
             return {"site.", "clock.source"};
         case Part::gyros:
             return {"platform.gyro_", "platform.drift_sign", "levelling.torque_"};
+        case Part::registers:
+        case Part::watchdog:
+        case Part::units:
+            return {"shaker."};
+        case Part::stop:
+            return {"shaker.", "commission.buttons", "commission.stop_s"};
+        case Part::excitation:
+            return {"shaker.", kLimits, "vibration.frequency_hz", "vibration.transmission"};
     }
     return {};
 }
@@ -67,8 +76,15 @@ std::vector<Part> below(Part part) {
         case Part::earth:
         case Part::gyros:
             return {Part::gimbals, Part::bus};
+        default:  // the shaker's keys are its own
+            return {};
     }
-    return {};
+}
+
+/// The command that proves it.
+std::string remedy_of(Part part) {
+    if (of_the_shaker(part)) return "vibrig commission watchdog stop units excitation";
+    return part == Part::gyros ? "vibrig commission gyros" : "vibrig commission";
 }
 
 std::string text_of(const Keys& keys) {
@@ -119,7 +135,8 @@ std::string read_text(const std::string& path) {
 }  // namespace
 
 const char* name_of(Part part) noexcept {
-    constexpr std::array kNames{"bus", "gimbals", "accelerometers", "earth", "gyros"};
+    constexpr std::array kNames{"bus",       "gimbals",  "accelerometers", "earth", "gyros",
+                                "registers", "watchdog", "stop",           "units", "excitation"};
     return kNames[static_cast<std::size_t>(part)];
 }
 
@@ -136,8 +153,11 @@ Keys keys_of(Part part, const configuration::Loaded& loaded) {
     for (const Part one : parts) {
         for (const auto& value : loaded.effective)
             for (const auto beginning : own_keys(one))
-                if (value.key.starts_with(beginning)) keys[value.key] = value.value;
+                if (value.key.starts_with(beginning) &&
+                    (part == Part::excitation || !value.key.starts_with(kLimits)))
+                    keys[value.key] = value.value;
     }
+    if (of_the_shaker(part)) return keys;
     if (const auto& dbc = loaded.configuration.dbc; !dbc.empty()) keys[kDbc] = dbc_of(dbc);
     return keys;
 }
@@ -244,7 +264,8 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
                 s.why += fmt::format(" by {} on {}", joined(r.by), date_of(r.utc_ns));
             else if (r.meaning != kMeaning)
                 s.why = fmt::format("version {} counts its keys otherwise", r.version);
-            else if (r.by.size() < 2 || journal::same_person(r.by[0], r.by[1]))
+            else if (!of_the_shaker(part) &&
+                     (r.by.size() < 2 || journal::same_person(r.by[0], r.by[1])))
                 s.why = fmt::format("proven by {}, two persons are asked", joined(r.by));
             else if (age_days < 0)
                 s.why = fmt::format("proven on {}, which is yet to come: look at the clock",
@@ -262,14 +283,14 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
 std::string Book::refusal(std::int64_t utc_ns) const {
     if (!loaded_.configuration.record_demanded()) return {};
     if (!trouble_.empty()) return "not commissioned: " + trouble_ + ": vibrig commission";
-    std::string missing, command = "vibrig commission";
+    std::string missing, command;
     for (const auto& s : standing(utc_ns)) {
         if (s.proven) continue;
         if (s.record)  // the first that somebody has changed says most
-            return fmt::format("not commissioned: {} ({}): vibrig commission{}", s.why,
-                               name_of(s.part), s.part == Part::gyros ? " gyros" : "");
+            return fmt::format("not commissioned: {} ({}): {}", s.why, name_of(s.part),
+                               remedy_of(s.part));
+        if (missing.empty()) command = remedy_of(s.part);
         missing += (missing.empty() ? "" : ", ") + std::string(name_of(s.part));
-        if (missing == name_of(Part::gyros)) command = "vibrig commission gyros";
     }
     if (missing.empty()) return {};
     return fmt::format("not commissioned: no record of {}: {}", missing, command);
@@ -291,6 +312,13 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
     proto::write_durably(path(), to_json(fresh), 0640);
     record_ = std::move(fresh);
     trouble_.clear();
+}
+
+std::string Book::not_proven_below_shaker(std::int64_t utc_ns) const {
+    for (const auto& s : standing(utc_ns))
+        if (!of_the_shaker(s.part) && !s.proven)
+            return fmt::format("{} first: {}", name_of(s.part), s.why);
+    return {};
 }
 
 Json Book::status(std::int64_t utc_ns) const {

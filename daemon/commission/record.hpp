@@ -15,11 +15,26 @@ namespace vibrig::commission {
 
 using Json = nlohmann::ordered_json;
 
-/// What is proven apart, and voided apart. What moves the table is the safe-state proof's
-/// (daemon/campaign/safety_proof.hpp).
-enum class Part : std::uint8_t { bus, gimbals, accelerometers, earth, gyros };
-inline constexpr std::array<Part, 5> kParts{Part::bus, Part::gimbals, Part::accelerometers,
-                                            Part::earth, Part::gyros};
+/// What is proven apart, and voided apart. From registers on it is the shaker's, which proofs of
+/// the safe state show (daemon/campaign/safety_proof.hpp).
+enum class Part : std::uint8_t {
+    bus,
+    gimbals,
+    accelerometers,
+    earth,
+    gyros,
+    registers,
+    watchdog,
+    stop,
+    units,
+    excitation
+};
+inline constexpr std::array<Part, 10> kParts{
+    Part::bus,       Part::gimbals,  Part::accelerometers, Part::earth, Part::gyros,
+    Part::registers, Part::watchdog, Part::stop,           Part::units, Part::excitation};
+inline constexpr std::array<Part, 5> kShakerParts{Part::registers, Part::watchdog, Part::stop,
+                                                  Part::units, Part::excitation};
+[[nodiscard]] constexpr bool of_the_shaker(Part part) noexcept { return part >= Part::registers; }
 [[nodiscard]] const char* name_of(Part part) noexcept;
 /// Nothing if there is no such part.
 [[nodiscard]] std::optional<Part> part_named(std::string_view name);
@@ -73,6 +88,9 @@ class Book {
     [[nodiscard]] std::vector<Standing> standing(std::int64_t utc_ns) const;
     /// Why nothing is armed; empty: all parts are proven, or none is demanded.
     [[nodiscard]] std::string refusal(std::int64_t utc_ns) const;
+    /// A part below the shaker's that does not stand: without it nothing of the shaker is
+    /// witnessed. Empty: all of them stand.
+    [[nodiscard]] std::string not_proven_below_shaker(std::int64_t utc_ns) const;
     /// What the file says that is not a record; empty: nothing.
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
     /// What the daemon runs with, as it was when it started.

@@ -35,8 +35,18 @@ std::string unit_of_force(double size) {
 
 }  // namespace
 
-void Procedure::ask_travel() {
+/// Nothing bounds the first moves of a gimbal that does not turn gravity and whose reading and
+/// command both count in turns.
+void Procedure::ask_degrees() {
     if (by_hand_) return look();
+    if (stated_.simulated) return ask_travel();
+    ask_yes("degrees",
+            "By the maker's paper: do the three angle channels and the gimbals' commands count in "
+            "degrees?",
+            "angles do not count in degrees: by hand (--by-hand)", [this] { ask_travel(); });
+}
+
+void Procedure::ask_travel() {
     const auto wrong = [this](std::string& value) -> std::string {
         std::istringstream in(value);
         auto limits = limits_deg_;

@@ -56,6 +56,9 @@ using TextRule = std::function<std::string(const std::string&)>;
                        At<std::array<estimator::SignedAxis, 3>> at);
 [[nodiscard]] Key numbers(std::string name, std::string unit, Range range, std::size_t at_most,
                           std::string doc, At<std::vector<double>> at);
+/// Names that differ, each of 1 to 40 printable characters.
+[[nodiscard]] Key names(std::string name, std::size_t at_most, std::string doc,
+                        At<std::vector<std::string>> at);
 /// [lowest, highest] each of outer, inner and azimuth.
 [[nodiscard]] Key travels(std::string name, std::string doc,
                           At<std::array<std::array<double, 2>, 3>> at);

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "daemon/configuration/key.hpp"
+#include "daemon/configuration/problems.hpp"
 #include "daemon/configuration/value.hpp"
 
 namespace vibrig::configuration {
@@ -196,6 +197,39 @@ Key numbers(std::string name, std::string unit, Range range, std::size_t at_most
     return {
         std::move(name), "numbers", std::move(unit), bounds,
         std::move(doc),  read,      write,           schema_of_array(schema_of(range), 1, at_most)};
+}
+
+Key names(std::string name, std::size_t at_most, std::string doc, At<std::vector<std::string>> at) {
+    auto read = [name, at_most, at](const toml::node& node, Configuration& c, Problems& problems) {
+        const toml::array* array = read_array(node, name, 1, at_most, "names", problems);
+        std::vector<std::string> value;
+        for (std::size_t i = 0; array != nullptr && i < array->size(); ++i) {
+            const auto* one = array->get(i)->as_string();
+            const bool fits = one != nullptr && !one->get().empty() && one->get().size() <= 40 &&
+                              printable(one->get()) == one->get();
+            if (!fits || std::ranges::find(value, one->get()) != value.end()) {
+                problems.add(place_of(array->get(i)->source()), element(name, i),
+                             describe(*array->get(i)),
+                             "a name of 1 to 40 printable characters, each once");
+                return;
+            }
+            value.push_back(one->get());
+        }
+        if (array != nullptr) at(c) = std::move(value);
+    };
+    auto write = [at](Configuration& c) {
+        std::string text;
+        for (const auto& one : at(c)) text += (text.empty() ? "" : ", ") + write_text(one);
+        return "[" + text + "]";
+    };
+    return {std::move(name),
+            "names",
+            "",
+            "1 to " + std::to_string(at_most) + " names",
+            std::move(doc),
+            read,
+            write,
+            schema_of_array(R"({"type":"string","minLength":1,"maxLength":40})", 1, at_most)};
 }
 
 Key travels(std::string name, std::string doc, At<std::array<std::array<double, 2>, 3>> at) {

@@ -137,6 +137,14 @@ void add_daemon_keys(std::vector<Key>& keys) {
                            "hold the configuration against free drift and gravity before the first "
                            "ramp, 4 min; of rigs that are armed by the record",
                            [](C& c) -> bool& { return c.commission.opening_check; }));
+    keys.push_back(names(
+        "commission.buttons", 16,
+        "emergency-stop buttons of the rig; each is pressed once before the "
+        "stop counts as proven",
+        [](C & c) -> auto& { return c.campaign.proof.buttons; }));
+    keys.push_back(number("commission.stop_s", "s", {0.1, 2},
+                          "from the table's fall until the register shows a pressed button",
+                          [](C& c) -> double& { return c.campaign.proof.seen_s; }));
     keys.push_back(text(
         "server.socket", "absolute or \"@name\"", "Unix socket of the status server", socket_rule,
         [](C & c) -> auto& { return c.socket; }));

@@ -71,7 +71,8 @@ struct MemoryLock {
 /// Locks the memory of the process: all that is there now, and whatever comes once it has been
 /// touched. Before other threads begin.
 [[nodiscard]] MemoryLock lock_memory();
-/// Of all that is had from here on: a large block is the system's again as soon as it is freed.
+/// Of all that is had from here on: a large block is the system's again as soon as it is freed,
+/// small ones come from one heap. Before other threads begin, or they have theirs.
 void give_large_blocks_back();
 /// All that is free and was needed once; where memory is locked it stays.
 void give_free_memory_back();

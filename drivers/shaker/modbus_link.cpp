@@ -11,6 +11,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <system_error>
@@ -265,6 +267,19 @@ Reply ModbusLink::write(std::uint16_t address, std::span<const std::uint16_t> wo
                            ? modbus_write_register(context_.get(), address, words[0])
                            : modbus_write_registers(context_.get(), address, count, words.data());
     return reply_of(result, count, errno);
+}
+
+Reply ModbusLink::identify(std::string& text) noexcept {
+    if (!connected_) return {ReplyKind::lost, ENOTCONN};
+    if (const Reply stale = stale_input(); !stale.ok()) return stale;
+    std::array<std::uint8_t, MODBUS_MAX_PDU_LENGTH> bytes{};
+    const int result = modbus_report_slave_id(context_.get(), int(bytes.size()), bytes.data());
+    if (result < 0) return reply_of(result, 0, errno);
+    const auto end = bytes.begin() + std::min<std::ptrdiff_t>(result, std::ssize(bytes));
+    text.clear();
+    for (auto at = bytes.begin(); at != end && text.size() < 200; ++at)
+        if (*at >= 0x20 && *at < 0x7f) text += static_cast<char>(*at);
+    return {};
 }
 
 Reply ModbusLink::read_coil(std::uint16_t address, bool& on) noexcept {

@@ -55,6 +55,10 @@ class ModbusLink {
     /// One word is written with function 6, more with function 16.
     [[nodiscard]] Reply write(std::uint16_t address, std::span<const std::uint16_t> words) noexcept;
 
+    /// What the device calls itself by function 17; `text`: its printable part, at most 200
+    /// characters. Many a device does not know the function: exception or timeout.
+    [[nodiscard]] Reply identify(std::string& text) noexcept;
+
     /// One coil; write uses function 5.
     [[nodiscard]] Reply read_coil(std::uint16_t address, bool& on) noexcept;
     [[nodiscard]] Reply write_coil(std::uint16_t address, bool on) noexcept;

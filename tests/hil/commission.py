@@ -4,22 +4,19 @@ and armed; one that hides something ends undecided or refused, with the reason.
 
 usage: commission.py PROGRAMS [--soak]     killed at some steps; at all
 """
-import fcntl
 import hashlib
 import json
 import math
 import os
-import pty
 import random
 import re
-import select
 import socket
-import struct
 import subprocess
 import sys
 import tempfile
-import termios
 import time
+
+import pexpect
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
@@ -180,12 +177,10 @@ def whole(checks, programs, folder, seed):
             said = subprocess.run([u.rig.program("vibrig"), "commission", "gyros", "--by", "Ada", "--second", "Bo", "--socket", u.rig.socket],
                                   input=typed, capture_output=True, text=True, check=False)
             checks.check(said.returncode == code and word in said.stdout + said.stderr, f"drift_sign is stated by two apart: {word}", said.stdout + said.stderr)
+        shaker_is_proven(checks, u)
         proven = tool("commission", "status")
         checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
                      proven.stdout)
-        armed = tool("arm", "--by", "Ada")
-        checks.check("not commissioned" not in armed.stderr and "proof" in armed.stderr, "what is left is the proof", armed.stderr)
-        tool("selftest", "--by", "Ada", timeout=120)
         checks.equal(tool("arm", "--by", "Ada").returncode, 0, "commissioned and proved it is armed")
         tool("start", "--by", "Ada")
         last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
@@ -197,6 +192,36 @@ def whole(checks, programs, folder, seed):
         each_key_is_caught_twice(checks, u, text)
     finally:
         u.rig.stop()
+
+
+def shaker_is_proven(checks, u):
+    """By proofs of the safe state, one for each button of the emergency stop, which somebody presses and acknowledges."""
+    tool, rig = u.rig.tool, u.rig
+    lacks = tool("arm", "--by", "Ada")
+    checks.check("no record of registers, watchdog, stop, units, excitation: vibrig commission watchdog stop units excitation" in lacks.stderr,
+                 "the shaker's parts are asked for", lacks.stderr)
+    unknown = tool("commission", "watchdog", "earth", "--by", "Ada")
+    checks.equal(unknown.returncode, 2, "parts of platform and shaker are not proven at once")
+    plain = tool("commission", "watchdog", "units", "excitation", "--by", "Ada", "--json", timeout=120)
+    found = json.loads(plain.stdout or "{}")
+    checks.check(plain.returncode == 0 and found["outcome"] == "decided" and found["simulated"] and
+                 found["parts"]["watchdog"]["evidence"]["watchdog, the controller says fault"] == 1 and
+                 found["parts"]["registers"]["proven"] and found["parts"]["units"]["evidence"]["hypotheses"][0]["unit"] == "g peak",
+                 "a proof shows registers, watchdog, units and excitation", plain.stdout + plain.stderr + rig.logs())
+    lacks = tool("arm", "--by", "Ada")
+    checks.check("no record of stop: vibrig commission watchdog stop" in lacks.stderr, "but no button", lacks.stderr)
+    stop = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
+    for button in ("rack", "door"):
+        asked = rig.wait_for(lambda s, b=button: f'press the emergency stop "{b}" now' in s.get("proof", {}).get("asks", ""), 60)
+        checks.check(asked and button in asked["proof"].get("asks", ""), f'the button "{button}" is asked for', stop.text())
+        rig.order("estop open")
+        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
+        rig.order("estop close")
+    for _ in range(600):
+        if not stop.running():
+            break
+        time.sleep(0.1)
+    checks.check(stop.process.poll() == 0 and "stop: proven" in stop.text(), "each was pressed and seen", stop.text() + rig.logs())
 
 
 def turned(value, by):
@@ -342,38 +367,30 @@ def hard_ones(checks, programs):
 class Terminal:
     """vibrig commission in a terminal of 80 columns."""
 
-    def __init__(self, rig):
-        self.pid, self.file = pty.fork()
-        if self.pid == 0:
-            os.execv(rig.program("vibrig"), ["vibrig", "commission", "--by", "Ada", "--socket", rig.socket])
-        fcntl.ioctl(self.file, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    def __init__(self, rig, *more):
+        self.child = pexpect.spawn(rig.program("vibrig"), ["commission", "--by", "Ada", "--socket", rig.socket, *more], encoding="utf-8",
+                                   dimensions=(24, 80), timeout=30)
         self.text = ""
 
     def until(self, word, timeout_s=30):
-        """True: it was shown, and what came before is forgotten for the next one."""
-        end = time.monotonic() + timeout_s
-        while word not in self.text and time.monotonic() < end:
-            if select.select([self.file], [], [], 0.1)[0]:
-                try:
-                    self.text += os.read(self.file, 4096).decode()
-                except OSError:
-                    break
-        shown = word in self.text
-        self.seen, self.text = self.text, self.text.partition(word)[2]
-        return shown
+        """True: it was shown, and what came before is forgotten for the next one. Lines are broken at blanks."""
+        found = self.child.expect([r"\s+".join(re.escape(part) for part in word.split()), pexpect.TIMEOUT, pexpect.EOF], timeout=timeout_s)
+        self.seen = (self.child.before if isinstance(self.child.before, str) else "") + (self.child.after if found == 0 else "")
+        self.text += self.seen
+        return found == 0
 
     def type(self, line):
-        os.write(self.file, (line + "\n").encode())
+        self.child.sendline(line)
 
     def kill(self):
-        os.kill(self.pid, 9)
-        os.waitpid(self.pid, 0)
-        os.close(self.file)
+        self.child.kill(9)
+        self.child.wait()
+        self.child.close()
 
     def end(self):
-        status = os.waitpid(self.pid, 0)[1]
-        os.close(self.file)
-        return os.waitstatus_to_exitcode(status)
+        self.child.expect(pexpect.EOF)
+        self.child.wait()
+        return self.child.exitstatus
 
 
 def dialogue(checks, programs, folder):
@@ -388,8 +405,8 @@ def dialogue(checks, programs, folder):
                                  ("OUTER", "y")):
             checks.check(t.until(question) and t.until("> "), f"it asks: {question}", t.text)
             t.type(answer)
-        wide = [line for line in t.seen.splitlines() if len(line) > 80]
-        checks.check(not wide and "\x1b" not in t.seen, "in 80 columns and without colours", wide or t.seen)
+        wide = [line for line in t.text.splitlines() if len(line) > 80]
+        checks.check(not wide and "\x1b" not in t.text, "in 80 columns and without colours", wide or t.text)
         time.sleep(0.5)
         checks.equal(u.rig.status()["campaign"]["state"], "commissioning", "the status says so")
         seen = u.rig.status()["campaign"]["reason"]
@@ -423,7 +440,7 @@ def dialogue(checks, programs, folder):
 
 
 def real(checks, programs, folder):
-    """A configuration that does not say that its rig is simulated: nothing of it is moved by command."""
+    """A configuration that does not say that its rig is simulated: persons answer, and its gimbals are moved with their permission."""
     rig = r.Rig(programs, "seqpacket", "real", folder)
     try:
         rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45")
@@ -441,12 +458,6 @@ def real(checks, programs, folder):
         rig.start_daemon()
         ready = rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("state") == 0, 60)
         checks.check(ready and ready["platform"].get("ready") and not ready.get("simulated"), "a rig that counts as real is ready", rig.logs())
-        before = after_slews(rig)
-        run = rig.tool("commission", "--by", "Ada")
-        checks.check(run.returncode == 1 and "this version moves no gimbal of a real rig by command: vibrig commission --by-hand" in run.stderr,
-                     "a real rig is not moved by command", run.stdout + run.stderr)
-        after = rig.status()
-        checks.check(not_moved(before, after) and r.state_of(after) == "idle", "and does not move", (before["sample"], after["sample"]))
         for _ in range(40):   # until the stop at the daemon's start is confirmed
             hand = rig.tool("commission", "--by", "Ada", "--by-hand")   # nobody answers
             if "at rest only" not in hand.stderr:
@@ -458,6 +469,20 @@ def real(checks, programs, folder):
             json.dump(ANSWERS, file)
         scripted = rig.tool("commission", "--by", "Ada", "--by-hand", "--answers", answers)
         checks.check(scripted.returncode == 2 and "persons answer on a real rig" in scripted.stderr, "and no script answers", scripted.stderr)
+        before = after_slews(rig)
+        unasked = rig.tool("commission", "--by", "Ada")   # nobody answers
+        after = rig.status()
+        checks.check("power stage off?" in unasked.stdout and unasked.returncode == 1 and not_moved(before, after) and r.state_of(after) == "idle",
+                     "by command, too; without a permission nothing moves", unasked.stdout + unasked.stderr)
+        t = Terminal(rig)
+        for question, answer in (("power stage off?", "yes"), ("count in", "yes"), ("or free", ""), ("hold where it is", "h"),
+                                 ("present readings", "y"), ("OUTER", "y"), ("Which gimbal turned?", "outer"), ("INNER", "no")):
+            checks.check(t.until(question, 120) and t.until("> "), f"of a real rig it asks: {question}", t.text + rig.logs())
+            t.type(answer)
+        checks.check(t.until("UNFINISHED") and t.end() == 1, "a no ends it", t.text)
+        stands = after_slews(rig)
+        outer = [readings(s)["outer"] for s in (before, stands)]
+        checks.check(abs(remainder(outer[1] - outer[0])) < 0.1 and not_moved(stands, rig.status()), "the gimbal is back where it was", outer)
         stated = rig.tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes")
         checks.check(stated.returncode == 2 and "--yes: persons answer on a real rig" in stated.stderr, "nor states", stated.stderr)
     finally:

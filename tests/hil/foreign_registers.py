@@ -15,6 +15,7 @@ import tempfile
 import threading
 
 from pymodbus.datastore import ModbusSequentialDataBlock, ModbusServerContext, ModbusSlaveContext
+from pymodbus.device import ModbusDeviceIdentification
 from pymodbus.server.async_io import ModbusSerialServer, ModbusTcpServer
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -46,13 +47,15 @@ class Controller:
         slave = ModbusSlaveContext(hr=self.holding, ir=self.inputs, co=self.coils, zero_mode=True)
         context = ModbusServerContext(slaves={1: slave}, single=False)
 
+        identity = None if line else ModbusDeviceIdentification(info_name={"VendorName": "ACME", "ProductCode": "VC-3", "MajorMinorRevision": "2.11"})
+
         async def serve():
             if line:
                 self.where, device = pymodbus_shaker.line()
-                server = ModbusSerialServer(context, port=device, baudrate=115200)
+                server = ModbusSerialServer(context, port=device, baudrate=115200, identity=identity)
                 await server.start()
             else:
-                server = ModbusTcpServer(context, address=("127.0.0.1", 0), allow_reuse_address=True)
+                server = ModbusTcpServer(context, address=("127.0.0.1", 0), allow_reuse_address=True, identity=identity)
                 task = asyncio.ensure_future(server.serve_forever())
                 await server.serving
                 self.where = f"127.0.0.1:{server.server.sockets[0].getsockname()[1]}"
@@ -82,7 +85,7 @@ class Person:
 
     def __init__(self, program, where, line):
         link = ["--device", where, "--baud", "115200"] if line else ["--tcp", where]
-        self.tool = subprocess.Popen([program, "commission", "registers", "--by", "Ada", "--json", "--holding", "200", *link], stdin=subprocess.PIPE,
+        self.tool = subprocess.Popen([program, "commission", "registers", "--by", "Ada", "--plate", "a plate", "--json", "--holding", "200", *link], stdin=subprocess.PIPE,
                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=r.die_with_parent)
         self.text = ""
 
@@ -118,6 +121,8 @@ def found_by_reading(checks, programs, line):
             person.type(shown)
         code, found, text = person.end()
         checks.check('found "fifteen", expected a positive number' in text and "another than before" in text, f"{name}: what is no value is asked again", text)
+        if not line:
+            checks.check(all(word in found.get("device", "") for word in ("ACME", "VC-3", "2.11")), "the device says who it is", found)
         places = found.get("places", {})
         own = [f'frequency = {{ address = {at}, type = "f32", word_order = "little", table = "holding", scale = 1 }}'
                for at in ((FREQUENCY, ACTUAL) if same else (FREQUENCY,))]

@@ -2,10 +2,11 @@
 """Resident memory of vibrigd within one campaign of many dwells, each as long as real ones, recorded, its status asked for
 all the while, on the seqpacket bus and the rig's clock.
 
-usage: memory_campaign.py PROGRAMS [--dwells N] [--dwell-s S] [--soak]
+usage: memory_campaign.py PROGRAMS [--dwells N] [--dwell-s S]
 """
 import argparse
 import os
+import statistics
 import sys
 import tempfile
 import time
@@ -14,8 +15,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
 LIMIT_KB_PER_H = 100   # of the rig's time
-WARM_SHARE = 0.2       # of the dwells, until caches and buffers have their size
-TOGETHER_SHARE = 0.2   # of which the least is taken: what a verdict or an answer has while it is made is not kept
+WARM = 140             # dwells until caches have their size; of the newest 128 more is kept than of those before
+TOGETHER = 70          # dwells of which the least is taken: what a verdict or an answer has while it is made is not kept
 
 
 def resident_kb(rig):
@@ -23,18 +24,21 @@ def resident_kb(rig):
         return next(int(line.split()[1]) for line in file if line.startswith("VmRSS"))
 
 
-def least(looks):
-    return min(looks, key=lambda look: look[2])
+def growth_kb_per_h(looks):
+    """Slope of the least of each so many dwells: what the system gives comes in pieces, of which two alone would not do."""
+    least = {}
+    for dwells, hours, kilobytes in looks:
+        group = dwells // TOGETHER
+        least[group] = min(least.get(group, (kilobytes, hours)), (kilobytes, hours))
+    return statistics.linear_regression([hours for _, hours in least.values()], [kb for kb, _ in least.values()]).slope
 
 
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("programs")
-    options.add_argument("--dwells", type=int)
+    options.add_argument("--dwells", type=int, default=420)
     options.add_argument("--dwell-s", type=float, default=100.0)
-    options.add_argument("--soak", action="store_true", help="420 dwells, 13 h of the rig")
     given = options.parse_args()
-    given.dwells = given.dwells or (420 if given.soak else 240)
     checks = r.Checks()
     campaign = {"name": "many", "identify": "what-it-can", "positions_deg": [[0, 0, 0], [0, 0, 2]] * (given.dwells // 4),
                 "table_g": [9.0, 7.0], "dwell_s": given.dwell_s, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
@@ -58,14 +62,11 @@ def main():
             checks.equal(r.state_of(status), "finished", f"a campaign of {given.dwells} dwells finishes {''.join(said)}")
         finally:
             rig.stop()
-    warm = [look for look in looks if look[0] >= WARM_SHARE * given.dwells]
-    together = TOGETHER_SHARE * given.dwells
+    warm = [look for look in looks if look[0] >= WARM]
     if checks.check(len(warm) >= 20, "it was looked at meanwhile", looks):
-        first, begin_h, before = least(look for look in warm if look[0] <= warm[0][0] + together)
-        last, end_h, after = least(look for look in warm if look[0] >= warm[-1][0] - together)
-        growth = (after - before) / (end_h - begin_h)
-        checks.note(f"{before} kB after {first} dwells and {begin_h:.1f} h, {after} kB after {last} and {end_h:.1f} h: "
-                    f"{growth:.0f} kB per hour of the rig")
+        growth = growth_kb_per_h(warm)
+        checks.note(f"{warm[0][2]} kB after {warm[0][0]} dwells and {warm[0][1]:.1f} h, {warm[-1][2]} kB after {warm[-1][0]} and "
+                    f"{warm[-1][1]:.1f} h: {growth:.0f} kB per hour of the rig")
         checks.check(growth <= LIMIT_KB_PER_H, f"resident memory grows by {LIMIT_KB_PER_H} kB per hour at most",
                      f"{growth:.0f}: {looks[::8]}")
     return checks.end()

@@ -23,10 +23,12 @@
 #include <thread>
 
 #include "daemon/commission/acceptance.hpp"
+#include "daemon/commission/shaker_parts.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/journal/latches.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/answers.hpp"
+#include "daemon/tool/live/commission_client.hpp"
 #include "daemon/tool/live/key_by_key.hpp"
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
@@ -37,25 +39,20 @@ namespace vibrig::tool {
 
 namespace {
 
-using CommissionJson = nlohmann::ordered_json;
-
 constexpr const char* kCommission = "vibrig commission: ";
 constexpr auto kCommissionPoll = std::chrono::milliseconds(250);
 constexpr std::size_t kColumns = 79;
 
 struct CommissionOptions {
     serve::Address at;
-    std::string by, second, answers, configuration, ask;
+    std::string by, second, answers, configuration, ask, display;
+    double reference_g = 0;
     std::vector<std::string> parts;
     bool json = false, by_hand = false, yes = false, resume = false;
 };
 
-class CommissionRefused : public std::runtime_error {
-  public:
-    using std::runtime_error::runtime_error;
-};
+}  // namespace
 
-/// Throws CommissionRefused when the daemon says no, ClientError when it cannot be asked.
 std::string commission_command(serve::Client& client, const std::string& by,
                                const CommissionJson& what) {
     v1::Command command;
@@ -84,7 +81,6 @@ CommissionJson commission_state(serve::Client& client, const std::string& by, st
         commission_command(client, by, {{"do", "read"}, {"after", after}}));
 }
 
-/// At blanks, to fit into 80 columns; what follows is indented.
 void print_wrapped(std::ostream& out, const std::string& line) {
     std::string rest = line;
     const std::string indent = "   ";
@@ -96,6 +92,8 @@ void print_wrapped(std::ostream& out, const std::string& line) {
     }
     out << rest << std::endl;
 }
+
+namespace {
 
 class Dialogue {
   public:
@@ -291,7 +289,6 @@ int show_commission(const CommissionOptions& options) {
         print_wrapped(std::cout, text);
     }
     if (!options.json) {
-        std::cout << "The shaker is the safe-state proof's: vibrig selftest --by NAME\n";
         if (const std::string trouble = record["trouble"]; !trouble.empty())
             print_wrapped(std::cout, trouble);
         if (record["simulated"] == true)
@@ -436,18 +433,26 @@ int state_gyros(const CommissionOptions& options) {
 
 int commission(const CommissionOptions& options) {
     constexpr std::array<std::string_view, 4> kShaker{"watchdog", "stop", "units", "excitation"};
+    const auto of_shaker = [&kShaker](const std::string& part) {
+        return std::ranges::find(kShaker, part) != kShaker.end();
+    };
+    const auto shaker = std::ranges::count_if(options.parts, of_shaker);
+    if (shaker > 0 && shaker == std::ssize(options.parts))
+        return commission_shaker({options.at, options.by, options.parts, options.display,
+                                  options.reference_g, options.json, options.yes});
     constexpr std::array<std::string_view, 4> kMeasured{"bus", "gimbals", "accelerometers",
                                                         "earth"};
     bool gyros = false;
     for (const auto& part : options.parts) {
-        if (std::ranges::find(kShaker, part) != kShaker.end())
+        if (of_shaker(part))
             throw std::runtime_error(part +
-                                     ": not commissioned by this version; arming demands the "
-                                     "safe-state proof: vibrig selftest --by NAME");
+                                     ": found parts of the platform beside it, expected it "
+                                     "after them");
         gyros = gyros || part == "gyros";
         if (part != "gyros" && std::ranges::find(kMeasured, part) == kMeasured.end())
             throw std::runtime_error("found \"" + part +
-                                     "\", expected bus, gimbals, accelerometers, earth or gyros");
+                                     "\", expected bus, gimbals, accelerometers, earth, gyros, "
+                                     "watchdog, stop, units or excitation");
     }
     if (gyros && options.parts.size() > 1)
         throw std::runtime_error("gyros: found other parts beside it, expected it alone");
@@ -490,23 +495,23 @@ void add_persons(CLI::App& command, CommissionOptions& options) {
 void add_commission(CLI::App& app, int& exit_code) {
     CLI::App& commissioning = *app.add_subcommand(
         "commission",
-        "Find out how a rig is wired, by moving its gimbals one by one, and record it. A rig that "
-        "is not simulated is moved by hand only (--by-hand)");
+        "Find out how a rig is wired, by moving its gimbals one by one, and record it. By command "
+        "where its angles are in degrees, else by hand (--by-hand)");
     auto options = std::make_shared<CommissionOptions>();
     options->at.socket = default_socket();
     commissioning
         .add_option(
             "parts", options->parts,
             "gimbals accelerometers earth and the bus: measured together; gyros: stated by two "
-            "persons. Without: all that is measured")
+            "persons; then watchdog stop units excitation: the shaker's, by proofs of the safe "
+            "state at a small level. Without: all of the first")
         ->expected(0, 5);
     commissioning.add_option("--socket", options->at.socket, "Unix socket of the daemon")
         ->capture_default_str();
     commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record");
     commissioning.add_option("--second", options->second, "Another person, for gyros");
     commissioning.add_flag("--by-hand", options->by_hand,
-                           "Nothing is commanded: a person turns the gimbals. The only way with "
-                           "a rig that is not simulated");
+                           "Nothing is commanded: a person turns the gimbals");
     commissioning.add_flag("--resume", options->resume,
                            "Go on where the daemon ended, by a new permission; where there is "
                            "nothing to go on with it begins anew");
@@ -515,13 +520,26 @@ void add_commission(CLI::App& app, int& exit_code) {
                     "Ask once more what was answered, or was not: latitude, compass, drawing or "
                     "sense; nothing else is measured again")
         ->check(CLI::IsMember({"latitude", "compass", "drawing", "sense"}));
-    commissioning.add_flag("--yes", options->yes, "gyros: do not ask; simulated rigs only");
+    commissioning.add_flag("--yes", options->yes,
+                           "gyros and the shaker's parts: do not ask; simulated rigs only");
+    auto* const display =
+        commissioning
+            .add_option("--display", options->display,
+                        "units: the unit of amplitude that the controller's display shows")
+            ->check(CLI::IsMember(commission::amplitude_units()));
+    auto* const reference =
+        commissioning
+            .add_option("--reference", options->reference_g,
+                        "units: peak g at the table by a reference, at the level of the proof")
+            ->check(CLI::PositiveNumber);
+    display->needs(reference);
+    reference->needs(display);
     commissioning.add_flag("--json", options->json,
                            "The finding as JSON; the dialogue goes to standard error");
     commissioning.add_option("--answers", options->answers,
                              "JSON file, question to answer; simulated rigs only");
     commissioning.footer(
-        "Example: vibrig commission --by-hand --by 'Ada Lovelace'\n"
+        "Example: vibrig commission --by 'Ada Lovelace'\n"
         "Exit code 0: decided; 1: undecided, refused or unfinished. A rig is commissioned at the\n"
         "local socket only.");
 

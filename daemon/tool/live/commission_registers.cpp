@@ -28,7 +28,7 @@ namespace {
 using RegisterJson = nlohmann::ordered_json;
 
 struct RegisterOptions {
-    std::string by, tcp, device;
+    std::string by, tcp, device, plate;
     int baud = 19200, unit = 1, holding = 128, input = 32;
     bool json = false;
 };
@@ -70,6 +70,19 @@ class ReadingLink {
         std::string why;
         if (link_.connect(why) != drivers::ModbusLink::Connection::open)
             throw std::runtime_error(link_.name() + ": " + why);
+    }
+
+    /// By function 17; empty: it does not say.
+    std::string device() {
+        std::string text, why;
+        std::this_thread::sleep_for(kBetweenRequests);
+        const auto reply = link_.identify(text);
+        if (reply.ok()) return text;
+        if (reply.kind == drivers::ReplyKind::exception) return {};
+        link_.close();  // a late reply would be taken for the next one
+        if (link_.connect(why) != drivers::ModbusLink::Connection::open)
+            throw std::runtime_error(link_.name() + ": " + why);
+        return {};
     }
 
     /// Up to the first one that the device refuses.
@@ -139,6 +152,10 @@ std::optional<std::vector<proto::Register>> places_by_values(ReadingLink& link,
 int find_registers(const RegisterOptions& options) {
     std::ostream& out = options.json ? std::cerr : std::cout;
     ReadingLink link(options);
+    std::string device = link.device();
+    if (device.empty()) device = options.plate;
+    out << "Device: "
+        << (device.empty() ? "does not say who it is; --plate names it" : device.c_str()) << '\n';
     out << "Read-only: " << link.name() << ", " << options.holding << " holding and "
         << options.input << " input registers. The shaker's power stage is off.\n";
     RegisterJson all = RegisterJson::object();
@@ -156,7 +173,11 @@ int find_registers(const RegisterOptions& options) {
     }
     const char* outcome = all.empty() ? "unfinished" : one_each ? "decided" : "undecided";
     if (options.json)
-        std::cout << RegisterJson{{"outcome", outcome}, {"by", options.by}, {"places", all}}.dump(1)
+        std::cout << RegisterJson{{"outcome", outcome},
+                                  {"by", options.by},
+                                  {"device", device},
+                                  {"places", all}}
+                         .dump(1)
                   << '\n';
     if (!all.empty() && one_each) {
         out << "DECIDED. The other registers are the manual's; nothing is recorded: what they do\n"
@@ -180,6 +201,9 @@ void add_commission_registers(CLI::App& commissioning, int& exit_code) {
     command.add_option("--by", options->by, "Who stands at the panel")->required();
     command.add_option("--tcp", options->tcp, "Modbus TCP, HOST or HOST:PORT (502)");
     command.add_option("--device", options->device, "Modbus RTU, serial device (8E1)");
+    command.add_option("--plate", options->plate,
+                       "Maker, type and firmware on its plate, of a device that does not say them "
+                       "by function 17");
     command.add_option("--baud", options->baud, "Of the serial device")->capture_default_str();
     command.add_option("--unit", options->unit, "Modbus unit")
         ->capture_default_str()

@@ -102,25 +102,25 @@ std::string mark_of(bool passed) {
     return passed ? colour::good("  ok    ") : colour::bad("  NOT   ");
 }
 
-void show_rows(const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& rows) {
+void show_rows(std::ostream& out,
+               const google::protobuf::RepeatedPtrField<v1::LoopCheck::Row>& rows) {
     for (const auto& row : rows) {
-        std::cout << mark_of(row.passed()) << row.name() << ": " << row.value()
-                  << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low()
-                  << " to " << row.high() << '\n';
+        out << mark_of(row.passed()) << row.name() << ": " << row.value()
+            << (row.unit().empty() ? "" : " ") << row.unit() << ", band " << row.low() << " to "
+            << row.high() << '\n';
     }
 }
 
 /// The proof's entry in the journal, once it is on disk. `before`: that of the proof that there
 /// was.
-void show_signed_record(serve::Client& client, const std::string& before) {
+void show_signed_record(std::ostream& out, serve::Client& client, const std::string& before) {
     constexpr auto kLook = std::chrono::milliseconds(100);
     constexpr int kLongestLine = 1000;
     for (int looks = 0; looks < 30; ++looks) {
         const auto journal = ask_status(client).journal();
         if (journal.path().empty()) return;
         if (!journal.proof_head().empty() && journal.proof_head() != before) {
-            std::cout << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine)
-                      << '\n';
+            out << "signed record: " << serve::clipped(journal.proof_head(), kLongestLine) << '\n';
             return;
         }
         std::this_thread::sleep_for(kLook);
@@ -128,7 +128,8 @@ void show_signed_record(serve::Client& client, const std::string& before) {
 }
 
 /// Waits for the end of loop check and safe-state proof; their rows. `then`: the status before.
-void show_loop_check(serve::Client& client, const v1::Status& then) {
+/// Returns the proof.
+v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::Status& then) {
     const std::int64_t before = then.proof().utc_ns();
     constexpr auto kLook = std::chrono::milliseconds(300);
     constexpr int kLooks = 100;  // after the check, for the proof's last rows
@@ -140,14 +141,16 @@ void show_loop_check(serve::Client& client, const v1::Status& then) {
         status = ask_status(client);
         if (status.proof().asks() != asked) {
             asked = status.proof().asks();
-            if (!asked.empty()) std::cout << ">>> " << asked << std::endl;
+            if (!asked.empty()) out << ">>> " << asked << std::endl;
         }
         if (status.loop_check().verdict() != "running" && asked.empty()) ++looks;
     } while (looks == 0 || (status.proof().utc_ns() == before && looks < kLooks));
-    show_rows(status.loop_check().rows());
-    show_rows(status.proof().rows());
-    if (!status.proof().passed()) std::cout << "not proved: " << status.proof().message() << '\n';
-    if (status.proof().utc_ns() != before) show_signed_record(client, then.journal().proof_head());
+    show_rows(out, status.loop_check().rows());
+    show_rows(out, status.proof().rows());
+    if (!status.proof().passed()) out << "not proved: " << status.proof().message() << '\n';
+    if (status.proof().utc_ns() != before)
+        show_signed_record(out, client, then.journal().proof_head());
+    return status.proof();
 }
 
 /// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
@@ -172,7 +175,7 @@ int self_test(const TestOptions& options) {
             std::cerr << kWho << problem_of(begun) << '\n';
             return is_no(begun.status) ? kNo : kBadInput;
         }
-        show_loop_check(client, before);
+        static_cast<void>(show_loop_check(std::cout, client, before));
     }
     const serve::Reply reply = client.get("/api/v1/selftest");
     v1::Readiness found;
@@ -377,6 +380,27 @@ void add_remote(CLI::App& app, int& exit_code) {
     add_command(app, exit_code, v1::Command::abort, "abort",
                 "Stop the shaker and end the campaign");
     add_command(app, exit_code, v1::Command::acknowledge, "ack", "Acknowledge a trip or an alarm");
+}
+
+std::string refusal_of(serve::Client& client, const v1::Command& command) {
+    const serve::Reply reply = client.post("/api/v1/commands", json_of(command));
+    if (reply.status != 200) return problem_of(reply);
+    if (command.kind() == v1::Command::acknowledge) wait_for_shaker(client);
+    return {};
+}
+
+std::string prove_safe_state(serve::Client& client, const std::string& by,
+                             const std::string& argument, std::ostream& out) {
+    v1::Command command;
+    command.set_kind(v1::Command::selftest);
+    command.set_by(by);
+    command.set_argument(argument);
+    wait_for_rest(client);
+    const auto before = ask_status(client);
+    if (auto why = refusal_of(client, command); !why.empty()) return why;
+    const auto proof = show_loop_check(out, client, before);
+    if (proof.utc_ns() == before.proof().utc_ns()) return "no proof was made";
+    return proof.passed() ? "" : proof.message();
 }
 
 }  // namespace vibrig::tool

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <iosfwd>
 #include <string>
 
 #include "daemon/results/exit_status.hpp"
@@ -21,6 +22,14 @@ void add_socket(CLI::App& command, serve::Address& at);
 /// Parses an answer; throws serve::ClientError with the daemon's own words when it is a problem.
 void parse_answer(const serve::Reply& reply, google::protobuf::Message& message);
 [[nodiscard]] v1::Status ask_status(serve::Client& client);
+
+/// Why the daemon does not take it; empty: it has. After an acknowledgement the controller has
+/// forgotten its fault.
+[[nodiscard]] std::string refusal_of(serve::Client& client, const v1::Command& command);
+/// Loop check and safe-state proof, with what they find to `out`; `argument` as the selftest's.
+/// Why it has not passed; empty: it has.
+[[nodiscard]] std::string prove_safe_state(serve::Client& client, const std::string& by,
+                                           const std::string& argument, std::ostream& out);
 
 struct WatchOptions {
     serve::Address at;

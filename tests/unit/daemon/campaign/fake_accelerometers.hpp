@@ -18,6 +18,7 @@ struct FakeAccelerometers {
     std::optional<double> platform_g;  ///< where it does not follow the table
     bool silent = false;
     bool table_good = true;
+    bool table_bound = true;
 
     void run_to(drivers::Time now, double controller_g) {
         fed = std::max(fed, now - drivers::kSecond);
@@ -34,6 +35,9 @@ struct FakeAccelerometers {
             if (!table_good)
                 sample.quality[static_cast<std::size_t>(drivers::Channel::table_accel)] =
                     drivers::Quality::flagged;
+            if (!table_bound)
+                sample.quality[static_cast<std::size_t>(drivers::Channel::table_accel)] =
+                    drivers::Quality::unbound;
             monitor.add(sample);
         }
     }

@@ -150,6 +150,34 @@ TEST_F(StopMonitorTest, NorDoAccelerometersThatAreSilent) {
               std::string::npos);
 }
 
+TEST_F(StopMonitorTest, AWitnessThatIsDoubtedConfirmsNothingAlone) {
+    // GIVEN a rig without an accelerometer on the table, the platform's stuck while it shakes, and
+    // a controller that says that it has stopped
+    accelerometers.table_bound = false;
+    shake(5);
+    accelerometers.platform_g = 0;
+    accelerometers.monitor.doubt(drivers::Channel::accel_y);
+    shaker.stop_now();
+    auto news = News::none;
+    // THEN that is no rest, and said when the platform's time is over
+    const double took_s = run(30, &news);
+    EXPECT_EQ(news, News::disobeyed);
+    EXPECT_NEAR(took_s, monitor.longest_s(5), 0.15);
+    EXPECT_NE(monitor.what_moves(now).find("accelerometer on the platform is doubted"),
+              std::string::npos)
+        << monitor.what_moves(now);
+}
+
+TEST_F(StopMonitorTest, BesideATableThatIsSeenToRestADoubtedPlatformIsNoDisobedience) {
+    shake(5);
+    accelerometers.platform_g = 0;
+    accelerometers.monitor.doubt(drivers::Channel::accel_y);
+    shaker.stop_now();
+    auto news = News::none;
+    EXPECT_LE(run(30, &news), 0.8);
+    EXPECT_EQ(news, News::confirmed);
+}
+
 TEST_F(StopMonitorTest, ARigThatIsSwitchedOffIsNoAlarmAtTheStart) {
     // GIVEN a rig that nothing has excited in this life, and that tells nothing
     accelerometers.silent = true;

@@ -14,7 +14,7 @@ class Moved : public Commissioned {
     /// Into the sweeps: a gimbal moves, for seconds.
     void into_a_sweep() {
         rig_of(1);
-        EXPECT_EQ(procedure->begin("Ada", false, now), "");
+        procedure->begin("Ada", false, now);
         run_until([this] {
             return most_travel[0] > 40 && procedure->state(0)["moving"] == true &&
                    arrives > now + kSecond;
@@ -100,17 +100,20 @@ TEST_F(Moved, AChannelThatFallsSilentStopsAMove) {
     EXPECT_EQ(run()["result"]["outcome"], "decided");
 }
 
-TEST_F(Moved, ARealRigIsNotMovedByCommand) {
-    rig_of(1);
-    procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
-                                            Stated{0, 2, false}, ports());
-    EXPECT_EQ(procedure->begin("Ada", false, now),
-              "this version moves no gimbal of a real rig by command: vibrig commission --by-hand");
-    EXPECT_FALSE(procedure->active());
-    pass(10);
-    EXPECT_EQ(slews + released, 0);
-    EXPECT_EQ(procedure->begin("Ada", true, now), "");
-    EXPECT_TRUE(procedure->active());
+TEST_F(Moved, ARealRigIsMovedByCommandWhereAPersonSaysThatItCountsInDegrees) {
+    for (const char* said : {"no", "yes"}) {
+        rig_of(1);
+        procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
+                                                Stated{0, 2, false}, ports());
+        procedure->begin("Ada", false, now);
+        pass(1);
+        EXPECT_EQ(procedure->answer("Ada", "power", "yes"), "");
+        ASSERT_EQ(question(), "degrees");
+        EXPECT_EQ(procedure->answer("Ada", "degrees", said), "");
+        EXPECT_EQ(procedure->active(), std::string(said) == "yes");
+        EXPECT_EQ(slews + released, 0);
+    }
+    EXPECT_EQ(question(), "travel");
 }
 
 TEST_F(Moved, SomebodyElseAtAnotherToolIsNobodyHere) {
@@ -128,7 +131,7 @@ TEST_F(Moved, SomebodyElseAtAnotherToolIsNobodyHere) {
 
 TEST_F(Moved, AnAnswerIsKeptWithWhoGaveIt) {
     rig_of(1);
-    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    procedure->begin("Ada", false, now);
     EXPECT_EQ(procedure->answer("Ada (uid 0)", "power", "yes"), "");
     ASSERT_FALSE(events.empty());
     EXPECT_EQ(events.back(),
@@ -146,7 +149,7 @@ TEST_F(Moved, WhoIsGoneStopsAMeanToo) {
 TEST_F(Moved, NothingIsReleasedThatWasNeverCommanded) {
     rig_of(1);
     answers["stop"] = "release";
-    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    procedure->begin("Ada", false, now);
     run_until([] { return true; });  // the first look
     procedure->stop("by Ada", now);
     EXPECT_EQ(released, 0);
@@ -169,7 +172,7 @@ TEST_F(Moved, AStopThatReleasesDoesSoWhereAllStandAndGoesBackBeforeItMeasures) {
 TEST_F(Moved, WhatWasPushedMeanwhileDoesNotGoTheLongWayRound) {
     answers["stop"] = "release";
     rig_of(1);
-    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    procedure->begin("Ada", false, now);
     run_until([this] { return most_travel[2] > 110 && procedure->state(0)["moving"] == false; });
     procedure->stop("by Ada", now);
     ASSERT_EQ(released, 1);
@@ -183,7 +186,7 @@ TEST_F(Moved, WhatWasPushedMeanwhileDoesNotGoTheLongWayRound) {
 
 TEST_F(Moved, AStopInAFreeDriftBeginsTheDriftAnew) {
     rig_of(1);
-    EXPECT_EQ(procedure->begin("Ada", false, now), "");
+    procedure->begin("Ada", false, now);
     run_until([this] { return released == 2 && procedure->state(0)["moving"] == false; });
     pass(10);
     const int before = slews;

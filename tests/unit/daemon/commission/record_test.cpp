@@ -48,8 +48,8 @@ class Books : public ::testing::Test {
 TEST_F(Books, WithoutARecordNothingIsArmedAndTheCommandIsNamed) {
     const auto as = loaded();
     EXPECT_EQ(Book(as).refusal(kNow),
-              "not commissioned: no record of bus, gimbals, accelerometers, earth, gyros: vibrig "
-              "commission");
+              "not commissioned: no record of bus, gimbals, accelerometers, earth, gyros, "
+              "registers, watchdog, stop, units, excitation: vibrig commission");
 }
 
 TEST_F(Books, WhatIsProvenIsArmed) {
@@ -89,6 +89,36 @@ TEST_F(Books, EachKeyOfTheTableVoidsItsPart) {
         const auto as = loaded(text + "\n");
         EXPECT_THAT(Book(as).refusal(kNow), HasSubstr(key + " is "));
     }
+}
+
+TEST_F(Books, AKeyOfTheShakerVoidsItsPartsAndNoneOfThePlatform) {
+    const auto proven = loaded();
+    prove_all(proven);
+    const auto void_parts = [](const configuration::Loaded& as) {
+        std::string names;
+        for (const auto& s : Book(as).standing(kNow))
+            if (!s.proven) names += std::string(name_of(s.part)) + " ";
+        return names;
+    };
+    EXPECT_EQ(void_parts(loaded("[shaker.registers]\namplitude = { address = 90 }\n")),
+              "registers watchdog stop units excitation ");
+    EXPECT_EQ(void_parts(loaded("[shaker.limits]\ndisplacement_mm = 9\n")), "excitation ");
+    EXPECT_EQ(void_parts(loaded("[vibration]\ntransmission = 0.7\n")), "excitation ");
+    const auto other = "[commission]\nenforce = true\nsimulated = true\nfolder = \"" +
+                       folder.string() + "\"\nbuttons = [\"rack\"]\n";
+    EXPECT_EQ(void_parts(configuration::parse(other, "/rig.toml", false)), "stop ");
+}
+
+TEST_F(Books, OfTheShakerOnePersonIsEnoughWhoHasArmedIt) {
+    const auto as = loaded();
+    PartRecord what;
+    what.by = {"A. Person"};
+    what.utc_ns = kNow;
+    Book book(as);
+    book.prove({kShakerParts.begin(), kShakerParts.end()}, what, as);
+    EXPECT_THAT(book.refusal(kNow), HasSubstr("no record of bus, gimbals, accelerometers, earth, "
+                                              "gyros: vibrig commission"));
+    EXPECT_EQ(book.not_proven_below_shaker(kNow), "bus first: no record");
 }
 
 TEST_F(Books, AZeroThatWasFoundAnewIsToldOnly) {

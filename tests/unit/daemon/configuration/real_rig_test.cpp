@@ -183,7 +183,6 @@ TEST(Zeroing, TakesASecondAxisWhereZCannotBeDown) {
     EXPECT_TRUE(of("gimbal.travel_deg = [[-80, 95], [-65, 65], [-180, 180]]"));
     EXPECT_FALSE(of("gimbal.travel_deg = [[-80, 95], [-55, 65], [-180, 180]]"));
     EXPECT_FALSE(of("gimbal.travel_deg = [[-80, 95], [-65, 65], [-175, 175]]"));
-    EXPECT_FALSE(of("gimbal.travel_deg = [[5, 95], [-65, 65], [-180, 180]]"));
     // AND as the encoders count
     EXPECT_TRUE(
         of("gimbal.travel_deg = [[-60, 115], [-65, 65], [-180, 180]]\n"

@@ -1,0 +1,102 @@
+// The shaker's parts of the commissioning record: proofs of the safe state, made by the daemon,
+// with each button of the emergency stop pressed once.
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <iostream>
+
+#include "daemon/tool/live/commission_client.hpp"
+#include "daemon/tool/live/remote.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+bool person_agrees(const ShakerCommission& options, std::ostream& out, const std::string& asked) {
+    print_wrapped(out, "? " + asked + " [yes or no]");
+    if (options.yes) return true;
+    for (std::string line; out << "> " << std::flush, std::getline(std::cin, line);) {
+        if (line == "yes" || line == "y") return true;
+        if (line == "no" || line == "n") return false;
+        print_wrapped(out, "  found \"" + line + "\", expected yes or no");
+    }
+    throw CommissionRefused("nobody answers: ended");
+}
+
+/// The trip of a button that was pressed on purpose.
+void acknowledge_press(serve::Client& client, const ShakerCommission& options, std::ostream& out,
+                       const std::string& button) {
+    if (!person_agrees(
+            options, out,
+            "The trip of \"" + button + "\" is latched. Acknowledge it, " + options.by + "?"))
+        throw CommissionRefused("not acknowledged: vibrig ack --by NAME, then go on");
+    v1::Command command;
+    command.set_kind(v1::Command::acknowledge);
+    command.set_by(options.by);
+    if (const auto why = refusal_of(client, command); !why.empty())
+        throw CommissionRefused(why + ": the buttons pressed so far are kept, go on after it");
+}
+
+/// Empty: it has passed.
+std::string prove_all_buttons(serve::Client& client, const ShakerCommission& options,
+                              const CommissionJson& left, std::ostream& out) {
+    const bool press = std::ranges::find(options.parts, "stop") != options.parts.end();
+    if (!press || left.empty()) return prove_safe_state(client, options.by, "", out);
+    for (const std::string button : left) {
+        if (!person_agrees(options, out,
+                           "The table will shake a little. Stand at the button \"" + button +
+                               "\" and press it when asked. Ready?"))
+            throw CommissionRefused("the button \"" + button + "\" was not pressed");
+        if (auto why = prove_safe_state(client, options.by, "emergency_stop " + button, out);
+            !why.empty())
+            return why;
+        acknowledge_press(client, options, out, button);
+    }
+    return {};
+}
+
+}  // namespace
+
+int commission_shaker(const ShakerCommission& options) {
+    std::ostream& out = options.json ? std::cerr : std::cout;
+    serve::Client client(options.at);
+    auto state = commission_state(client, options.by, 0);
+    if (options.yes && state["simulated"] != true)
+        throw std::runtime_error("--yes: persons answer on a real rig");
+    if (state["record"]["demanded"] != true)
+        throw CommissionRefused("this rig is armed without a record: nothing is kept of it");
+    std::string why;
+    if (!options.display.empty())
+        print_wrapped(out, commission_command(client, options.by,
+                                              {{"do", "state"},
+                                               {"part", "units"},
+                                               {"display", options.display},
+                                               {"reference_g", options.reference_g}}));
+    else
+        why = prove_all_buttons(client, options, state["record"]["buttons_left"], out);
+    state = CommissionJson::parse(
+        commission_command(client, options.by, {{"do", "read"}, {"shaker", true}}));
+    const auto& parts = state["record"]["parts"];
+    const auto& lacking = state["record"]["lacking"];
+    bool all = why.empty();
+    for (const auto& part : options.parts) {
+        const bool proven = parts[part]["proven"];
+        all = all && proven;
+        print_wrapped(
+            out, part + (proven ? ": proven"
+                                : " NOT: " +
+                                      lacking.value(part, parts[part]["why"].get<std::string>())));
+    }
+    if (!why.empty()) print_wrapped(out, "REFUSED: " + why);
+    const char* outcome = !why.empty() ? "refused" : all ? "decided" : "undecided";
+    if (options.json)
+        std::cout << CommissionJson{{"outcome", outcome},
+                                    {"why", why},
+                                    {"simulated", state["simulated"]},
+                                    {"parts", parts}}
+                         .dump(1)
+                  << '\n';
+    return all ? 0 : kNo;
+}
+
+}  // namespace vibrig::tool
