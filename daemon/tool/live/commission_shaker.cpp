@@ -65,6 +65,10 @@ int commission_shaker(const ShakerCommission& options) {
         throw std::runtime_error("--yes: persons answer on a real rig");
     if (state["record"]["demanded"] != true)
         throw CommissionRefused("this rig is armed without a record: nothing is kept of it");
+    for (const char* below : {"bus", "gimbals", "accelerometers", "earth", "gyros"})
+        if (const auto& part = state["record"]["parts"][below]; part["proven"] != true)
+            throw CommissionRefused(std::string("the platform's parts first: ") + below + ": " +
+                                    part["why"].get<std::string>());
     std::string why;
     if (!options.display.empty())
         print_wrapped(out, commission_command(client, options.by,
