@@ -148,7 +148,8 @@ TEST(ByChance, HarmonicsThatAliasAndNoiseThatIsWrongAreDoubtful) {
 TEST(ByChance, SoakOfHarmonicsThatAliasAndNoiseThatIsWrong) {
     for (const double frequency_hz : {40.0 / 3, 10.0}) {
         const Chance c = aliased(20, frequency_hz);
-        expect_by_chance(frequency_hz > 11 ? "f = fs/3" : "f = fs/4", c, "D", 1.2);
+        // Where the levels scatter by 5 % u may be more than five times what the noise explains.
+        expect_by_chance(frequency_hz > 11 ? "f = fs/3" : "f = fs/4", c, "DN", 1.2);
         EXPECT_EQ(c.told, 20);
     }
     const Chance gyro = noisier(20, 2, 1);
