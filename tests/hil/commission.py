@@ -171,7 +171,7 @@ def whole(checks, programs, folder, seed):
         checks.check(early.returncode == 1 and "restart vibrigd first" in early.stderr, "what the daemon has not read is not recorded", early.stderr)
         u.restart()
         gyros = tool("arm", "--by", "Ada")
-        checks.check("no record of gyros: vibrig commission gyros" in gyros.stderr, "what nothing measures is asked for", gyros.stderr)
+        checks.check("no record of gyros, registers, watchdog, stop, units, excitation: vibrig commission gyros" in gyros.stderr, "what nothing measures is asked for", gyros.stderr)
         for typed, code, word in (("1\ndrawing 7\n2\ncertificate\nyes\n", 1, "they differ"), ("2\nd\n2\nd\nyes\n", 1, "expected 1 as both say"),
                                   ("7\n1\n\ndrawing 7\n1\ncertificate\nyes\n", 0, "gyros recorded by Ada")):
             said = subprocess.run([u.rig.program("vibrig"), "commission", "gyros", "--by", "Ada", "--second", "Bo", "--socket", u.rig.socket],

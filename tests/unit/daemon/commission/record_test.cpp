@@ -102,7 +102,7 @@ TEST_F(Books, AKeyOfTheShakerVoidsItsPartsAndNoneOfThePlatform) {
     };
     EXPECT_EQ(void_parts(loaded("[shaker.registers]\namplitude = { address = 90 }\n")),
               "registers watchdog stop units excitation ");
-    EXPECT_EQ(void_parts(loaded("[shaker.limits]\ndisplacement_mm = 9\n")), "excitation ");
+    EXPECT_EQ(void_parts(loaded("[shaker.limits]\ndisplacement_mm = 11\n")), "excitation ");
     EXPECT_EQ(void_parts(loaded("[vibration]\ntransmission = 0.7\n")), "excitation ");
     const auto other = "[commission]\nenforce = true\nsimulated = true\nfolder = \"" +
                        folder.string() + "\"\nbuttons = [\"rack\"]\n";
