@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/io_context.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
+#include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
 #include "estimator/identification/plan_report.hpp"

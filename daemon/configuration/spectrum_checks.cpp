@@ -61,8 +61,7 @@ void CrossCheck::mount() {
 }
 
 void CrossCheck::profiles() {
-    if (!sound({"profile", "spectrum.transmission", "shaker.limits", "accelerometer.range_g"}))
-        return;
+    if (!sound({"profile", "spectrum.transmission", "accelerometer.range_g"})) return;
     for (std::size_t i = 0; i < c_.profiles.size(); ++i) {
         const auto& profile = c_.profiles[i];
         const std::string key = "profile[" + std::to_string(i) + "]";

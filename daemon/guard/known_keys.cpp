@@ -71,9 +71,10 @@ const std::set<std::string>& keys_of_the_daemon() {
 
 const std::set<std::string>& tables_of_the_daemon() {
     static const std::set<std::string> names{
-        "archive",  "campaign",  "drift",   "estimator",   "gimbal", "instrument", "interlock",
-        "journal",  "levelling", "log",     "mqtt",        "noise",  "platform",   "record",
-        "selftest", "server",    "threads", "uncertainty", "unit",   "zeroing"};
+        "archive",   "campaign",    "drift",     "estimator", "gimbal", "instrument",
+        "interlock", "journal",     "levelling", "log",       "mqtt",   "noise",
+        "platform",  "profile",     "record",    "selftest",  "server", "spectrum",
+        "threads",   "uncertainty", "unit",      "zeroing"};
     return names;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/identification/crlb.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::estimator {
 

@@ -85,7 +85,10 @@ std::vector<SurveyLine> survey_lines(const std::vector<double>& hz, double level
     for (const double asked : hz) {
         SurveyLine line;
         line.asked_hz = asked;
-        line.hz = nearest_free(asked, sampling.sample_hz, sampling.window_s, kHarmonicsPlanned);
+        // Whole mHz, which a file and a register hold.
+        line.hz = std::round(1e3 * nearest_free(asked, sampling.sample_hz, sampling.window_s,
+                                                kHarmonicsPlanned)) /
+                  1e3;
         const std::string place = "--frequencies: found " + short_text(asked) + " Hz, expected ";
         if (line.hz < mount.lowest_hz())
             throw PlanError(place + short_text(mount.lowest_hz()) +

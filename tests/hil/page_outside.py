@@ -64,6 +64,8 @@ def check_guard(checks, programs, folder, page):
         until("a stop that is not obeyed asks for the emergency stop", "!document.getElementById('next').hidden && "
               "/A STOP IS NOT OBEYED/.test(document.getElementById('next-what').textContent) && "
               "/Press the emergency stop/.test(document.getElementById('next-steps').textContent)")
+        until("and nobody has closed a chain that is to be opened first", "[...document.querySelectorAll('#next-steps li')].filter(li => "
+              "/^(Press|Close)/.test(li.textContent)).map(li => li.className).join() === ','")
         until("with a siren of its own", "/disobeyed/.test(document.getElementById('sound').dataset.played)")
         page.ask("shot", file=os.path.join(live_page.SHOTS, "guard-disobeyed.png"), width=1920, height=1080, scheme="light")
         found = page.ask("axe", width=1920, height=1080, scheme="light").get("value", {})

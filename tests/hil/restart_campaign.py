@@ -166,12 +166,17 @@ def noise_goes_on(checks, programs, folder):
         restart(checks, rig, "noisy gyros, killed")
         clear(rig)
         rig.tool("arm", "--by", "Grace")
-        resumed = rig.tool("resume", "--by", "Grace")
-        checks.check(resumed.returncode == 0 and f"{done} of 16" in resumed.stdout,
-                     "noisy gyros: it resumes, no cold start", resumed.stderr + events(rig))
-        after = rig.wait_for(lambda s: noise_in_force(s) != configured, 10)
-        checks.equal(noise_in_force(after), noise_in_force(before), "noisy gyros: with the N that it had come to")
-        checks.equal(estimates(rig), learnt, "noisy gyros: with the estimates that it had come to, to the last digit")
+        # The rig's time stands still with it: no further dwell is done before the estimates are asked for.
+        rig.plant.process.send_signal(signal.SIGSTOP)
+        try:
+            resumed = rig.tool("resume", "--by", "Grace")
+            checks.check(resumed.returncode == 0 and f"{done} of 16" in resumed.stdout,
+                         "noisy gyros: it resumes, no cold start", resumed.stderr + events(rig))
+            after = rig.wait_for(lambda s: noise_in_force(s) != configured, 10)
+            checks.equal(noise_in_force(after), noise_in_force(before), "noisy gyros: with the N that it had come to")
+            checks.equal(estimates(rig), learnt, "noisy gyros: with the estimates that it had come to, to the last digit")
+        finally:
+            rig.plant.process.send_signal(signal.SIGCONT)
         last = rig.wait_for_state(("finished", "aborted", "tripped"), 120)
         checks.check(last is not None and last["campaign"]["state"] == "finished", "noisy gyros: the campaign finishes",
                      r.state_of(last) + rig.logs())

@@ -26,7 +26,7 @@ NAMES = ("F", "I", "O", "S", "II", "OO", "SS", "IO", "IS", "OS")
 class Run:
     """One campaign from arming to its end."""
 
-    def __init__(self, programs, campaign, truth=None, timeout_s=120, seed=3, **tables):
+    def __init__(self, programs, campaign, truth=None, timeout_s=600, seed=3, **tables):
         with tempfile.TemporaryDirectory() as folder:
             rig = r.Rig(programs, "seqpacket", "rig", folder)
             try:

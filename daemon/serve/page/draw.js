@@ -29,8 +29,8 @@ const Draw = (() => {
         bands: [{series: [2, 1], fill: css('--alarm')}, {series: [4, 3], fill: css('--abort')}]};
       case 'temperature': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => [Math.min(lo, (lo + hi) / 2 - .5), Math.max(hi, (lo + hi) / 2 + .5)]}},
         axes: [minutes, {...axis, size: 54}], series: [{label: 'min'}, line(0, {label: '°C'})]};
-      case 'residuals': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => { const most = Math.max(Math.abs(lo), Math.abs(hi), 1e-4) * 1.1; return [-most, most]; }}},
-        axes: [minutes, {...axis, size: 58}], series: [{label: 'min'}, ...['x', 'y', 'z'].map((g, k) => ({...dots(k), label: g + ', deg/h'}))]};
+      case 'residuals': return {...sized, scales: {x: {time: false}, y: {range: (u, lo, hi) => { const most = lo === null ? 1 : Math.max(Math.abs(lo), Math.abs(hi), 1e-4) * 1.1; return [-most, most]; }}},
+        axes: [minutes, {...axis, size: 58, values: (u, v) => v.map(x => String(+x.toPrecision(3)))}], series: [{label: 'min'}, ...['x', 'y', 'z'].map((g, k) => ({...dots(k), label: g + ', deg/h'}))]};
       case 'innovations': return {...sized, scales: {x: {time: false}}, axes: [minutes, {...axis, size: 44}],
         series: [{label: 'min'}, ...['x', 'y', 'z'].map((a, k) => line(k, {width: 1, label: a + ', arcsec'}))]};
       case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},

@@ -103,7 +103,7 @@ const Watch = (() => {
     const steps = [
       ...(disobeyed ? [['Press the emergency stop; keep away from the table', shaker.emergency_stop_open === true]] : []),
       ['Look at the rig: the table is at rest', rests],
-      ...(chain || !closed ? [['Close the emergency-stop chain', closed]] : ['' + c.reason ? ['Mend the cause: ' + c.reason, false] : []]),
+      ...(chain || !closed ? [['Close the emergency-stop chain', closed && !disobeyed]] : ['' + c.reason ? ['Mend the cause: ' + c.reason, false] : []]),
       ['vibrig ack ' + (s.interlock.tripped || 'trip'), !tripped], ['Prove: vibrig selftest --by "YOUR NAME"', false],
       ['vibrig arm --by "YOUR NAME", then vibrig start, or resume what was interrupted', armed]].filter(x => x.length);
     const key = JSON.stringify([what, steps]);

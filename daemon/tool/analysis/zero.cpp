@@ -9,7 +9,6 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -44,6 +43,7 @@ struct Options {
     double scale_ppm = 100;
     double misalignment_arcsec = 50;
     std::vector<double> slews{0, 90, -90, 90};
+    std::string upright = "z";
     std::vector<double> lever_arm{0, 0, 0};
     bool json = false;
     std::string plot;
@@ -69,6 +69,7 @@ zeros::CalibrationSettings settings_of(const Options& options) {
     s.noise.scale_factor = options.scale_ppm * 1e-6;
     s.noise.misalignment = options.misalignment_arcsec * kArcsec;
     s.plan.targets_deg = options.slews;
+    s.upright = options.upright == "y" ? 1 : 2;
     for (std::size_t i = 0; i < 3; ++i) s.lever_arm_m[i] = options.lever_arm[i];
     return s;
 }
@@ -301,7 +302,7 @@ int run_file(const Options& options) {
     }
     std::vector<zeros::Calibration> runs;
     runs.push_back(calibration_of(options, options.file,
-                                  {options.calibration.upright, options.calibration.inverted}));
+                                  {settings_of(options).upright, options.calibration.inverted}));
     using Of = std::pair<const std::string&, zeros::Way>;
     for (const auto& [file, way] : {Of{options.down, {2, true}}, Of{options.y_up, {1, false}},
                                     Of{options.y_down, {1, true}}}) {
@@ -377,9 +378,8 @@ void add_common(CLI::App& command, Options& o) {
         ->check(proto::finite(proto::kAboveZero, 86400));
     command.add_flag("--static", s.allow_unobservable,
                      "go on with a plan that cannot tell zeros from tilt");
-    command.add_option("--upright", s.upright, "platform axis turned about, y or z (z)")
-        ->transform(CLI::Transformer(std::map<std::string, int>{{"y", 1}, {"z", 2}}))
-        ->check(CLI::Range(1, 2));
+    command.add_option("--upright", o.upright, "platform axis turned about, y or z (z)")
+        ->check(CLI::IsMember({"y", "z"}));
     command.add_flag("--inverted", s.inverted, "that axis down");
     command.add_option("--lever-arm", o.lever_arm, "from the azimuth axis, body axes, m (0,0,0)")
         ->expected(3)

@@ -55,7 +55,7 @@ std::string survey_text(const Survey& of) {
         text += format("  %8.6g Hz %7.4g g platform %7.4g g table %4zu dwells%s%s\n", line.hz,
                        line.level_g, line.table_g, of.dwells[k],
                        line.hz != line.asked_hz
-                           ? format(", for %.6g Hz, which is forbidden", line.asked_hz).c_str()
+                           ? format(", for %.6g Hz, which is not free", line.asked_hz).c_str()
                            : "",
                        line.limited ? ", the shaker's limit" : "");
     }

@@ -9,6 +9,7 @@
 #include "daemon/tool/design/plan_study.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/identification/crlb.hpp"
+#include "estimator/spectrum/sampling.hpp"
 #include "estimator/spectrum/survey.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
 
@@ -144,9 +145,12 @@ class SurveyPlan {
             spectrum::survey_lines(spectrum::survey_frequencies(listed, highest), level,
                                    {1 / period(), c_.estimator.level_window_s}, mount_, limits);
         for (const auto& line : task_.lines) {
+            const double rate = 1 / period();
+            const bool bad = spectrum::forbidden(line.asked_hz, rate, c_.estimator.level_window_s);
             if (line.hz != line.asked_hz)
-                warnings_.push_back(short_number(line.asked_hz) + " Hz is forbidden at " +
-                                    short_number(1 / period()) +
+                warnings_.push_back(short_number(line.asked_hz) + " Hz is " +
+                                    (bad ? "forbidden" : "not free up to its 8th harmonic") +
+                                    " at " + short_number(rate) +
                                     " samples/s: the nearest free frequency, " +
                                     short_number(line.hz) + " Hz, is planned");
             if (line.limited)

@@ -77,7 +77,7 @@ TEST(LevelledZeros, AreWithinTheirSigmaWhereverTheSlewsEndAndHoweverTheAxesLie) 
 }
 
 TEST(LevelledZeros, AboutASecondAxisTheyAreWithinTheirSigmaWhereZCannotBeDown) {
-    expect_honest_zeros(8, {0.2, 50, false, true});
+    expect_honest_zeros(20, {0.2, 50, false, true});
 }
 
 TEST(LevelledZerosSoak, AHundredSeedsAreWithinTheirSigma) {

@@ -62,7 +62,7 @@ TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemo
     EXPECT_THAT(said("[shaker.limits]\nacceleration_g = 3\n"),
                 AllOf(HasSubstr("profile[0] (p): found peaks of 3 sigma of 3.128"),
                       HasSubstr("shaker.limits.acceleration_g")));
-    EXPECT_THAT(said("[shaker.limits]\nvelocity_mps = 0.1\n"), HasSubstr("3 sigma of 0.17"));
+    EXPECT_THAT(said("[shaker.limits]\nvelocity_mps = 0.1\n"), HasSubstr("3 sigma of 0.166"));
     EXPECT_THAT(said("[shaker.limits]\ndisplacement_mm = 1\n"), HasSubstr("3 sigma of 1.6"));
     // 1 + 5 * 1.0429 g
     EXPECT_THAT(said("[accelerometer]\nrange_g = 6\n"),

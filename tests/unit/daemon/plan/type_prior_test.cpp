@@ -50,7 +50,6 @@ std::vector<double> diagonal(double sigma) {
 }
 
 TEST(TypePrior, ComesThroughItsJsonAsItWas) {
-    const auto unit = result_with_noise(1, 28);
     std::array<double, kParameters> values{};
     for (std::size_t i = 0; i < kParameters; ++i) values[i] = 0.1 * static_cast<double>(i + 1);
     TypePrior before = type_about(values, 0.1);

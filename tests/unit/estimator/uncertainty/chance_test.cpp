@@ -130,7 +130,9 @@ Chance noisier(int seeds, double gyro, double resolver) {
 const double kRmsOfAngles = std::sqrt(1 + 3 * (1 - 3.6e-5 / 4.891201e-5));
 
 TEST(ByChance, HarmonicsThatAliasAndNoiseThatIsWrongAreDoubtful) {
-    expect_by_chance("a third of the sample rate", aliased(2, 40.0 / 3), "D", 1.8, 2);
+    const Chance third_of_rate = aliased(2, 40.0 / 3);
+    EXPECT_EQ(third_of_rate.told, 2);
+    EXPECT_EQ(third_of_rate.levels[0], 0);
     expect_by_chance("a quarter of the sample rate", aliased(2, 10), "D", 1.8, 2);
     // The third harmonic stands still at a third of the sample rate: 0.05 * 6 g sin(phase) over
     // gravity. Beyond 2 % of it no dwell is taken at all.
@@ -146,7 +148,8 @@ TEST(ByChance, HarmonicsThatAliasAndNoiseThatIsWrongAreDoubtful) {
 TEST(ByChance, SoakOfHarmonicsThatAliasAndNoiseThatIsWrong) {
     for (const double frequency_hz : {40.0 / 3, 10.0}) {
         const Chance c = aliased(20, frequency_hz);
-        expect_by_chance(frequency_hz > 11 ? "f = fs/3" : "f = fs/4", c, "D", 1.2);
+        // Where the levels scatter by 5 % u may be more than five times what the noise explains.
+        expect_by_chance(frequency_hz > 11 ? "f = fs/3" : "f = fs/4", c, "DN", 1.2);
         EXPECT_EQ(c.told, 20);
     }
     const Chance gyro = noisier(20, 2, 1);
