@@ -159,7 +159,7 @@ void Procedure::try_gimbal() {
 
 void Procedure::hand_moved() {
     // By how many times its noise: nobody knows the units yet.
-    const Vec3 change = difference(mean_.angle, before_.angle);
+    const Vec3 change = difference(unwrapped(mean_.angle, before_.angle), before_.angle);
     std::size_t most = 0;
     for (std::size_t c = 1; c < 3; ++c)
         if (std::abs(change[c]) / noise_[c] > std::abs(change[most]) / noise_[most]) most = c;
@@ -183,7 +183,8 @@ void Procedure::nudge() {
 }
 
 void Procedure::nudged() {
-    const Vec3 change = difference(mean_.angle, small_.front().angle);
+    const Vec3& first = small_.front().angle;  // near 0 the next reading may be 360
+    const Vec3 change = difference(unwrapped(mean_.angle, first), first);
     std::vector<std::size_t> moved;
     for (std::size_t c = 0; c < 3; ++c)
         if (std::abs(change[c]) > kMoved_sigma * noise_[c]) moved.push_back(c);
