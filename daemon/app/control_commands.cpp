@@ -79,7 +79,9 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
         return fmt::format("commission.simulated is true, and the CAN interface {} is a device",
                            can.interface);
     // First: what is proved of a rig that is not the one described says little.
-    if (auto why = book_.refusal(utc_now()); !why.empty()) return why;
+    if (auto why = book_.refusal(utc_now(), request.kind == CommandRequest::Kind::arm);
+        !why.empty())
+        return why;
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
     if (auto why = outside_.refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))

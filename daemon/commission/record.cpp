@@ -280,12 +280,12 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
     return all;
 }
 
-std::string Book::refusal(std::int64_t utc_ns) const {
+std::string Book::refusal(std::int64_t utc_ns, bool the_shaker) const {
     if (!loaded_.configuration.record_demanded()) return {};
     if (!trouble_.empty()) return "not commissioned: " + trouble_ + ": vibrig commission";
     std::string missing, command;
     for (const auto& s : standing(utc_ns)) {
-        if (s.proven) continue;
+        if (s.proven || (!the_shaker && of_the_shaker(s.part))) continue;
         if (s.record)  // the first that somebody has changed says most
             return fmt::format("not commissioned: {} ({}): {}", s.why, name_of(s.part),
                                remedy_of(s.part));

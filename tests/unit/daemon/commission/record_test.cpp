@@ -121,6 +121,20 @@ TEST_F(Books, OfTheShakerOnePersonIsEnoughWhoHasArmedIt) {
     EXPECT_EQ(book.not_proven_below_shaker(kNow), "bus first: no record");
 }
 
+TEST_F(Books, AProofIsMadeWithoutThePartsThatItProves) {
+    const auto as = loaded();
+    PartRecord what;
+    what.by = {"A. Person", "B. Person"};
+    what.utc_ns = kNow;
+    Book book(as);
+    EXPECT_THAT(book.refusal(kNow, false), HasSubstr("no record of bus, gimbals"));
+    book.prove({Part::bus, Part::gimbals, Part::accelerometers, Part::earth, Part::gyros}, what,
+               as);
+    EXPECT_EQ(book.refusal(kNow, false), "");
+    EXPECT_THAT(book.refusal(kNow), HasSubstr("no record of registers, watchdog, stop, units, "
+                                              "excitation: vibrig commission watchdog stop"));
+}
+
 TEST_F(Books, AZeroThatWasFoundAnewIsToldOnly) {
     const auto proven = loaded();
     prove_all(proven);
