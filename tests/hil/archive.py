@@ -2,7 +2,7 @@
 """Campaigns on their way to an archive that is gone, sick, slow, killed, or shared: none is lost, none comes twice, no half
 one is seen, and a measurement does not notice. The index in SQLite, and in a PostgreSQL of our own that is killed.
 
-usage: archive.py PROGRAMS [--seed N]
+usage: archive.py PROGRAMS [--seed N] [--soak]
 """
 import concurrent.futures
 import glob
