@@ -229,7 +229,8 @@ void Campaign::end(State state, const std::string& why, Time now) {
     const bool commissioning = state_ == State::commissioning;
     if (checking) {
         loop_->not_completed(why);
-        if (check_ == Check::press && ports_.rig.shaker.reading().emergency_stop_open) {
+        if (check_ == Check::press &&
+            (state == State::tripped || ports_.rig.shaker.reading().emergency_stop_open)) {
             begin_pressed(now);
         } else {
             conclude_proof("not completed: " + why + suspect_unit());

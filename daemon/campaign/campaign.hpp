@@ -168,6 +168,7 @@ class Campaign {
     void prove_emergency_stop(drivers::Time now);
     void prove_refusals(drivers::Time now);
     void begin_pressed(drivers::Time now);
+    void see_pressed(drivers::Time now);
     void await_pressed(drivers::Time now);
     void end_pressed(const std::string& why);
     void prove_quiet();
@@ -350,6 +351,7 @@ class Campaign {
     drivers::Time pressed_at_ = 0;  ///< when that began
     drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
     bool press_felt_ = false;       ///< by the controller, too
+    bool press_seen_ = false;       ///< by the chain's register
     Zeroing zeroing_ = Zeroing::none;
     bool zeroed_ = false;                      ///< in this campaign, before the first dwell
     bool opened_ = false;                      ///< likewise, the opening check

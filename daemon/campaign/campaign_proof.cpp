@@ -178,7 +178,8 @@ void Campaign::prove_emergency_stop(Time now) {
     if (ports_.log.wall() - asked_wall_ > kPress) abort("nobody pressed the emergency stop", now);
 }
 
-/// The opened chain has tripped: whether it was seen in time, by the table's own fall.
+/// The opened chain has tripped, or first the witnesses of the table's fall, between two looks at
+/// the chain's register: whether that shows it in time, counted from the fall.
 void Campaign::begin_pressed(Time now) {
     rt::Motion motion;
     while (take_motion(motion, now)) loop_->add(motion);
@@ -186,6 +187,14 @@ void Campaign::begin_pressed(Time now) {
     pressed_at_ = now;
     press_felt_ = false;
     stop_times_.begin(now);
+    press_seen_ = false;
+    see_pressed(now);
+}
+
+void Campaign::see_pressed(Time now) {
+    const auto reading = ports_.rig.shaker.reading();
+    if (press_seen_ || !reading.valid || !reading.emergency_stop_open) return;
+    press_seen_ = true;
     const Time fell = loop_->last_at_half();
     proof_.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0,
                settings_.proof.seen_s);
@@ -198,10 +207,12 @@ void Campaign::await_pressed(Time now) {
     const auto rest = stop_.rest(now);
     if (pressed_ == Pressed::rest) {
         stop_times_.look(reading, rest);
+        see_pressed(now);
         press_felt_ =
             press_felt_ || (reading.valid && reading.time > pressed_at_ &&
                             (reading.fault != 0 || reading.state == drivers::kShakerFault));
         if (stop_.stopping() && !stop_.disobeyed()) return;
+        if (!press_seen_) return end_pressed("not completed: " + reason_);
         const double limit_s = stop_.longest_s(settings_.loop.table_g);
         proof_.row("emergency stop, rest", "s", stop_times_.platform_s.value_or(1e3), 0, limit_s);
         proof_.row("emergency stop, latched", state_ == CampaignState::tripped);

@@ -29,9 +29,10 @@ void acknowledge_press(serve::Client& client, const ShakerCommission& options, s
     if (!person_agrees(
             options, out,
             "The trip of \"" + button + "\" is latched. Acknowledge it, " + options.by + "?"))
-        throw CommissionRefused("not acknowledged: vibrig ack --by NAME, then go on");
+        throw CommissionRefused("not acknowledged: vibrig ack trip --by NAME, then go on");
     v1::Command command;
     command.set_kind(v1::Command::acknowledge);
+    command.set_argument("trip");
     command.set_by(options.by);
     if (const auto why = refusal_of(client, command); !why.empty())
         throw CommissionRefused(why + ": the buttons pressed so far are kept, go on after it");
