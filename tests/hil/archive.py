@@ -2,7 +2,7 @@
 """Campaigns on their way to an archive that is gone, sick, slow, killed, or shared: none is lost, none comes twice, no half
 one is seen, and a measurement does not notice. The index in SQLite, and in a PostgreSQL of our own that is killed.
 
-usage: archive.py PROGRAMS [--seed N]
+usage: archive.py PROGRAMS [--seed N] [--soak]
 """
 import concurrent.futures
 import glob
@@ -24,7 +24,8 @@ import urllib.request
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import recording_faults  # noqa: E402
 import rig as r  # noqa: E402
-from archive_parts import POSTGRES, Archive, Postgres, SickArchive, asked, clone, without_role  # noqa: E402
+import server_load  # noqa: E402
+from archive_parts import POSTGRES, Archive, Postgres, SickArchive, asked, clone, result_in, without_role  # noqa: E402
 
 CAMPAIGN = {"name": "unit", "identify": "what-it-can", "dwell_s": 2.0}
 
@@ -199,9 +200,140 @@ def served_remotely(checks, lab, folder, serial="0017"):
     checks.equal(server.end(), 0, "it ends when it is told")
 
 
+def adaptive_by_type(checks, rig, lab, base, seed):
+    """A unit among twelve others of its type, which an adaptive campaign starts from; and without an archive."""
+    chance = random.Random(seed)
+    others = os.path.join(rig.folder, "others")
+    for i in range(12):
+        clone(base, os.path.join(others, f"other-{i}"), -100 + i, serial=f"type-{i}", scatter=lambda u: chance.gauss(0, 3 * u))
+    run = lab.run("archive", "type", "GP-3", "--simulated")
+    checks.check(run.returncode == 1 and "expected at least 10 units" in run.stderr, "of few units nothing is said about their type",
+                 run.stdout + run.stderr)
+    run = lab.add(others, "rig-7")
+    checks.check(run.returncode == 0, "twelve other units are added", run.stderr)
+    run = lab.run("archive", "type", "GP-3", "--simulated", "--without", "0019", "--json")
+    known = json.loads(run.stdout or '{"units": 0, "coefficients": []}')
+    checks.check(known["units"] >= 12 and len(known["coefficients"]) == 30, "vibrig archive type knows them", run.stderr)
+    checks.equal(lab.run("archive", "type", "GP-3").returncode, 1, "those on simulated rigs say nothing about real ones")
+    u = [p["u"] for p in result_in(base)["parameters"]]
+    rig.daemon.end()
+    targets = {"bias": 4 * max(u[::10]), "linear": 4 * max(u[1:4]), "quadratic": 4 * max(u[4:10])}
+    rig.configure({"name": "typed", "identify": "what-it-can", "dwell_s": 2.0, "adaptive": True, "prior": "type", "table_g": [9.0, 0.0]},
+                  **{"campaign.targets": targets}, unit={"type": "GP-3", "serial": "0019"}, server={"page": "127.0.0.1:0"},
+                  archive={"folder": lab.folder, "rig": "rig-7", "retry_max_s": 1.0})
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
+    end = time.monotonic() + 60   # it is asked when nobody else wants the processor
+    while time.monotonic() < end:
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "test")
+        rig.wait_for_state(("recording", "slewing", "ramping", "settling", "finished"), 60)
+        if "has not answered yet" not in rig.tool("events").stdout:
+            break
+        rig.tool("abort", "--by", "test")
+        rig.wait_for_state(("aborted", "tripped"), 60)
+        rig.daemon.end()
+        rig.start_daemon()
+        rig.wait_for(r.measuring, 60)
+        time.sleep(5)
+    status = rig.wait_for_state(("finished", "aborted", "tripped"), 240)
+    events = rig.tool("events").stdout
+    checks.check(r.state_of(status) == "finished", "an adaptive campaign with prior = \"type\" finishes", rig.logs())
+    checks.check(f"starts from {known['units']} units of type GP-3" in events, "it says what it starts from", events[-1500:])
+    rig.wait_for(lambda s: not s["recorder"].get("recording", False), 20)
+    campaign = sorted(glob.glob(os.path.join(rig.results, "typed-*")), key=os.path.getmtime)[-1]
+    result = result_in(campaign)
+    typed = result.get("type_prior", {"parameters": []})
+    checks.check(len(typed["parameters"]) == 30 and typed["units"] == known["units"] and
+                 all(with_type["u"] < without["u"] for with_type, without in zip(typed["parameters"], result["parameters"])),
+                 "the result is there without and with the type, which makes it narrower", json.dumps(typed)[:500])
+    report = os.path.join(rig.folder, "typed.html")
+    run = subprocess.run([lab.program, "report", campaign, "-o", report], capture_output=True, text=True, timeout=120)
+    with open(report, encoding="utf-8") as file:
+        checks.check("With the unit" in file.read(), "and in the report", run.stderr)
+
+
 def losses(status):
     return [number(status["recorder"], "samples_lost", top=True), number(status["recorder"], "frames_lost", top=True),
             number(status["can"], "kernel_dropped", top=True), number(status["estimator_ring"], "dropped", top=True)]
+
+
+def latencies(rig, looks=5, look_s=2):
+    """How long frames wait: of some looks the class that holds 99 %, ms, and the mean. A machine that is busy for one look is not
+    for all of them; what hangs, hangs in each."""
+    found = []
+    control = server_load.Control(rig.socket)
+    before = control.status()
+    for _ in range(looks):
+        time.sleep(look_s)
+        after = control.status()
+        mean, bound, count = server_load.latency(before, after)
+        found += [(bound, mean)] if count > 0 else []
+        before = after
+    return min(found), before["acquisition_latency"]["bounds_ms"]
+
+
+def felt(checks, programs, folder, server, lab, recorded):
+    """On the real clock: the same rig beside no archive, and beside one that hangs while it delivers to it."""
+    found = {}
+    for what in ("without an archive", "beside one that hangs"):
+        rig = r.Rig(programs, "seqpacket", "real", os.path.join(folder, "felt-" + what.split()[0]))
+        rig.start_plant()
+        rig.be_punctual()
+        archive = {"folder": lab.folder, "index": server.url, "rig": "rig-9", "retry_max_s": 1.0}
+        rig.configure({"name": "felt", "identify": "what-it-can"}, **({"archive": archive} if "hangs" in what else {}))
+        if "hangs" in what:
+            shutil.copytree(recorded, os.path.join(rig.results, "waits"))
+        rig.start_daemon()
+        rig.wait_for(r.measuring, 60)
+        if "hangs" in what:
+            status = rig.wait_for(lambda s: s["archive"].get("delivering") or number(s, "failures") > 0, 60)
+            checks.check(status["archive"].get("delivering") or number(status, "failures") > 0, "a delivery hangs", status["archive"])
+        found[what], classes = latencies(rig)
+        checks.equal(losses(rig.status()), [0, 0, 0, 0], f"{what}, in real time: nothing is lost")
+        r.check_balance(checks, rig, what)
+        if "hangs" in what:
+            checks.equal(number(rig.status(), "delivered"), 0, "and nothing was delivered meanwhile")
+        rig.stop()
+    quiet, beside = found.values()
+    # A class more is chance: where the classes' border lies in the midst of what is usual.
+    allowed = min([bound for bound in classes if bound > quiet[0]], default=float("inf"))
+    checks.check(beside[0] <= allowed, f"99 % of the frames wait {beside[0]:g} ms at most (mean {beside[1]:.3f}), without an archive "
+                 f"{quiet[0]:g} ms (mean {quiet[1]:.3f})")
+
+
+def hanging(checks, programs, folder, seed):
+    """A server that stands still: a campaign is measured beside a delivery that hangs on it, and is delivered once it goes on."""
+    server = Postgres(os.path.join(folder, "standing"))
+    server.start()
+    lab = Archive(programs, os.path.join(folder, "standing-lab"), server.url)
+    rig = r.Rig(programs, "seqpacket", "rig", os.path.join(folder, "beside-standing"))
+    rig.start_plant("--seed", str(seed))
+    rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": "0020"},
+                  archive={"folder": lab.folder, "index": server.url, "rig": "rig-8", "retry_max_s": 1.0})
+    server.process.send_signal(signal.SIGSTOP)
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
+    for round_ in range(2):   # the second beside the delivery of the first
+        for command in ("arm", "start"):
+            rig.tool(command, "--by", "test")
+        rig.wait_for_state(("recording", "slewing", "ramping", "settling"), 30)
+        status = rig.wait_for_state(("finished", "aborted", "tripped"), 180)
+        checks.equal(r.state_of(status), "finished", f"campaign {round_ + 1} finishes beside a server that stands")
+        status = rig.wait_for(lambda s: not s["recorder"].get("recording", False) and number(s, "waiting") >= 1, 30)
+        checks.check(number(status, "waiting") >= 1 and number(status, "delivered") == 0, "meanwhile nothing could be delivered",
+                     status["archive"])
+    checks.equal(losses(status), [0, 0, 0, 0], "and nothing of the measurement is lost")
+    r.check_balance(checks, rig, "beside a server that stands")
+    if "--soak" in sys.argv:   # what waits for real time wants the machine for itself
+        felt(checks, programs, folder, server, lab, glob.glob(os.path.join(rig.results, "unit-*"))[0])
+    server.process.send_signal(signal.SIGCONT)
+    status = rig.wait_for(lambda s: number(s, "delivered") >= 2 and number(s, "waiting") == 0, 120)
+    checks.equal(number(status, "waiting"), 0, "the server goes on: all is delivered")
+    checks.equal((len(lab.campaigns("--rig", "rig-8") or []), [f for f in lab.verify() if "rig-8" in f["campaign"]]), (2, []),
+                 "whole, each once")
+    rig.stop()
+    server.kill(signal.SIGQUIT)
 
 
 def kills(checks, programs, folder, base, seed):
@@ -343,6 +475,7 @@ def main():
         base = glob.glob(os.path.join(rig.results, "unit-*"))[0]
         small = clone(base, os.path.join(folder, "small"), 0)
         moves(checks, rig, lab, base)
+        adaptive_by_type(checks, rig, lab, base, seed)
         rig.daemon.end()
         rig.plant.end()
         browsed(checks, lab, folder)
@@ -354,6 +487,7 @@ def main():
         grows(checks, programs, folder)
         if POSTGRES:
             shared(checks, programs, folder, small)
+            hanging(checks, programs, folder, seed)
         else:
             checks.check(False, "there is a PostgreSQL (tests/packages test)")
     return checks.end()

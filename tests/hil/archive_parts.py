@@ -70,8 +70,9 @@ class Archive:
         return wrong
 
 
-def clone(campaign, to, days, serial=None, shift=None):
-    """The same recording as of another day: of another unit, with the first coefficient elsewhere."""
+def clone(campaign, to, days, serial=None, shift=None, scatter=None):
+    """The same recording as of another day: of another unit, with the first coefficient elsewhere, or all of them scattered by
+    `scatter(u)`."""
     shutil.copytree(campaign, to, ignore=shutil.ignore_patterns("raw-*"))
     with h5py.File(os.path.join(to, "campaign.h5"), "r+") as file:
         for name in ("started_utc_ns", "ended_utc_ns"):
@@ -83,12 +84,23 @@ def clone(campaign, to, days, serial=None, shift=None):
             result = json.loads(file["result"][()])
             result["parameters"][0]["value"] += shift
             replace(file, "result", json.dumps(result))
+        if scatter is not None:
+            result = json.loads(file["result"][()])
+            for of in result["parameters"]:
+                of["value"] += scatter(of["u"])
+            result["verdict"]["word"] = "valid"
+            replace(file, "result", json.dumps(result))
     return to
 
 
 def replace(file, name, text):
     del file[name]
     file[name] = numpy.bytes_(text.encode())   # of fixed length, as vibrigd writes it
+
+
+def result_in(campaign):
+    with h5py.File(os.path.join(campaign, "campaign.h5")) as file:
+        return json.loads(file["result"][()])
 
 
 def asked(port, pki, name, path, method="GET", version=None, authority="authority.crt"):
