@@ -107,7 +107,7 @@ double step_inflation(const GyroRates& gyro) {
     const MatrixXd p = information.llt().solve(MatrixXd::Identity(columns, columns));
     const double sum = weight.sum();
     double worst = 1, tail = 0;
-    VectorXd of_tail = VectorXd::Zero(10);
+    VectorXd of_tail = VectorXd::Zero(columns);
     for (Index k = n - 1; k >= 2; --k) {
         tail += weight[k];
         of_tail += weight[k] * gyro.regressors.row(k).transpose();
