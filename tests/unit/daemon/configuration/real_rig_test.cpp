@@ -145,15 +145,18 @@ TEST(Positions, BeyondTheTravelAreRefused) {
     EXPECT_THAT(complaint("site.elevation_deg = 2.1"), HasSubstr("site.elevation_deg: found 2.1"));
 }
 
+/// What becomes of [zeroing] on a rig of which `more` is said.
+auto zeroing_of(const std::string& more) {
+    return accepted(
+               "campaign = { zeroing = true, positions_deg = [[0, 0, 0]], identify = "
+               "\"what-it-can\" }\n" +
+                   more,
+               true)
+        .campaign.zero;
+}
+
 TEST(Zeroing, IsBothWaysWhereTheOuterGimbalTurnsThatFar) {
-    const auto of = [](const std::string& more) {
-        return accepted(
-                   "campaign = { zeroing = true, positions_deg = [[0, 0, 0]], identify = "
-                   "\"what-it-can\" }\n" +
-                       more,
-                   true)
-            .campaign.zero.both_ways;
-    };
+    const auto of = [](const std::string& more) { return zeroing_of(more).both_ways; };
     // Platform y is up at zero angles: the azimuth axis is upright at 90 and at -90 deg.
     EXPECT_TRUE(of(""));
     EXPECT_TRUE(of("gimbal.travel_deg = [[-95, 95], [-30, 30], [-175, 175]]"));
@@ -170,14 +173,7 @@ TEST(Zeroing, IsBothWaysWhereTheOuterGimbalTurnsThatFar) {
 }
 
 TEST(Zeroing, TakesASecondAxisWhereZCannotBeDown) {
-    const auto of = [](const std::string& more) {
-        return accepted(
-                   "campaign = { zeroing = true, positions_deg = [[0, 0, 0]], identify = "
-                   "\"what-it-can\" }\n" +
-                       more,
-                   true)
-            .campaign.zero.second_axis;
-    };
+    const auto of = [](const std::string& more) { return zeroing_of(more).second_axis; };
     EXPECT_FALSE(of(""));
     // z down is out of reach, y is not: the inner gimbal has its 60 deg, the azimuth its half turn
     EXPECT_TRUE(of("gimbal.travel_deg = [[-80, 95], [-65, 65], [-180, 180]]"));
