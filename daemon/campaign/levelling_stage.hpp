@@ -5,8 +5,8 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "estimator/levelling/leveller.hpp"
 
 namespace vibrig::campaign {

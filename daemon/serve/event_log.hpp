@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
 
 namespace vibrig::serve {
 
