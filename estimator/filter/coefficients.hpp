@@ -22,15 +22,9 @@ struct CoefficientRow {
 
 /// All coefficients of a gyro in the filter's order (Tang et al. 2009: input, *spin*, output).
 inline constexpr CoefficientRow kCoefficientTable[] = {
-    {"F", 0, kInput, kInput, 0},     //
-    {"I", 1, kInput, kInput, 1},     //
-    {"S", 1, kSpin, kSpin, 3},       //
-    {"O", 1, kOutput, kOutput, 2},   //
-    {"II", 2, kInput, kInput, 4},    //
-    {"SS", 2, kSpin, kSpin, 6},      //
-    {"OO", 2, kOutput, kOutput, 5},  //
-    {"IS", 2, kInput, kSpin, 8},     //
-    {"IO", 2, kInput, kOutput, 7},   //
+    {"F", 0, kInput, kInput, 0},    {"I", 1, kInput, kInput, 1},  {"S", 1, kSpin, kSpin, 3},
+    {"O", 1, kOutput, kOutput, 2},  {"II", 2, kInput, kInput, 4}, {"SS", 2, kSpin, kSpin, 6},
+    {"OO", 2, kOutput, kOutput, 5}, {"IS", 2, kInput, kSpin, 8},  {"IO", 2, kInput, kOutput, 7},
     {"OS", 2, kSpin, kOutput, 9},
 };
 

@@ -13,11 +13,11 @@ namespace vibrig::campaign {
 
 /// Levels the platform at one position: the two channels are the platform directions normal to the
 /// position's nominal vertical. Control thread only.
-class LevellingStage {
+class PositionLeveller {
   public:
     /// Throws estimator::levelling::DesignError.
-    LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
-                   double sample_s, double torquer_limit_deg_h);
+    PositionLeveller(const LevellingSettings& settings, const estimator::Settings& rig,
+                     double sample_s, double torquer_limit_deg_h);
 
     /// Which key of [levelling] cannot work with the noise, what was found and expected; empty:
     /// none.
