@@ -62,7 +62,7 @@ void check_again(const std::string& path) {
     try {
         const auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_bindings(loaded);
-        vibrig::check_results(loaded.configuration);
+        vibrig::check_results(loaded);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -260,7 +260,7 @@ int main(int argc, char** argv) {
         auto loaded = vibrig::configuration::load(path, true);
         if (check) {
             vibrig::check_bindings(loaded);
-            vibrig::check_results(loaded.configuration);
+            vibrig::check_results(loaded);
             std::cout << vibrig::configuration::format_effective(loaded);
             // As comments: what stands above reads back as a configuration.
             const auto forecast = vibrig::forecast_campaign(loaded.configuration);

@@ -153,10 +153,26 @@ def refused(checks, programs, folder):
                      f"{what}: --check prints the configuration and says the same", check.stdout + check.stderr)
 
 
+def unwritable(checks, programs, folder):
+    """Results that could not be kept are found before the campaign, by whoever checks: root is stopped by no permission."""
+    path, nowhere = os.path.join(folder, "unwritable.toml"), os.path.join(folder, "file")
+    with open(nowhere, "w", encoding="utf-8"):
+        pass
+    for results in ("/proc/nowhere", "/proc", nowhere, os.path.join(nowhere, "below")):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(r.toml({"campaign": {"results": results}, "clock": {"source": "rig"}, "shaker": {"host": "127.0.0.1"},
+                               "can": {"port": "seqpacket", "path": os.path.join(folder, "bus.sock")}}))
+        check = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True,
+                               text=True, timeout=30)
+        told = f'unwritable.toml:2: campaign.results: found "{results}", expected a folder that can be written: '
+        checks.check(check.returncode == 2 and told in check.stderr, f"--check finds that results cannot be kept in {results.replace(folder, '...')}",
+                     check.stderr)
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (from_a_file, adaptively, restarted, at_other_rates, refused):
+    for part in (from_a_file, adaptively, restarted, at_other_rates, refused, unwritable):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()
