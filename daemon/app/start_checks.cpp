@@ -60,8 +60,7 @@ void check_bindings(const configuration::Loaded& loaded) {
     const auto port = drivers::make_can_port(io, configuration.can);
     std::string missing;
     const auto add = [&](const drivers::BindingError& error) {
-        missing +=
-            (missing.empty() ? "" : "\n") + place_of(loaded, error.key()) + error.what();
+        missing += (missing.empty() ? "" : "\n") + place_of(loaded, error.key()) + error.what();
     };
     const auto collect = [&](const auto& bind) {
         try {
