@@ -10,10 +10,13 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/serve/socket_file.hpp"
+#include "daemon/serve/tls.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
 
@@ -103,6 +106,27 @@ void check_results(const configuration::Loaded& loaded) {
     throw configuration::ConfigurationError(place_of(loaded, "campaign.results") +
                                             "campaign.results: found \"" + folder +
                                             "\", expected a folder that can be written: " + why);
+}
+
+void check_certificates(const configuration::Loaded& loaded) {
+    const auto& server = loaded.configuration.server;
+    if (server.remote.empty()) return;
+    for (const auto& [key, file] : {std::pair("server.certificate", server.certificate),
+                                    {"server.key", server.key},
+                                    {"server.clients_ca", server.clients_ca},
+                                    {"server.revoked", server.revoked}}) {
+        if (file.empty() || ::access(file.c_str(), R_OK) == 0) continue;
+        if (errno == EACCES) return;
+        throw configuration::ConfigurationError(place_of(loaded, key) + key + ": found \"" + file +
+                                                "\", expected a PEM file: " + std::strerror(errno));
+    }
+    try {
+        (void)serve::mutual_tls(server.certificate, server.key, server.clients_ca, true,
+                                server.revoked);
+    } catch (const serve::ServeError& error) {
+        throw configuration::ConfigurationError(place_of(loaded, "server.remote") +
+                                                "server.remote: " + error.what());
+    }
 }
 
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {

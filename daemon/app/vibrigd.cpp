@@ -63,6 +63,7 @@ void check_again(const std::string& path) {
         const auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_bindings(loaded);
         vibrig::check_results(loaded);
+        vibrig::check_certificates(loaded);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -258,6 +259,7 @@ int main(int argc, char** argv) {
             return std::cout ? 0 : 2;
         }
         auto loaded = vibrig::configuration::load(path, true);
+        vibrig::check_certificates(loaded);
         if (check) {
             vibrig::check_bindings(loaded);
             vibrig::check_results(loaded);
