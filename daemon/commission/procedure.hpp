@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/commission/finding.hpp"
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
 #include "drivers/gimbal/gimbal.hpp"
 #include "estimator/commissioning/earth.hpp"
 

@@ -212,7 +212,8 @@ void add_daemon_keys(std::vector<Key>& keys) {
                            "the thread keeps to this CPU, counted from 0; -1: to none",
                            [](C& c) -> int& { return c.acquisition_cpu; }));
     keys.push_back(integer("threads.estimator_cpu", "", -1, kLastCpu,
-                           "the thread keeps to this CPU, counted from 0; -1: to none",
+                           "the thread keeps to this CPU, counted from 0; -1: to that of "
+                           "acquisition, wherever that is",
                            [](C& c) -> int& { return c.estimator_cpu; }));
     keys.push_back(boolean("threads.lock_memory",
                            "the daemon's memory stays in memory; not where the rig owns the time",

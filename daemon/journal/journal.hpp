@@ -13,7 +13,11 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/commands.hpp"
+#include "daemon/domain/events.hpp"
+#include "daemon/domain/latch.hpp"
+#include "daemon/domain/positions.hpp"
+#include "daemon/domain/services.hpp"
 #include "daemon/journal/chained_file.hpp"
 #include "daemon/journal/checkpoint.hpp"
 #include "daemon/journal/latches.hpp"
