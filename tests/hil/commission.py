@@ -414,6 +414,23 @@ def hard_ones(checks, programs):
             hidden(checks, programs, folder, truth, others, outcome, word)
 
 
+def counts_in_radians(checks, programs, folder):
+    """A reading that counts in another unit is found out, and nothing is accepted before the DBC says so."""
+    truth = drawn(15)
+    truth["platform"]["angle_unit"] = ["deg", "rad", "deg"]
+    truth["platform"]["encoder_zero_deg"][1] = 100.0
+    u = Unknown(checks, programs, folder, truth)
+    try:
+        run, found = u.commission()
+        checks.check(found["outcome"] == "decided" and run.returncode == 1 and len(found["corrections"]) == 1 and
+                     "Resolvers.Inner counts in rad, expected deg: multiply its factor by 57.2957795" in found["corrections"][0],
+                     "an angle in rad is named as a correction of the DBC", found)
+        refused = u.rig.tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
+        checks.check(refused.returncode == 1 and "the DBC first" in refused.stderr, "and nothing is accepted before", refused.stderr)
+    finally:
+        u.rig.stop()
+
+
 class Terminal:
     """vibrig commission in a terminal of 80 columns."""
 
@@ -557,6 +574,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)
+    with tempfile.TemporaryDirectory() as folder:
+        counts_in_radians(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         real(checks, programs, folder)
     return checks.end()
