@@ -431,6 +431,29 @@ def counts_in_radians(checks, programs, folder):
         u.rig.stop()
 
 
+def against_its_certificate(checks, programs, folder):
+    """The maker says another sign than the campaign finds: it is marked."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45")
+        rig.configure({"name": "certified", "table_g": [9.0, 5.0], "dwell_s": 20.0, "settle_s": 2.0})
+        with open(rig.configuration, "a", encoding="utf-8") as file:   # the simulated gyros have +1 and +1
+            file.write('[commission]\ncertificate = [{ name = "D_Fx", value = 1.2 }, { name = "D_Fz", value = -1.2 }]\n')
+        rig.start_daemon()
+        rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("rest") == "at rest", 60)
+        rig.tool("arm", "--by", "Ada")
+        rig.tool("start", "--by", "Ada")
+        last = rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 120)
+        checks.equal(r.state_of(last), "finished", "a campaign")
+        rig.daemon.end()
+        warnings = json.loads(rig.result()[1] or "{}").get("warnings", [])
+        marked = [w for w in warnings if w.startswith("campaign marked: D_Fz is ") and "-1.2 by the certificate: sign of platform.drift_sign" in w]
+        checks.check(len(marked) == 1 and "D_Fx" not in marked[0] and marked[0] in rig.daemon.text(), "whose sign is against the certificate is marked",
+                     warnings + [rig.logs()])
+    finally:
+        rig.stop()
+
+
 class Terminal:
     """vibrig commission in a terminal of 80 columns."""
 
@@ -576,6 +599,8 @@ def main():
     hard_ones(checks, programs)
     with tempfile.TemporaryDirectory() as folder:
         counts_in_radians(checks, programs, folder)
+    with tempfile.TemporaryDirectory() as folder:
+        against_its_certificate(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         real(checks, programs, folder)
     return checks.end()
