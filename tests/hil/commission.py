@@ -405,30 +405,17 @@ def hard_ones(checks, programs):
         return truth
 
     south = rig_with(11, "site", latitude_deg=-45.0)
+    # A reading in rad commanded as deg: the first command, which is to move nothing, moves it, and is stopped.
+    radians = rig_with(15, "platform", angle_unit=["deg", "rad", "deg"])
+    radians["platform"]["encoder_zero_deg"][1] = 100.0
     for truth, others, outcome, word in (
             (rig_with(12, "platform", stuck_gimbal="inner"), {}, "undecided", "INNER"),
             (rig_with(13, "accelerometer", dead="+z"), {}, "refused", "accelerometer."),
             (rig_with(14, "platform", command_offset_deg=[0, 6, 0]), {}, "undecided", "by hand"),
+            (radians, {}, "undecided", "by hand"),
             (south, {"latitude": 45.0, "compass": "-"}, "undecided", "latitude")):
         with tempfile.TemporaryDirectory() as folder:
             hidden(checks, programs, folder, truth, others, outcome, word)
-
-
-def counts_in_radians(checks, programs, folder):
-    """A reading that counts in another unit is found out, and nothing is accepted before the DBC says so."""
-    truth = drawn(15)
-    truth["platform"]["angle_unit"] = ["deg", "rad", "deg"]
-    truth["platform"]["encoder_zero_deg"][1] = 100.0
-    u = Unknown(checks, programs, folder, truth)
-    try:
-        run, found = u.commission()
-        checks.check(found["outcome"] == "decided" and run.returncode == 1 and len(found["corrections"]) == 1 and
-                     "Resolvers.Inner counts in rad, expected deg: multiply its factor by 57.2957795" in found["corrections"][0],
-                     "an angle in rad is named as a correction of the DBC", found)
-        refused = u.rig.tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
-        checks.check(refused.returncode == 1 and "the DBC first" in refused.stderr, "and nothing is accepted before", refused.stderr)
-    finally:
-        u.rig.stop()
 
 
 def against_its_certificate(checks, programs, folder):
@@ -597,8 +584,6 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)
-    with tempfile.TemporaryDirectory() as folder:
-        counts_in_radians(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         against_its_certificate(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
