@@ -74,6 +74,12 @@ CommandReply Campaign::begin_loop_check(const CommandRequest& request, Time now)
     return {true, text};
 }
 
+bool Campaign::take_motion(rt::Motion& motion, Time now) {
+    if (!ports_.rig.feed->pop(motion)) return false;
+    last_motion_ = now;
+    return true;
+}
+
 /// The next part of the check; the ramps have their time from here on.
 void Campaign::go_on_to(Check part, Time now) {
     check_ = part;
