@@ -62,7 +62,8 @@ void check_again(const std::string& path) {
     try {
         const auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_bindings(loaded);
-        vibrig::check_results(loaded.configuration);
+        vibrig::check_results(loaded);
+        vibrig::check_certificates(loaded);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -258,9 +259,10 @@ int main(int argc, char** argv) {
             return std::cout ? 0 : 2;
         }
         auto loaded = vibrig::configuration::load(path, true);
+        vibrig::check_certificates(loaded);
         if (check) {
             vibrig::check_bindings(loaded);
-            vibrig::check_results(loaded.configuration);
+            vibrig::check_results(loaded);
             std::cout << vibrig::configuration::format_effective(loaded);
             // As comments: what stands above reads back as a configuration.
             const auto forecast = vibrig::forecast_campaign(loaded.configuration);
