@@ -21,7 +21,7 @@ TEST(Legend, ANameThatWouldNotFitIsDrawnIn) {
     for (const char* name : {"short", "measured by the controller"})
         chart.curves.push_back({.name = name, .x = {0, 1}, .y = {0, 1}, .low = {}, .high = {}});
     const auto svg = chart.svg();
-    EXPECT_THAT(svg, HasSubstr("textLength=\"146\">measured by the controller<"));
+    EXPECT_THAT(svg, HasSubstr("textLength=\"146.00\">measured by the controller<"));
     EXPECT_EQ(svg.find("textLength"), svg.rfind("textLength")) << "and only that";
 }
 
