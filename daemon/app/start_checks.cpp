@@ -14,7 +14,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/zero_calibration.hpp"
 #include "daemon/serve/socket_file.hpp"
 #include "daemon/serve/tls.hpp"
 #include "estimator/identification/plan_report.hpp"
