@@ -104,8 +104,12 @@ std::string ControlLoop::journal_being_verified() const {
 }
 
 void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
-    if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty())
+    if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty()) {
+        if (why == book_.refusal(utc_now(), waiting.request.kind == CommandRequest::Kind::arm))
+            keep_commissioned({"", "", waiting.request.by, "", "refused arm",
+                               commission::Json{{"why", why}}.dump()});
         return answer(waiting, {false, why});
+    }
     if (!journal_) {  // on the rig's clock
         auto reply = campaign_.command(waiting.request, now);
         if (reply.accepted) reply.message += tell_overdue();

@@ -108,6 +108,8 @@ class ControlLoop {
     [[nodiscard]] CommandReply begin_commissioning(const CommandRequest& request,
                                                    const commission::Json& what, drivers::Time now);
     [[nodiscard]] commission::Progress progress() const;
+    void keep_commissioned(journal::Commissioned row);
+    void keep_voided();
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,
                                                     const configuration::Loaded& file);

@@ -7,6 +7,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/stages/stage.hpp"
 
 namespace vibrig::campaign {
 
@@ -34,8 +35,8 @@ std::string Campaign::not_fit_to_check(Time now) const {
     if (state_ == State::armed) return "armed for a campaign: abort that first";
     if (ports_.rig.feed == nullptr) return "no samples to look at";
     if (auto why = not_fit_to_excite(now); !why.empty()) return why;
-    if (auto why = platform_lacks(now); !why.empty()) return why;
-    if (torquing()) return "the platform is torqued, expected free drift";
+    if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) return why;
+    if (torquing(ports_.rig)) return "the platform is torqued, expected free drift";
     return LoopCheck::beyond_limits(settings_);
 }
 
@@ -93,7 +94,7 @@ Time Campaign::check_loop(Time now) {
     const auto reading = ports_.rig.shaker.reading();
     if (now - last_motion_ > kCheckSilence) {
         abort("samples ceased", now);
-    } else if (auto why = platform_lacks(now); !why.empty()) {
+    } else if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) {
         abort(why, now);
     } else if ((check_ == Check::settle || check_ == Check::measure || check_ == Check::press) &&
                !reading.emergency_stop_open &&

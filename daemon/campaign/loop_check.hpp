@@ -7,8 +7,8 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "estimator/level/loop_response.hpp"
 
 namespace vibrig::campaign {

@@ -4,6 +4,7 @@ and armed; one that hides something ends undecided or refused, with the reason.
 
 usage: commission.py PROGRAMS [--soak]     killed at some steps; at all
 """
+import contextlib
 import hashlib
 import json
 import math
@@ -11,6 +12,7 @@ import os
 import random
 import re
 import socket
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -190,8 +192,29 @@ def whole(checks, programs, folder, seed):
             text = file.read()
         checks.check("# SIMULATED: ln LR" in text, "the configuration's comments say so, too", text)
         each_key_is_caught_twice(checks, u, text)
+        checks.check("commissioning: commissioning:" not in u.rig.daemon.text(), "no event names its source twice", u.rig.logs())
+        journal_has_it(checks, u)
     finally:
         u.rig.stop()
+
+
+def journal_has_it(checks, u):
+    """The table commissioning: each step, question and answer, who said so; chained with the rest."""
+    path = os.path.join(u.rig.results, "journal.sqlite3")
+    u.rig.daemon.end()
+    with contextlib.closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5)) as database:
+        rows = database.execute("SELECT part, step, by, identity, what, data_json FROM commissioning ORDER BY id").fetchall()
+    whats = {row[4] for row in rows}
+    checks.equal(sorted(whats - {"answer"}), ["accept", "begin", "hypothesis", "move", "permission", "question", "reading", "refused arm",
+                                              "verdict", "void"], "the journal has each kind of step")
+    checks.check(all(row[2] == "Ada" for row in rows if row[4] != "void") and
+                 any(row[3].startswith("uid ") for row in rows if row[4] == "permission") and all(json.loads(row[5]) for row in rows),
+                 "with the person and who the socket says it was", rows[:3])
+    signed = [json.loads(row[5]).get("signed_with") for row in rows if row[4] == "accept" and row[0] == "gimbals"]
+    with open(u.record, encoding="utf-8") as file:
+        checks.equal(signed, [json.load(file)["signature"]["public_key"]], "and the key of the record's signature")
+    verified = subprocess.run([u.rig.program("vibrig"), "journal", "verify", path], capture_output=True, text=True, check=False)
+    checks.equal(verified.returncode, 0, "and its chain holds: " + verified.stdout[-200:] + verified.stderr)
 
 
 def shaker_is_proven(checks, u):
@@ -253,6 +276,15 @@ def each_key_is_caught_twice(checks, u, text):
         edited = u.rig.tool("arm", "--by", "Ada")
         checks.check(edited.returncode == 1 and f"{key} is " in edited.stderr and f"was proven as {was[1]} by Ada" in edited.stderr,
                      f"an edited {key} voids its part: {wrong}", edited.stderr)
+        if key == WRONG[0][0]:
+            forge(u, key, with_its_key=False)
+            u.restart()
+            forged = u.rig.tool("arm", "--by", "Ada")
+            checks.check(forged.returncode == 1 and "record.json: its signature is not that of what it says" in forged.stderr,
+                         "a record whose hashes were made anew is none without the key", forged.stderr)
+            with open(u.record, "w", encoding="utf-8") as file:
+                file.write(recorded)
+            u.restart()
         forge(u, key)
         u.restart()
         if u.rig.tool("arm", "--by", "Ada").returncode:
@@ -266,8 +298,9 @@ def each_key_is_caught_twice(checks, u, text):
                      not last["campaign"].get("dwells"), f"and {key} is caught before the table moves", reason)
 
 
-def forge(unknown, key):
-    """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit."""
+def forge(unknown, key, with_its_key=True):
+    """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit, and the signature, too, where the
+    forger is root and reads the daemon's key."""
     proven = unknown.rig.tool("commission", "status", "--json")
     now = [re.search(re.escape(key) + " is (.*), was proven as ", part["why"]) for part in json.loads(proven.stdout)["parts"].values()]
     value = next(found[1] for found in now if found)
@@ -282,6 +315,13 @@ def forge(unknown, key):
     whole_text = json.dumps(record, separators=(",", ":"), ensure_ascii=False)
     record["sha256"] = hashlib.sha256(whole_text.encode()).hexdigest()
     record["signature"] = signature
+    if with_its_key:
+        message = os.path.join(unknown.rig.folder, "message")
+        with open(message, "w", encoding="ascii") as file:
+            file.write(record["sha256"])
+        made = subprocess.run(["openssl", "pkeyutl", "-sign", "-rawin", "-inkey", os.path.join(os.path.dirname(unknown.record), "record.key"),
+                               "-in", message], capture_output=True, check=True)
+        record["signature"]["value"] = made.stdout.hex()
     with open(unknown.record, "w", encoding="utf-8") as file:
         json.dump(record, file)
 
