@@ -67,6 +67,9 @@ class Campaign {
     void take_over_proofs(std::vector<ProofRecord> history);
     /// Before the first step(): what an earlier life has left latched, in words.
     void take_over_trip(const std::string& causes, double table_g = 0);
+    /// The next proof goes up from 0.03 g, each rung held against the command before the next:
+    /// nobody has seen yet what this shaker makes of a number.
+    void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Why an arming or an acknowledgement would be refused now; empty: it would not, or it is
     /// another command.
@@ -115,6 +118,8 @@ class Campaign {
     /// The last parts are the safe-state proof's.
     enum class Check : std::uint8_t {
         look,
+        climb,  ///< to the next rung of the ladder
+        rung,   ///< there
         ramp,
         settle,
         measure,
@@ -158,6 +163,9 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_check(drivers::Time now) const;
     CommandReply begin_loop_check(const CommandRequest& request, drivers::Time now);
     drivers::Time check_loop(drivers::Time now);
+    [[nodiscard]] double check_level() const;
+    [[nodiscard]] Check after_rung() const;
+    void stand_on_rung(drivers::Time now);
     void go_on_to(Check part, drivers::Time now);
     void ramp_for_check(Check then, drivers::Time now);
     void conclude_loop_check(drivers::Time now);
@@ -344,6 +352,10 @@ class Campaign {
     SafetyProof proof_;
     StopTimes stop_times_;
     bool press_wanted_ = false;  ///< the emergency stop is to be proved, too
+    bool climbs_ = false;        ///< the next proof goes up a ladder
+    std::vector<double> rungs_;  ///< g at the table, of this one
+    std::size_t rung_ = 0;
+    bool rung_counts_ = false;
     /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
     enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
     drivers::Time pressed_at_ = 0;  ///< when that began

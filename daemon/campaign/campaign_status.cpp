@@ -65,8 +65,7 @@ void Campaign::fill(StatusData& status, Time now) const {
         status.command_table_g = vibrating ? table_g() : 0;
         status.command_frequency_hz = settings_.frequency_hz;
     } else if (state_ == State::checking) {
-        status.command_table_g =
-            check_ == Check::look || check_ == Check::rest ? 0 : settings_.loop.table_g;
+        status.command_table_g = check_ == Check::look || check_ == Check::rest ? 0 : check_level();
         status.command_frequency_hz = settings_.frequency_hz;
     }
 }

@@ -562,7 +562,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     Page page;
     if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
-    add_uncertainty(page, analysis.assessed);
+    add_uncertainty(page, analysis.assessed, coverage_of(campaign));
     add_lead(page, campaign, analysis.replayed);
     add_coefficients(page, analysis);
     add_campaign(page, campaign, analysis);
