@@ -125,7 +125,7 @@ void add_daemon_keys(std::vector<Key>& keys) {
         "commission.folder", "a path",
         "of the commissioning record; a simulated rig is held to one with enforce and a folder "
         "that is not the default",
-        path_rule, [](C & c) -> auto& { return c.commission.folder; }));
+        folder_rule, [](C & c) -> auto& { return c.commission.folder; }));
     keys.push_back(number("commission.valid_days", "d", {1, 3660},
                           "how long a part of the commissioning record counts",
                           [](C& c) -> double& { return c.commission.valid_days; }));

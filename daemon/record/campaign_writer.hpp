@@ -40,7 +40,6 @@ class CampaignWriter {
     void end(const Ended& ended);
 
     [[nodiscard]] std::size_t samples_waiting() const { return samples_->waiting(); }
-    [[nodiscard]] std::size_t samples_written() const { return samples_->written(); }
     [[nodiscard]] const std::string& path() const { return file_->path(); }
 
   private:

@@ -20,20 +20,12 @@ Regressors DriftModel::regressors(const Eigen::Vector3d& up,
     Regressors h{};
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        const auto product = [&](std::size_t p, std::size_t q) {
-            return g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
-        };
-        constexpr std::size_t kInput = 0, kOutput = 1, kSpin = 2;
-        h[kDt][j] = 1.0;
-        h[kDi][j] = g.sign[kInput] * up[g.axis[kInput]];
-        h[kDs][j] = g.sign[kSpin] * up[g.axis[kSpin]];
-        h[kDo][j] = g.sign[kOutput] * up[g.axis[kOutput]];
-        h[kDii][j] = product(kInput, kInput);
-        h[kDss][j] = product(kSpin, kSpin);
-        h[kDoo][j] = product(kOutput, kOutput);
-        h[kDis][j] = product(kInput, kSpin);
-        h[kDio][j] = product(kInput, kOutput);
-        h[kDos][j] = product(kSpin, kOutput);
+        for (std::size_t group = 0; group < kGroups; ++group) {
+            const auto& [letters, order, p, q, place] = kCoefficientTable[group];
+            h[group][j] = order == 0   ? 1.0
+                          : order == 1 ? g.sign[p] * up[g.axis[p]]
+                                       : g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
+        }
     }
     return h;
 }
@@ -58,21 +50,18 @@ Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, const Eigen::Matrix3d& mo
     Eigen::Matrix3d turning;  // one gyro a row
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        const auto d = [&](std::size_t group) { return parameters[internal_index(group, j)]; };
-        const auto [i, o, s] = g.axis;
-        const auto [si, so, ss] = g.sign;
-        Eigen::Vector3d linear;
-        linear[i] = si * d(kDi);
-        linear[o] = so * d(kDo);
-        linear[s] = ss * d(kDs);
-        Eigen::Matrix3d q;
-        q(i, i) = d(kDii);
-        q(o, o) = d(kDoo);
-        q(s, s) = d(kDss);
-        q(i, s) = q(s, i) = 0.5 * si * ss * d(kDis);
-        q(i, o) = q(o, i) = 0.5 * si * so * d(kDio);
-        q(o, s) = q(s, o) = 0.5 * so * ss * d(kDos);
-        const Eigen::Matrix3d a = product(moment, q);
+        Eigen::Vector3d linear = Eigen::Vector3d::Zero();
+        Eigen::Matrix3d quadratic = Eigen::Matrix3d::Zero();
+        for (std::size_t group = 0; group < kGroups; ++group) {
+            const auto& [letters, order, p, q, place] = kCoefficientTable[group];
+            const double d = parameters[internal_index(group, j)];
+            if (order == 1) linear[g.axis[p]] = g.sign[p] * d;
+            if (order != 2) continue;
+            // A product of two axes stands twice in the symmetric matrix, half each time.
+            const double share = p == q ? d : 0.5 * g.sign[p] * g.sign[q] * d;
+            quadratic(g.axis[p], g.axis[q]) = quadratic(g.axis[q], g.axis[p]) = share;
+        }
+        const Eigen::Matrix3d a = product(moment, quadratic);
         turning.row(static_cast<Eigen::Index>(j)) =
             pose.up.cross(linear) +
             2.0 * Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0));

@@ -172,7 +172,17 @@ std::string contradiction(const Settings& settings, const Evidence& e) {
     }
 }
 
-void add_patterns(const Settings& settings, const Assessment& a, std::vector<Reason>& list) {
+/// What the odds of a pattern must be above to make the dwells so far "not valid". With each dwell
+/// there is another look, and another chance of a false alarm: the l-th has a share of 1/l of what
+/// a single one has (docs/theory/uncertainty.md). Of a campaign that has ended there is one.
+double asked_of(const Assessment& a, Stage stage) {
+    if (stage == Stage::ended) return Evidence::kNamedFrom;
+    const int looks = 1 + std::max(0, a.degrees - kFewestDegrees) / static_cast<int>(kGyros);
+    return Evidence::kNamedFrom + std::log(static_cast<double>(looks));
+}
+
+void add_patterns(const Settings& settings, const Assessment& a, Stage stage,
+                  std::vector<Reason>& list) {
     std::vector<const Evidence*> structural;
     for (const Evidence& e : a.evidence) {
         if (!e.named() || e.log_odds < a.evidence.front().log_odds - kNearBest) continue;
@@ -201,10 +211,12 @@ void add_patterns(const Settings& settings, const Assessment& a, std::vector<Rea
     reason.largest_effect_u = worst.in_u;
     reason.coefficient = parameter_names()[worst.coefficient];
     reason.text += contradiction(settings, *structural.front());
-    reason.text +=
-        text(worst.in_u > 1 ? ": %s by %.1f u; correct or declare it" : ": %s by %.1f u at most",
-             parameter_names()[worst.coefficient], worst.in_u);
-    if (worst.in_u > 1) reason.level = Level::not_valid;
+    const bool sure = structural.front()->log_odds > asked_of(a, stage);
+    reason.text += text(worst.in_u <= 1 ? ": %s by %.1f u at most"
+                        : sure          ? ": %s by %.1f u; correct or declare it"
+                                        : ": %s by %.1f u; the dwells to come will tell",
+                        parameter_names()[worst.coefficient], worst.in_u);
+    if (worst.in_u > 1 && sure) reason.level = Level::not_valid;
     list.push_back(std::move(reason));
 }
 
@@ -341,7 +353,7 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     add_cross_check(result.cross_check, list);
     add_dwells(result, list);
     if (a.done) {
-        add_patterns(settings, a, list);
+        add_patterns(settings, a, stage, list);
         add_chi_square(a, list);
         add_sync(settings, a, list);
         add_order(settings, a, list);
