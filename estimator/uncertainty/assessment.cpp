@@ -4,10 +4,13 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
+#include <utility>
 
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
 #include "estimator/uncertainty/distributions.hpp"
+#include "estimator/uncertainty/doubtful_levels.hpp"
 #include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -140,6 +143,21 @@ void declare(const MatrixXd& columns, std::array<GyroRates, 3>& gyros) {
         if (k < 3) of_gyro.resize(columns.rows() / 3, columns.cols());
         of_gyro.row(k / 3) = columns.row(k);
     }
+}
+
+/// What the tests of fit work on.
+struct Tested {
+    DwellTable table;
+    std::array<GyroRates, 3> gyros;
+    NullFit fit;
+};
+
+Tested tested_with(const Settings& settings, DwellTable table, std::span<const DwellRow> rows,
+                   const MatrixXd& declared, const VectorXd& prior, const Freed& freed) {
+    table.rows = rows;
+    auto gyros = gyros_of(table, settings);
+    declare(declared, gyros);
+    return {table, std::move(gyros), NullFit(table, declared, prior, freed.determined)};
 }
 
 struct TypeB {
@@ -346,8 +364,12 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         scaled << inputs.rates * MatrixXd(root.matrixL()), freed.prior;
         declare(scaled, of.gyros);
         const NullFit fit(table, scaled, prior, freed.determined);
-        out.chi_square = fit.chi_square();
-        out.degrees = fit.degrees();
+        const auto in_doubt = with_doubtful_levels(settings, table, model);
+        const Tested tested = in_doubt.empty()
+                                  ? Tested{table, of.gyros, fit}
+                                  : tested_with(settings, table, in_doubt, scaled, prior, freed);
+        out.chi_square = tested.fit.chi_square();
+        out.degrees = tested.fit.degrees();
         if (out.degrees > 0) out.birge = std::sqrt(out.chi_square / out.degrees);
         if (out.degrees >= 9) {
             // Noise that is known to a relative r: 1/2 (1/r)^2 degrees of freedom.
@@ -364,7 +386,8 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         tell_cross_axis(table, out);
         out.worst_step = worst_step(of.gyros);
         tell_rates(table, fit.residual(all.value), fit.residual_variance(inputs.rates.cols()), out);
-        if (out.degrees >= 9) out.evidence = weigh_patterns(table, fit, out.ramps, model, of.gyros);
+        if (out.degrees >= 9)
+            out.evidence = weigh_patterns(tested.table, tested.fit, out.ramps, model, tested.gyros);
         const TypeB b = propagate(settings, all, inputs.rates, u, out.sync_bound);
         out.sensitivity = b.sensitivity;
         tell_coefficients(settings, result, table, fit, all, b, out);

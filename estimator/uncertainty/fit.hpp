@@ -87,8 +87,9 @@ struct Evidence {
     Eigen::VectorXd change;    ///< of the coefficients of constant bias, filter order
     double smallest_seen = 0;  ///< of its best seen unknown, with 90 %
 
+    static constexpr double kNamedFrom = 4;
     /// Odds enough to be named.
-    [[nodiscard]] bool named() const { return log_odds > 4.0; }
+    [[nodiscard]] bool named() const { return log_odds > kNamedFrom; }
 };
 
 /// All patterns, the best first. `coefficients`: filter order, with which signatures are taken.

@@ -16,9 +16,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
-                                                     "OO", "SS", "IO", "IS", "OS"};
-
 constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 constexpr std::array<std::string_view, 3> kAmplitudeUnits{"g_peak", "g_rms", "mps2_peak"};
 constexpr std::array<std::string_view, 7> kAngleUnits{"deg", "turn",  "rad", "arcmin",

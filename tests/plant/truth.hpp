@@ -36,6 +36,8 @@ enum class AngleUnit : std::uint8_t { deg, turn, rad, arcmin, gon, twice, half }
 
 /// Positions within one gyro's ten coefficients; F fixed, I input, O output, S spin (IEEE Std 517).
 enum Term : std::size_t { kF, kI, kO, kS, kII, kOO, kSS, kIO, kIS, kOS, kTerms };
+inline constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
+                                                            "OO", "SS", "IO", "IS", "OS"};
 
 using GyroCoefficients = std::array<double, kTerms>;  ///< deg/h, deg/h/g x 3, deg/h/g^2 x 6
 
