@@ -63,7 +63,15 @@ void check_bindings(const configuration::Loaded& loaded) {
     const auto port = drivers::make_can_port(io, configuration.can);
     std::string missing;
     const auto add = [&](const drivers::BindingError& error) {
-        missing += (missing.empty() ? "" : "\n") + place_of(loaded, error.key()) + error.what();
+        auto place = place_of(loaded, error.key());
+        std::string text = error.what();
+        // A default that another DBC does not have is the fault of that one's line.
+        if (place == "default: " && !configuration.dbc.empty()) {
+            place = place_of(loaded, "can.dbc");
+            const auto end = text.find("\", expected");
+            if (end != std::string::npos) text.insert(end + 1, " (default)");
+        }
+        missing += (missing.empty() ? "" : "\n") + place + text;
     };
     const auto collect = [&](const auto& bind) {
         try {

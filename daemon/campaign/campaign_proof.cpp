@@ -237,6 +237,7 @@ void Campaign::end_pressed(const std::string& why) {
 
 /// Rest is called by what is well above the noise of those who call it.
 void Campaign::prove_quiet() {
+    loop_->rests();
     const auto noise = loop_->noise();
     const double limit_g = settings_.rest.limit_g / kNoises;
     if (noise.table_g > 0) proof_.row("noise at rest, table", "g", noise.table_g, 0, limit_g);

@@ -18,6 +18,7 @@
 #include "daemon/report/plan_section.hpp"
 #include "daemon/report/proof_section.hpp"
 #include "daemon/report/result_charts.hpp"
+#include "daemon/report/spectrum_section.hpp"
 #include "daemon/report/type_section.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/version.hpp"
@@ -468,6 +469,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     }
     if (told == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
 
+    add_spectrum(page, campaign);
     add_type(page, campaign);
     if (!a.history_note.empty()) {
         page.section("history", "Earlier campaigns of the unit");
@@ -562,7 +564,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     Page page;
     if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
-    add_uncertainty(page, analysis.assessed);
+    add_uncertainty(page, analysis.assessed, coverage_of(campaign));
     add_lead(page, campaign, analysis.replayed);
     add_coefficients(page, analysis);
     add_campaign(page, campaign, analysis);

@@ -225,8 +225,18 @@ def shaker_is_proven(checks, u):
                  "the shaker's parts are asked for", lacks.stderr)
     unknown = tool("commission", "watchdog", "earth", "--by", "Ada")
     checks.equal(unknown.returncode, 2, "parts of platform and shaker are not proven at once")
+    for lie, word in (("unit-rms", "g rms for g peak?"), ("unit-mps2", "m/s2 for g?"), ("dead-table readback-echo", "the platform does")):
+        for one in lie.split():
+            rig.order("fault " + one)
+        refused = tool("commission", "units", "--by", "Ada", timeout=120)
+        checks.check(refused.returncode == 1 and "REFUSED: not completed: ladder: at 0.03 g" in refused.stdout.replace("\n   ", " ") and
+                     word in refused.stdout.replace("\n   ", " "), f"the ladder ends at its first rung: {lie}", refused.stdout + refused.stderr + rig.logs())
+        rig.order("clear")
     plain = tool("commission", "watchdog", "units", "excitation", "--by", "Ada", "--json", timeout=120)
     found = json.loads(plain.stdout or "{}")
+    ladder = {name: value for name, value in found["parts"]["registers"].get("evidence", {}).items() if name.startswith("ladder")}
+    checks.check(sorted(ladder) == sorted(f"ladder, {g} g, {what}" for g in (0.03, 0.1, 0.3) for what in ("platform over expected", "table over command")) and
+                 all(0.9 < value < 1.1 for value in ladder.values()), "the first proof goes up by 0.03, 0.1 and 0.3 g", ladder)
     checks.check(plain.returncode == 0 and found["outcome"] == "decided" and found["simulated"] and
                  found["parts"]["watchdog"]["evidence"]["watchdog, the controller says fault"] == 1 and
                  found["parts"]["registers"]["proven"] and found["parts"]["units"]["evidence"]["hypotheses"][0]["unit"] == "g peak",
@@ -404,6 +414,23 @@ def hard_ones(checks, programs):
             hidden(checks, programs, folder, truth, others, outcome, word)
 
 
+def counts_in_radians(checks, programs, folder):
+    """A reading that counts in another unit is found out, and nothing is accepted before the DBC says so."""
+    truth = drawn(15)
+    truth["platform"]["angle_unit"] = ["deg", "rad", "deg"]
+    truth["platform"]["encoder_zero_deg"][1] = 100.0
+    u = Unknown(checks, programs, folder, truth)
+    try:
+        run, found = u.commission()
+        checks.check(found["outcome"] == "decided" and run.returncode == 1 and len(found["corrections"]) == 1 and
+                     "Resolvers.Inner counts in rad, expected deg: multiply its factor by 57.2957795" in found["corrections"][0],
+                     "an angle in rad is named as a correction of the DBC", found)
+        refused = u.rig.tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
+        checks.check(refused.returncode == 1 and "the DBC first" in refused.stderr, "and nothing is accepted before", refused.stderr)
+    finally:
+        u.rig.stop()
+
+
 class Terminal:
     """vibrig commission in a terminal of 80 columns."""
 
@@ -490,6 +517,13 @@ def real(checks, programs, folder):
         heard = {message["id"]: message for message in json.loads(bus.stdout)["messages"]} if bus.returncode == 0 else {}
         checks.check(0x80 in heard and 20 < heard[0x80]["period_ms"] < 30 and 0 in heard[0x80]["counters"] and 4 in heard[0x101]["at_rest"],
                      "without a daemon and a DBC the bus is listed", bus.stdout + bus.stderr)
+        dbc = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "rig.dbc")
+        bus = subprocess.run([rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "1", "--turn", "--dbc", dbc, "--json"],
+                             capture_output=True, text=True, check=False)
+        signals = json.loads(bus.stdout or "{}")
+        checks.check(bus.returncode == 1 and signals["outcome"] == "undecided" and signals["answers"] == [] and
+                     "Sync.SyncCount" in signals["counters"] and "Resolvers.OuterValid" in signals["unproven"] and signals["unknown"] == [],
+                     "with a DBC its signals are, and nobody has turned any", bus.stdout + bus.stderr)
         rig.configure(CAMPAIGN, **r.PATIENT)
         check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
         stated = {}
@@ -540,6 +574,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)
+    with tempfile.TemporaryDirectory() as folder:
+        counts_in_radians(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         real(checks, programs, folder)
     return checks.end()

@@ -172,6 +172,21 @@ def unwritable(checks, programs, folder):
         check = checked(server=server)
         checks.check(check.returncode == 2 and told in check.stderr, "--check finds certificates that are not there or are none",
                      check.stderr)
+    # A DBC of another rig: all that it does not have in one run, each with the line where it is mended.
+    dbc = os.path.join(folder, "another.dbc")
+    text = subprocess.run([os.path.join(programs, "vibrigd"), "--print-dbc"], capture_output=True, text=True, check=True).stdout
+    with open(dbc, "w", encoding="utf-8") as file:
+        file.write(text.replace("TableAccelerometer", "TableAcc").replace("GyrosAtSpeed", "AtSpeed"))
+    signals = {"can.signals": {"temperature": "Nobody.T"}}
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(r.toml({"clock": {"source": "rig"}, "shaker": {"host": "127.0.0.1"},
+                           "can": {"port": "seqpacket", "path": os.path.join(folder, "bus.sock"), "dbc": dbc}, **signals}))
+    check = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True, text=True, timeout=30)
+    told = ['unwritable.toml:8: can.signals.table_accel: found "TableAccelerometer.Axial" (default), expected',
+            'unwritable.toml:8: can.signals.gyros_at_speed: found "PlatformStatus.GyrosAtSpeed" (default), expected',
+            'unwritable.toml:10: can.signals.temperature: found "Nobody.T", expected']
+    checks.check(check.returncode == 2 and all(line in check.stderr for line in told),
+                 "--check finds all signals that a DBC does not have, each with its line", check.stderr)
     for results in ("/proc/nowhere", "/proc", nowhere, os.path.join(nowhere, "below")):
         check = checked(campaign={"results": results})
         told = f'unwritable.toml:2: campaign.results: found "{results}", expected a folder that can be written: '

@@ -20,6 +20,7 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "encoder_sign", t.encoder_sign, -1, 1);
     field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
     field("platform", "channel", t.channel, 0, 0);
+    field("platform", "angle_unit", t.angle_unit, 0, 0);
     field("platform", "command_channel", t.command_channel, 0, 0);
     field("platform", "command_offset_deg", t.command_offset_deg, -180.0, 180.0);
     field("platform", "stuck_gimbal", t.stuck_gimbal, 0, 0);
@@ -98,6 +99,7 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "unit_rms", t.shaker_lies.unit_rms, 0, 0);
     field("shaker", "unit_mps2", t.shaker_lies.unit_mps2, 0, 0);
     field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
+    field("shaker", "frequency_ignored", t.shaker_lies.frequency_ignored, 0, 0);
     field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
     field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
 }
