@@ -179,7 +179,7 @@ void CampaignDwells::take_done(campaign::Campaign& campaign) {
     while (with_.stage.take_done(done)) {
         if (--with_estimator_ == 0) take_noise(done.summary);
         auto result = with_.identification.result();
-        record_dwell(done.summary, result);
+        record_dwell(done.summary);
         campaign.on_dwell_done(done.summary);
         campaign.qualify(result);
         keep(std::move(result));
@@ -188,8 +188,7 @@ void CampaignDwells::take_done(campaign::Campaign& campaign) {
     take_verdict(campaign);
 }
 
-void CampaignDwells::record_dwell(const estimator::DwellSummary& summary,
-                                  const estimator::Result& result) {
+void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
     if (!with_.recorder) return;
     // The identification is this thread's: the dwell is over and no other is ordered.
     estimator::Estimate estimate;
@@ -202,9 +201,10 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary,
     dwell.sigma = estimate.sigma;
     dwell.observable = estimate.observable;
     dwell.covariance = with_.identification.covariance();
-    if (!summary.left_out && !result.rows.empty() && result.rows.back().run == summary.run &&
-        result.rows.back().position == summary.position)
-        dwell.row = result.rows.back();
+    const auto& rows = with_.identification.rows();
+    if (!summary.left_out && !rows.empty() && rows.back().run == summary.run &&
+        rows.back().position == summary.position)
+        dwell.row = rows.back();
     with_.recorder->dwell_done(std::move(dwell));
 }
 
@@ -212,7 +212,7 @@ void CampaignDwells::write_out(campaign::Campaign& campaign) {
     if (written() || with_estimator_ != 0) return;
     assessing_.abandon();
     write_result(judge(configuration_.estimator, whole_result(), again(),
-                       estimator::uncertainty::Stage::ended),
+                       estimator::uncertainty::Stage::ended, with_.identification.rows()),
                  campaign);
 }
 
@@ -231,7 +231,8 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
         std::optional<tool::KnownType> type;
         if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
         text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
-                                 judged.live.get(), nullptr, type ? &*type : nullptr);
+                                 judged.live.get(), judged.spectrum ? &*judged.spectrum : nullptr,
+                                 type ? &*type : nullptr);
     }
     StatusData ended;
     campaign.fill(ended, with_.clock.now());

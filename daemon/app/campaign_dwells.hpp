@@ -16,6 +16,7 @@
 #include "daemon/plan/adaptive.hpp"
 #include "daemon/plan/aside.hpp"
 #include "daemon/plan/type_prior.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/stirred_waiter.hpp"
 #include "estimator/identification/result.hpp"
@@ -89,17 +90,22 @@ class CampaignDwells final : public campaign::Dwells {
     struct Judged {
         estimator::uncertainty::Assessment assessed;
         std::optional<estimator::Result> anew;
-        std::shared_ptr<const dwells::Live> live;  ///< what `anew` replaces
-        std::string not_anew;                      ///< why not, though it should be
+        std::shared_ptr<const dwells::Live> live;           ///< what `anew` replaces
+        std::string not_anew;                               ///< why not, though it should be
+        std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
     };
     [[nodiscard]] std::optional<Again> again() const;
     [[nodiscard]] static Judged judge(const estimator::Settings& settings,
                                       const estimator::Result& result,
                                       const std::optional<Again>& again,
-                                      estimator::uncertainty::Stage stage);
+                                      estimator::uncertainty::Stage stage,
+                                      const std::vector<estimator::DwellRow>& all_rows);
+    [[nodiscard]] static std::vector<estimator::DwellRow> assess(
+        Judged& out, const estimator::Settings& settings, const estimator::Result& result,
+        const std::optional<Again>& again, estimator::uncertainty::Stage stage);
     [[nodiscard]] bool verdict_wanted();
     void take_noise(estimator::DwellSummary& dwell);
-    void record_dwell(const estimator::DwellSummary& summary, const estimator::Result& result);
+    void record_dwell(const estimator::DwellSummary& summary);
     void take_type_prior();
     void keep(estimator::Result result);
     [[nodiscard]] estimator::Result whole_result() const;

@@ -20,7 +20,12 @@ std::vector<plan::PlannedRun> runs_of(const campaign::Settings& campaign, double
     const auto add = [&](const std::array<double, 3>& position, double table_g) {
         runs.push_back({position, table_g * transmission, table_g, 1});
     };
-    for (const auto& stop : campaign.stops) add(stop.position_deg, stop.table_g);
+    for (const auto& stop : campaign.stops) {
+        const bool apart =
+            stop.verify || (stop.frequency_hz > 0 && stop.table_g > 0 &&
+                            !estimator::at_reference(campaign.rig, stop.frequency_hz));
+        if (!apart) add(stop.position_deg, stop.table_g);
+    }
     if (!runs.empty()) return runs;
     for (const double table_g : campaign.table_g) {
         for (const auto& position : campaign.positions_deg) add(position, table_g);
@@ -69,11 +74,12 @@ PlanData plan_data(const configuration::Configuration& c) {
         return plan;
     }
     int run = 1;
-    std::vector<double> levels;
+    std::vector<std::pair<double, double>> levels;
     for (const auto& stop : campaign.stops) {
         // Each level is a run, as in the campaign.
-        auto level = std::ranges::find(levels, stop.table_g);
-        if (level == levels.end()) level = levels.insert(level, stop.table_g);
+        const std::pair one{stop.table_g, stop.frequency_hz};
+        auto level = std::ranges::find(levels, one);
+        if (level == levels.end()) level = levels.insert(level, one);
         plan.stops.push_back({static_cast<int>(level - levels.begin()) + 1,
                               static_cast<int>(plan.stops.size()) + 1, stop.position_deg,
                               stop.table_g});

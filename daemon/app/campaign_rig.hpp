@@ -41,6 +41,10 @@ class CampaignRig final : public campaign::Rig {
     void transmission(double measured) override { interlock_.transmission(measured); }
     void disobeyed(bool now_so) override;
     void uncommanded() override { interlock_.uncommanded(); }
+    void wrong_vibration() override {
+        interlock_.wrong_vibration(true);
+        interlock_.wrong_vibration(false);  // seen once, before a dwell
+    }
     void proving(campaign::Proving what) override;
 
     /// Any thread: the campaign is between ramp and rest.

@@ -60,11 +60,13 @@ std::optional<CampaignDwells::Again> CampaignDwells::again() const {
                  journal::configuration_hash(result_configuration(with_.loaded))};
 }
 
-CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings,
-                                             const estimator::Result& result,
-                                             const std::optional<Again>& again,
-                                             uncertainty::Stage stage) {
-    Judged out;
+/// Without what other frequencies say. Returns all rows of what was identified anew; none: nothing
+/// was.
+std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
+                                                        const estimator::Settings& settings,
+                                                        const estimator::Result& result,
+                                                        const std::optional<Again>& again,
+                                                        uncertainty::Stage stage) {
     if (again && !result.dwells.empty()) {
         dwells::Anew anew(settings, again->found, result.dwells.size());
         auto& identification = anew.identification();
@@ -89,10 +91,25 @@ CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings
             out.assessed =
                 uncertainty::assess(dwells::Anew::settings_of(settings, again->found), found);
             out.anew = std::move(found);
-            return out;
+            return identification.rows();
         }
     }
     out.assessed = uncertainty::assess(settings, result, stage);
+    return {};
+}
+
+/// `all_rows`: with those apart from the result's.
+CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings,
+                                             const estimator::Result& result,
+                                             const std::optional<Again>& again,
+                                             uncertainty::Stage stage,
+                                             const std::vector<estimator::DwellRow>& all_rows) {
+    Judged out;
+    const auto anew = assess(out, settings, result, again, stage);
+    if (stage != uncertainty::Stage::ended || !out.assessed.done) return out;
+    const auto in_force = out.anew ? dwells::Anew::settings_of(settings, again->found) : settings;
+    out.spectrum = tool::spectrum_of(in_force, out.anew ? anew : all_rows);
+    if (out.spectrum) tool::adopt(*out.spectrum, in_force, out.assessed);
     return out;
 }
 
@@ -124,7 +141,7 @@ void CampaignDwells::keep(estimator::Result result) {
 /// While no dwell is with the estimator. Only this thread changes result_.
 estimator::Result CampaignDwells::whole_result() const {
     auto result = result_;
-    result.rows = with_.identification.rows();
+    result.rows = estimator::without_apart(with_.identification.rows());
     return result;
 }
 
@@ -134,16 +151,16 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
     if (verdict_wanted()) {
         // In a thread of its own also where one may wait: what it has of memory, more with each
         // dwell, is in nobody's way.
-        const auto work = [settings = configuration_.estimator, result = whole_result(),
-                           anew = concluding_ ? again() : std::nullopt,
-                           stage = concluding_ ? uncertainty::Stage::ended
-                                               : uncertainty::Stage::under_way,
-                           trim = !with_.memory_locked] {
-            auto found = judge(settings, result, anew, stage);
-            // Locked memory is not given back; asking for it would only disturb.
-            if (trim) rt::give_free_memory_back();
-            return found;
-        };
+        const auto work =
+            [settings = configuration_.estimator, result = whole_result(),
+             rows = with_.identification.rows(), anew = concluding_ ? again() : std::nullopt,
+             stage = concluding_ ? uncertainty::Stage::ended : uncertainty::Stage::under_way,
+             trim = !with_.memory_locked] {
+                auto found = judge(settings, result, anew, stage, rows);
+                // Locked memory is not given back; asking for it would only disturb.
+                if (trim) rt::give_free_memory_back();
+                return found;
+            };
         // The rig's clock waits for this thread: there a verdict takes no time.
         if (with_.at_once) {
             judged = assessing_.compute(work);

@@ -71,6 +71,7 @@ Campaign::Campaign(const Settings& settings, const Ports& ports)
       stop_(
           ports_.rig.shaker, [this](Time at) { return ports_.rig.rest(at); }, settings_.stop),
       proof_(settings_.proof) {
+    excited_hz_ = settings_.frequency_hz;
     plan_stops();
     make_stages();
 }
@@ -83,6 +84,11 @@ void Campaign::enter(State state, Time now) {
     state_ = state;
     if (state == State::paused) ports_.rig.gimbal.forget_position();
     if (state == State::ramping) excited_deg_ = here().stop.position_deg;
+    if (state == State::ramping || state == State::checking) {
+        const Stop stop = state == State::ramping ? here().stop : Stop{};
+        excited_hz_ = stop.frequency_hz > 0 ? stop.frequency_hz : settings_.frequency_hz;
+        excited_transmission_ = stop.transmission;
+    }
     if (state == State::ramping || state == State::checking) {
         // From rest: what the table was told last is over, and no witness may hold it to that.
         asked_g_ = 0;

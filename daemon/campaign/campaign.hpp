@@ -22,6 +22,7 @@
 #include "drivers/gimbal/gimbal.hpp"
 #include "drivers/gimbal/torquer.hpp"
 #include "drivers/shaker/shaker.hpp"
+#include "estimator/level/loop_response.hpp"
 
 namespace vibrig::campaign {
 
@@ -212,6 +213,10 @@ class Campaign {
     void stop_shaker();
     void watch_gravity();
     /// Before a ramp: not yet, or not at all.
+    [[nodiscard]] bool frequency_may_change(drivers::Time now);
+    void watch_vibration();
+    void look_at_vibration(drivers::Time now);
+    /// Before a ramp: not yet, or not at all.
     [[nodiscard]] bool gravity_holds(drivers::Time now);
     void pause_at_rest(const std::string& why, drivers::Time now);
     /// Two or so in a row: it pauses. True: it has.
@@ -276,9 +281,13 @@ class Campaign {
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
     /// Of the dwell that is being done.
     [[nodiscard]] estimator::DwellInfo dwell_info() const {
-        return {here().run, here().position, table_g(),
+        return {here().run,
+                here().position,
+                table_g(),
                 drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_)),
-                power_lost_ && positions_done_ > 0};
+                power_lost_ && positions_done_ > 0,
+                here().stop.frequency_hz,
+                here().stop.verify};
     }
     void watch_power();
     void take_over_origin();
@@ -297,11 +306,12 @@ class Campaign {
     drivers::Time started_ = 0;  ///< when the campaign began
     Pace pace_;
     std::vector<NumberedStop> stops_;
-    std::size_t at_ = 0;          ///< the stop that is being done
-    std::size_t expected_ = 0;    ///< stops in all, as far as can be foreseen
-    std::size_t planned_ = 0;     ///< of them by the plan: not adaptive, no repeats
-    std::vector<double> levels_;  ///< one run each, in order of appearance
-    int repeats_ = 0;             ///< of the present stop, after flagged dwells
+    std::size_t at_ = 0;        ///< the stop that is being done
+    std::size_t expected_ = 0;  ///< stops in all, as far as can be foreseen
+    std::size_t planned_ = 0;   ///< of them by the plan: not adaptive, no repeats
+    /// Table g and Hz, one run each, in order of appearance.
+    std::vector<std::pair<double, double>> levels_;
+    int repeats_ = 0;  ///< of the present stop, after flagged dwells
     std::string armed_by_;
     std::string armed_for_, started_by_;
     drivers::Time armed_wall_ = 0;  ///< when it was armed, in people's time
@@ -325,6 +335,10 @@ class Campaign {
     std::optional<drivers::Time> origin_;  ///< when the campaign's first dwell began
     /// Where the gimbals are while the table moves; at_ is ahead when it comes to rest.
     std::array<double, 3> excited_deg_{};
+    double excited_hz_ = 0;            ///< what it is told then
+    double excited_transmission_ = 0;  ///< see Stop
+    bool watching_ = false;            ///< the accelerometers are to show it before the dwell
+    std::vector<estimator::LoopReading> shown_;
     std::size_t positions_done_ = 0;
     std::size_t positions_before_ = 0;  ///< of them before a restart
     double used_before_s_ = 0;          ///< of the campaign, before a restart

@@ -76,6 +76,7 @@ Time Campaign::ramp(Time now) {
         return now;
     }
     if (!requested_ && !gravity_holds(now)) return now + kDwellPoll;
+    if (!requested_ && !frequency_may_change(now)) return now + kDwellPoll;
     if (table_g() <= kAtRestG) {
         enter(State::settling, now);
         return now;
@@ -118,6 +119,7 @@ Time Campaign::record(Time now) {
             order.zero_g = found->raw_zero_g();
             order.level_sigma_g = found->level_sigma(here().stop.position_deg);
         }
+        watch_vibration();
         if (!ports_.dwells.order(order)) abort("the estimator takes no order", now);
         return now + kDwellPoll;
     }
@@ -134,6 +136,7 @@ Time Campaign::record(Time now) {
         return now;
     }
     if (state_ == State::settling) {
+        look_at_vibration(now);
         if (now < dwell_from_) return std::min(dwell_from_, now + kDwellPoll);
         state_ = State::recording;
     }
@@ -152,9 +155,10 @@ Time Campaign::record(Time now) {
 void Campaign::next_position(Time now) {
     ++positions_done_;
     pace_.stop_done(now);
-    ports_.log.position_done(dwell_info(), dwells_.back(),
-                             {here().stop.position_deg, table_g(), repeats_, used_s(now),
-                              dwell_info().begin_s, dwell_utc_ns_});
+    ports_.log.position_done(
+        dwell_info(), dwells_.back(),
+        {here().stop.position_deg, table_g(), repeats_, used_s(now), dwell_info().begin_s,
+         dwell_utc_ns_, here().stop.frequency_hz, here().stop.verify});
     ++at_;
     enter(State::resting, now);
 }
@@ -179,6 +183,7 @@ Time Campaign::rest(Time now) {
 }
 
 void Campaign::leave_dwell() {
+    if (std::exchange(watching_, false)) ports_.rig.feed->order(rt::StageFeed::Mode::off);
     if (std::exchange(dwell_ordered_, false)) {
         rt::DwellOrder cancel;
         cancel.cancel = true;
@@ -203,7 +208,7 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
 
 bool Campaign::vibrating_as_commanded(const drivers::ShakerReading& reading, double table_g) const {
     return reading.valid && reading.running && reading.state == drivers::kShakerRunning &&
-           std::abs(reading.frequency_hz - settings_.frequency_hz) <= kFrequencyToleranceHz &&
+           std::abs(reading.frequency_hz - excited_hz_) <= kFrequencyToleranceHz &&
            std::abs(reading.measured_g - table_g) <= settings_.amplitude_tolerance * table_g;
 }
 

@@ -23,13 +23,13 @@ void Campaign::stop_shaker() {
 
 double Campaign::highest_level() const {
     if (state_ == State::checking) return settings_.loop.table_g;
-    return *std::ranges::max_element(settings_.stops.empty() ? settings_.table_g : levels_);
+    if (settings_.stops.empty()) return *std::ranges::max_element(settings_.table_g);
+    return std::ranges::max_element(levels_)->first;
 }
 
 bool Campaign::ask_level(double table_g, Time now) {
     stop_.excited(table_g);
-    if (!ports_.rig.shaker.request({settings_.frequency_hz, table_g, settings_.ramp_s},
-                                   armed_under_))
+    if (!ports_.rig.shaker.request({excited_hz_, table_g, settings_.ramp_s}, armed_under_))
         return false;
     tell_ramp(table_g, now);
     return true;
@@ -40,7 +40,8 @@ void Campaign::tell_ramp(double table_g, Time now) {
     asked_at_ = now;
     const RigFrame frame(settings_.rig);
     ports_.rig.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_level(),
-                        state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_))});
+                        state_ != State::checking, frame.to_raw(frame.up_at_deg(excited_deg_)),
+                        excited_hz_, excited_transmission_});
 }
 
 void Campaign::order_stop(const std::string& by) {

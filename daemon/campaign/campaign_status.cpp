@@ -63,10 +63,10 @@ void Campaign::fill(StatusData& status, Time now) const {
         const bool vibrating =
             state_ == State::ramping || state_ == State::settling || state_ == State::recording;
         status.command_table_g = vibrating ? table_g() : 0;
-        status.command_frequency_hz = settings_.frequency_hz;
+        status.command_frequency_hz = excited_hz_;
     } else if (state_ == State::checking) {
         status.command_table_g = check_ == Check::look || check_ == Check::rest ? 0 : check_level();
-        status.command_frequency_hz = settings_.frequency_hz;
+        status.command_frequency_hz = excited_hz_;
     }
 }
 

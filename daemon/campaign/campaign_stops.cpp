@@ -19,15 +19,17 @@ constexpr int kMostRepeats = 2;
 constexpr Time kLongInterruption = 3600 * drivers::kSecond;
 
 bool same(const Stop& a, const Stop& b) {
-    return a.position_deg == b.position_deg && a.table_g == b.table_g;
+    return a.position_deg == b.position_deg && a.table_g == b.table_g &&
+           a.frequency_hz == b.frequency_hz && a.verify == b.verify;
 }
 
 }  // namespace
 
 void Campaign::add_stop(const Stop& stop) {
-    const auto level = std::ranges::find(levels_, stop.table_g);
+    const std::pair one{stop.table_g, stop.frequency_hz};
+    const auto level = std::ranges::find(levels_, one);
     const auto run = level - levels_.begin();
-    if (level == levels_.end()) levels_.push_back(stop.table_g);
+    if (level == levels_.end()) levels_.push_back(one);
     stops_.push_back({stop, static_cast<int>(run) + 1, static_cast<int>(stops_.size()) + 1});
 }
 
@@ -66,7 +68,9 @@ bool Campaign::put_first(const std::vector<estimator::DwellSummary>& done) {
         const NumberedStop again{{}, done[i].run, done[i].position};
         if (is_repeat(again) && offered_stops_.size() == done.size()) {
             const auto of = std::find_if(stops_.begin(), from, [&](const NumberedStop& stop) {
-                return same(stop.stop, {offered_stops_[i].position_deg, offered_stops_[i].table_g});
+                const StopDone& offered = offered_stops_[i];
+                return same(stop.stop, {offered.position_deg, offered.table_g, offered.frequency_hz,
+                                        offered.held_out});
             });
             if (of == from) return false;
             stops_.insert(from, {of->stop, again.run, again.position});

@@ -66,6 +66,8 @@ class Rig {
     virtual void disobeyed(bool) {}
     /// The table moves though nothing was asked for.
     virtual void uncommanded() {}
+    /// It moves otherwise than asked for.
+    virtual void wrong_vibration() {}
     /// What is being proved by making it happen.
     virtual void proving(Proving) {}
 };

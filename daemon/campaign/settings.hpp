@@ -24,6 +24,7 @@ struct Stop {
     double table_g = 0;
     double frequency_hz = 0;  ///< 0: [vibration] frequency_hz
     bool verify = false;      ///< held out: no part of the fit
+    double transmission = 0;  ///< platform over table at that frequency; 0: as configured
 };
 
 /// Before each position: the platform's two channels across the vertical are brought level by fast

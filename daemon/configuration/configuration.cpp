@@ -165,9 +165,12 @@ void take_plan(Configuration& c) {
         return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
     };
     for (const auto& run : plan::read_plan(c.campaign.plan, transmission)) {
-        c.campaign.stops.insert(
-            c.campaign.stops.end(), run.count,
-            campaign::Stop{run.position_deg, run.table_g, run.frequency_hz, run.verify});
+        campaign::Stop stop{run.position_deg, run.table_g, run.table_g > 0 ? run.frequency_hz : 0,
+                            run.verify};
+        // At the reference frequency the loop check measures it.
+        if (stop.frequency_hz > 0 && !estimator::at_reference(c.estimator, stop.frequency_hz))
+            stop.transmission = *transmission(stop.frequency_hz);
+        c.campaign.stops.insert(c.campaign.stops.end(), run.count, stop);
         auto& levels = c.campaign.table_g;
         if (std::find(levels.begin(), levels.end(), run.table_g) == levels.end())
             levels.push_back(run.table_g);

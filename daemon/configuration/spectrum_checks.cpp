@@ -106,13 +106,9 @@ void CrossCheck::frequencies_of_plan() {
                 "vibration.frequency_hz", "spectrum.transmission"}))
         return;
     const double window_s = c_.estimator.level_window_s, rate = rate_of(c_);
+    bool told = false, reference = false;
     for (std::size_t i = 0; i < c_.campaign.stops.size(); ++i) {
         const auto& stop = c_.campaign.stops[i];
-        if (stop.verify) {
-            refuse({"campaign.plan"}, "dwell " + std::to_string(i + 1) + " of role \"verify\"",
-                   "\"identify\": vibrigd takes every dwell into the fit");
-            return;
-        }
         if (stop.frequency_hz <= 0 || stop.table_g <= 0) continue;
         const auto blame = [&](const char* other, const std::string& expected) {
             refuse({"campaign.plan", other},
@@ -131,12 +127,19 @@ void CrossCheck::frequencies_of_plan() {
             return blame("vibration.transmission", rounded(c_.spectrum.mount.lowest_hz()) +
                                                        " Hz at least: below it the isolators "
                                                        "amplify");
-        if (stop.frequency_hz != c_.estimator.frequency_hz)
-            return blame("vibration.frequency_hz",
-                         plain(c_.estimator.frequency_hz) +
-                             " Hz in every dwell (vibration.frequency_hz): vibrigd changes no "
-                             "frequency within a campaign");
+        const bool apart = stop.verify || !estimator::at_reference(c_.estimator, stop.frequency_hz);
+        if (!apart) reference = true;
+        if (apart && c_.estimator.method != estimator::Method::joint)
+            return blame("estimator.method",
+                         "estimator.method = \"joint\": the two-step route has "
+                         "coefficients at one frequency only");
+        told = true;
     }
+    if (told && !reference)
+        refuse({"campaign.plan", "vibration.frequency_hz"},
+               "no dwell to identify at " + plain(c_.estimator.frequency_hz) + " Hz within 2 %",
+               "the plan's lowest frequency as vibration.frequency_hz: its dwells give the 30 "
+               "coefficients");
 }
 
 }  // namespace vibrig::configuration

@@ -15,6 +15,8 @@ struct StopDone {
     /// When its dwell began: since the campaign's first, NaN: not known; and UTC.
     double begin_s = std::numeric_limits<double>::quiet_NaN();
     std::int64_t begun_utc_ns = 0;
+    double frequency_hz = 0;  ///< 0: the configuration's
+    bool held_out = false;
 };
 
 /// What the platform drifted by at the end of a levelling, which torqued it out.

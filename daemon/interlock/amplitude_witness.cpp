@@ -62,12 +62,23 @@ double Ramp::at(Time time, Time from) const noexcept {
     return start_g + share * (target_g - start_g);
 }
 
-AmplitudeWitness::AmplitudeWitness(const Settings& settings)
-    : settings_(settings),
-      window_(drivers::from_seconds(window_for(settings))),
-      block_(window_ / static_cast<Time>(LockIn<1>::kBlocks)),
-      fewest_(std::max(
-          6.0, 0.5 * static_cast<double>(window_) / static_cast<double>(settings.sample_period))) {}
+AmplitudeWitness::AmplitudeWitness(const Settings& settings) : settings_(settings) {
+    set_windows();
+}
+
+void AmplitudeWitness::set_windows() noexcept {
+    window_ = drivers::from_seconds(window_for(settings_));
+    block_ = window_ / static_cast<Time>(LockIn<1>::kBlocks);
+    fewest_ = std::max(
+        6.0, 0.5 * static_cast<double>(window_) / static_cast<double>(settings_.sample_period));
+}
+
+void AmplitudeWitness::retune(double frequency_hz) noexcept {
+    if (frequency_hz == settings_.frequency_hz) return;
+    settings_.frequency_hz = frequency_hz;
+    set_windows();
+    begin();
+}
 
 void AmplitudeWitness::begin() noexcept {
     force_.clear();

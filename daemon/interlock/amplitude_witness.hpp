@@ -18,6 +18,8 @@ struct Ramp {
     bool transmission_known = true;
     /// What the raw accelerometers show of 1 g along the vertical at this position; all 0: unknown.
     std::array<double, 3> raw_up{};
+    double frequency_hz = 0;  ///< 0: the configuration's
+    double transmission = 0;  ///< platform over table there; 0: as configured or measured
 
     std::uint64_t number = 0;  ///< the interlock's
 
@@ -65,6 +67,8 @@ class AmplitudeWitness {
 
     explicit AmplitudeWitness(const Settings& settings);
     void begin() noexcept;  ///< excitation begins
+    /// What it is to be at; from rest, as if excitation began.
+    void retune(double frequency_hz) noexcept;
     /// True: a block is complete, and verdict() judges the newest.
     [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
     [[nodiscard]] Verdict verdict(const Situation& situation) noexcept;
@@ -75,6 +79,7 @@ class AmplitudeWitness {
         double low = 0, high = 0;
     };
     [[nodiscard]] Bounds bounds(const Situation& now, bool known, double low, double high) const;
+    void set_windows() noexcept;
     [[nodiscard]] double platform_g() const noexcept;
     [[nodiscard]] double table_g() const noexcept;
     /// Of platform and table: one does not move where another does, and will be named as stuck.
@@ -84,8 +89,8 @@ class AmplitudeWitness {
     [[nodiscard]] double range(std::size_t channel, std::size_t blocks) const noexcept;
 
     Settings settings_;
-    drivers::Time window_, block_;
-    double fewest_;  ///< samples in a window
+    drivers::Time window_ = 0, block_ = 0;
+    double fewest_ = 0;  ///< samples in a window
     LockIn<3> force_;
     LockIn<1> table_;
     drivers::Time origin_ = 0, newest_ = 0;

@@ -46,6 +46,7 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
       platform_age_(limits.platform_age),
       rules_(std::move(limits.rules)),
       transmission_(limits.transmission),
+      frequency_hz_(limits.witness.frequency_hz),
       seconds_(limits.witness.frequency_hz),
       witness_(limits.witness) {
     std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
@@ -162,13 +163,19 @@ void Interlock::check(const drivers::Sample& sample,
 void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
     const std::uint64_t before = told_.number;
     static_cast<void>(ramp_.try_read(told_));
-    if (told_.number != before) controller_began_ = 0;
+    if (told_.number != before) {
+        controller_began_ = 0;
+        const double hz = told_.frequency_hz > 0 ? told_.frequency_hz : frequency_hz_;
+        witness_.retune(hz);
+        seconds_.retune(hz);
+    }
     const Time now = std::max(sample.time, now_);
     if (controller_began_ == 0 && !shaker_.busy() && !shaker_.stop_pending())
         controller_began_ = std::max(now, told_.begin);
     if (!witness_.add(sample)) return;
-    verdict_ = witness_.verdict(
-        {told_, controller_began_, now, commanded_g_.load() > 0, transmission_.load(), table_g_});
+    verdict_ = witness_.verdict({told_, controller_began_, now, commanded_g_.load() > 0,
+                                 told_.transmission > 0 ? told_.transmission : transmission_.load(),
+                                 table_g_});
     for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(verdict_.seen_g[i]);
     judge(Trip::over_armed, verdict_.over_armed, sample.time);
     if (proving_.load()) return;

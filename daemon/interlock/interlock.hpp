@@ -128,6 +128,10 @@ class Interlock {
     }
     /// Control thread: the accelerometers see motion where nothing was asked for.
     void uncommanded() noexcept;
+    /// Control thread, which alone judges this one: they see another vibration than was asked for.
+    void wrong_vibration(bool wrong) noexcept {
+        judge(By::read_back, Trip::wrong_vibration, wrong, wall_clock());
+    }
     /// Any thread. The first cause stays.
     void trip(Trip cause) noexcept { trip(cause, 0, 0, drivers::kChannels); }
     /// Shaker thread: a stop was written and confirmed.
@@ -203,7 +207,8 @@ class Interlock {
 
     // Acquisition thread.
     drivers::Time arrived_ = 0;
-    drivers::Time now_ = 0;  ///< when silence was last looked for
+    drivers::Time now_ = 0;      ///< when silence was last looked for
+    const double frequency_hz_;  ///< the configuration's
     MeanMotionMeter seconds_;
     AmplitudeWitness witness_;
     AmplitudeWitness::Verdict verdict_;  ///< the newest

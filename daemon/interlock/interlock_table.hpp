@@ -39,9 +39,10 @@ enum class Trip : std::uint8_t {
     watchdog_changed,
     guard_lost,
     guard_stop,
-    horn
+    horn,
+    wrong_vibration
 };
-inline constexpr std::size_t kTrips = 30;
+inline constexpr std::size_t kTrips = 31;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -112,6 +113,8 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::guard_lost, "guard_lost", "no word from vibrig-guard", Guard::armed},
     {Trip::guard_stop, "guard_stop", "vibrig-guard has stopped the shaker", Guard::idle, true},
     {Trip::horn, "annunciator_silent", "horn or lamp do not read back as told"},
+    {Trip::wrong_vibration, "wrong_vibration",
+     "the accelerometers do not show the vibration that was asked for", Guard::excitation, true},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];

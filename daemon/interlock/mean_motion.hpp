@@ -23,6 +23,12 @@ class MeanMotionMeter {
     explicit MeanMotionMeter(double frequency_hz) : frequency_hz_(frequency_hz) {}
     /// A second that has begun is given up; `excited` holds for what comes.
     void begin(bool excited) noexcept;
+    /// From here on the vibration is at this frequency; a second that has begun is given up.
+    void retune(double frequency_hz) noexcept {
+        if (frequency_hz == frequency_hz_) return;
+        frequency_hz_ = frequency_hz;
+        begun_ = false;
+    }
     /// True: a second is over, and mean() is it.
     [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
     [[nodiscard]] const MeanMotion& mean() const noexcept { return mean_; }

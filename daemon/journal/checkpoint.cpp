@@ -141,6 +141,8 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     put(bytes, dwell.stop.begin_s);
     put(bytes, dwell.stop.begun_utc_ns);
     bytes.push_back(dwell.info.power_lost ? 1 : 0);
+    put(bytes, dwell.info.frequency_hz);
+    bytes.push_back(dwell.info.held_out ? 1 : 0);
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -204,6 +206,16 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     char power_lost = 0;
     if (version >= 5) reader.get(power_lost);
     dwell.info.power_lost = power_lost != 0;
+    dwell.info.frequency_hz = 0;
+    char held_out = 0;
+    if (version >= 6) {
+        reader.get(dwell.info.frequency_hz);
+        reader.get(held_out);
+        if (reader.good() && !(dwell.info.frequency_hz >= 0)) return "corrupt: frequency";
+    }
+    dwell.info.held_out = held_out != 0;
+    dwell.stop.frequency_hz = dwell.info.frequency_hz;
+    dwell.stop.held_out = dwell.info.held_out;
     std::uint64_t count = 0;
     reader.get(count);
     if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())

@@ -282,6 +282,13 @@ std::optional<Found> NoiseMonitor::found() const {
 
 void NoiseMonitor::conclude(estimator::DwellSummary& dwell,
                             estimator::Identification& identification) {
+    // What is apart drifts otherwise than these coefficients say.
+    const auto& rows = identification.rows();
+    if (!rows.empty() && rows.back().apart && rows.back().run == dwell.run &&
+        rows.back().position == dwell.position) {
+        blocks_.clear();
+        return;
+    }
     estimator::Estimate estimate;
     identification.estimate(estimate);
     if (end_dwell(dwell, {estimate.value, identification.covariance_now()})) {

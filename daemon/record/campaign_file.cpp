@@ -112,8 +112,9 @@ void read_orders(const File& file, Campaign& to) {
                position = c.integers("position"), cancel = c.integers("cancel");
     const auto table = c.doubles("table_g"), zero = c.doubles("zero_g", 3),
                level = c.doubles("level_sigma_g"), angle = c.doubles("noise_angle_arcsec"),
-               walk = c.doubles("noise_walk", 3), begin = c.doubles_if_any("begin_s");
-    const auto power = c.integers_if_any("power_lost");
+               walk = c.doubles("noise_walk", 3), begin = c.doubles_if_any("begin_s"),
+               frequency = c.doubles_if_any("frequency_hz");
+    const auto power = c.integers_if_any("power_lost"), held_out = c.integers_if_any("held_out");
     for (std::size_t i = 0; i < c.rows(); ++i) {
         to.orders.push_back({announced[i],
                              from[i],
@@ -126,7 +127,9 @@ void read_orders(const File& file, Campaign& to) {
                              level[i],
                              {angle[i], row<3>(walk, i)},
                              i < begin.size() ? begin[i] : kNotKnown,
-                             i < power.size() && power[i] != 0});
+                             i < power.size() && power[i] != 0,
+                             i < frequency.size() ? frequency[i] : 0,
+                             i < held_out.size() && held_out[i] != 0});
     }
 }
 

@@ -36,7 +36,9 @@ std::vector<ColumnSpec> order_columns() {
             {"noise_angle_arcsec", Type::f64, {}, "arcsec", "noise of a reading, for the filter"},
             {"noise_walk", Type::f64, {3}, "deg/sqrt(h)", "gyros' random walk, for the filter"},
             {"begin_s", Type::f64, {}, "s", "of the dwell, since the campaign's first one"},
-            {"power_lost", Type::u8, {}, "", "1: the gyros were without power since the last"}};
+            {"power_lost", Type::u8, {}, "", "1: the gyros were without power since the last"},
+            {"frequency_hz", Type::f64, {}, "Hz", "commanded; 0: the configuration's"},
+            {"held_out", Type::u8, {}, "", "1: for verification, no part of the fit"}};
 }
 
 std::vector<ColumnSpec> dwell_columns() {
@@ -313,6 +315,7 @@ void CampaignWriter::order(const Order& order) {
     orders_->put(order.level_sigma_g).put(order.noise.angle_arcsec);
     put(*orders_, order.noise.gyro_random_walk_deg_per_rt_h);
     orders_->put(order.begin_s).put(byte(order.power_lost));
+    orders_->put(order.frequency_hz).put(byte(order.held_out));
 }
 
 void CampaignWriter::dwell(const Dwell& dwell) {
@@ -384,6 +387,10 @@ void CampaignWriter::end(const Ended& ended) {
     write_end(file, ended);
     if (!ended.journal_head.empty()) file.set("/", "journal_head", ended.journal_head);
     file.write_text("/result", ended.result_json, "final result, JSON as vibrig identify --json");
+    const auto result = nlohmann::json::parse(ended.result_json, nullptr, false);
+    if (result.is_object() && result.contains("spectrum") && result.at("spectrum").is_object())
+        file.write_text("/spectrum", result.at("spectrum").dump(),
+                        "coefficients over frequency, JSON as in the result");
     file.close();
 }
 

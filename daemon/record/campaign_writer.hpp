@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "daemon/domain/events.hpp"
 #include "daemon/record/disk.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/records.hpp"

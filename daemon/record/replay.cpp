@@ -268,9 +268,16 @@ void read_dwells(const std::string& path, Campaign& to) {
              {13, &walk[1]},
              {14, &walk[2]}}};
         const bool dated = fields.size() >= 16 && !fields[15].empty();
-        order.power_lost = fields.size() == 17 && fields[16] == "1";
-        bool good = fields.size() >= 15 && fields.size() <= 17 &&
-                    (fields.size() < 17 || fields[16] == "1" || fields[16] == "0") &&
+        order.power_lost = fields.size() >= 17 && fields[16] == "1";
+        order.held_out = fields.size() == 19 && fields[18] == "1";
+        const auto yes_or_no = [&fields](std::size_t at) {
+            return fields.size() <= at || fields[at] == "1" || fields[at] == "0";
+        };
+        bool good = fields.size() >= 15 && fields.size() <= 19 && fields.size() != 18 &&
+                    yes_or_no(16) && yes_or_no(18) &&
+                    (fields.size() < 19 ||
+                     (proto::read_number(fields[17], order.frequency_hz) &&
+                      std::isfinite(order.frequency_hz) && order.frequency_hz >= 0)) &&
                     (!dated || (proto::read_number(fields[15], order.begin_s) &&
                                 std::isfinite(order.begin_s))) &&
                     proto::read_number(fields[0], order.run) &&

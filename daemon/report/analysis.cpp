@@ -117,6 +117,9 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
         campaign.found ? campaign.found->levels : estimator::noise_levels(settings);
     for (std::size_t d = 0; d < dwells.size() && d < replayed.dwells.size(); ++d) {
         const RecordedDwell& dwell = dwells[d];
+        // What is apart is nothing that these coefficients foretell.
+        const double hz = dwell.order->frequency_hz;
+        if (dwell.order->held_out || (hz > 0 && !estimator::at_reference(settings, hz))) continue;
         if (!left_out.contains(dwell.order->position)) continue;
         const auto blocks = blocks_of(campaign, dwell);
         if (blocks.size() < 10) continue;

@@ -18,6 +18,7 @@
 #include "daemon/report/plan_section.hpp"
 #include "daemon/report/proof_section.hpp"
 #include "daemon/report/result_charts.hpp"
+#include "daemon/report/spectrum_section.hpp"
 #include "daemon/report/type_section.hpp"
 #include "daemon/report/uncertainty_section.hpp"
 #include "daemon/version.hpp"
@@ -468,6 +469,7 @@ void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
     }
     if (told == 0) page.paragraph("No levelling and no zeroing was done in this campaign.");
 
+    add_spectrum(page, campaign);
     add_type(page, campaign);
     if (!a.history_note.empty()) {
         page.section("history", "Earlier campaigns of the unit");

@@ -273,6 +273,24 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
     return {std::move(analysis), std::move(table), hz};
 }
 
+std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
+                                          const std::vector<estimator::DwellRow>& rows, Form form) {
+    std::vector<SpectralDwell> dwells;
+    std::vector<Kind> kinds;
+    for (const estimator::DwellRow& row : rows) {
+        if (row.held_out) continue;
+        dwells.push_back({row, {}, 0});
+        if (!(row.vibration.kappa > 1)) continue;
+        const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
+        const auto known =
+            std::ranges::find_if(kinds, [hz](const Kind& k) { return k.hz() == hz; });
+        dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
+        if (known == kinds.end()) kinds.push_back({"", {{hz, 1, 0}}});
+    }
+    if (kinds.size() < 2 || dwells.size() > kMostSpectralDwells) return std::nullopt;
+    return spectrum_of(settings, std::move(dwells), std::move(kinds), form);
+}
+
 void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
            uncertainty::Assessment& assessed) {
     if (!spectrum.several()) return;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,12 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
                                          std::vector<estimator::spectrum::SpectralDwell> dwells,
                                          std::vector<estimator::spectrum::Kind> kinds,
                                          estimator::spectrum::Form form);
+
+/// Of a campaign's rows that say with which frequency they shook, those held out left aside;
+/// nothing where there are not several frequencies, or too few or too many rows.
+[[nodiscard]] std::optional<SpectrumResult> spectrum_of(
+    const estimator::Settings& settings, const std::vector<estimator::DwellRow>& rows,
+    estimator::spectrum::Form form = estimator::spectrum::Form::automatic);
 
 /// With several frequencies the assessment's coefficients become those of the analysis, its rates
 /// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.

@@ -24,8 +24,6 @@ static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);
 
-constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
-
 /// Sets an optional field only with a number that JSON can carry.
 template <typename Message>
 void set(Message& message, void (Message::*setter)(double), double value) {

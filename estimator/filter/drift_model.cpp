@@ -1,10 +1,24 @@
 #include "estimator/filter/drift_model.hpp"
 
 #include <Eigen/Geometry>
+#include <type_traits>
+#include <utility>
 
 #include "estimator/filter/product.hpp"
 
 namespace vibrig::estimator {
+namespace {
+
+/// `each` is called with each group as a constant: the filter's inner loop, written out.
+template <typename Each>
+void for_each_group(Each each) {
+    [&]<std::size_t... G>(std::index_sequence<G...>) {
+        (each(std::integral_constant<std::size_t, G>{}), ...);
+    }
+    (std::make_index_sequence<kGroups>{});
+}
+
+}  // namespace
 
 DriftModel::DriftModel(const Settings& settings) : axes_{}, sign_(settings.drift_sign) {
     for (std::size_t j = 0; j < kGyros; ++j) {
@@ -20,12 +34,17 @@ Regressors DriftModel::regressors(const Eigen::Vector3d& up,
     Regressors h{};
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        for (std::size_t group = 0; group < kGroups; ++group) {
-            const auto& [letters, order, p, q, place] = kCoefficientTable[group];
-            h[group][j] = order == 0   ? 1.0
-                          : order == 1 ? g.sign[p] * up[g.axis[p]]
-                                       : g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
-        }
+        for_each_group([&](auto group) {
+            constexpr CoefficientRow kRow = kCoefficientTable[group];
+            constexpr auto p = kRow.p, q = kRow.q;
+            if constexpr (kRow.order == 0) {
+                h[group][j] = 1.0;
+            } else if constexpr (kRow.order == 1) {
+                h[group][j] = g.sign[p] * up[g.axis[p]];
+            } else {
+                h[group][j] = g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
+            }
+        });
     }
     return h;
 }
@@ -50,17 +69,22 @@ Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, const Eigen::Matrix3d& mo
     Eigen::Matrix3d turning;  // one gyro a row
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        Eigen::Vector3d linear = Eigen::Vector3d::Zero();
-        Eigen::Matrix3d quadratic = Eigen::Matrix3d::Zero();
-        for (std::size_t group = 0; group < kGroups; ++group) {
-            const auto& [letters, order, p, q, place] = kCoefficientTable[group];
+        Eigen::Vector3d linear;
+        Eigen::Matrix3d quadratic;
+        for_each_group([&](auto group) {
+            constexpr CoefficientRow kRow = kCoefficientTable[group];
+            constexpr auto p = kRow.p, q = kRow.q;
             const double d = parameters[internal_index(group, j)];
-            if (order == 1) linear[g.axis[p]] = g.sign[p] * d;
-            if (order != 2) continue;
-            // A product of two axes stands twice in the symmetric matrix, half each time.
-            const double share = p == q ? d : 0.5 * g.sign[p] * g.sign[q] * d;
-            quadratic(g.axis[p], g.axis[q]) = quadratic(g.axis[q], g.axis[p]) = share;
-        }
+            if constexpr (kRow.order == 1) {
+                linear[g.axis[p]] = g.sign[p] * d;
+            } else if constexpr (kRow.order == 2 && p == q) {
+                quadratic(g.axis[p], g.axis[p]) = d;
+            } else if constexpr (kRow.order == 2) {
+                // A product of two axes stands twice in the symmetric matrix, half each time.
+                quadratic(g.axis[p], g.axis[q]) = quadratic(g.axis[q], g.axis[p]) =
+                    0.5 * g.sign[p] * g.sign[q] * d;
+            }
+        });
         const Eigen::Matrix3d a = product(moment, quadratic);
         turning.row(static_cast<Eigen::Index>(j)) =
             pose.up.cross(linear) +

@@ -22,6 +22,8 @@ struct DwellInfo {
     /// When its measurements' time is 0, on a clock common to all dwells, s; NaN: there is none.
     double begin_s = std::numeric_limits<double>::quiet_NaN();
     bool power_lost = false;  ///< the gyros were without power since the dwell before
+    double frequency_hz = 0;  ///< of the vibration, commanded; 0: Settings::frequency_hz
+    bool held_out = false;    ///< to try a result on: the coefficients take nothing of it
 };
 
 enum class StepOutcome : std::uint8_t {

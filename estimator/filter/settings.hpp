@@ -73,6 +73,12 @@ struct Settings {
     std::vector<uncertainty::Misfit> free;  ///< structural classes that the data determine as well
 };
 
+/// Whether coefficients at Settings::frequency_hz are to take up what shakes at `hz`.
+[[nodiscard]] inline bool at_reference(const Settings& settings, double hz) noexcept {
+    constexpr double kSame = 0.02;
+    return hz > (1 - kSame) * settings.frequency_hz && hz < (1 + kSame) * settings.frequency_hz;
+}
+
 /// Noise as the filter takes it.
 struct NoiseLevels {
     double angle_arcsec = 0;  ///< of one encoder reading, quantisation included

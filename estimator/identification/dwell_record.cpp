@@ -20,7 +20,8 @@ constexpr double kLeastReadings = 0.5;  ///< of those that a steady rate would g
 /// is that of two or more periods. Not those of nothing: stamps may come in pairs.
 constexpr double kCrowdedTolerance = 0.25;
 constexpr double kCrowdedFrom = 0.1, kCrowdedTo = 0.6;
-constexpr double kShaken = 1.001;  ///< kappa; below, its error does no harm
+constexpr double kOffFrequency_hz = 0.05;  ///< where a frequency was commanded
+constexpr double kShaken = 1.001;          ///< kappa; below, its error does no harm
 
 constexpr const char* kSaturated[3] = {"accelerometer x is saturated: dwell rejected",
                                        "accelerometer y is saturated: dwell rejected",
@@ -103,7 +104,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     const double window_s =
         std::clamp(r.span_s, VibrationLevel::kFirstWindow_s, settings.level_window_s);
     // As measured, where that is known: the nominal one may be off.
-    const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : settings.frequency_hz;
+    const double nominal_hz = r.info.frequency_hz > 0 ? r.info.frequency_hz : settings.frequency_hz;
+    const double frequency_hz = s.frequency_hz > 0 ? s.frequency_hz : nominal_hz;
     if (r.samples == 0) {
         flag("no samples", true);
     } else if (r.level_samples <= 0) {
@@ -118,11 +120,15 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         // The level lags behind by its window: second-order terms would take up the difference.
         flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
     } else if (s.kappa > 1.0 && r.period_s > 0 &&
-               VibrationLevel::excluded(settings.frequency_hz, r.period_s, window_s)) {
+               VibrationLevel::excluded(nominal_hz, r.period_s, window_s)) {
         flag(
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
             "rejected",
             true);
+    } else if (r.info.frequency_hz > 0 && s.frequency_hz > 0 &&
+               std::abs(s.frequency_hz - nominal_hz) > kOffFrequency_hz) {
+        flag("the vibration is not at its commanded frequency within 0.05 Hz: dwell rejected",
+             true);
     } else if (const char* alias =
                    s.kappa > 1.0 && r.period_s > 0
                        ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s)

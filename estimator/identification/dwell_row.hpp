@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 #include "estimator/filter/coefficients.hpp"
 #include "estimator/filter/vibration_moment.hpp"
@@ -34,8 +35,14 @@ struct DwellRow {
     Regression ramp_regressors = Regression::Zero();
     double nis_per_dof = 0, innovation_correlation = 0;
     std::uint32_t used = 0;
-    double sync_arcsec = 0;  ///< motion of the angles in step with the vibration
-    bool flagged = false;    ///< and not merely followed
+    double sync_arcsec = 0;   ///< motion of the angles in step with the vibration
+    bool flagged = false;     ///< and not merely followed
+    double commanded_hz = 0;  ///< 0: nobody said
+    bool held_out = false;    ///< as DwellInfo
+    bool apart = false;       ///< held out, or of another frequency: the coefficients lack it
 };
+
+/// Those that the coefficients at the reference frequency rest on.
+[[nodiscard]] std::vector<DwellRow> without_apart(const std::vector<DwellRow>& rows);
 
 }  // namespace vibrig::estimator

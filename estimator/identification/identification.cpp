@@ -120,6 +120,10 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     bad_times_in_a_row_ = 0;
     walked_.reset();
     power_lost_ = power_lost_ || dwell.power_lost;
+    const double hz = dwell.frequency_hz > 0 ? dwell.frequency_hz : settings.frequency_hz;
+    apart_ = settings.method == Method::joint && (dwell.held_out || !at_reference(settings, hz));
+    level_.nominal(hz);
+    sync_.nominal(hz);
     active_ = filter_of(dwell.run);
     if (active_ == nullptr) {
         refused_run = true;
@@ -260,6 +264,11 @@ StepResult Identification::Impl::replay() noexcept {
 void Identification::Impl::let_biases_walk() noexcept {
     walk_begin_s_ = record_.info.begin_s + buffer_.readings().front().time_s;
     walked_ = 0.0;
+    if (apart_) {
+        // Its drift may be any; nothing of it is kept.
+        active_->filter.begin_dwell_after_walk(settings.prior_bias * settings.prior_bias);
+        return;
+    }
     if (!walked_from_ || settings.method != Method::joint ||
         settings.drift.model == uncertainty::BiasModel::constant)
         return;
@@ -369,6 +378,9 @@ void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
     row.nis_per_dof = summary.nis_per_dof;
     row.innovation_correlation = summary.innovation_correlation;
     row.flagged = summary.flagged && !summary.followed;
+    row.commanded_hz = record_.info.frequency_hz;
+    row.held_out = record_.info.held_out;
+    row.apart = apart_;
     if (row.frequency_hz > 0)
         row.sync_arcsec =
             sync_.amplitude_arcsec(row.frequency_hz, noise.angle_arcsec * noise.angle_arcsec);
@@ -389,13 +401,12 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             verdict.summary.amplitude_g = paper_.amplitude_g();
         }
         if (!verdict.rejected) keep_row(verdict.summary);
-        active_->batch.end_dwell(!verdict.rejected, walked_.value_or(0.0));
-        if (!verdict.rejected && walked_)
+        active_->batch.end_dwell(!verdict.rejected && !apart_, walked_.value_or(0.0));
+        if (!verdict.rejected && !apart_ && walked_)
             walked_from_.emplace(walk_begin_s_, last_time_s_ - dwell_begin_s_);
-        if (verdict.rejected) {
-            active_->filter.restore(active_->saved);
-        } else {
-            active_->kappa.add(verdict.summary.kappa);
+        if (verdict.rejected || apart_) active_->filter.restore(active_->saved);
+        if (!verdict.rejected) {
+            if (!apart_) active_->kappa.add(verdict.summary.kappa);
             nis_sum += record_.nis_sum;
             nis_count += record_.nis_count;
             if (active_ == &filters[0] && settings.method == Method::two_step &&

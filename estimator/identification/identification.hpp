@@ -76,7 +76,7 @@ class Identification {
     [[nodiscard]] const NoiseLevels& noise() const noexcept;
     /// Final result over all ended dwells. Allocates; does not change the filter.
     [[nodiscard]] Result result() const;
-    /// Those of result(), without a copy.
+    /// Those of result() and, in their order, those apart from them.
     [[nodiscard]] const std::vector<DwellRow>& rows() const noexcept;
     /// Of solved(), 30 x 30 row-major in the order of parameter_names(), whether or not they are
     /// observable. Allocates.

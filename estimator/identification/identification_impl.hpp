@@ -111,6 +111,7 @@ struct Identification::Impl {
     DwellRecord record_;
     bool power_lost_ = false;  ///< since the row kept last
     bool in_dwell_ = false;
+    bool apart_ = false;   ///< this dwell: see DwellRow
     bool primed_ = false;  ///< the level of this stretch is known
     /// Of the biases' walk since the dwell kept before, (deg/h)^2; none: not in the filter yet.
     std::optional<double> walked_;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 
@@ -103,6 +104,14 @@ std::string unobservable_warning(const std::array<bool, kParameters>& observable
 }
 
 }  // namespace
+
+std::vector<DwellRow> without_apart(const std::vector<DwellRow>& rows) {
+    std::vector<DwellRow> out;
+    out.reserve(rows.size());
+    std::ranges::copy_if(rows, std::back_inserter(out),
+                         [](const DwellRow& row) { return !row.apart; });
+    return out;
+}
 
 void widen_amplitudes(Result& result, const std::vector<std::pair<int, double>>& level_variances) {
     for (RunAmplitude& amplitude : result.amplitudes) {
@@ -231,7 +240,7 @@ Result Identification::Impl::result() const {
     out.samples = samples;
     out.rejected = rejected;
     out.dwells = dwells;
-    out.rows = rows;
+    out.rows = without_apart(rows);
     out.warnings = dwell_warnings(dwells);
     if (settings.method == Method::two_step) {
         std::map<int, KappaSpread> levels;

@@ -46,7 +46,7 @@ struct Result {
     double nis_per_dof = 0;
     std::uint64_t samples = 0, rejected = 0;
     std::vector<DwellSummary> dwells;
-    std::vector<DwellRow> rows;  ///< of the dwells kept, in their order
+    std::vector<DwellRow> rows;  ///< of the dwells kept, in their order; none that is apart
     CrossCheck cross_check;
     std::vector<std::string> warnings;
 };

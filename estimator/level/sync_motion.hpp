@@ -14,6 +14,8 @@ class SyncMotion {
   public:
     explicit SyncMotion(double nominal_hz);
     void clear() noexcept;
+    /// Of the vibration to come; after clear().
+    void nominal(double hz) noexcept { nominal_hz_ = hz; }
     /// One reading, time from the beginning of the dwell.
     void add(double time_s, const std::array<double, 3>& innovation_arcsec) noexcept;
     /// Of the three axes together, arcsec; `variance`: of one innovation, arcsec^2, whose share is

@@ -28,7 +28,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 28> kDescriptions{{
+constexpr std::array<Description, 29> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -82,6 +82,8 @@ constexpr std::array<Description, 28> kDescriptions{{
      "unit-mps2             amplitudes are taken and read back as m/s^2 peak"},
     {FaultKind::dead_table, "dead-table", Value::none, false,
      "dead-table            the table does not move, measured amplitude 0 (but readback-echo)"},
+    {FaultKind::frequency_ignored, "frequency-ignored", Value::none, false,
+     "frequency-ignored     another frequency is taken and read back, the table keeps the old one"},
     {FaultKind::timeout_register, "timeout-register", Value::whole, false,
      "timeout-register=MS   another master keeps this in the watchdog's timeout register; 0: off"},
     {FaultKind::latched_fault, "latched-fault", Value::none, false,

@@ -39,6 +39,7 @@ ShakerLies lies_at(double time_s, ShakerLies lies, const Faults& faults) noexcep
     yes(FaultKind::unit_rms, lies.unit_rms);
     yes(FaultKind::unit_mps2, lies.unit_mps2);
     yes(FaultKind::dead_table, lies.dead_table);
+    yes(FaultKind::frequency_ignored, lies.frequency_ignored);
     if (const Fault* fault = faults.active(FaultKind::timeout_register, time_s))
         lies.timeout_register = static_cast<std::uint16_t>(fault->value);
     yes(FaultKind::latched_fault, lies.latched_fault);

@@ -43,6 +43,7 @@ enum class FaultKind : std::uint8_t {
     unit_rms,
     unit_mps2,
     dead_table,
+    frequency_ignored,
     timeout_register,
     latched_fault
 };

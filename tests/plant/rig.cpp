@@ -102,8 +102,8 @@ void Rig::vibrate() {
     shaker_.advance(tick_s_);
     shaking_s_ = shaker_.at_rest() ? 0 : shaking_s_ + passing_s_;
     const double end = table_g();
-    if (shaker_.frequency_hz() != frequency_hz_) {
-        frequency_hz_ = shaker_.frequency_hz();
+    if (shaker_.table_hz() != frequency_hz_) {
+        frequency_hz_ = shaker_.table_hz();
         isolator_.set_drive(frequency_hz_, {truth_.second_harmonic, truth_.third_harmonic,
                                             truth_.fourth_harmonic, truth_.fifth_harmonic});
     }

@@ -63,6 +63,7 @@ ShakerController::Answer ShakerController::write(std::size_t address,
         return Answer::illegal_value;
     }
 
+    if (!lies_.frequency_ignored) table_hz_ = frequency;
     if (lies_.timeout_register) next[kMap.watchdog_timeout.address] = *lies_.timeout_register;
     if (next[kMap.watchdog->address] != holding_[kMap.watchdog->address]) since_feed_s_ = 0;
     const double old_amplitude = set_point_g();
@@ -147,7 +148,7 @@ void ShakerController::advance(double dt_s) noexcept {
         if (state_ == ShakerState::ramping) state_ = ShakerState::running;
         if (state_ == ShakerState::stopping) state_ = ShakerState::idle;
     }
-    const double omega = 2 * std::numbers::pi * frequency_hz();
+    const double omega = 2 * std::numbers::pi * table_hz_;
     const double peak_mm = 1e3 * amplitude_g() * kMetrePerSecond2 / (omega * omega);
     if (peak_mm > limit_mm_ && state_ != ShakerState::fault) trip(kFaultLimit, kWatchdogStop);
 }

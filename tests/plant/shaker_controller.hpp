@@ -45,8 +45,9 @@ class ShakerController {
 
     [[nodiscard]] ShakerState state() const noexcept { return state_; }
     [[nodiscard]] std::uint16_t faults() const noexcept { return faults_; }
-    [[nodiscard]] double amplitude_g() const noexcept;  ///< of the table now, peak, in truth
-    [[nodiscard]] double frequency_hz() const noexcept;
+    [[nodiscard]] double amplitude_g() const noexcept;   ///< of the table now, peak, in truth
+    [[nodiscard]] double frequency_hz() const noexcept;  ///< as its register says
+    [[nodiscard]] double table_hz() const noexcept { return table_hz_; }  ///< in truth
     [[nodiscard]] double set_point_g() const noexcept;
     [[nodiscard]] double ramp_s() const noexcept;
     [[nodiscard]] bool at_rest() const noexcept { return amplitude_g() == 0; }
@@ -70,6 +71,7 @@ class ShakerController {
     double slope_g_per_s_ = 0;  ///< positive
     double held_g_ = 0;         ///< what a contactor that is stuck keeps up when the drive goes
     double since_feed_s_ = 0;
+    double table_hz_ = 15;
 };
 
 }  // namespace vibrig::plant

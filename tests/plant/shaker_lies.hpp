@@ -15,10 +15,11 @@ struct ShakerLies {
     bool readback_echo = false;     ///< the measured amplitude is the set-point, or 0 with run = 0
     /// A stop leaves the table as it is: the controller believes itself at rest and says so.
     bool stuck_contactor = false;
-    double slow_ramp = 1;     ///< ramps take so many times their time, a stop's too
-    bool unit_rms = false;    ///< amplitudes are rms, set-point and measured
-    bool unit_mps2 = false;   ///< amplitudes are m/s^2 peak
-    bool dead_table = false;  ///< the table does not move; the measured amplitude is 0
+    double slow_ramp = 1;            ///< ramps take so many times their time, a stop's too
+    bool unit_rms = false;           ///< amplitudes are rms, set-point and measured
+    bool unit_mps2 = false;          ///< amplitudes are m/s^2 peak
+    bool dead_table = false;         ///< the table does not move; the measured amplitude is 0
+    bool frequency_ignored = false;  ///< a new frequency is taken and read back, not done
     /// Another master keeps this in the watchdog's timeout register, which obeys it; ms, 0: off.
     std::optional<std::uint16_t> timeout_register{};
     bool latched_fault = false;  ///< trips by itself when this begins

@@ -99,6 +99,7 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "unit_rms", t.shaker_lies.unit_rms, 0, 0);
     field("shaker", "unit_mps2", t.shaker_lies.unit_mps2, 0, 0);
     field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
+    field("shaker", "frequency_ignored", t.shaker_lies.frequency_ignored, 0, 0);
     field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
     field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
 }

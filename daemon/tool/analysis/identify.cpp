@@ -65,10 +65,11 @@ struct Found {
     std::string contradiction;  ///< the first; empty: none
     std::vector<estimator::spectrum::SpectralDwell> spectral;
     std::vector<estimator::spectrum::Kind> kinds;
+    std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
 };
 
 Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
-    Found found{std::move(result), {}, {}, {}};
+    Found found{std::move(result), {}, {}, {}, {}};
     found.contradiction = doubts.tell(found.result);
     return found;
 }
@@ -222,15 +223,6 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
     }
 }
 
-/// What a dwell at another frequency than the filter's says: by a filter of its own, so that the
-/// coefficients at the reference frequency take nothing of it.
-void add_apart(estimator::Identification& apart, estimator::Result& to) {
-    estimator::Result one = apart.result();
-    to.samples += one.samples;
-    to.rejected += one.rejected;
-    std::move(one.dwells.begin(), one.dwells.end(), std::back_inserter(to.dwells));
-}
-
 /// A recording that says with which frequency each dwell shook: kept whole, since the frequency
 /// that the filter takes is known at its end.
 Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settings,
@@ -248,26 +240,19 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
     std::size_t done = 0;
     Found found;
     found.kinds = kinds.kinds();
-    estimator::Result others;
     for (std::size_t d = 0; d < dwells.size(); ++d) {
         const Dwell& dwell = dwells[d];
         const auto kind = kinds.of(d);
-        std::optional<estimator::Identification> apart;
-        if (kind && kind != reference) {
-            estimator::Settings own = settings;
-            own.frequency_hz = kinds.kinds()[*kind].hz();
-            apart.emplace(own, 1);
-        }
-        estimator::Identification& filter = apart ? *apart : identification;
-        const std::size_t before = filter.rows().size();
+        const std::size_t before = identification.rows().size();
         estimator::DwellInfo info{dwell.run, dwell.position};
         if (common_clock) info.begin_s = 0;
-        filter.begin_dwell(info);
+        if (kind) info.frequency_hz = kinds.kinds()[*kind].hz();
+        identification.begin_dwell(info);
         doubts.begin_dwell();
         plan.begin_dwell(dwell.run);
         for (const RecordingRow* row : dwell.rows) {
             const auto measurement = measurement_of(*row);
-            static_cast<void>(filter.add(measurement));
+            static_cast<void>(identification.add(measurement));
             doubts.add(measurement);
             plan.add(measurement);
             // Asking a clock costs more than a filter step.
@@ -275,9 +260,9 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
                 progress.show(done, rows.size());
             }
         }
-        static_cast<void>(filter.end_dwell());
-        if (filter.rows().size() > before) {
-            const estimator::DwellRow& row = filter.rows().back();
+        static_cast<void>(identification.end_dwell());
+        if (identification.rows().size() > before) {
+            const estimator::DwellRow& row = identification.rows().back();
             const bool shook = row.vibration.kappa > 1;
             if (shook && !kind)
                 throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
@@ -286,15 +271,11 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
                                          " g, expected its frequency");
             found.spectral.push_back({row, shook ? kind : std::nullopt, 0});
         }
-        if (apart) add_apart(*apart, others);
     }
     if (!request.held_out) plan.tell();
     Found whole = with_doubts(identification.result(), doubts);
     found.result = std::move(whole.result);
     found.contradiction = std::move(whole.contradiction);
-    found.result.samples += others.samples;
-    found.result.rejected += others.rejected;
-    std::move(others.dwells.begin(), others.dwells.end(), std::back_inserter(found.result.dwells));
     return found;
 }
 
@@ -325,7 +306,9 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }
-    return with_doubts(anew ? anew->result() : identification.result(), doubts);
+    Found found = with_doubts(anew ? anew->result() : identification.result(), doubts);
+    found.rows = identification.rows();
+    return found;
 }
 
 Found identify_campaign(const std::string& path, const std::string& config,
@@ -441,7 +424,13 @@ Identified identify_recording(const std::string& file, const std::string& config
         identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
                                           std::move(found.kinds), request.form);
         adopt(*identified.spectrum, identified.settings, identified.assessed);
+    } else if (identified.assessed.done) {
+        identified.spectrum = spectrum_of(identified.settings, found.rows, request.form);
+        if (identified.spectrum)
+            adopt(*identified.spectrum, identified.settings, identified.assessed);
     }
+    std::ranges::copy_if(found.rows, std::back_inserter(identified.held_out),
+                         &estimator::DwellRow::held_out);
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }

@@ -65,6 +65,19 @@ struct Held {
     std::vector<std::array<double, 3>> deg;
 };
 
+/// Of a campaign's held-out dwells those that shook with the profile's sine.
+std::vector<estimator::DwellRow> under(const Profile& profile,
+                                       const std::vector<estimator::DwellRow>& held_out) {
+    constexpr double kSame = 0.02;
+    std::vector<estimator::DwellRow> rows;
+    for (const estimator::DwellRow& row : held_out) {
+        if (profile.sines.size() == 1 && row.vibration.kappa > 1 &&
+            std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame)
+            rows.push_back(row);
+    }
+    return rows;
+}
+
 Held held_out(const std::string& recording, const std::string& config, const Profile& profile,
               const AtPlatform& vibration) {
     if (!profile.psd.empty())
@@ -74,12 +87,17 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
     SpectrumRequest request;
     request.held_out = true;
     const Identified found = identify_recording(recording, config, request);
-    const auto& rows = found.result.rows.empty() || !found.spectrum
+    const bool planned = !found.held_out.empty();
+    const auto& rows = planned ? under(profile, found.held_out)
+                       : found.result.rows.empty() || !found.spectrum
                            ? std::vector<estimator::DwellRow>(found.result.rows)
                            : std::vector<estimator::DwellRow>(found.spectrum->table.rows().begin(),
                                                               found.spectrum->table.rows().end());
     if (rows.empty())
-        throw std::runtime_error(recording + ": found no dwell that can be used, expected one");
+        throw std::runtime_error(
+            recording + ": found no dwell " +
+            (planned ? "of role \"verify\" at the profile's frequency" : "that can be used") +
+            ", expected one");
     Held held;
     held.rates.resize(static_cast<Index>(rows.size()), 3);
     for (std::size_t k = 0; k < rows.size(); ++k) {

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/results/spectrum_result.hpp"
@@ -17,7 +18,8 @@ struct Identified {
     estimator::uncertainty::Assessment assessed;
     bool simulated = false;                  ///< the rig was a program
     std::optional<dwells::Live> live;        ///< of a campaign that was identified anew at its end
-    std::optional<SpectrumResult> spectrum;  ///< of a CSV recording with rows enough
+    std::optional<SpectrumResult> spectrum;  ///< of rows enough, and of a campaign frequencies
+    std::vector<estimator::DwellRow> held_out;  ///< of a campaign: planned for verification
 };
 
 /// How a recording's frequencies are to be taken.

@@ -103,7 +103,7 @@ TEST(SpectrumKeys, FrequenciesThatSamplingForbidsAreRefusedWithTheNearestFreeOne
     EXPECT_THAT(plan_at("60"), AllOf(StartsWith("rig.toml:1:"), HasSubstr("found dwell 1 at 60 Hz"),
                                      HasSubstr("the nearest free one is 60.2 Hz")));
     EXPECT_THAT(plan_at("10.7"), HasSubstr("below it the isolators amplify"));
-    EXPECT_THAT(plan_at("35.1"), HasSubstr("changes no frequency within a campaign"));
+    EXPECT_THAT(plan_at("35.1"), HasSubstr("no dwell to identify at 15 Hz within 2 %"));
     EXPECT_EQ(plan_at("15"), "");
     EXPECT_THAT(complaint("spectrum.mode = \"mixed\"\n", true),
                 HasSubstr("found \"mixed\" without registers of mode and profile"));

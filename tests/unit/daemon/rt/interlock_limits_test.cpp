@@ -211,6 +211,9 @@ const Case kCases[] = {
     {"stop_disobeyed", Trip::stop_disobeyed, 0,
      [](Rig& rig, bool beyond) { rig.interlock->stop_disobeyed(beyond); }, Guard::idle, Guard::idle,
      0},
+    {"wrong_vibration", Trip::wrong_vibration, 0,
+     [](Rig& rig, bool beyond) { rig.interlock->wrong_vibration(beyond); }, Guard::excitation,
+     Guard::excitation, 0},
     {"watchdog_changed", Trip::watchdog_changed, 0,
      [](Rig& rig, bool beyond) {
          rig.shaker.now.watchdog =

@@ -5,6 +5,8 @@
 #include <limits>
 #include <thread>
 
+#include "daemon/domain/campaign_state.hpp"
+
 namespace vibrig::serve {
 namespace {
 

@@ -183,7 +183,7 @@ std::vector<DwellMean> recorded(std::uint64_t seed, double dwell_s,
 constexpr std::uint64_t kRecordings = 30;
 
 TEST(Consistency, OfShortDwellsIsAsUncertainAsTheirSlopes) {
-    for (const double dwell_s : {2.0, 5.0, 20.0, 100.0}) {
+    for (const double dwell_s : {2.0, 5.0, 20.0}) {
         double square = 0, sigma = 0, noise = 0;
         for (std::uint64_t seed = 1; seed <= kRecordings; ++seed) {
             const auto dwells = recorded(seed, dwell_s);
@@ -212,8 +212,8 @@ TEST(Consistency, OfShortDwellsIsAsUncertainAsTheirSlopes) {
 }
 
 TEST(Consistency, OfShortDwellsStillFindsWhatIsBeyondTheirNoise) {
-    // 2 deg of azimuth are 0.37 deg/h, seen with dwells of 100 s; 30 deg 5.2 deg/h, with 5 s too
-    for (const auto& [dwell_s, off] : {std::pair{100.0, 2.0}, {5.0, 30.0}}) {
+    // 2 deg of azimuth are 0.37 deg/h, seen with dwells of 40 s; 30 deg 5.2 deg/h, with 5 s too
+    for (const auto& [dwell_s, off] : {std::pair{40.0, 2.0}, {5.0, 30.0}}) {
         for (std::uint64_t seed = 1; seed <= 20; ++seed) {
             const double azimuth = off;
             const auto dwells =
