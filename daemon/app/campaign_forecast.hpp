@@ -4,8 +4,8 @@
 #include <string>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/plan/adaptive.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig {
 

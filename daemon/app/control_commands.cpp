@@ -103,9 +103,22 @@ std::string ControlLoop::journal_being_verified() const {
                        journal.not_watched.empty() ? "" : "; " + journal.not_watched);
 }
 
+/// Whether this shaker's numbers are still to be understood: its first proof goes up slowly.
+bool ControlLoop::first_shaking() const {
+    if (!configuration_.record_demanded()) return false;
+    const auto standing = book_.standing(utc_now());
+    return !standing[static_cast<std::size_t>(commission::Part::units)].proven ||
+           !standing[static_cast<std::size_t>(commission::Part::registers)].proven;
+}
+
 void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
-    if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty())
+    campaign_.climb_next_proof(first_shaking());
+    if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty()) {
+        if (why == book_.refusal(utc_now(), waiting.request.kind == CommandRequest::Kind::arm))
+            keep_commissioned({"", "", waiting.request.by, "", "refused arm",
+                               commission::Json{{"why", why}}.dump()});
         return answer(waiting, {false, why});
+    }
     if (!journal_) {  // on the rig's clock
         auto reply = campaign_.command(waiting.request, now);
         if (reply.accepted) reply.message += tell_overdue();

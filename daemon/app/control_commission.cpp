@@ -87,12 +87,34 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
                       std::string("what is done is not kept: ") + error.what());
         }
     };
+    ports.note = [this](const commission::Note& note) {
+        keep_commissioned({note.part, note.step, note.by, {}, note.what, note.data.dump()});
+    };
     return std::make_unique<commission::Procedure>(
         std::move(names),
         commission::Stated{configuration_.estimator.latitude_deg,
                            configuration_.commission.linear_sigma,
                            configuration_.simulated() && !real_wire(configuration_.can)},
         std::move(ports));
+}
+
+/// `by` as the audit has it: the name, and who the socket says it was.
+void ControlLoop::keep_commissioned(journal::Commissioned row) {
+    if (!journal_) return;
+    const std::string name = commission::name_of_person(row.by);
+    if (name.size() + 3 <= row.by.size())
+        row.identity = row.by.substr(name.size() + 2, row.by.size() - name.size() - 3);
+    row.by = name;
+    row.utc_ns = utc_now();
+    journal_->commissioned(row);
+}
+
+/// At the start: parts that were proven, and by what they no longer are.
+void ControlLoop::keep_voided() {
+    for (const auto& part : book_.standing(utc_now()))
+        if (part.record && !part.proven)
+            keep_commissioned(
+                {name_of(part.part), "", "", "", "void", Json{{"why", part.why}}.dump()});
 }
 
 commission::Progress ControlLoop::progress() const {
@@ -208,6 +230,8 @@ std::string ControlLoop::enter_shaker_parts(const std::string& by,
     for (const auto& [part, evidence] : parts.proven) {
         what.evidence = evidence;
         book_.prove({part}, what, loaded_);
+        keep_commissioned({name_of(part), "", by, "", "accept",
+                           Json{{"record_sha256", book_.sha256()}, {"evidence", evidence}}.dump()});
         names += (names.empty() ? "" : ", ") + std::string(name_of(part));
     }
     auto text = fmt::format("{}{} recorded by {}", configuration_.simulated() ? "SIMULATED: " : "",
@@ -331,6 +355,13 @@ CommandReply ControlLoop::record_parts(const CommandRequest& request, const std:
                                   configuration_.simulated() ? "SIMULATED: " : "", names,
                                   request.by, second, book_.sha256());
     log(Severity::info, "commissioning", text);
+    for (const Part part : parts)
+        keep_commissioned({name_of(part), "", request.by, "", "accept",
+                           Json{{"second", second},
+                                {"record_sha256", book_.sha256()},
+                                {"signed_with", book_.signed_with()},
+                                {"evidence", evidence}}
+                               .dump()});
     const auto standing = book_.standing(what.utc_ns);
     const bool read = std::ranges::all_of(
         parts, [&standing](Part part) { return standing[static_cast<std::size_t>(part)].proven; });

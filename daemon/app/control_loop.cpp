@@ -126,6 +126,7 @@ void ControlLoop::take_over() {
     campaign_.take_over_proofs(std::move(proofs));
     proofs_taken_ = campaign_.proof().history().size();
     if (!book_.trouble().empty()) log(Severity::warning, "commissioning", book_.trouble());
+    keep_voided();
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign)
         dwells_.offer_unfinished(*campaign, campaign_);

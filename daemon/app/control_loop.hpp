@@ -108,6 +108,9 @@ class ControlLoop {
     [[nodiscard]] CommandReply begin_commissioning(const CommandRequest& request,
                                                    const commission::Json& what, drivers::Time now);
     [[nodiscard]] commission::Progress progress() const;
+    void keep_commissioned(journal::Commissioned row);
+    void keep_voided();
+    [[nodiscard]] bool first_shaking() const;
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,
                                                     const configuration::Loaded& file);

@@ -200,8 +200,12 @@ void Daemon::start_threads() {
         control_.run();
     });
     begin(estimator_thread_, parts_.estimator_setup,
-          {"estimator", configuration.estimator_priority, configuration.estimator_cpu},
-          [this] { parts_.estimator_stage.run(); });
+          {"estimator", configuration.estimator_priority, configuration.estimator_cpu}, [this] {
+              // Ordinary threads share a CPU with whoever is there: they are not to be held to one.
+              if (parts_.configuration.estimator_cpu < 0 && rt::this_thread_is_fifo())
+                  parts_.estimator_stage.stay_by_giver();
+              parts_.estimator_stage.run();
+          });
     begin(acquisition_thread_, parts_.acquisition_setup,
           {"acquisition", configuration.acquisition_priority, configuration.acquisition_cpu},
           [this] { parts_.io.run(); });

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
 #include "daemon/journal/journal.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/serve/event_log.hpp"

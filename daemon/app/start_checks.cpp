@@ -10,10 +10,13 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/zero_calibration.hpp"
+#include "daemon/serve/socket_file.hpp"
+#include "daemon/serve/tls.hpp"
 #include "estimator/identification/plan_report.hpp"
 #include "estimator/level/vibration_level.hpp"
 
@@ -25,6 +28,13 @@ proto::Dbc load_dbc(const std::string& path) {
 }
 
 namespace {
+
+/// Where a key is stated, "file:line: "; empty: nowhere, or there is no such key.
+std::string place_of(const configuration::Loaded& loaded, const std::string& key) {
+    const auto same = [&](const auto& value) { return value.key == key; };
+    const auto value = std::ranges::find_if(loaded.effective, same);
+    return value == loaded.effective.end() ? "" : value->origin + ": ";
+}
 
 /// Throws ConfigurationError where the cables do not let zeroing go.
 void check_zeroing_travel(const configuration::Configuration& c) {
@@ -53,10 +63,15 @@ void check_bindings(const configuration::Loaded& loaded) {
     const auto port = drivers::make_can_port(io, configuration.can);
     std::string missing;
     const auto add = [&](const drivers::BindingError& error) {
-        const auto same = [&](const auto& value) { return value.key == error.key(); };
-        const auto value = std::ranges::find_if(loaded.effective, same);
-        missing += (missing.empty() ? "" : "\n") +
-                   (value == loaded.effective.end() ? "" : value->origin + ": ") + error.what();
+        auto place = place_of(loaded, error.key());
+        std::string text = error.what();
+        // A default that another DBC does not have is the fault of that one's line.
+        if (place == "default: " && !configuration.dbc.empty()) {
+            place = place_of(loaded, "can.dbc");
+            const auto end = text.find("\", expected");
+            if (end != std::string::npos) text.insert(end + 1, " (default)");
+        }
+        missing += (missing.empty() ? "" : "\n") + place + text;
     };
     const auto collect = [&](const auto& bind) {
         try {
@@ -78,8 +93,8 @@ void check_bindings(const configuration::Loaded& loaded) {
     check_zeroing_travel(configuration);
 }
 
-void check_results(const configuration::Configuration& configuration) {
-    const std::string& folder = configuration.results;
+void check_results(const configuration::Loaded& loaded) {
+    const std::string& folder = loaded.configuration.results;
     if (folder.empty()) return;
     // It is made when it is not there: then what counts is the folder that it is made in.
     auto there = std::filesystem::absolute(folder);
@@ -88,12 +103,38 @@ void check_results(const configuration::Configuration& configuration) {
         there = there.parent_path();
     if (!std::filesystem::is_directory(there, error)) {
         errno = ENOTDIR;
-    } else if (::access(there.c_str(), W_OK | X_OK) == 0) {
-        return;
+    } else {
+        auto trial = (there / ".vibrigd-check-XXXXXX").string();
+        if (::mkdtemp(trial.data()) != nullptr) {
+            ::rmdir(trial.c_str());
+            return;
+        }
     }
-    throw configuration::ConfigurationError("campaign.results: found \"" + folder +
-                                            "\", expected a folder that can be written: " +
-                                            there.string() + ": " + std::strerror(errno));
+    const std::string why = there.string() + ": " + std::strerror(errno);
+    throw configuration::ConfigurationError(place_of(loaded, "campaign.results") +
+                                            "campaign.results: found \"" + folder +
+                                            "\", expected a folder that can be written: " + why);
+}
+
+void check_certificates(const configuration::Loaded& loaded) {
+    const auto& server = loaded.configuration.server;
+    if (server.remote.empty()) return;
+    for (const auto& [key, file] : {std::pair("server.certificate", server.certificate),
+                                    {"server.key", server.key},
+                                    {"server.clients_ca", server.clients_ca},
+                                    {"server.revoked", server.revoked}}) {
+        if (file.empty() || ::access(file.c_str(), R_OK) == 0) continue;
+        if (errno == EACCES) return;
+        throw configuration::ConfigurationError(place_of(loaded, key) + key + ": found \"" + file +
+                                                "\", expected a PEM file: " + std::strerror(errno));
+    }
+    try {
+        (void)serve::mutual_tls(server.certificate, server.key, server.clients_ca, true,
+                                server.revoked);
+    } catch (const serve::ServeError& error) {
+        throw configuration::ConfigurationError(place_of(loaded, "server.remote") +
+                                                "server.remote: " + error.what());
+    }
 }
 
 std::vector<std::string> check_plan(const configuration::Configuration& configuration) {

@@ -17,11 +17,11 @@
 #include "daemon/app/start_checks.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/configuration/forms.hpp"
-#include "daemon/domain/upgrade.hpp"
 #include "daemon/log/log_sink.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/serve/openapi.hpp"
 #include "daemon/serve/status_server.hpp"
+#include "daemon/status/upgrade.hpp"
 #include "daemon/version.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "proto/command_tree.hpp"
@@ -62,7 +62,8 @@ void check_again(const std::string& path) {
     try {
         const auto loaded = vibrig::configuration::load(path, true);
         vibrig::check_bindings(loaded);
-        vibrig::check_results(loaded.configuration);
+        vibrig::check_results(loaded);
+        vibrig::check_certificates(loaded);
         insist(vibrig::forecast_campaign(loaded.configuration));
         spdlog::info("configuration checked: valid; it takes effect with the next start");
     } catch (const std::exception& error) {
@@ -258,9 +259,10 @@ int main(int argc, char** argv) {
             return std::cout ? 0 : 2;
         }
         auto loaded = vibrig::configuration::load(path, true);
+        vibrig::check_certificates(loaded);
         if (check) {
             vibrig::check_bindings(loaded);
-            vibrig::check_results(loaded.configuration);
+            vibrig::check_results(loaded);
             std::cout << vibrig::configuration::format_effective(loaded);
             // As comments: what stands above reads back as a configuration.
             const auto forecast = vibrig::forecast_campaign(loaded.configuration);

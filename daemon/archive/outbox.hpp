@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "daemon/archive/settings.hpp"
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
+#include "daemon/domain/services.hpp"
 
 namespace vibrig::archive {
 

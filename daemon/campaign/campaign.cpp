@@ -7,8 +7,9 @@
 #include <array>
 
 #include "daemon/campaign/loop_check.hpp"
-#include "daemon/campaign/opening_stage.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/stages/opening.hpp"
+#include "daemon/campaign/stages/waiting.hpp"
+#include "daemon/campaign/stages/zeroing.hpp"
 
 namespace vibrig::campaign {
 
@@ -112,21 +113,20 @@ void Campaign::begin(const std::string& by, Time now) {
     offered_stops_.clear();
     at_ = positions_done_;
     repeat_after_interruption();
-    temperatures_.clear();
     pause_asked_ = false;
     rejected_in_a_row_ = 0;
     vibration_off_.clear();
     vibration_off_since_ = -1;
     doubted_.reset();
     zeroed_ = opened_ = false;
-    zeroing_ = Zeroing::none;
+    zeroing_ = ZeroingAt::none;
     mark_.clear();
     level_variances_.clear();
     origin_.reset();
     if (zero_) zero_->reset();
     started_ = now;
     pace_.begin(now);
-    enter(State::waiting, now);
+    begin(*waiting_, State::waiting, now);
 }
 
 Time Campaign::step(Time now) {
@@ -243,10 +243,9 @@ void Campaign::end(State state, const std::string& why, Time now) {
         }
     }
     const bool slewing = state_ == State::slewing || state_ == State::zeroing || opening();
-    if (opening_) opening_->end();
     leave_dwell();
     leave_stage();
-    zeroing_ = Zeroing::none;
+    zeroing_ = ZeroingAt::none;
     armed_by_.clear();
     reason_ = why;
     enter(state, now);
@@ -275,9 +274,10 @@ void Campaign::shut_down(Time now) {
     if (state_ == State::checking || state_ == State::commissioning)
         return abort("the daemon is shutting down", now);
     if (!active()) return;
+    const bool slewing = state_ == State::slewing || opening();
     leave_dwell();
     leave_stage();
-    if (state_ == State::slewing || opening()) ports_.rig.gimbal.release(now);
+    if (slewing) ports_.rig.gimbal.release(now);
     if (!stop_.excited()) return end(State::aborted, "the daemon is shutting down", now);
     ports_.log.event(Severity::warning, "shutting down: ramping the shaker down");
     enter(State::resting, now);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,10 +14,11 @@
 #include "daemon/campaign/ports.hpp"
 #include "daemon/campaign/settings.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/commands.hpp"
 #include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "drivers/gimbal/gimbal.hpp"
 #include "drivers/gimbal/torquer.hpp"
 #include "drivers/shaker/shaker.hpp"
@@ -27,10 +27,13 @@
 namespace vibrig::campaign {
 
 class GravityWatch;
-class LevellingStage;
+class Levelling;
 class LoopCheck;
-class OpeningStage;
-class ZeroingStage;
+class Opening;
+class Stage;
+class Waiting;
+class ZeroCalibration;
+class Zeroing;
 
 /// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
 [[nodiscard]] std::string check_stages(const Settings& settings, const proto::Dbc& dbc,
@@ -65,6 +68,9 @@ class Campaign {
     void take_over_proofs(std::vector<ProofRecord> history);
     /// Before the first step(): what an earlier life has left latched, in words.
     void take_over_trip(const std::string& causes, double table_g = 0);
+    /// The next proof goes up from 0.03 g, each rung held against the command before the next:
+    /// nobody has seen yet what this shaker makes of a number.
+    void climb_next_proof(bool climbs) noexcept { climbs_ = climbs; }
     CommandReply command(const CommandRequest& request, drivers::Time now);
     /// Why an arming or an acknowledgement would be refused now; empty: it would not, or it is
     /// another command.
@@ -106,15 +112,15 @@ class Campaign {
     [[nodiscard]] const std::string& mark() const { return mark_; }
 
   private:
-    /// Within zeroing and levelling.
-    enum class Part : std::uint8_t { go, slew, release, measure, zero };
     /// The zeroing that is under way, its levelling included.
-    enum class Zeroing : std::uint8_t { none, start, end };
+    enum class ZeroingAt : std::uint8_t { none, start, end };
 
     /// Within a loop check.
     /// The last parts are the safe-state proof's.
     enum class Check : std::uint8_t {
         look,
+        climb,  ///< to the next rung of the ladder
+        rung,   ///< there
         ramp,
         settle,
         measure,
@@ -150,15 +156,17 @@ class Campaign {
     drivers::Time wait_for_platform(drivers::Time now);
     drivers::Time slew(drivers::Time now);
     drivers::Time zeroing(drivers::Time now);
-    drivers::Time end_zeroing(drivers::Time now);
-    drivers::Time fail_zeroing(const std::string& why, drivers::Time now);
+    void fail_zeroing(const std::string& why, drivers::Time now);
     void leave_zeroing(drivers::Time now);
+    void begin_levelling(drivers::Time now);
     drivers::Time levelling(drivers::Time now);
-    drivers::Time fail_levelling(const std::string& why, drivers::Time now);
-    [[nodiscard]] bool for_zeroing() const { return zeroing_ != Zeroing::none; }
+    [[nodiscard]] bool for_zeroing() const { return zeroing_ != ZeroingAt::none; }
     [[nodiscard]] std::string not_fit_to_check(drivers::Time now) const;
     CommandReply begin_loop_check(const CommandRequest& request, drivers::Time now);
     drivers::Time check_loop(drivers::Time now);
+    [[nodiscard]] double check_level() const;
+    [[nodiscard]] Check after_rung() const;
+    void stand_on_rung(drivers::Time now);
     void go_on_to(Check part, drivers::Time now);
     void ramp_for_check(Check then, drivers::Time now);
     void conclude_loop_check(drivers::Time now);
@@ -178,19 +186,18 @@ class Campaign {
     [[nodiscard]] std::string suspect_unit() const;
     void proving(Proving what);
     [[nodiscard]] std::int64_t utc_ns() const { return ports_.log.utc_ns(); }
-    /// Gimbals slew only at rest; why not, else empty.
-    [[nodiscard]] std::string may_slew() const;
     void make_stages();
-    void make_opening();
     [[nodiscard]] bool opening() const;  ///< it is being held against the rig at rest
     void begin_opening(drivers::Time now);
     drivers::Time open(drivers::Time now);
     void conclude_opening(drivers::Time now);
+    [[nodiscard]] const ZeroCalibration* zeros() const;  ///< null: none are taken
     void begin_zeroing(bool at_end, drivers::Time now);
+    /// A stage at rest; it is left by leave_stage() at the latest.
+    void begin(Stage& stage, CampaignState state, drivers::Time now);
     void leave_stage();
     void insist_on_zero_torque(drivers::Time now);
     [[nodiscard]] bool take_motion(rt::Motion& motion, drivers::Time now);
-    [[nodiscard]] bool torquing() const;
     void fill_stages(StatusData& status) const;
     void fill_rest(StatusData& status, drivers::Time now) const;
     drivers::Time ramp(drivers::Time now);
@@ -243,7 +250,6 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
     CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
-    [[nodiscard]] std::string platform_lacks(drivers::Time now) const;
     [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
                                               double table_g) const;
     [[nodiscard]] bool stopped_by_another(drivers::Time now);
@@ -341,13 +347,14 @@ class Campaign {
     std::optional<StopDone> offered_last_;
     bool power_lost_ = false;  ///< the gyros were seen run down since the dwell done last
     std::vector<estimator::DwellSummary> dwells_;
-    std::deque<std::pair<drivers::Time, double>> temperatures_;
     // shared: their types are known where they are made
-    std::shared_ptr<LevellingStage> level_;
-    std::shared_ptr<ZeroingStage> zero_;
+    std::shared_ptr<Waiting> waiting_;
+    std::shared_ptr<Levelling> level_;
+    std::shared_ptr<Zeroing> zero_;
     std::shared_ptr<LoopCheck> loop_;
     std::shared_ptr<GravityWatch> gravity_;
-    std::shared_ptr<OpeningStage> opening_;
+    std::shared_ptr<Opening> opening_;
+    Stage* stage_ = nullptr;          ///< of them the one under way
     drivers::Time second_from_ = -1;  ///< the newest second that was judged
     bool gravity_told_ = false;
     drivers::Time vibration_off_since_ = -1;  ///< -1: it is vertical
@@ -355,22 +362,24 @@ class Campaign {
     int rejected_in_a_row_ = 0;               ///< dwells, the newest included
     std::string rejected_for_;
     std::optional<Doubt> doubted_;  ///< and nothing done about it yet
-    Part part_ = Part::go;
     Check check_ = Check::look;
     SafetyProof proof_;
     StopTimes stop_times_;
     bool press_wanted_ = false;  ///< the emergency stop is to be proved, too
+    bool climbs_ = false;        ///< the next proof goes up a ladder
+    std::vector<double> rungs_;  ///< g at the table, of this one
+    std::size_t rung_ = 0;
+    bool rung_counts_ = false;
     /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
     enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
     drivers::Time pressed_at_ = 0;  ///< when that began
     drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
     bool press_felt_ = false;       ///< by the controller, too
     bool press_seen_ = false;       ///< by the chain's register
-    Zeroing zeroing_ = Zeroing::none;
-    bool zeroed_ = false;                      ///< in this campaign, before the first dwell
-    bool opened_ = false;                      ///< likewise, the opening check
-    std::array<double, 3> level_angle_rad_{};  ///< encoders, while levelling
-    drivers::Time last_motion_ = 0, torque_sent_ = 0, zero_since_ = 0;
+    ZeroingAt zeroing_ = ZeroingAt::none;
+    bool zeroed_ = false;  ///< in this campaign, before the first dwell
+    bool opened_ = false;  ///< likewise, the opening check
+    drivers::Time last_motion_ = 0, torque_sent_ = 0;
     std::string mark_;  ///< why the campaign is marked
     /// Of each dwell in which zeros were in force: run, and variance of the relative level.
     std::vector<std::pair<int, double>> level_variances_;

@@ -6,6 +6,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/stages/opening.hpp"
 
 namespace vibrig::campaign {
 
@@ -47,8 +48,8 @@ std::string Campaign::begin_commissioning(const std::string& by, Time now) {
     if (state_ == State::checking) return "a loop check is running";
     if (state_ == State::armed) return "armed for a campaign: abort that first";
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
-    if (auto why = platform_lacks(now); !why.empty()) return why;
-    if (auto why = may_slew(); !why.empty()) return why;
+    if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) return why;
+    if (auto why = may_slew(ports_.rig, stop_); !why.empty()) return why;
     ports_.rig.gimbal.forget_position();
     reason_ = by;
     enter(State::commissioning, now);

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "daemon/campaign/campaign.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/stages/levelling.hpp"
+#include "daemon/campaign/stages/opening.hpp"
+#include "daemon/campaign/stages/zeroing.hpp"
 
 namespace vibrig::campaign {
 
@@ -38,7 +40,7 @@ Time Campaign::slew(Time now) {
         return now;
     }
     if (!requested_) {
-        if (const auto why = may_slew(); !why.empty()) {
+        if (const auto why = may_slew(ports_.rig, stop_); !why.empty()) {
             abort(why, now);
             return now;
         }
@@ -48,8 +50,11 @@ Time Campaign::slew(Time now) {
     switch (ports_.rig.gimbal.update(ports_.rig.platform(), now)) {
         case drivers::GimbalState::in_position:
             ports_.rig.gimbal.release(now);
-            part_ = Part::go;
-            enter(level_ ? State::levelling : State::ramping, now);
+            if (level_) {
+                begin_levelling(now);
+            } else {
+                enter(State::ramping, now);
+            }
             return now;
         case drivers::GimbalState::timed_out:
             abort("gimbals did not reach the position in time", now);
@@ -110,9 +115,9 @@ Time Campaign::record(Time now) {
         dwell_utc_ns_ = utc_ns() + (dwell_from_ - now);
         if (!origin_) take_over_origin();
         order.dwell = dwell_info();
-        if (zero_) {
-            order.zero_g = zero_->raw_zero_g();
-            order.level_sigma_g = zero_->level_sigma(here().stop.position_deg);
+        if (const auto* const found = zeros()) {
+            order.zero_g = found->raw_zero_g();
+            order.level_sigma_g = found->level_sigma(here().stop.position_deg);
         }
         watch_vibration();
         if (!ports_.dwells.order(order)) abort("the estimator takes no order", now);
@@ -126,7 +131,7 @@ Time Campaign::record(Time now) {
               now);
         return now;
     }
-    if (torquing()) {
+    if (torquing(ports_.rig)) {
         abort("the platform is torqued during a dwell, expected free drift", now);
         return now;
     }
@@ -189,8 +194,8 @@ void Campaign::leave_dwell() {
 void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
     dwell_done_ = true;
     dwells_.push_back(summary);
-    if (zero_ && zero_->status().known && at_ < stops_.size()) {
-        const double sigma = zero_->level_sigma(here().stop.position_deg);
+    if (zeros() != nullptr && zeros()->status().known && at_ < stops_.size()) {
+        const double sigma = zeros()->level_sigma(here().stop.position_deg);
         level_variances_.emplace_back(summary.run, sigma * sigma);
     }
     rejected_in_a_row_ = summary.left_out ? rejected_in_a_row_ + 1 : 0;

@@ -7,7 +7,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/gravity_watch.hpp"
 #include "daemon/campaign/rig_frame.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/stages/zeroing.hpp"
 
 namespace vibrig::campaign {
 
@@ -37,8 +37,8 @@ void Campaign::watch_gravity() {
     second_from_ = second.from;
     if (state_ == State::ramping && !requested_) gravity_->next_position();
     Vector zero_g = settings_.rig.accelerometer_zero_g;
-    if (zero_ && zero_->status().known) {  // on top of the configuration's
-        const Vector found = zero_->raw_zero_g();
+    if (zeros() != nullptr && zeros()->status().known) {  // on top of the configuration's
+        const Vector found = zeros()->raw_zero_g();
         for (std::size_t i = 0; i < 3; ++i) zero_g[i] += found[i];
     }
     const auto verdict = gravity_->judge(second, zero_g, !stop_.excited());

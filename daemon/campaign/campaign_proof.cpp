@@ -8,6 +8,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
 #include "daemon/campaign/safety_proof.hpp"
+#include "daemon/campaign/stages/opening.hpp"
 #include "estimator/level/ring_down.hpp"
 
 namespace vibrig::campaign {
@@ -42,15 +43,6 @@ void StopTimes::look(const drivers::ShakerReading& reading, const rt::Rest& rest
     stands(rest.table, table_s);
     stands(rest.platform, platform_s);
     table_known = table_known || rest.table.verdict != rt::RestVerdict::absent;
-}
-
-std::string Campaign::may_slew() const {
-    const auto reading = ports_.rig.shaker.reading();
-    if (!reading.at_rest() || stop_.stopping())
-        return fmt::format(
-            "gimbals slew at rest only: the shaker is in state {}, measured {:.3f} g",
-            reading.state, reading.measured_g);
-    return {};
 }
 
 /// From the table's last motion on: what the pads do by themselves.
@@ -245,6 +237,7 @@ void Campaign::end_pressed(const std::string& why) {
 
 /// Rest is called by what is well above the noise of those who call it.
 void Campaign::prove_quiet() {
+    loop_->rests();
     const auto noise = loop_->noise();
     const double limit_g = settings_.rest.limit_g / kNoises;
     if (noise.table_g > 0) proof_.row("noise at rest, table", "g", noise.table_g, 0, limit_g);
@@ -255,7 +248,7 @@ void Campaign::prove_quiet() {
 void Campaign::prove_refusals(Time now) {
     const auto tried = command({CommandRequest::Kind::arm, proof_.record().by, ""}, now);
     proof_.row("arming is refused while it moves", !tried.accepted);
-    proof_.row("a slew is refused while it moves", !may_slew().empty());
+    proof_.row("a slew is refused while it moves", !may_slew(ports_.rig, stop_).empty());
     const bool taken = ports_.rig.shaker.request(
         {settings_.frequency_hz + 1, settings_.loop.table_g, settings_.ramp_s}, armed_under_);
     proof_.row("another frequency is refused while it moves", !taken);

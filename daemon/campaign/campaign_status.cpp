@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "daemon/campaign/campaign.hpp"
-#include "daemon/campaign/levelling_stage.hpp"
 #include "daemon/campaign/loop_check.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/stages/levelling.hpp"
+#include "daemon/campaign/stages/zeroing.hpp"
 #include "estimator/identification/result.hpp"
 
 namespace vibrig::campaign {
@@ -65,8 +65,7 @@ void Campaign::fill(StatusData& status, Time now) const {
         status.command_table_g = vibrating ? table_g() : 0;
         status.command_frequency_hz = excited_hz_;
     } else if (state_ == State::checking) {
-        status.command_table_g =
-            check_ == Check::look || check_ == Check::rest ? 0 : settings_.loop.table_g;
+        status.command_table_g = check_ == Check::look || check_ == Check::rest ? 0 : check_level();
         status.command_frequency_hz = excited_hz_;
     }
 }
@@ -105,8 +104,8 @@ void Campaign::qualify(estimator::Result& result) const {
 void Campaign::fill_stages(StatusData& status) const {
     status.levelling = {};
     status.zeros = {};
-    if (level_) level_->fill(status.levelling);
-    if (zero_) zero_->fill(status.zeros);
+    if (level_) level_->leveller().fill(status.levelling);
+    if (zero_) zeros()->fill(status.zeros);
     status.loop_check = loop_->status();
     if (!mark_.empty()) status.zeros.mark = mark_;
 }

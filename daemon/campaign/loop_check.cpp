@@ -118,6 +118,14 @@ LoopCheck::Noise LoopCheck::noise() const {
     return {rms(platform), rms(table)};
 }
 
+LoopCheck::Noise LoopCheck::peak() const {
+    const auto of = [](double value, double noise) {
+        return std::sqrt(2 * std::max(0.0, value * value - noise * noise));
+    };
+    const Noise all = noise();
+    return {of(all.platform_g, at_rest_.platform_g), of(all.table_g, at_rest_.table_g)};
+}
+
 drivers::Time LoopCheck::last_at_half() const {
     const auto values = motion();
     double highest = 0;

@@ -7,8 +7,8 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "estimator/level/loop_response.hpp"
 
 namespace vibrig::campaign {
@@ -33,6 +33,10 @@ class LoopCheck {
         double platform_g = 0, table_g = 0;
     };
     [[nodiscard]] Noise noise() const;
+    /// What counts is of a rig at rest: how much of later vibration is noise.
+    void rests() { at_rest_ = noise(); }
+    /// Amplitudes of a vibration, peak, less what was noise at rest.
+    [[nodiscard]] Noise peak() const;
     /// The last moment at which the table (or the platform, where the table has no accelerometer)
     /// was beyond half of its highest; 0: nothing counts.
     [[nodiscard]] drivers::Time last_at_half() const;
@@ -72,6 +76,7 @@ class LoopCheck {
     std::vector<estimator::LoopReading> readings_;
     Vector angle_rad_{};
     std::size_t bad_ = 0;  ///< samples without good force or angles
+    Noise at_rest_;
     bool passed_ = false;
     double transmission_ = 0;
     std::string out_of_band_;  ///< of the newest that was completed

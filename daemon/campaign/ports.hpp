@@ -7,10 +7,12 @@
 
 #include "daemon/campaign/safety_proof.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/commands.hpp"
+#include "daemon/domain/events.hpp"
 #include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "drivers/gimbal/gimbal.hpp"
 #include "drivers/gimbal/torquer.hpp"
 #include "drivers/shaker/shaker.hpp"

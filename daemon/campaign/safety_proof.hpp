@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "daemon/campaign/stop_monitor.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/interlock/rest_monitor.hpp"
+#include "daemon/status/status.hpp"
 #include "drivers/shaker/shaker.hpp"
 
 namespace vibrig::campaign {

@@ -76,6 +76,7 @@ void Procedure::decide_gravity() {
         return conclude(Verdict::refused, wrong.what());
     }
     finding_.hypotheses = hypotheses_of(gravity_);
+    note("hypothesis", finding_.hypotheses);
     const auto channels = [this](std::string why) {
         for (std::size_t c = 0; c < 3; ++c) {
             const auto word = fmt::format("angle channel {}", c + 1);

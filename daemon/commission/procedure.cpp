@@ -60,12 +60,26 @@ void Procedure::open(const std::string& by, bool by_hand, Time now) {
     by_ = by;
     by_hand_ = by_hand;
     now_ = now;
+    note("begin", {{"by_hand", by_hand}});
     ask_yes("power", "Is the shaker's power stage off?", "the shaker's power stage is on",
             [this] { ask_degrees(); });
 }
 
 void Procedure::attend(const std::string& by, Time wall) {
     if (journal::same_person(by, by_)) attended_ = wall;
+}
+
+std::string Procedure::step_name() const {
+    if (!gravity_.hypotheses.empty() && gravity_.verdict == Verdict::decided) return "F";
+    if (extra_ > 0) return "E";
+    if (at_ < plan_.size() && !careful_) return plan_[at_].slot >= 0 ? "C" : "D";
+    return commanded_ || !small_.empty() ? "B" : "A";
+}
+
+void Procedure::note(const char* what, const Json& data) const {
+    if (replaying_ || !ports_.note) return;
+    const std::string step = step_name();
+    ports_.note({step == "F" ? "earth" : "gimbals", step, by_, what, data});
 }
 
 void Procedure::tell(const std::string& line) {
@@ -77,6 +91,7 @@ void Procedure::ask(Question question, std::function<void(const std::string&)> t
     question_ = std::move(question);
     answered_ = std::move(then);
     doing_ = Doing::asking;
+    note("question", {{"id", question_.id}, {"text", question_.text}});
     if (!left_.contains(question_.id)) return;
     const std::string value = left_[question_.id];
     left_.erase(question_.id);
@@ -109,8 +124,9 @@ std::string Procedure::answer(const std::string& by, const std::string& id, std:
     if (const auto expected = question_.wrong ? question_.wrong(value) : std::string();
         !expected.empty())
         return fmt::format("found \"{}\", expected {}", given, expected);
-    ports_.event(Severity::info,
-                 fmt::format("commissioning: {} {}, says {}", question_.text, value, by));
+    ports_.event(Severity::info, fmt::format("{} {}, says {}", question_.text, value, by));
+    const bool permission = id == "power" || id == "go_on" || id.starts_with("permit.");
+    note(permission ? "permission" : "answer", {{"id", id}, {"value", value}});
     take_answer(value);
     return {};
 }
@@ -207,6 +223,7 @@ void Procedure::next_leg() {
 void Procedure::command_to(const Vec3& command) {
     commanded_ = true;
     released_ = false;
+    note("move", {{"command_deg", command}});
     if (!replaying_) ports_.slew(command, now_);
 }
 
@@ -306,6 +323,7 @@ void Procedure::take_second(Time now) {
         }
     }
     if (noise_ == Vec3{}) noise_ = noise_of(samples_);
+    note("reading", {{"angle", mean_.angle}, {"force_g", mean_.force}, {"seconds", wanted_s_}});
     keep_mean();
     auto then = std::move(then_);
     then();
@@ -390,6 +408,7 @@ void Procedure::conclude(Verdict verdict, const std::string& why) {
                        : verdict == Verdict::refused ? Finding::Outcome::refused
                                                      : Finding::Outcome::undecided;
     finding_.why = why;
+    note("verdict", {{"outcome", name_of(finding_.outcome)}, {"why", why}});
     if (!why.empty()) tell(why);
 }
 

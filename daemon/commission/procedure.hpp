@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/commission/finding.hpp"
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
 #include "drivers/gimbal/gimbal.hpp"
 #include "estimator/commissioning/earth.hpp"
 
@@ -21,6 +21,13 @@ struct Look {
     bool good = false;
 };
 
+/// For the journal: what was done, asked or found at which step.
+struct Note {
+    std::string part, step, by;
+    std::string what;  ///< begin, permission, move, reading, hypothesis, question, answer, verdict
+    Json data = Json::object();
+};
+
 /// What it acts on. Control thread.
 struct Ports {
     std::function<Look()> sample, second;
@@ -30,6 +37,7 @@ struct Ports {
     std::function<void(Severity, const std::string&)> event;
     /// What was answered and measured so far, on disk when this returns: begin_again() takes it.
     std::function<void(const Json& log)> keep;
+    std::function<void(const Note& note)> note;
 };
 
 /// What an earlier daemon kept of a procedure.
@@ -105,6 +113,8 @@ class Procedure {
     void next_leg();
     void average(double seconds, Then then);
     void tell(const std::string& line);
+    void note(const char* what, const Json& data) const;
+    [[nodiscard]] std::string step_name() const;
     void conclude(Verdict verdict, const std::string& why);
     void watch_move(drivers::Time now);
     void arrive(drivers::Time now);

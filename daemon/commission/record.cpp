@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "daemon/journal/latches.hpp"
+#include "daemon/journal/signing_key.hpp"
 #include "daemon/record/digest.hpp"
 #include "proto/durable_file.hpp"
 
@@ -26,6 +27,7 @@ constexpr double kZeroMoved_g = 10e-3;  // `vibrig zero` may find so much anew
 constexpr const char* kDbc = "contents of can.dbc";
 constexpr const char* kLimits = "shaker.limits.";  // of the excitation alone
 constexpr const char* kZero = "accelerometer.zero_g";
+constexpr const char* kAlgorithm = "Ed25519";
 
 std::string dbc_of(const std::string& path) {
     try {
@@ -125,6 +127,16 @@ std::string joined(const std::vector<std::string>& words) {
     return text;
 }
 
+/// Public key of the signature; empty: there is none. Throws std::invalid_argument.
+std::string signer_of(const Json& signature, const std::string& hash) {
+    if (signature.is_null()) return {};
+    const std::string key = signature.at("public_key");
+    if (signature.at("algorithm") != kAlgorithm ||
+        !journal::signature_holds(key, hash, signature.at("value").get<std::string>()))
+        throw std::invalid_argument("its signature is not that of what it says");
+    return key;
+}
+
 std::string read_text(const std::string& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) return {};  // nobody waits at a pipe
@@ -173,11 +185,11 @@ std::string instant_of(std::int64_t utc_ns) {
 
 std::string date_of(std::int64_t utc_ns) { return instant_of(utc_ns).substr(0, 10); }
 
-std::string to_json(const Record& record) {
+std::string to_json(const Record& record, const journal::SigningKey* key) {
     Json parts = Json::object();
     for (const auto& [part, r] : record.parts) {
         Json keys = Json::object();
-        for (const auto& [key, value] : r.keys) keys[key] = value;
+        for (const auto& [name, value] : r.keys) keys[name] = value;
         parts[name_of(part)] = {{"keys", keys},
                                 {"meaning", r.meaning},
                                 {"sha256", record::sha256_of_text(text_of(r.keys))},
@@ -189,8 +201,13 @@ std::string to_json(const Record& record) {
     }
     Json whole{
         {"version", 1}, {"rig", record.rig}, {"simulated", record.simulated}, {"parts", parts}};
-    whole["sha256"] = record::sha256_of_text(whole.dump());
+    const std::string hash = record::sha256_of_text(whole.dump());
+    whole["sha256"] = hash;
     whole["signature"] = nullptr;
+    if (key != nullptr)
+        whole["signature"] = {{"algorithm", kAlgorithm},
+                              {"public_key", key->public_key()},
+                              {"value", key->sign(hash)}};
     return whole.dump(1) + "\n";
 }
 
@@ -200,11 +217,13 @@ Record record_from_json(const std::string& text) {
         if (const int version = whole.at("version"); version != 1)
             throw std::invalid_argument(fmt::format("version: found {}, expected 1", version));
         const std::string hash = whole.at("sha256");
+        const Json signature = whole.value("signature", Json());
         whole.erase("sha256");
         whole.erase("signature");
         if (record::sha256_of_text(whole.dump()) != hash)
             throw std::invalid_argument("its SHA-256 is not that of what it says");
         Record record;
+        record.signed_with = signer_of(signature, hash);
         record.rig = whole.at("rig");
         record.simulated = whole.at("simulated");
         for (const auto& [name, json] : whole.at("parts").items()) {
@@ -231,18 +250,40 @@ Book::Book(const configuration::Loaded& loaded) : loaded_(loaded) {
     std::error_code error;
     if (!std::filesystem::exists(path(), error)) return;
     try {
-        record_ = record_from_json(read_text(path()));
-        if (record_->simulated && !loaded.configuration.simulated())
-            trouble_ = path() +
-                       ": the record of a simulated rig, which does not count on a real "
-                       "one";
-        else if (record_->rig != host_name())
-            trouble_ = fmt::format("{}: found the record of rig \"{}\", expected that of \"{}\"",
-                                   path(), record_->rig, host_name());
-        if (!trouble_.empty()) record_.reset();
+        text_ = read_text(path());
+        record_ = record_from_json(text_);
+        if (const auto why = doubt(); !why.empty()) {
+            trouble_ = path() + ": " + why;
+            record_.reset();
+        }
     } catch (const std::invalid_argument& wrong) {
         trouble_ = path() + ": " + wrong.what();
     }
+}
+
+/// Why a record that is as it was written is not this rig's; empty: it is.
+std::string Book::doubt() const {
+    const bool simulated = loaded_.configuration.simulated();
+    if (record_->simulated && !simulated)
+        return "the record of a simulated rig, which does not count on a real one";
+    if (record_->rig != host_name())
+        return fmt::format("found the record of rig \"{}\", expected that of \"{}\"", record_->rig,
+                           host_name());
+    if (record_->signed_with.empty())
+        return simulated ? "" : "it carries no signature, expected that of " + key_path();
+    std::error_code error;
+    if (!std::filesystem::exists(key_path(), error))
+        return key_path() + ", which has signed it, is gone";
+    try {
+        if (journal::SigningKey(key_path()).public_key() == record_->signed_with) return {};
+    } catch (const std::runtime_error& wrong) {
+        return wrong.what();
+    }
+    return "it is signed with another key than " + key_path();
+}
+
+std::string Book::key_path() const {
+    return (std::filesystem::path(loaded_.configuration.commission.folder) / "record.key").string();
 }
 
 std::string Book::path() const {
@@ -309,7 +350,11 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
     }
     std::error_code error;  // whatever it is, the file then says it
     std::filesystem::create_directories(loaded_.configuration.commission.folder, error);
-    proto::write_durably(path(), to_json(fresh), 0640);
+    journal::SigningKey key(key_path());
+    key.keep();
+    text_ = to_json(fresh, &key);
+    proto::write_durably(path(), text_, 0640);
+    fresh.signed_with = key.public_key();
     record_ = std::move(fresh);
     trouble_.clear();
 }
@@ -339,11 +384,10 @@ Json Book::status(std::int64_t utc_ns) const {
             {"trouble", trouble_},
             {"file", path()},
             {"sha256", sha256()},
+            {"signed_with", signed_with()},
             {"parts", parts}};
 }
 
-std::string Book::sha256() const {
-    return record_ ? record::sha256_of_text(to_json(*record_)) : "";
-}
+std::string Book::sha256() const { return record_ ? record::sha256_of_text(text_) : ""; }
 
 }  // namespace vibrig::commission

@@ -11,6 +11,10 @@
 
 #include "daemon/configuration/configuration.hpp"
 
+namespace vibrig::journal {
+class SigningKey;
+}
+
 namespace vibrig::commission {
 
 using Json = nlohmann::ordered_json;
@@ -60,13 +64,15 @@ struct Record {
     std::string rig;
     bool simulated = false;
     std::map<Part, PartRecord> parts;
+    std::string signed_with;  ///< public key, hexadecimal; empty: it carries no signature
 };
 
 /// "2026-11-23" and "2026-11-23T14:05:00Z".
 [[nodiscard]] std::string date_of(std::int64_t utc_ns);
 [[nodiscard]] std::string instant_of(std::int64_t utc_ns);
 
-[[nodiscard]] std::string to_json(const Record& record);
+/// Signed with `key`; nullptr: by nobody.
+[[nodiscard]] std::string to_json(const Record& record, const journal::SigningKey* key = nullptr);
 /// Throws std::invalid_argument: no such text, or one that is not as it was written.
 [[nodiscard]] Record record_from_json(const std::string& text);
 
@@ -100,15 +106,20 @@ class Book {
     void prove(const std::vector<Part>& parts, const PartRecord& what,
                const configuration::Loaded& as);
     [[nodiscard]] Json status(std::int64_t utc_ns) const;
+    /// Public key of its signature; empty: there is none.
+    [[nodiscard]] std::string signed_with() const { return record_ ? record_->signed_with : ""; }
     /// SHA-256 of the file; empty: there is none.
     [[nodiscard]] std::string sha256() const;
 
   private:
     [[nodiscard]] std::string path() const;
+    [[nodiscard]] std::string key_path() const;
+    [[nodiscard]] std::string doubt() const;
 
     const configuration::Loaded& loaded_;
     std::map<Part, Keys> keys_;  ///< now
     std::optional<Record> record_;
+    std::string text_;  ///< of the file
     std::string trouble_;
 };
 

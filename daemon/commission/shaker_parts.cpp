@@ -104,7 +104,7 @@ ShakerParts shaker_parts(const std::vector<Json>& proofs,
         pressed[button] = rows_of(one, {"emergency stop", "closing"});
     }
     parts.proven[Part::registers] =
-        rows_of(newest, {"controller", "frequency", "stop, controller"});
+        rows_of(newest, {"controller", "frequency", "stop, controller", "ladder"});
     parts.proven[Part::watchdog] = rows_of(newest, {"watchdog"});
     parts.proven[Part::excitation] =
         rows_of(newest, {"transmission", "frequency", "distortion", "cross-axis", "phase"});

@@ -108,6 +108,7 @@ void CrossCheck::for_daemon() {
     doors();
     broker();
     onlookers();
+    archiving();
     adaptive();
     rest();
     set_points_fit();
@@ -223,6 +224,16 @@ void CrossCheck::onlookers() {
         refuse({"annunciator.modbus.lamp_coil", "annunciator.modbus.horn_coil"},
                std::to_string(horn.lamp_coil) + " for horn and lamp", "two coils, or -1: no lamp");
     }
+}
+
+void CrossCheck::archiving() {
+    if (!sound({"archive.folder", "archive.index", "record.enabled"})) return;
+    if (c_.archive.folder.empty() && !c_.archive.index.empty())
+        refuse({"archive.index"}, '"' + c_.archive.index + "\" without archive.folder",
+               "the archive's folder as well: without it nothing is delivered");
+    if (!c_.archive.folder.empty() && !c_.record.enabled)
+        refuse({"archive.folder", "record.enabled"}, "an archive with record.enabled = false",
+               "true: what is not recorded cannot be delivered");
 }
 
 void CrossCheck::adaptive() {

@@ -32,6 +32,7 @@ class CrossCheck {
     void bus();
     void broker();
     void onlookers();
+    void archiving();
     void doors();
     void status_signals();
     void rest();

@@ -75,6 +75,10 @@ std::string path_rule(const std::string& text) {
     return good ? "" : "a path";
 }
 
+std::string folder_rule(const std::string& text) {
+    return text.empty() || !path_rule(text).empty() ? "a path, not empty" : "";
+}
+
 std::string host_rule(const std::string& text) {
     const bool good = !text.empty() && text.size() <= kHostName && only(text, ".:-_%");
     return good ? "" : "a host name or numeric address";

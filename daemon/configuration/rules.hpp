@@ -17,6 +17,8 @@ namespace vibrig::configuration {
 [[nodiscard]] std::string endpoint_rule(const std::string& text);
 [[nodiscard]] std::string group_rule(const std::string& text);
 [[nodiscard]] std::string path_rule(const std::string& text);
+/// Not empty.
+[[nodiscard]] std::string folder_rule(const std::string& text);
 [[nodiscard]] std::string host_rule(const std::string& text);
 [[nodiscard]] std::string host_or_empty_rule(const std::string& text);
 /// No control characters, 256 bytes at most.

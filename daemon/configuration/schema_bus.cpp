@@ -34,7 +34,7 @@ void add_port_keys(std::vector<Key>& keys) {
                            "receive buffer of the socket",
                            [](C& c) -> int& { return c.can.receive_buffer; }));
     keys.push_back(converted(
-        "can.sample_rate_hz", "Hz", {1, 1000}, "samples, that is sync counts, per second",
+        "can.sample_rate_hz", "Hz", {1, 10'000}, "samples, that is sync counts, per second",
         [](C& c) {
             // The period is kept in whole ns; a rate such as 30 Hz shows as it was written.
             return std::round(1e9 / static_cast<double>(c.assembler.sample_period) * 1e4) / 1e4;
@@ -42,6 +42,11 @@ void add_port_keys(std::vector<Key>& keys) {
         [](C& c, double rate) {
             c.assembler.sample_period = static_cast<drivers::Time>(std::llround(1e9 / rate));
         }));
+    keys.push_back(integer("can.samples_per_frame", "", 1, 16,
+                           "samples in each frame that carries a channel, as CAN FD has room for: "
+                           "signal S is of the first, S_1, S_2, ... of the next; the frame's count "
+                           "is the first one's",
+                           [](C& c) -> int& { return c.assembler.samples_per_frame; }));
     keys.push_back(milliseconds(
         "can.join_deadline_ms", {1, 10'000},
         "a sample is given out this long after its first frame",

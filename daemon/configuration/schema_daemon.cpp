@@ -125,7 +125,7 @@ void add_daemon_keys(std::vector<Key>& keys) {
         "commission.folder", "a path",
         "of the commissioning record; a simulated rig is held to one with enforce and a folder "
         "that is not the default",
-        path_rule, [](C & c) -> auto& { return c.commission.folder; }));
+        folder_rule, [](C & c) -> auto& { return c.commission.folder; }));
     keys.push_back(number("commission.valid_days", "d", {1, 3660},
                           "how long a part of the commissioning record counts",
                           [](C& c) -> double& { return c.commission.valid_days; }));
@@ -212,7 +212,8 @@ void add_daemon_keys(std::vector<Key>& keys) {
                            "the thread keeps to this CPU, counted from 0; -1: to none",
                            [](C& c) -> int& { return c.acquisition_cpu; }));
     keys.push_back(integer("threads.estimator_cpu", "", -1, kLastCpu,
-                           "the thread keeps to this CPU, counted from 0; -1: to none",
+                           "the thread keeps to this CPU, counted from 0; -1: to that of "
+                           "acquisition, wherever that is",
                            [](C& c) -> int& { return c.estimator_cpu; }));
     keys.push_back(boolean("threads.lock_memory",
                            "the daemon's memory stays in memory; not where the rig owns the time",

@@ -1,8 +1,11 @@
 #include "daemon/fleet/edge_node.hpp"
 
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "daemon/serve/status_message.hpp"
+#include "daemon/status/values.hpp"
 #include "proto/sparkplug.pb.h"
 
 namespace vibrig::fleet {
@@ -22,51 +25,24 @@ struct Reading {
     Value value;
 };
 
-std::uint64_t whole(int value) { return value < 0 ? 0 : static_cast<std::uint64_t>(value); }
+/// What is not known now: a number is null, the others are what they are without it.
+Value told(const StatusValue& row, const StatusData& status) {
+    static const std::array<Value, 4> kUnknown{
+        false, std::uint64_t{0}, std::numeric_limits<double>::quiet_NaN(), std::string()};
+    const StatusScalar value = row.value(status);
+    if (const auto* const flag = std::get_if<bool>(&value)) return *flag;
+    if (const auto* const count = std::get_if<std::uint64_t>(&value)) return *count;
+    if (const auto* const number = std::get_if<double>(&value)) return *number * row.mqtt_factor;
+    if (const auto* const text = std::get_if<std::string>(&value)) return *text;
+    return kUnknown[row.kind - 1];
+}
 
 /// The same rows in the same order for every status: an alias is a row's place.
 std::vector<Reading> readings_of(const StatusData& s) {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    const auto& shaker = s.shaker;
-    std::uint64_t alarms = 0;
-    for (const auto& row : s.interlock.rows) alarms += row.raised ? 1 : 0;
-    std::vector<Reading> readings{
-        {"Properties/Version", "", s.version},
-        {"Properties/Clock", "", s.clock},
-        {"Properties/SIMULATED", "", s.simulated},
-        {"Uptime", "s", drivers::to_seconds(s.uptime)},
-        {"Campaign/Name", "", s.campaign_name},
-        {"Campaign/State", "", std::string(name_of(s.state))},
-        {"Campaign/Reason", "", s.reason},
-        {"Campaign/Armed by", "", s.armed_by},
-        {"Campaign/Run", "", whole(s.run)},
-        {"Campaign/Runs", "", whole(s.runs)},
-        {"Campaign/Position", "", whole(s.position)},
-        {"Campaign/Positions", "", whole(s.positions)},
-        {"Campaign/Progress", "%", 100 * s.progress},
-        {"Campaign/Remaining", "s", s.remaining_s},
-        {"Campaign/Dwells", "", static_cast<std::uint64_t>(s.dwells.size())},
-        {"Shaker/Link up", "", s.shaker_link == drivers::LinkState::running},
-        {"Shaker/Command", "g", s.command_table_g},
-        {"Shaker/Measured", "g", shaker.valid ? shaker.measured_g : kNone},
-        {"Shaker/Frequency", "Hz", shaker.valid ? shaker.frequency_hz : kNone},
-        {"Shaker/Running", "", shaker.valid && shaker.running},
-        {"Shaker/Emergency stop open", "", shaker.valid && shaker.emergency_stop_open},
-        {"Shaker/Stop pending", "", s.stop_pending},
-        {"Interlock/Tripped", "", s.interlock.tripped},
-        {"Interlock/Raised", "", alarms},
-        {"CAN/Link up", "", s.can == drivers::PortState::running},
-        {"CAN/Received", "", s.can_counters.received},
-        {"CAN/Dropped", "", s.can_counters.kernel_dropped},
-        {"Samples/Taken", "", s.assembler.samples},
-        {"Samples/Incomplete", "", s.assembler.incomplete},
-        {"Samples/Gaps", "", s.assembler.gaps},
-        {"Samples/Dropped", "", s.estimator_ring.dropped},
-        {"Platform/Ready", "", s.platform.time != 0 && s.platform.ready},
-        {"Platform/Temperature", "degC", s.platform.time != 0 ? s.platform.temperature_c : kNone},
-        {"Journal/Writes", "", s.journal.path.empty() || s.journal.running},
-        {"Recorder/Writes", "", !s.recorder.recording || s.recorder.good},
-        {"Filter/NIS per degree of freedom", "", s.estimate.nis_per_dof}};
+    std::vector<Reading> readings;
+    for (const StatusValue& row : status_values())
+        if (row.mqtt_name != nullptr) readings.push_back({row.mqtt_name, row.unit, told(row, s)});
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const bool known = s.estimate.observable[i];
         const std::string name = std::string("Coefficients/") + estimator::parameter_names()[i];

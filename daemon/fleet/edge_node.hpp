@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/status/status.hpp"
 
 namespace vibrig::fleet {
 

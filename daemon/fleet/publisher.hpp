@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/fleet/settings.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig::fleet {
 

@@ -56,9 +56,10 @@ void Guard::look_later() {
 void Guard::look() {
     const auto now = monotonic();
     const bool asked = meeting_.attend(now);
+    const auto shaker = shaker_.word(now);
+    witnesses_.doubt(now, shaker.known ? shaker.measured_g : 0);
     sight_ = witnesses_.sight(now);
-    judge_.judge(
-        {now, witnesses_.time(now), sight_, shaker_.word(now), meeting_.word(), meeting_.heard()});
+    judge_.judge({now, witnesses_.time(now), sight_, shaker, meeting_.word(), meeting_.heard()});
     alarm_.show(judge_.tune());
     // Before the shaker, whose answer may take its time.
     if (asked) meeting_.tell(word(now));
@@ -102,6 +103,16 @@ void Guard::tell_links(drivers::Time now) {
     if (std::exchange(told_blind_, !sight_.known()) != !sight_.known())
         say(sight_.known() ? "info" : "warning",
             sight_.known() ? "an accelerometer is seen" : "no accelerometer is seen");
+    const auto tell_stuck = [](bool& told, bool stuck, const std::string& where) {
+        if (std::exchange(told, stuck) == stuck) return;
+        say(stuck ? "warning" : "info",
+            "accelerometer of the " + where +
+                (stuck ? " is stuck: it does not move although the table shakes, and its "
+                         "stillness is not taken for rest"
+                       : " moves again"));
+    };
+    tell_stuck(told_table_stuck_, sight_.table_stuck, "table");
+    tell_stuck(told_platform_stuck_, sight_.platform_stuck, "platform");
     const bool unreached = !shaker_.word(now).known;
     if (std::exchange(told_shaker_, unreached) != unreached)
         say(unreached ? "warning" : "info",
@@ -125,13 +136,15 @@ proto::GuardWord Guard::word(drivers::Time now) const {
 std::string Guard::words() const {
     const auto now = monotonic();
     const auto shaker = shaker_.word(now);
-    const auto of = [](bool there, const Motion& motion) {
+    const auto of = [](bool there, const Motion& motion, bool stuck) {
         if (!there) return std::string("none");
+        if (stuck) return std::string("stuck");
         return motion.known ? std::to_string(motion.rest_g) + " g rms" : std::string("not seen");
     };
-    return "table accelerometer " + of(sight_.has_table, sight_.table) + ", platform " +
-           of(sight_.has_platform, sight_.platform) + ", shaker " +
-           (shaker.known ? (shaker.runs ? "runs" : "does not run") : "not reached") + ", vibrigd " +
+    return "table accelerometer " + of(sight_.has_table, sight_.table, sight_.table_stuck) +
+           ", platform " + of(sight_.has_platform, sight_.platform, sight_.platform_stuck) +
+           ", shaker " + (shaker.known ? (shaker.runs ? "runs" : "does not run") : "not reached") +
+           ", vibrigd " +
            (!meeting_.word()              ? "never heard"
             : meeting_.word()->armed      ? "says armed"
             : meeting_.word()->excitation ? "says excitation"

@@ -48,6 +48,7 @@ class Guard {
 
     std::uint64_t told_finding_ = 0;
     bool told_disobeyed_ = false, told_over_ = true;
+    bool told_table_stuck_ = false, told_platform_stuck_ = false;
     bool told_silent_ = true, told_blind_ = true, told_shaker_ = true;
 };
 

@@ -17,10 +17,6 @@ constexpr double kLeastLevel_g = 0.15;
 
 }  // namespace
 
-double Judge::seconds_between(const Moment& from, const Moment& to) noexcept {
-    return drivers::to_seconds(std::min(to.wall - from.wall, to.rig - from.rig));
-}
-
 bool Judge::Held::for_s(bool condition, const Moment& now, double seconds) noexcept {
     if (!condition) {
         since_.reset();

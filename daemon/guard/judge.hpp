@@ -53,10 +53,6 @@ class Judge {
     [[nodiscard]] bool rests() const noexcept { return rests_; }
 
   private:
-    /// A moment on both clocks.
-    struct Moment {
-        drivers::Time wall = 0, rig = 0;
-    };
     /// Since when a condition holds without a break.
     class Held {
       public:
@@ -66,7 +62,6 @@ class Judge {
       private:
         std::optional<Moment> since_;
     };
-    [[nodiscard]] static double seconds_between(const Moment& from, const Moment& to) noexcept;
     [[nodiscard]] bool hangs(const Moment& now, const proto::DaemonWord& word) noexcept;
     [[nodiscard]] proto::GuardCause find(const Evidence& e, const Moment& now) noexcept;
     void watch_stop(const Evidence& e, const Moment& now) noexcept;

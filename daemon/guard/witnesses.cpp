@@ -1,6 +1,7 @@
 #include "daemon/guard/witnesses.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace vibrig::guard {
 
@@ -44,7 +45,9 @@ Witnesses::Witnesses(const WitnessSettings& settings)
     : settings_(settings),
       dbc_(dbc_of(settings)),
       platform_motion_(window_of(settings), 3),
-      table_motion_(window_of(settings), 1) {
+      table_motion_(window_of(settings), 1),
+      platform_watch_(3, {}),
+      table_watch_(1, {}) {
     constexpr std::array<const char*, 3> kKeys{"can.signals.accel_x", "can.signals.accel_y",
                                                "can.signals.accel_z"};
     std::string problems;
@@ -70,6 +73,9 @@ Witnesses::Witnesses(const WitnessSettings& settings)
                                "the simulated rig's message");
     }
     if (!problems.empty()) throw SettingsError(problems);
+    platform_watch_ =
+        StuckWatch(3, {count_of(platform_[0]), count_of(platform_[1]), count_of(platform_[2])});
+    table_watch_ = StuckWatch(1, {count_of(table_), 0, 0});
 }
 
 Witnesses::Place Witnesses::find(const std::string& key, const std::string& name,
@@ -94,6 +100,11 @@ std::optional<double> Witnesses::value_of(const Place& place,
     return proto::decode(*place.value, payload);
 }
 
+double Witnesses::count_of(const Place& place) noexcept {
+    if (!place || place.value->type != proto::ValueType::integer) return 0;
+    return std::abs(place.value->scale);
+}
+
 void Witnesses::take(std::span<const drivers::ReceivedFrame> frames) {
     for (const auto& frame : frames) take(frame);
 }
@@ -113,14 +124,17 @@ void Witnesses::take(const drivers::ReceivedFrame& received) {
     }
     const double time_s = drivers::to_seconds(time(received.time));
     if (message == table_.message)
-        if (const auto value = value_of(table_, payload)) table_motion_.add(time_s, {*value, 0, 0});
+        if (const auto value = value_of(table_, payload)) {
+            table_motion_.add(time_s, {*value, 0, 0});
+            table_watch_.add(time(received.time), {*value, 0, 0});
+        }
     for (std::size_t i = 0; i < 3; ++i)
         if (message == platform_[i].message)
             if (const auto value = value_of(platform_[i], payload))
-                take_platform(i, *value, time_s);
+                take_platform(i, *value, time(received.time));
 }
 
-void Witnesses::take_platform(std::size_t axis, double value, double time_s) {
+void Witnesses::take_platform(std::size_t axis, double value, drivers::Time at) {
     // An axis that comes again before the others have: theirs were lost, and this begins anew.
     if (seen_[axis]) seen_ = {};
     raw_[axis] = value - settings_.zero_g[axis];
@@ -130,7 +144,8 @@ void Witnesses::take_platform(std::size_t axis, double value, double time_s) {
     std::array<double, 3> force{};
     for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t j = 0; j < 3; ++j) force[i] += settings_.matrix[i][j] * raw_[j];
-    platform_motion_.add(time_s, force);
+    platform_motion_.add(drivers::to_seconds(at), force);
+    platform_watch_.add(at, raw_);
 }
 
 Sight Witnesses::sight(drivers::Time now) const {
@@ -140,8 +155,23 @@ Sight Witnesses::sight(drivers::Time now) const {
     sight.has_platform = platform_[0] && platform_[1] && platform_[2];
     if (sight.has_table) sight.table = table_motion_.at(now_s);
     if (sight.has_platform) sight.platform = platform_motion_.at(now_s);
+    sight.table_stuck = sight.has_table && table_watch_.doubted();
+    sight.platform_stuck = sight.has_platform && platform_watch_.doubted();
     sight.table_g = std::max(sight.table.peak_g, sight.platform.peak_g / settings_.transmission);
     return sight;
+}
+
+void Witnesses::doubt(drivers::Time now, double shaker_g) noexcept {
+    const Moment moment{now, time(now)};
+    const Sight seen = sight(now);
+    // Less is no vibration: hands, noise, a slew.
+    const auto over = [](double g) { return g >= safety::kMoving_g ? g : 0; };
+    const double by_platform = seen.platform.rest_g >= safety::kMoving_g
+                                   ? seen.platform.peak_g / settings_.transmission
+                                   : 0;
+    const double by_table = seen.table.rest_g >= safety::kMoving_g ? seen.table.peak_g : 0;
+    table_watch_.expect(moment, std::max(over(shaker_g), by_platform));
+    platform_watch_.expect(moment, settings_.transmission * std::max(over(shaker_g), by_table));
 }
 
 }  // namespace vibrig::guard

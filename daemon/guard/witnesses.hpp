@@ -9,6 +9,7 @@
 
 #include "daemon/guard/motion.hpp"
 #include "daemon/guard/settings.hpp"
+#include "daemon/guard/stuck.hpp"
 #include "drivers/can/can_port.hpp"
 #include "proto/dbc.hpp"
 
@@ -18,22 +19,26 @@ namespace vibrig::guard {
 struct Sight {
     bool has_table = false, has_platform = false;
     Motion table, platform;
+    bool table_stuck = false, platform_stuck = false;  ///< stillness of it is no rest
     double table_g = 0;  ///< the largest peak at the table that any of them shows
 
-    [[nodiscard]] bool known() const { return table.known || platform.known; }
+    [[nodiscard]] bool known() const {
+        return (table.known && !table_stuck) || (platform.known && !platform_stuck);
+    }
     /// One of them moves by more than so much, rms.
     [[nodiscard]] bool moves(double g) const {
         return (table.known && table.rest_g > g) || (platform.known && platform.rest_g > g);
     }
     [[nodiscard]] bool table_rests(double g) const {
-        return !has_table || (table.known && table.rest_g < g);
+        return !has_table || table_stuck || (table.known && table.rest_g < g);
     }
     [[nodiscard]] bool platform_rests(double g) const {
-        return !has_platform || (platform.known && platform.rest_g < g);
+        return !has_platform || platform_stuck || (platform.known && platform.rest_g < g);
     }
-    /// Measured, by all there are.
+    /// Measured, by all there are; beside one that is stuck the other alone decides.
     [[nodiscard]] bool rests(double g) const {
-        return (has_table || has_platform) && table_rests(g) && platform_rests(g);
+        const bool any = (has_table && !table_stuck) || (has_platform && !platform_stuck);
+        return any && table_rests(g) && platform_rests(g);
     }
 };
 
@@ -44,6 +49,9 @@ class Witnesses {
     explicit Witnesses(const WitnessSettings& settings);
     void take(std::span<const drivers::ReceivedFrame> frames);
     [[nodiscard]] Sight sight(drivers::Time now) const;
+    /// Whether one of them should move and does not: by the other one, and by what the shaker's
+    /// controller says that it does, peak at the table.
+    void doubt(drivers::Time now, double shaker_g) noexcept;
     /// What is judged by: CLOCK_MONOTONIC, or the simulated rig's time where it owns the time.
     [[nodiscard]] drivers::Time time(drivers::Time now) const {
         return rig_time_ == nullptr ? now : rig_now_;
@@ -59,7 +67,9 @@ class Witnesses {
     [[nodiscard]] Place find(const std::string& key, const std::string& name,
                              std::string& problems) const;
     void take(const drivers::ReceivedFrame& frame);
-    void take_platform(std::size_t axis, double value, double time_s);
+    void take_platform(std::size_t axis, double value, drivers::Time at);
+    /// What one count is, g; 0: the bus carries a floating-point number, or nothing.
+    [[nodiscard]] static double count_of(const Place& place) noexcept;
     [[nodiscard]] static std::optional<double> value_of(
         const Place& place, std::span<const std::uint8_t> payload) noexcept;
 
@@ -73,6 +83,7 @@ class Witnesses {
     std::array<double, 3> raw_{};
     std::array<bool, 3> seen_{};
     MotionWindow platform_motion_, table_motion_;
+    StuckWatch platform_watch_, table_watch_;
 };
 
 }  // namespace vibrig::guard

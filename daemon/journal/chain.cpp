@@ -105,6 +105,7 @@ void Verification::compare_row(Database& database, std::int64_t entry, const std
 
 void Verification::find_strangers(Database& database) {
     for (const char* table : kChained) {
+        if (!has_table(database, table)) continue;  // named where it is lacking
         const std::string ask = fmt::format(
             "SELECT rowid FROM {0} WHERE NOT EXISTS (SELECT 1 FROM chain WHERE tbl = '{0}' AND "
             "row = {0}.rowid) LIMIT {1}",

@@ -109,10 +109,12 @@ void ChainedFile::take_key(std::vector<std::string>& found) {
 
 void ChainedFile::check_start(const FoundHead& beside, std::vector<std::string>& found) {
     for (const char* table : kChained) {
-        if (!has_table(*database_, table))
+        if (has_table(*database_, "chain") ? lacks_table(*database_, table)
+                                           : !has_table(*database_, table))
             found.push_back(fmt::format("{}: table {} is missing", path_, table));
     }
     if (!found.empty()) return;
+    make_commissioning(*database_);
     chain_ = Chain(Chain::newest(*database_));
     name_ = Chain::name_of(*database_);
     check_head(beside, found);

@@ -146,6 +146,7 @@ void Journal::proved(const std::string& by, const std::string& record) {
     put(Proved{by, record, utc_now()});
 }
 void Journal::event(const EventRecord& event) { put(event); }
+void Journal::commissioned(const Commissioned& row) { put(row); }
 std::uint64_t Journal::command(const CommandRequest& request, const CommandReply& reply,
                                std::int64_t utc_ns) {
     return put(Commanded{request, reply, utc_ns});
@@ -356,6 +357,16 @@ void Journal::write_one(const Proved& proved) {
     database().run("INSERT INTO proof (utc_ns, person, record) VALUES (?, ?, ?)",
                    {proved.utc_ns, std::string_view(proved.by), std::string_view(proved.record)});
     chained("proof");
+}
+
+void Journal::write_one(const Commissioned& row) {
+    database().run(
+        "INSERT INTO commissioning (utc_ns, part, step, by, identity, what, data_json) "
+        "VALUES (?, ?, ?, ?, ?, ?, ?)",
+        {row.utc_ns, std::string_view(row.part), std::string_view(row.step),
+         std::string_view(row.by), std::string_view(row.identity), std::string_view(row.what),
+         std::string_view(row.data_json)});
+    chained(kCommissioning);
 }
 
 void Journal::write_one(const Safety& safety) {

@@ -13,7 +13,11 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/commands.hpp"
+#include "daemon/domain/events.hpp"
+#include "daemon/domain/latch.hpp"
+#include "daemon/domain/positions.hpp"
+#include "daemon/domain/services.hpp"
 #include "daemon/journal/chained_file.hpp"
 #include "daemon/journal/checkpoint.hpp"
 #include "daemon/journal/latches.hpp"
@@ -28,6 +32,13 @@ struct Unfinished {
     std::int64_t id = 0;
     std::string name, started_by;
     std::vector<DwellCheckpoint> dwells;  ///< contiguous from run 1, position 1
+};
+
+/// One step of commissioning. `what`: begin, permission, move, reading, hypothesis, question,
+/// answer, verdict, accept, void or refused arm.
+struct Commissioned {
+    std::string part, step, by, identity, what, data_json;
+    std::int64_t utc_ns = 0;
 };
 
 /// What opening the journal found.
@@ -87,6 +98,7 @@ class Journal {
     /// A proof of the safe state is over; `record` is kept as it is.
     void proved(const std::string& by, const std::string& record);
     void event(const EventRecord& event);
+    void commissioned(const Commissioned& row);
     std::uint64_t command(const CommandRequest& request, const CommandReply& reply,
                           std::int64_t utc_ns);
 
@@ -132,8 +144,8 @@ class Journal {
         bool two_persons = false;
         std::int64_t utc_ns = 0;
     };
-    using Entry =
-        std::variant<Proved, Begun, Done, Ended, EventRecord, Commanded, LoopChecked, Safety>;
+    using Entry = std::variant<Proved, Begun, Done, Ended, EventRecord, Commanded, LoopChecked,
+                               Safety, Commissioned>;
 
     void open();
     void recover();
@@ -165,6 +177,7 @@ class Journal {
     void write_one(const Commanded& commanded);
     void write_one(const LoopChecked& checked);
     void write_one(const Proved& proved);
+    void write_one(const Commissioned& row);
     void write_one(const Safety& safety);
 
     const std::string path_;

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/latch.hpp"
 
 namespace vibrig::journal {
 

@@ -29,6 +29,9 @@ CREATE TABLE IF NOT EXISTS safety (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NU
     two_persons INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS proof (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
     person TEXT NOT NULL, record TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS commissioning (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL,
+    part TEXT NOT NULL, step TEXT NOT NULL, by TEXT NOT NULL, identity TEXT NOT NULL,
+    what TEXT NOT NULL, data_json TEXT NOT NULL);
 CREATE TABLE origin (id INTEGER PRIMARY KEY, utc_ns INTEGER NOT NULL, text TEXT NOT NULL,
     public_key TEXT NOT NULL, previous TEXT NOT NULL);
 CREATE TABLE chain (entry INTEGER PRIMARY KEY, tbl TEXT NOT NULL, row INTEGER NOT NULL,
@@ -42,6 +45,20 @@ constexpr std::array kOthers{"chain", "chain_row", "head"};
 }  // namespace
 
 void make_tables(Database& database) { database.execute(kTables); }
+
+void make_commissioning(Database& database) {
+    if (has_table(database, kCommissioning)) return;
+    const std::string_view tables(kTables);
+    const auto begin = tables.find(std::string("CREATE TABLE IF NOT EXISTS ") + kCommissioning);
+    database.execute(std::string(tables.substr(begin, tables.find(';', begin) - begin)).c_str());
+}
+
+bool lacks_table(Database& database, const char* name) {
+    if (has_table(database, name)) return false;
+    return std::string_view(name) != kCommissioning ||
+           !database.ask("SELECT 1 FROM chain WHERE tbl = ? LIMIT 1", {std::string_view(name)})
+                .empty();
+}
 
 bool has_table(Database& database, const char* name) {
     return !database

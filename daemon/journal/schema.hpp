@@ -13,8 +13,10 @@ class Database;
 inline constexpr std::int64_t kSchemaVersion = 2;
 
 /// Tables whose rows are chained: all that say something.
-inline constexpr std::array kChained{"origin",  "campaign",   "dwell",  "event",
+inline constexpr std::array kChained{"origin",  "campaign",   "dwell",  "event", "commissioning",
                                      "command", "loop_check", "safety", "proof"};
+/// Came later: a file of this version that never had it has none.
+inline constexpr const char* kCommissioning = "commissioning";
 
 /// What stands in the table safety.
 inline constexpr const char* kArmed = "armed";
@@ -28,7 +30,11 @@ inline constexpr const char* kCertificate = "certificate";
 
 /// Those that are not there yet.
 void make_tables(Database& database);
+/// Where an earlier release had none yet.
+void make_commissioning(Database& database);
 [[nodiscard]] bool has_table(Database& database, const char* name);
+/// One that was there has gone.
+[[nodiscard]] bool lacks_table(Database& database, const char* name);
 /// What the file has beside its tables, a trigger for example, by name.
 [[nodiscard]] std::vector<std::string> strange_objects(Database& database);
 

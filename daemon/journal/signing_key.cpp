@@ -44,16 +44,16 @@ SigningKey::SigningKey(const std::string& path) : path_(path) {
         const File file(::fdopen(fd, "r"), std::fclose);
         struct stat found {};
         if (::fstat(fd, &found) != 0) fail(path, std::strerror(errno));
-        if (!S_ISREG(found.st_mode)) fail(path, "is no file, expected the journal's key");
+        if (!S_ISREG(found.st_mode)) fail(path, "is no file, expected a signing key");
         if ((found.st_mode & (S_IRWXG | S_IRWXO)) != 0)
             fail(path,
                  fmt::format("found mode {:04o}, expected 0600: others than the daemon can read "
-                             "the journal's key",
+                             "its signing key",
                              found.st_mode & 07777U));
         if (found.st_uid != ::geteuid())
             fail(path,
                  fmt::format("found it owned by user {}, expected {}: another than the daemon "
-                             "has the journal's key",
+                             "has its signing key",
                              found.st_uid, ::geteuid()));
         key_.reset(PEM_read_PrivateKey(file.get(), nullptr, nullptr, nullptr));
         if (!key_ || EVP_PKEY_get_id(key_.get()) != EVP_PKEY_ED25519)
@@ -96,7 +96,7 @@ std::string SigningKey::sign(std::string_view message) const {
     if (EVP_DigestSignInit(context.get(), nullptr, nullptr, nullptr, key_.get()) != 1 ||
         EVP_DigestSign(context.get(), bytes_of(signature), &size, bytes_of(message),
                        message.size()) != 1) {
-        throw std::runtime_error("the journal's head cannot be signed");
+        throw std::runtime_error("nothing can be signed with the key");
     }
     return to_hex(signature);
 }

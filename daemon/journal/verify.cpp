@@ -98,7 +98,8 @@ bool look_at_version(Database& database, const std::string& path, Verdict& verdi
         return false;
     }
     for (const char* table : kChained) {
-        if (!has_table(database, table))
+        if (has_table(database, "chain") ? lacks_table(database, table)
+                                         : !has_table(database, table))
             verdict.found.push_back(fmt::format("table {} is missing", table));
     }
     return verdict.found.empty();

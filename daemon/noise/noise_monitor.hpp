@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
+#include "daemon/domain/positions.hpp"
+#include "daemon/noise/noise_status.hpp"
 #include "daemon/rt/angle_blocks.hpp"
 #include "estimator/allan/dwell_monitor.hpp"
 #include "estimator/identification/dwell_residual.hpp"

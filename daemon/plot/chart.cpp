@@ -20,7 +20,8 @@ constexpr double kWidth = 860;
 constexpr double kLeft = 84;
 constexpr double kTop = 44;
 constexpr double kPlotHeight = 420;
-constexpr double kRight = 190;  // legend or colour scale
+constexpr double kRight = 190;              // legend or colour scale
+constexpr std::size_t kLegendLetters = 20;  // that surely fit beside it
 constexpr double kNoteHeight = 16;
 constexpr double kNameHeight = 30;  // of a tick's name, upright, beyond a number's
 constexpr std::size_t kColours = 8;
@@ -147,6 +148,13 @@ class Drawing {
              " transform=\"rotate(-90 22 " + number(middle) + ")\"");
     }
 
+    /// A name of the legend that would not end within the picture is drawn in.
+    static std::string fitted(const std::string& name) {
+        return name.size() <= kLegendLetters ? ""
+                                             : " lengthAdjust=\"spacingAndGlyphs\" textLength=\"" +
+                                                   number(kRight - 14 - 28 - 2) + '"';
+    }
+
     void curve(const Curve& curve, std::size_t index) {
         out_ += "<g class=\"c" + std::to_string(index % kColours) + "\">";
         if (curve.low.size() == curve.x.size() && curve.look != Look::dots) {
@@ -165,7 +173,7 @@ class Drawing {
             } else {
                 line(class_of(curve.look), x, y, x + 22, y);
             }
-            text(x + 28, y + 4, curve.name, "start");
+            text(x + 28, y + 4, curve.name, "start", fitted(curve.name));
         }
         out_ += "</g>\n";
     }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "daemon/domain/events.hpp"
 #include "daemon/record/disk.hpp"
 #include "daemon/record/hdf5.hpp"
 #include "daemon/record/records.hpp"
@@ -40,7 +41,6 @@ class CampaignWriter {
     void end(const Ended& ended);
 
     [[nodiscard]] std::size_t samples_waiting() const { return samples_->waiting(); }
-    [[nodiscard]] std::size_t samples_written() const { return samples_->written(); }
     [[nodiscard]] const std::string& path() const { return file_->path(); }
 
   private:

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
 #include "daemon/rt/ring.hpp"
 #include "drivers/sample/sample.hpp"
 

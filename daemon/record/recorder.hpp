@@ -10,7 +10,8 @@
 #include <thread>
 #include <variant>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
+#include "daemon/domain/services.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/raw_log.hpp"

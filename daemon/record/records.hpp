@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/frame_record.hpp"
 #include "drivers/sample/sample.hpp"

@@ -30,6 +30,10 @@ std::string word_of(const Campaign& campaign, const Json& result,
     if (campaign.state != "finished")
         throw Refused(campaign.path + ": found a campaign that is " + campaign.state +
                       ", expected a finished one");
+    if (!campaign.head.simulated && paperwork_of(campaign).unit_serial.empty())
+        throw Refused(campaign.path +
+                      ": found no serial number ([unit] serial) in its configuration, expected "
+                      "one: a certificate is of one item");
     const auto verdict = result.find("verdict");
     if (verdict == result.end() || !verdict->is_object())
         throw Refused(campaign.path +

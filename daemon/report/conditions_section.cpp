@@ -59,8 +59,7 @@ void add_conditions(Page& page, const record::Campaign& campaign) {
     shaker.curves = {
         curve("commanded", Look::line, [](const auto& r) { return r.command_g; }),
         curve("set-point read back", Look::dashed, [](const auto& r) { return r.set_point_g; }),
-        curve("measured by the controller", Look::dots,
-              [](const auto& r) { return r.measured_g; })};
+        curve("controller measures", Look::dots, [](const auto& r) { return r.measured_g; })};
     page.figure(shaker.svg(), "Once a second.");
 }
 

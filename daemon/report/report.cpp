@@ -253,7 +253,7 @@ void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
             for (std::size_t i = 0; i < rows.size(); i += step) {
                 double least = std::numeric_limits<double>::infinity(), most = 0, log_sum = 0;
                 for (const std::size_t k : group.of) {
-                    const double s = rows[i].sigma[gyro * 10 + k];
+                    const double s = rows[i].sigma[gyro * estimator::kGroups + k];
                     least = std::min(least, s);
                     most = std::max(most, s);
                     log_sum += std::log(std::max(s, 1e-300));
@@ -280,11 +280,11 @@ void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
         curve.name = std::string("gyro ") + kGyro[gyro];
         for (std::size_t i = 0; i < rows.size(); i += every) {
             double square = 0;
-            for (std::size_t k = 0; k < 10; ++k) {
-                const std::size_t p = gyro * 10 + k;
+            for (std::size_t k = 0; k < estimator::kGroups; ++k) {
+                const std::size_t p = gyro * estimator::kGroups + k;
                 const double d =
                     (rows[i].value[p] - a.coefficients.value[p]) / a.coefficients.sigma[p];
-                square += d * d / 10;
+                square += d * d / estimator::kGroups;
             }
             curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
             curve.y.push_back(std::sqrt(square));
@@ -564,7 +564,7 @@ std::string make_page(const Campaign& campaign, const Analysis& analysis,
     Page page;
     if (campaign.head.simulated) page.mark("SIMULATED");
     add_head(page, campaign, analysis);
-    add_uncertainty(page, analysis.assessed);
+    add_uncertainty(page, analysis.assessed, coverage_of(campaign));
     add_lead(page, campaign, analysis.replayed);
     add_coefficients(page, analysis);
     add_campaign(page, campaign, analysis);

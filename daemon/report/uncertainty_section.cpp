@@ -67,7 +67,7 @@ std::vector<std::vector<std::string>> budget_rows(const uncertainty::Assessment&
 
 }  // namespace
 
-void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
+void add_uncertainty(Page& page, const uncertainty::Assessment& a, double coverage) {
     page.section("uncertainty", "Uncertainty and verdict");
     const bool valid = a.verdict.level == uncertainty::Level::valid;
     page.table({{"verdict"}, {(valid ? "" : "!") + a.verdict.sentence}});
@@ -75,10 +75,11 @@ void add_uncertainty(Page& page, const uncertainty::Assessment& a) {
         page.paragraph("Also: " + a.verdict.reasons[i].text);
     if (!a.done) return;
     page.table(budget_rows(a), "budget");
-    page.paragraph(
+    page.paragraph(fmt::format(
         "u combines noise, a bias that may have moved during the campaign, and the inputs declared "
-        "in the configuration; U = k u covers with the probability declared. *: nothing was "
-        "declared, a default stands in.");
+        "in the configuration; U = k u, with the k given, covers with a probability of about {:g} "
+        "%. *: nothing was declared, a default stands in.",
+        100 * coverage));
     for (const auto& of : uncertainty::leverages(a)) {
         page.paragraph("What would shrink it most: " + uncertainty::advice(of) + ".");
         break;

@@ -6,6 +6,7 @@
 namespace vibrig::report {
 
 /// The verdict first, then what each coefficient is worth and why, then the dwells' residuals.
-void add_uncertainty(Page& page, const estimator::uncertainty::Assessment& assessed);
+void add_uncertainty(Page& page, const estimator::uncertainty::Assessment& assessed,
+                     double coverage);
 
 }  // namespace vibrig::report

@@ -15,6 +15,9 @@ using drivers::Time;
 namespace {
 // Silence is looked for this often on the real clock; stale deadlines are longer.
 constexpr Time kTimerPeriod = 50 * drivers::kMillisecond;
+// Of what is shown while no sample is complete. When frames end in the midst of one, the timer
+// shows the last of them.
+constexpr Time kShowPeriod = drivers::kMillisecond;
 constexpr Time kFaultPeriod = 200 * drivers::kMillisecond;  // a system call each time
 }  // namespace
 
@@ -82,7 +85,13 @@ void Acquisition::on_frames(std::span<const drivers::ReceivedFrame> frames) noex
     }
     if (rig_link_) return;
     oldest_ = frames.empty() ? 0 : frames.front().time;
-    hand_on();
+    // Between two samples nobody acts on more than the platform's state.
+    if (assembler_.counters().samples != shown_.assembler.samples || platform_changed() ||
+        oldest_ - shown_.beat >= kShowPeriod) {
+        hand_on();
+    } else {
+        count_latency(clock_.now());
+    }
 }
 
 void Acquisition::record(const drivers::ReceivedFrame& frame, Time time) noexcept {
@@ -138,7 +147,7 @@ void Acquisition::push_batch() noexcept {
     // First the recorder's: when a dwell is reported done its samples are there.
     if (to_.recorder_samples != nullptr) to_.recorder_samples->push_n({batch_.data(), batched_});
     to_.estimator_ring.push_n({batch_.data(), batched_});
-    if (to_.to_estimator != nullptr) to_.to_estimator->given(clock_.now());
+    if (to_.to_estimator != nullptr) to_.to_estimator->given(clock_.now(), cpu_of_this_thread());
     to_.estimator.notify();
     if (to_.pre_trip != nullptr) to_.pre_trip->push_n({batch_.data(), batched_});
     shown_.samples_offered += batched_;
@@ -146,27 +155,34 @@ void Acquisition::push_batch() noexcept {
     batched_ = 0;
 }
 
-void Acquisition::hand_on() noexcept {
-    push_batch();
+bool Acquisition::platform_changed() const noexcept {
     const auto& platform = assembler_.platform();
     const auto& was = shown_.platform;
-    const bool changed = platform.ready != was.ready || platform.loop_closed != was.loop_closed ||
-                         platform.gyros_at_speed != was.gyros_at_speed ||
-                         platform.fault != was.fault || platform.in_position != was.in_position ||
-                         platform.slewing != was.slewing ||
-                         platform.gimbal_command_echo != was.gimbal_command_echo;
-    shown_.platform = platform;
+    return platform.ready != was.ready || platform.loop_closed != was.loop_closed ||
+           platform.gyros_at_speed != was.gyros_at_speed || platform.fault != was.fault ||
+           platform.in_position != was.in_position || platform.slewing != was.slewing ||
+           platform.gimbal_command_echo != was.gimbal_command_echo;
+}
+
+void Acquisition::count_latency(Time now) noexcept {
+    if (oldest_ != 0) {
+        shown_.latency.add(now - oldest_);
+        shown_.lateness.add(now - oldest_);
+    }
+    oldest_ = 0;
+}
+
+void Acquisition::hand_on() noexcept {
+    push_batch();
+    const bool changed = platform_changed();
+    shown_.platform = assembler_.platform();
     shown_.assembler = assembler_.counters();
     shown_.port = port_.counters();
     for (std::size_t c = 0; c < drivers::kChannels; ++c) {
         shown_.last_good[c] = assembler_.last_good(static_cast<drivers::Channel>(c));
     }
     shown_.beat = clock_.now();
-    if (oldest_ != 0) {
-        shown_.latency.add(shown_.beat - oldest_);
-        shown_.lateness.add(shown_.beat - oldest_);
-    }
-    oldest_ = 0;
+    count_latency(shown_.beat);
     count_faults(shown_.beat);
     view_.publish(shown_);
     if (changed) to_.control.notify();

@@ -84,6 +84,8 @@ class Acquisition {
     void feed(const drivers::ReceivedFrame& frame) noexcept;
     void push_batch() noexcept;
     void hand_on() noexcept;
+    [[nodiscard]] bool platform_changed() const noexcept;
+    void count_latency(drivers::Time now) noexcept;
     void count_faults(drivers::Time now) noexcept;
     void on_time(drivers::Time now) noexcept;
     void arm_timer();

@@ -16,6 +16,7 @@ EstimatorStage::EstimatorStage(Ring<drivers::Sample>& samples, drivers::Waiter& 
 void EstimatorStage::run() noexcept {
     while (!stop_.load()) {
         work();
+        if (stays_) follow();
         self_.wait_until(drivers::kNever);
     }
     if (begun_) finish();
@@ -28,6 +29,13 @@ void EstimatorStage::work() noexcept {
     }
     if (since != 0 && clock_ != nullptr) shown_.lateness.add(clock_->now() - since);
     if (shown_.sample_time - published_at_ >= kPublishPeriod) publish();
+}
+
+void EstimatorStage::follow() noexcept {
+    const int cpu = handed_over_.cpu();
+    if (cpu == cpu_) return;
+    cpu_ = cpu;
+    keep_this_thread_to(cpu);
 }
 
 void EstimatorStage::stop() noexcept {

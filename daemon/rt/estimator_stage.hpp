@@ -39,6 +39,12 @@ class EstimatorStage {
     void work() noexcept;
     void stop() noexcept;  ///< any thread
 
+    /// Before run(), in its thread: it works on the CPU where samples are handed over, and goes
+    /// along when the giver moves. To be woken on another CPU costs several times as much as what a
+    /// sample takes here. Nobody waits for the other: who gives has more priority, and the kernel
+    /// moves it where a long piece of work is in its way.
+    void stay_by_giver() noexcept { stays_ = true; }
+
     /// Before run(): what goes into the filter goes there too.
     void feed_to(Ring<Fed>& journal) noexcept { journal_ = &journal; }
 
@@ -60,6 +66,7 @@ class EstimatorStage {
     void take_sample(const drivers::Sample& sample) noexcept;
     void finish() noexcept;
     void publish() noexcept;
+    void follow() noexcept;
 
     Ring<drivers::Sample>& samples_;
     drivers::Waiter& self_;
@@ -68,6 +75,8 @@ class EstimatorStage {
     Ring<Fed>* journal_ = nullptr;
     const drivers::Clock* clock_ = nullptr;  ///< null: lateness does not count
     HandOver handed_over_;
+    bool stays_ = false;
+    int cpu_ = -1;  ///< it keeps to, of stay_by_giver()
     Ring<DwellOrder> orders_{8};
     Ring<DwellDone> done_{8};
     Ring<BlockRecord> blocks_{256};

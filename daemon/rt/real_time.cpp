@@ -61,6 +61,22 @@ PageFaults page_faults_of_this_thread() noexcept {
     return {static_cast<std::uint64_t>(use.ru_majflt), static_cast<std::uint64_t>(use.ru_minflt)};
 }
 
+int cpu_of_this_thread() noexcept { return ::sched_getcpu(); }
+
+void keep_this_thread_to(int cpu) noexcept {
+    if (cpu < 0 || cpu >= CPU_SETSIZE) return;
+    cpu_set_t only;
+    CPU_ZERO(&only);
+    CPU_SET(static_cast<std::size_t>(cpu), &only);
+    ::pthread_setaffinity_np(::pthread_self(), sizeof only, &only);
+}
+
+bool this_thread_is_fifo() noexcept {
+    int policy = SCHED_OTHER;
+    sched_param got{};
+    return ::pthread_getschedparam(::pthread_self(), &policy, &got) == 0 && policy == SCHED_FIFO;
+}
+
 ThreadSetup set_up_this_thread(const ThreadWishes& wishes) {
     const pthread_t self = ::pthread_self();
     ThreadSetup setup;

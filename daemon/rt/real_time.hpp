@@ -29,19 +29,24 @@ struct Lateness {
     }
 };
 
-/// Since when the next stage has had something that it is not done with. One giver, one taker.
+/// Since when the next stage has had something that it is not done with, and where that was given.
+/// One giver, one taker.
 class HandOver {
   public:
-    /// After the records are in the ring, before the notice.
-    void given(drivers::Time now) noexcept {
+    /// After the records are in the ring, before the notice; `cpu` the giver runs on, -1: not
+    /// known.
+    void given(drivers::Time now, int cpu = -1) noexcept {
+        cpu_.store(cpu, std::memory_order_relaxed);
         drivers::Time none = 0;
         since_.compare_exchange_strong(none, now);
     }
     /// Before the ring is emptied; 0: nothing new.
     [[nodiscard]] drivers::Time taken() noexcept { return since_.exchange(0); }
+    [[nodiscard]] int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
 
   private:
     std::atomic<drivers::Time> since_{0};
+    std::atomic<int> cpu_{-1};
 };
 
 /// What a thread is to have.
@@ -58,6 +63,13 @@ struct ThreadSetup {
     std::vector<std::string> missing;  ///< what could not be had, each with its cause
     PageFaults faults;                 ///< it took so far
 };
+
+/// The CPU it is on; -1: not known.
+[[nodiscard]] int cpu_of_this_thread() noexcept;
+/// From here on the calling thread keeps to this one, if it may; one system call.
+void keep_this_thread_to(int cpu) noexcept;
+/// SCHED_FIFO, not merely asked for.
+[[nodiscard]] bool this_thread_is_fifo() noexcept;
 
 /// Sets up the calling thread and brings its stack into memory. What cannot be had is left as it
 /// is and told.

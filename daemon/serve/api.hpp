@@ -5,12 +5,12 @@
 #include <string_view>
 #include <variant>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/serve/caller.hpp"
 #include "daemon/serve/documents.hpp"
 #include "daemon/serve/history.hpp"
 #include "daemon/serve/rate_limit.hpp"
 #include "daemon/serve/stream_feed.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig::serve {
 

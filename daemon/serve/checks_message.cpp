@@ -56,15 +56,10 @@ void fill_proof(v1::Proof& out, const ProofStatus& proof) {
 
 }  // namespace
 
-void fill(v1::Verdict& out, const VerdictStatus& verdict) {
-    out.set_level(verdict.level);
-    out.set_word(verdict.word);
-    out.set_sentence(verdict.sentence);
-    out.set_dwells(verdict.dwells);
-    out.set_widening(verdict.widening);
-    out.set_complete(verdict.complete);
-    if (!verdict.residuals) return;
-    for (const auto& r : *verdict.residuals) {
+void fill(v1::Verdict& out, const StatusData& status) {
+    fill_values(out, "verdict.", status);
+    if (!status.verdict.residuals) return;
+    for (const auto& r : *status.verdict.residuals) {
         v1::Verdict::Residual& to = *out.add_residuals();
         to.set_run(r.run);
         to.set_position(r.position);

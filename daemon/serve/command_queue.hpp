@@ -8,7 +8,8 @@
 #include <string>
 #include <thread>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/commands.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig::serve {
 

@@ -26,9 +26,4 @@ std::vector<EventRecord> EventLog::after(std::uint64_t after_id, std::size_t at_
     return {first, first + static_cast<std::ptrdiff_t>(count)};
 }
 
-std::uint64_t EventLog::newest_id() const {
-    const std::lock_guard lock(mutex_);
-    return newest_id_;
-}
-
 }  // namespace vibrig::serve

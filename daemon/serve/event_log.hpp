@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/events.hpp"
 
 namespace vibrig::serve {
 
@@ -22,7 +22,6 @@ class EventLog {
     /// The oldest `at_most` events with an id above `after_id`, oldest first.
     [[nodiscard]] std::vector<EventRecord> after(std::uint64_t after_id, std::size_t at_most) const;
     /// Of the newest event; 0: none yet.
-    [[nodiscard]] std::uint64_t newest_id() const;
 
   private:
     const std::size_t capacity_;

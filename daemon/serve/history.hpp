@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig::serve {
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <sstream>
 #include <utility>
+#include <variant>
+
+#include "daemon/status/values.hpp"
 
 namespace vibrig::serve {
 namespace {
@@ -82,6 +85,25 @@ class Families {
 
 double yes(bool value) { return value ? 1 : 0; }
 
+/// What has no labels is in the table; what is not known now is left out.
+void add_values(Families& to, const StatusData& s) {
+    for (const StatusValue& row : status_values()) {
+        if (row.metric == nullptr) continue;
+        const StatusScalar value = row.value(s);
+        if (const auto* const flag = std::get_if<bool>(&value)) {
+            to.gauge(row.metric, row.help, yes(*flag));
+        } else if (const auto* const number = std::get_if<double>(&value)) {
+            to.gauge(row.metric, row.help, *number * row.metric_factor);
+        } else if (const auto* const count = std::get_if<std::uint64_t>(&value)) {
+            if (row.counts) {
+                to.counter(row.metric, row.help, *count);
+            } else {
+                to.gauge(row.metric, row.help, static_cast<double>(*count));
+            }
+        }
+    }
+}
+
 void add_campaign(Families& to, const StatusData& s) {
     std::vector<std::pair<Labels, double>> states;
     for (int i = 0; i <= static_cast<int>(kLastCampaignState); ++i) {
@@ -90,14 +112,7 @@ void add_campaign(Families& to, const StatusData& s) {
     }
     to.gauge("vibrig_build_info", "Version of the daemon, and which clock it follows.",
              {{{{"clock", s.clock}, {"version", s.version}}, 1}});
-    to.gauge("vibrig_simulated", "1: the rig is a program.", s.simulated ? 1 : 0);
-    to.gauge("vibrig_uptime_seconds", "Since the start, by the daemon's clock.",
-             drivers::to_seconds(s.uptime));
     to.gauge("vibrig_campaign_state", "1 for the state the campaign is in.", states);
-    to.gauge("vibrig_campaign_progress_ratio", "Part of the campaign that is done.", s.progress);
-    to.gauge("vibrig_campaign_remaining_seconds", "Estimate.", s.remaining_s);
-    to.gauge("vibrig_campaign_run", "Present run, from 1; 0: none.", s.run);
-    to.gauge("vibrig_campaign_position", "Present position, from 1; 0: none.", s.position);
     std::uint64_t flagged = 0;
     for (const auto& dwell : s.dwells) flagged += dwell.flagged ? 1 : 0;
     to.gauge("vibrig_campaign_dwells", "Ended dwells of this campaign.",
@@ -108,21 +123,6 @@ void add_campaign(Families& to, const StatusData& s) {
 void add_shaker(Families& to, const StatusData& s) {
     constexpr double kGravity = 9.80665;  // m/s^2
     const auto& n = s.shaker_counters;
-    to.gauge("vibrig_shaker_link_up", "1 while the shaker's controller answers.",
-             yes(s.shaker_link == drivers::LinkState::running));
-    to.gauge("vibrig_shaker_command_meters_per_second_squared",
-             "Commanded peak acceleration of the table.", s.command_table_g * kGravity);
-    if (s.shaker.valid) {
-        to.gauge("vibrig_shaker_measured_meters_per_second_squared",
-                 "Measured peak acceleration of the table.", s.shaker.measured_g * kGravity);
-        to.gauge("vibrig_shaker_frequency_hertz", "Set-point as read back.", s.shaker.frequency_hz);
-        to.gauge("vibrig_shaker_running", "1 while the run register is set.",
-                 yes(s.shaker.running));
-        to.gauge("vibrig_shaker_fault", "1 while the controller reports a fault.",
-                 yes(s.shaker.fault != 0));
-        to.gauge("vibrig_emergency_stop_open", "1 while the emergency-stop chain is open.",
-                 yes(s.shaker.emergency_stop_open));
-    }
     std::vector<std::pair<Labels, double>> witnesses;
     for (std::size_t w = 0; w < s.witness_g.size(); ++w) {
         if (s.witness_g[w] >= 0)
@@ -131,11 +131,6 @@ void add_shaker(Families& to, const StatusData& s) {
     }
     to.gauge("vibrig_witness_meters_per_second_squared",
              "Peak acceleration at the table as an accelerometer shows it.", witnesses);
-    to.gauge("vibrig_shaker_stop_pending", "1: a stop is ordered and rest not measured since.",
-             yes(s.stop_pending));
-    to.gauge("vibrig_shaker_stop_disobeyed",
-             "1: a stop was not obeyed in its time: the emergency stop is to be pressed.",
-             yes(s.rest.disobeyed));
     const auto& [platform, table] = s.rest.witnesses;
     to.gauge("vibrig_rest_rms_meters_per_second_squared",
              "Of the accelerometers, less the mean; 0 while unknown.",
@@ -147,11 +142,6 @@ void add_shaker(Families& to, const StatusData& s) {
                 {{{"result", "exception"}}, n.exceptions},
                 {{{"result", "wrong_reply"}}, n.wrong_replies},
                 {{{"result", "lost"}}, n.lost}});
-    to.counter("vibrig_shaker_reconnects_total", "Connections made anew.", n.reconnects);
-    to.counter("vibrig_shaker_watchdog_feeds_total", "Feeds of the shaker's watchdog.", n.feeds);
-    to.counter("vibrig_shaker_stops_total", "Stops written.", n.stops_written);
-    to.counter("vibrig_shaker_read_back_mismatches_total", "Set-points that read back otherwise.",
-               n.read_back_mismatches);
 }
 
 void add_real_time(Families& to, const RealTimeStatus& s) {
@@ -164,8 +154,6 @@ void add_real_time(Families& to, const RealTimeStatus& s) {
         faults.push_back({{{"kind", "major"}, {"thread", thread.name}}, thread.major_faults});
         faults.push_back({{{"kind", "minor"}, {"thread", thread.name}}, thread.minor_faults});
     }
-    to.gauge("vibrig_memory_locked", "1 while the daemon's memory is locked.",
-             yes(s.memory_locked));
     to.gauge("vibrig_thread_fifo_priority", "SCHED_FIFO; 0: ordinary scheduling.", priorities);
     to.counter("vibrig_thread_deadline_misses_total",
                "What a thread did later than a sample period; real clock.", misses);
@@ -175,8 +163,6 @@ void add_real_time(Families& to, const RealTimeStatus& s) {
 void add_acquisition(Families& to, const StatusData& s) {
     const auto& can = s.can_counters;
     const auto& a = s.assembler;
-    to.gauge("vibrig_can_link_up", "1 while the CAN port runs.",
-             yes(s.can == drivers::PortState::running));
     using Controller = drivers::ControllerState;
     to.gauge("vibrig_can_controller_state",
              "1 for the state that the CAN controller says it is in, by error frames.",
@@ -184,8 +170,6 @@ void add_acquisition(Families& to, const StatusData& s) {
               {{{"state", "warning"}}, yes(can.controller == Controller::warning)},
               {{{"state", "passive"}}, yes(can.controller == Controller::passive)},
               {{{"state", "bus_off"}}, yes(can.controller == Controller::bus_off)}});
-    to.counter("vibrig_can_received_frames_total", "Frames read from the CAN port.", can.received);
-    to.counter("vibrig_can_sent_frames_total", "Frames sent.", can.sent);
     to.counter("vibrig_can_frames_dropped_total", "Frames that went no further, by reason.",
                {{{{"reason", "kernel"}}, can.kernel_dropped},
                 {{{"reason", "error_frame"}}, can.error_frames},
@@ -194,10 +178,6 @@ void add_acquisition(Families& to, const StatusData& s) {
                 {{{"reason", "duplicate"}}, a.duplicate},
                 {{{"reason", "late"}}, a.late},
                 {{{"reason", "wrong_length"}}, a.wrong_length}});
-    to.counter("vibrig_can_send_failures_total", "Frames that could not be sent.", can.send_failed);
-    to.counter("vibrig_samples_total", "Samples put together.", a.samples);
-    to.counter("vibrig_samples_incomplete_total", "Samples with a missing channel.", a.incomplete);
-    to.counter("vibrig_sample_gaps_total", "Sync counts that never showed.", a.gaps);
     to.counter("vibrig_ring_pushed_samples_total", "Samples offered and taken by the ring.",
                {{{{"ring", "estimator"}}, s.estimator_ring.pushed}});
     to.counter("vibrig_ring_popped_samples_total", "Samples the consumer took.",
@@ -222,21 +202,6 @@ void add_acquisition(Families& to, const StatusData& s) {
     to.gauge("vibrig_channel_age_seconds", "Since the newest good value.", ages);
     to.gauge("vibrig_channel_quality",
              "1 for the quality as it stands now; silent: nothing within the deadline.", good);
-    if (s.sample_rate_hz > 0)
-        to.gauge("vibrig_sample_rate_hertz", "Measured over ten seconds at most.",
-                 s.sample_rate_hz);
-    to.gauge("vibrig_clock_misfit", "1 where rig and daemon have no time in common.",
-             yes(!s.clock_misfit.empty()));
-    to.gauge("vibrig_platform_silent", "1 while it has said nothing within its deadline.",
-             yes(s.platform_state() != ChannelState::good));
-    if (s.platform_state() == ChannelState::good) {
-        to.gauge("vibrig_platform_ready", "1 while the platform says so.", yes(s.platform.ready));
-        to.gauge("vibrig_platform_loop_closed", "1 while its loop is closed.",
-                 yes(s.platform.loop_closed));
-        to.gauge("vibrig_platform_fault", "1 while it reports a fault.", yes(s.platform.fault));
-        to.gauge("vibrig_platform_temperature_celsius", "As the platform says.",
-                 s.platform.temperature_c);
-    }
 }
 
 void add_estimate(Families& to, const StatusData& s) {
@@ -252,8 +217,6 @@ void add_estimate(Families& to, const StatusData& s) {
     to.gauge("vibrig_coefficient", "Gyro error coefficients (IEEE Std 517), in the unit named.",
              values);
     to.gauge("vibrig_coefficient_sigma", "Their standard deviations, in the unit named.", sigmas);
-    to.gauge("vibrig_filter_nis_ratio", "Normalised innovation squared per degree of freedom.",
-             e.nis_per_dof);
     to.gauge("vibrig_filter_samples", "Samples of this campaign in the filter, by outcome.",
              {{{{"outcome", "used"}}, static_cast<double>(e.used)},
               {{{"outcome", "rejected"}}, static_cast<double>(e.rejected)}});
@@ -276,17 +239,6 @@ void add_estimate(Families& to, const StatusData& s) {
              sigma_walks);
     to.gauge("vibrig_gyro_random_walk_in_force_degrees_per_root_hour", "N of the filter.",
              in_force);
-    if (s.verdict.dwells > 0) {
-        to.gauge("vibrig_verdict_level",
-                 "Of the campaign so far: 0 valid, 1 doubtful, 2 not valid.", s.verdict.level);
-        to.gauge("vibrig_verdict_dwells", "Dwells that the verdict rests on.", s.verdict.dwells);
-        to.gauge("vibrig_uncertainty_widening_ratio",
-                 "Uncertainty of a coefficient over that of noise alone, median.",
-                 s.verdict.widening);
-    }
-    to.gauge("vibrig_noise_dwells", "Dwells the noise is known from.", s.noise.dwells);
-    to.counter("vibrig_noise_alarms_total", "Dwells whose noise was not that of the earlier ones.",
-               s.noise.alarms_total);
 }
 
 void add_server(Families& to, const ServerStatus& s) {
@@ -323,8 +275,6 @@ void add_interlock(Families& to, const StatusData& s) {
     to.gauge("vibrig_interlock_value", "What is judged now, in the unit named.", present);
     to.gauge("vibrig_interlock_limit", "What it is judged by, in the unit named.", limits);
     to.gauge("vibrig_interlock_margin_ratio", "The part of the limit that is left.", margins);
-    to.gauge("vibrig_interlock_tripped", "1: the shaker was stopped; latched until acknowledged.",
-             yes(!s.interlock.tripped.empty()));
     to.histogram("vibrig_interlock_reaction_seconds",
                  "From the frames that tripped to the stop confirmed by the controller.",
                  s.interlock.reaction_bounds_ms, s.interlock.reaction_counts,
@@ -335,57 +285,33 @@ void add_interlock(Families& to, const StatusData& s) {
 
 std::string metrics_text(const StatusData& status, const Api::Traffic& traffic) {
     Families families;
+    add_values(families, status);
     add_campaign(families, status);
     add_shaker(families, status);
     add_acquisition(families, status);
     add_estimate(families, status);
     add_interlock(families, status);
     add_server(families, status.server);
-    families.gauge("vibrig_journal_up", "1 while the journal writes, or none is kept.",
-                   yes(status.journal.path.empty() || status.journal.running));
     families.counter("vibrig_journal_entries_total", "Entries of the journal.",
                      {{{{"outcome", "written"}}, status.journal.written},
                       {{{"outcome", "dropped"}}, status.journal.dropped}});
     families.counter("vibrig_log_lines_total", "Lines of the log.",
                      {{{{"outcome", "written"}}, status.log.written},
                       {{{"outcome", "dropped"}}, status.log.dropped}});
-    families.gauge("vibrig_log_blocked", "1 while nobody takes the log's lines.",
-                   yes(status.log.blocked));
-    if (!status.guard.socket.empty()) {
-        families.gauge("vibrig_guard_up", "1 while vibrig-guard is heard.",
-                       yes(status.guard.heard));
-        families.gauge("vibrig_guard_finding", "1 while vibrig-guard has found something.",
-                       yes(!status.guard.text.empty()));
-    }
-    if (status.annunciator.horn)
-        families.gauge("vibrig_annunciator_confirms", "1 while horn and lamp read back as told.",
-                       yes(status.annunciator.confirms));
     if (status.annunciator.command)
         families.counter("vibrig_annunciator_command_runs_total", "Runs of the page command.",
                          {{{{"outcome", "started"}}, status.annunciator.started},
                           {{{"outcome", "failed"}}, status.annunciator.failed},
                           {{{"outcome", "timed_out"}}, status.annunciator.timed_out},
                           {{{"outcome", "left_out"}}, status.annunciator.left_out}});
-    if (!status.archive.folder.empty()) {
-        families.gauge("vibrig_archive_up", "1 while campaigns can be delivered to the archive.",
-                       yes(status.archive.good));
-        families.gauge("vibrig_archive_waiting", "Campaigns that are over and not delivered.",
-                       static_cast<double>(status.archive.waiting));
-        families.gauge("vibrig_archive_waiting_bytes", "Bytes of them.",
-                       static_cast<double>(status.archive.waiting_bytes));
+    if (!status.archive.folder.empty())
         families.counter("vibrig_archive_deliveries_total", "Attempts to deliver a campaign.",
                          {{{{"outcome", "delivered"}}, status.archive.delivered},
                           {{{"outcome", "failed"}}, status.archive.failures}});
-    }
-    if (!status.mqtt.broker.empty()) {
-        families.gauge("vibrig_mqtt_up", "1 while the broker is connected.",
-                       yes(status.mqtt.connected));
+    if (!status.mqtt.broker.empty())
         families.counter("vibrig_mqtt_messages_total", "Messages with data for the broker.",
                          {{{{"outcome", "sent"}}, status.mqtt.messages},
                           {{{"outcome", "left_out"}}, status.mqtt.left_out}});
-        families.counter("vibrig_mqtt_connections_total", "Connections to the broker.",
-                         status.mqtt.connections);
-    }
     families.counter("vibrig_server_requests_total", "Requests to the status server.",
                      traffic.requests);
     families.counter("vibrig_server_commands_refused_total", "Commands that were not let through.",

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/serve/api.hpp"
+#include "daemon/status/status.hpp"
 
 namespace vibrig::serve {
 

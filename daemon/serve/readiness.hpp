@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/status/status.hpp"
 
 namespace vibrig::serve {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/status/source.hpp"
 
 /// The daemon's answers as JSON text: the messages of proto/vibrig.proto in protobuf's mapping,
 /// original field names, zeros printed. What is not valid is absent; NaN and infinity never appear.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "daemon/status/values.hpp"
 #include "drivers/sample/channels.hpp"
 #include "estimator/identification/result.hpp"
 #include "proto/vibrig.pb.h"
@@ -22,8 +23,6 @@ static_assert(static_cast<int>(CampaignState::commissioning) + 1 == v1::Campaign
 static_assert(static_cast<int>(drivers::LinkState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(drivers::PortState::fault) + 1 == v1::Link::fault);
 static_assert(static_cast<int>(Severity::trip) + 1 == v1::Event::trip);
-
-constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
 
 /// Sets an optional field only with a number that JSON can carry.
 template <typename Message>
@@ -53,8 +52,9 @@ void fill(v1::Frame& out, const FrameStatus& frame) {
         for (const double cell : row) out.add_accelerometer_matrix(cell);
 }
 
-void fill(v1::RealTime& out, const RealTimeStatus& real_time) {
-    for (const RealTimeStatus::Thread& thread : real_time.threads) {
+void fill(v1::RealTime& out, const StatusData& status) {
+    fill_values(out, "real_time.", status);
+    for (const RealTimeStatus::Thread& thread : status.real_time.threads) {
         v1::RealTime::Thread& to = *out.add_threads();
         to.set_name(thread.name);
         to.set_fifo_priority(thread.fifo_priority);
@@ -64,9 +64,7 @@ void fill(v1::RealTime& out, const RealTimeStatus& real_time) {
         to.set_deadline_misses(thread.deadline_misses);
         to.set_longest_ms(thread.longest_ms);
     }
-    out.set_memory_locked(real_time.memory_locked);
-    out.set_deadline_ms(real_time.deadline_ms);
-    for (const std::string& what : real_time.missing) out.add_missing(mend_utf8(what));
+    for (const std::string& what : status.real_time.missing) out.add_missing(mend_utf8(what));
 }
 
 void fill(v1::Server& out, const ServerStatus& server, std::int64_t utc_ns) {
@@ -88,65 +86,9 @@ void fill(v1::Server& out, const ServerStatus& server, std::int64_t utc_ns) {
     }
 }
 
-void fill(v1::Recorder& out, const RecorderStatus& recorder) {
-    out.set_folder(mend_utf8(recorder.folder));
-    out.set_file(mend_utf8(recorder.file));
-    out.set_recording(recorder.recording);
-    out.set_good(recorder.good);
-    out.set_note(mend_utf8(recorder.note));
-    out.set_samples(recorder.samples);
-    out.set_samples_lost(recorder.samples_lost);
-    out.set_frames(recorder.frames);
-    out.set_frames_lost(recorder.frames_lost);
-    out.set_raw_bytes(recorder.raw_bytes);
-    out.set_segments(recorder.segments);
-    out.set_gaps(recorder.gaps);
-    out.set_samples_dropped(recorder.samples_dropped);
-    out.set_frames_dropped(recorder.frames_dropped);
-    out.set_entries_dropped(recorder.entries_dropped);
-}
-
 void fill(v1::Shaker& out, const StatusData& status) {
     out.set_link(wire_enum<v1::Link::State>(status.shaker_link));
-    const drivers::ShakerReading& reading = status.shaker;
-    if (reading.valid) {
-        out.set_reading_time_s(drivers::to_seconds(reading.time));
-        set(out, &v1::Shaker::set_frequency_hz, reading.frequency_hz);
-        set(out, &v1::Shaker::set_amplitude_g, reading.amplitude_g);
-        set(out, &v1::Shaker::set_measured_g, reading.measured_g);
-        out.set_state(reading.state);
-        out.set_fault(reading.fault);
-        out.set_running(reading.running);
-        out.set_emergency_stop_open(reading.emergency_stop_open);
-    }
-    const drivers::ShakerCounters& counters = status.shaker_counters;
-    out.set_requests(counters.requests);
-    out.set_replies(counters.replies);
-    out.set_timeouts(counters.timeouts);
-    out.set_exceptions(counters.exceptions);
-    out.set_reconnects(counters.reconnects);
-    out.set_set_points_discarded(counters.set_points_discarded);
-    out.set_feeds(counters.feeds);
-    out.set_stops_written(counters.stops_written);
-    out.set_read_back_mismatches(counters.read_back_mismatches);
-    out.set_wrong_replies(counters.wrong_replies);
-    out.set_lost(counters.lost);
-    out.set_stop_pending(status.stop_pending);
-    out.set_rest(status.rest.state);
-    out.set_not_at_rest(status.rest.what);
-    const auto known = [](const rt::RestWitness& witness) {
-        return witness.verdict == rt::RestVerdict::moving ||
-               witness.verdict == rt::RestVerdict::still;
-    };
-    if (const auto& platform = status.rest.witnesses.platform; known(platform))
-        set(out, &v1::Shaker::set_platform_rms_g, platform.rms_g);
-    if (const auto& table = status.rest.witnesses.table; known(table))
-        set(out, &v1::Shaker::set_table_rms_g, table.rms_g);
-    if (reading.valid && reading.watchdog != drivers::WatchdogTimeout::unread)
-        set(out, &v1::Shaker::set_watchdog_timeout_s, reading.watchdog_timeout_s);
-    if (status.witness_g[0] >= 0)
-        set(out, &v1::Shaker::set_platform_witness_g, status.witness_g[0]);
-    if (status.witness_g[1] >= 0) set(out, &v1::Shaker::set_table_witness_g, status.witness_g[1]);
+    fill_values(out, "shaker.", status);
 }
 
 void fill(v1::Interlock& out, const InterlockStatus& status) {
@@ -182,32 +124,7 @@ void fill(v1::Interlock& out, const InterlockStatus& status) {
 
 void fill(v1::Can& out, const StatusData& status) {
     out.set_link(wire_enum<v1::Link::State>(status.can));
-    const drivers::CanPortCounters& counters = status.can_counters;
-    out.set_received(counters.received);
-    out.set_delivered(counters.delivered);
-    out.set_own(counters.own);
-    out.set_error_frames(counters.error_frames);
-    out.set_malformed(counters.malformed);
-    out.set_kernel_dropped(counters.kernel_dropped);
-    out.set_sent(counters.sent);
-    out.set_send_failed(counters.send_failed);
-    out.set_transitions(counters.transitions);
-    constexpr std::array<const char*, 4> kControllerWords{"active", "warning", "passive",
-                                                          "bus off"};
-    out.set_controller(kControllerWords[static_cast<std::size_t>(counters.controller)]);
-}
-
-void fill(v1::Assembler& out, const drivers::AssemblerCounters& counters) {
-    out.set_received(counters.received);
-    out.set_used(counters.used);
-    out.set_unknown(counters.unknown);
-    out.set_duplicate(counters.duplicate);
-    out.set_late(counters.late);
-    out.set_wrong_length(counters.wrong_length);
-    out.set_samples(counters.samples);
-    out.set_incomplete(counters.incomplete);
-    out.set_gaps(counters.gaps);
-    out.set_resyncs(counters.resyncs);
+    fill_values(out, "can.", status);
 }
 
 v1::Channel::Quality wire_state(ChannelState state) {
@@ -232,10 +149,7 @@ v1::Channel::Quality wire_state(ChannelState state) {
 
 void fill(v1::Sample& out, const StatusData& status) {
     const drivers::Sample& sample = status.sample;
-    out.set_time_s(drivers::to_seconds(sample.time));
-    out.set_sequence(sample.sequence);
-    out.set_dropped_before(sample.dropped_before);
-    if (status.sample_rate_hz > 0) set(out, &v1::Sample::set_rate_hz, status.sample_rate_hz);
+    fill_values(out, "sample.", status);
     for (std::size_t i = 0; i < drivers::kChannels; ++i) {
         v1::Channel& channel = *out.add_channels();
         const drivers::ChannelRow& row = drivers::kChannelTable[i];
@@ -251,26 +165,6 @@ void fill(v1::Sample& out, const StatusData& status) {
     }
 }
 
-void fill(v1::Platform& out, const StatusData& status) {
-    const drivers::PlatformStatus& platform = status.platform;
-    const ChannelState state = status.platform_state();
-    out.set_quality(name_of(state));
-    if (platform.time != 0) out.set_time_s(drivers::to_seconds(platform.time));
-    if (state == ChannelState::good) {
-        out.set_ready(platform.ready);
-        out.set_loop_closed(platform.loop_closed);
-        out.set_gyros_at_speed(platform.gyros_at_speed);
-        out.set_fault(platform.fault);
-        set(out, &v1::Platform::set_temperature_c, platform.temperature_c);
-    }
-    if (platform.gimbal_time != 0) {
-        out.set_gimbal_time_s(drivers::to_seconds(platform.gimbal_time));
-        out.set_in_position(platform.in_position);
-        out.set_slewing(platform.slewing);
-        out.set_gimbal_command_echo(platform.gimbal_command_echo);
-    }
-}
-
 void fill_parameter(v1::Parameter& out, std::size_t index, double value, double sigma,
                     bool observable) {
     out.set_name(estimator::parameter_names()[index]);
@@ -281,26 +175,22 @@ void fill_parameter(v1::Parameter& out, std::size_t index, double value, double 
     set(out, &v1::Parameter::set_sigma, sigma);
 }
 
-void fill(v1::Estimate& out, const estimator::Estimate& estimate) {
+void fill(v1::Estimate& out, const StatusData& status) {
+    const estimator::Estimate& estimate = status.estimate;
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         fill_parameter(*out.add_parameters(), i, estimate.value[i], estimate.sigma[i],
                        estimate.observable[i]);
     }
-    set(out, &v1::Estimate::set_amplitude_g, estimate.amplitude_g);
-    set(out, &v1::Estimate::set_frequency_hz, estimate.frequency_hz);
-    set(out, &v1::Estimate::set_kappa, estimate.kappa);
-    out.set_samples(estimate.samples);
-    out.set_used(estimate.used);
-    out.set_rejected(estimate.rejected);
-    set(out, &v1::Estimate::set_nis_per_dof, estimate.nis_per_dof);
+    fill_values(out, "estimate.", status);
     v1::Innovation& innovation = *out.mutable_innovation();
     set(innovation, &v1::Innovation::set_x_arcsec, estimate.innovation_arcsec[0]);
     set(innovation, &v1::Innovation::set_y_arcsec, estimate.innovation_arcsec[1]);
     set(innovation, &v1::Innovation::set_z_arcsec, estimate.innovation_arcsec[2]);
-    out.set_dwells(estimate.dwells);
 }
 
-void fill(v1::Noise& out, const NoiseStatus& noise) {
+void fill(v1::Noise& out, const StatusData& status) {
+    const NoiseStatus& noise = status.noise;
+    fill_values(out, "noise.", status);
     namespace allan = estimator::allan;
     constexpr std::array<const char*, 3> kGyroNames{"x", "y", "z"};
     for (std::size_t j = 0; j < kGyroNames.size(); ++j) {
@@ -330,11 +220,6 @@ void fill(v1::Noise& out, const NoiseStatus& noise) {
             set(term, &v1::NoiseTerm::set_below, gyro.terms[t].below);
         }
     }
-    set(out, &v1::Noise::set_angle_in_force_arcsec, noise.angle_in_force_arcsec);
-    if (noise.dwells > 0) set(out, &v1::Noise::set_block_s, noise.block_s);
-    out.set_dwells(noise.dwells);
-    out.set_dwells_left_out(noise.dwells_left_out);
-    out.set_alarms_total(noise.alarms_total);
     for (const NoiseStatus::Alarm& alarm : noise.alarms) {
         v1::NoiseAlarm& to = *out.add_alarms();
         to.set_run(alarm.run);
@@ -373,6 +258,43 @@ void fill(v1::Dwell& out, const estimator::DwellSummary& dwell) {
 }
 
 }  // namespace
+
+namespace {
+
+void set_field(google::protobuf::Message& out, const google::protobuf::FieldDescriptor& field,
+               const StatusScalar& value) {
+    using Field = google::protobuf::FieldDescriptor;
+    const auto& to = *out.GetReflection();
+    const auto count = [&] { return std::get<std::uint64_t>(value); };
+    switch (field.cpp_type()) {
+        case Field::CPPTYPE_BOOL:
+            return to.SetBool(&out, &field, std::get<bool>(value));
+        case Field::CPPTYPE_UINT64:
+            return to.SetUInt64(&out, &field, count());
+        case Field::CPPTYPE_UINT32:
+            return to.SetUInt32(&out, &field, static_cast<std::uint32_t>(count()));
+        case Field::CPPTYPE_INT32:
+            return to.SetInt32(&out, &field, static_cast<std::int32_t>(count()));
+        case Field::CPPTYPE_DOUBLE:
+            return to.SetDouble(&out, &field, std::get<double>(value));
+        default:
+            return to.SetString(&out, &field, mend_utf8(std::get<std::string>(value)));
+    }
+}
+
+}  // namespace
+
+void fill_values(google::protobuf::Message& out, std::string_view part, const StatusData& status) {
+    for (const StatusValue& row : status_values()) {
+        const std::string_view name = row.field;
+        if (name.empty() || !name.starts_with(part) || name.find('.', part.size()) != name.npos)
+            continue;
+        const StatusScalar value = row.value(status);
+        if (std::holds_alternative<std::monostate>(value)) continue;
+        set_field(out, *out.GetDescriptor()->FindFieldByName(std::string(name.substr(part.size()))),
+                  value);
+    }
+}
 
 void fill(v1::Levelling& out, const LevellingStatus& levelling) {
     out.set_verdict(levelling.verdict);
@@ -414,28 +336,14 @@ void fill(v1::Zeros& out, const ZeroStatus& zeros) {
 }
 
 void fill(v1::Campaign& out, const StatusData& status) {
-    out.set_name(mend_utf8(status.campaign_name));
     out.set_state(wire_enum<v1::Campaign::State>(status.state));
-    out.set_reason(mend_utf8(status.reason));
-    out.set_armed_by(mend_utf8(status.armed_by));
-    out.set_armed_for(mend_utf8(status.armed_for));
-    if (status.arming_left_s > 0) out.set_arming_left_s(status.arming_left_s);
-    out.set_started_by(mend_utf8(status.started_by));
-    out.set_resume_offer(mend_utf8(status.resume_offer));
-    out.set_run(status.run);
-    out.set_runs(status.runs);
-    out.set_position(status.position);
-    out.set_positions(status.positions);
+    fill_values(out, "campaign.", status);
     v1::Angles& angles = *out.mutable_position_angles();
     if (status.position > 0) {
         set(angles, &v1::Angles::set_outer_deg, status.position_deg[0]);
         set(angles, &v1::Angles::set_inner_deg, status.position_deg[1]);
         set(angles, &v1::Angles::set_azimuth_deg, status.position_deg[2]);
     }
-    set(out, &v1::Campaign::set_progress, status.progress);
-    set(out, &v1::Campaign::set_remaining_s, status.remaining_s);
-    set(out, &v1::Campaign::set_command_table_g, status.command_table_g);
-    set(out, &v1::Campaign::set_command_frequency_hz, status.command_frequency_hz);
     for (const estimator::DwellSummary& dwell : status.dwells) fill(*out.add_dwells(), dwell);
     if (status.levelling.begun) fill(*out.mutable_level(), status.levelling);
     if (status.zeros.running || status.zeros.known || !status.zeros.message.empty())
@@ -443,53 +351,28 @@ void fill(v1::Campaign& out, const StatusData& status) {
 }
 
 void fill(v1::Status& out, const StatusData& status) {
-    out.set_version(mend_utf8(status.version));
-    out.set_clock(mend_utf8(status.clock));
     set_time(*out.mutable_utc(), status.utc_ns);
-    out.set_time_s(drivers::to_seconds(status.time));
-    out.set_uptime_s(drivers::to_seconds(status.uptime));
+    fill_values(out, "", status);
     fill(*out.mutable_campaign(), status);
     fill_checks(out, status);
-    out.set_simulated(status.simulated);
-    out.set_clock_misfit(status.clock_misfit);
     fill(*out.mutable_shaker(), status);
     fill(*out.mutable_can(), status);
-    fill(*out.mutable_assembler(), status.assembler);
-    out.mutable_estimator_ring()->set_pushed(status.estimator_ring.pushed);
-    out.mutable_estimator_ring()->set_popped(status.estimator_ring.popped);
-    out.mutable_estimator_ring()->set_dropped(status.estimator_ring.dropped);
-    out.mutable_estimator_ring()->set_in_dwell(status.estimator_in_dwell);
-    out.mutable_estimator_ring()->set_idle(status.estimator_idle);
-    out.mutable_assembler()->set_rig_ticks(status.rig_ticks);
-    out.mutable_assembler()->set_increments(status.increment_frames);
+    fill_values(*out.mutable_assembler(), "assembler.", status);
+    fill_values(*out.mutable_estimator_ring(), "estimator_ring.", status);
     fill(*out.mutable_sample(), status);
-    fill(*out.mutable_platform(), status);
-    fill(*out.mutable_estimate(), status.estimate);
+    fill_values(*out.mutable_platform(), "platform.", status);
+    fill(*out.mutable_estimate(), status);
     fill(*out.mutable_interlock(), status.interlock);
-    v1::Journal& journal = *out.mutable_journal();
-    journal.set_path(mend_utf8(status.journal.path));
-    journal.set_running(status.journal.running);
-    journal.set_note(mend_utf8(status.journal.note));
-    journal.set_taken(status.journal.taken);
-    journal.set_written(status.journal.written);
-    journal.set_dropped(status.journal.dropped);
-    journal.set_public_key(status.journal.public_key);
-    journal.set_head(status.journal.head);
-    journal.set_proof_head(status.journal.proof_head);
-    journal.set_entries(status.journal.entries);
-    journal.set_verified(status.journal.verified);
-    journal.set_verified_part(status.journal.verified_part);
-    journal.set_not_watched(mend_utf8(status.journal.not_watched));
-    fill(*out.mutable_recorder(), status.recorder);
-    fill(*out.mutable_noise(), status.noise);
-    if (status.verdict.dwells > 0 || status.verdict.complete)
-        fill(*out.mutable_verdict(), status.verdict);
-    fill(*out.mutable_mqtt(), status.mqtt);
-    fill(*out.mutable_log(), status.log);
+    fill_values(*out.mutable_journal(), "journal.", status);
+    fill_values(*out.mutable_recorder(), "recorder.", status);
+    fill(*out.mutable_noise(), status);
+    if (status.verdict.dwells > 0 || status.verdict.complete) fill(*out.mutable_verdict(), status);
+    fill_values(*out.mutable_mqtt(), "mqtt.", status);
+    fill_values(*out.mutable_log(), "log.", status);
     fill(*out.mutable_server(), status.server, status.utc_ns);
     fill_outside(out, status);
     fill(*out.mutable_frame(), status.frame);
-    fill(*out.mutable_real_time(), status.real_time);
+    fill(*out.mutable_real_time(), status);
     v1::Latency& latency = *out.mutable_acquisition_latency();
     for (const double bound : rt::FrameLatency::kBounds_ms) latency.add_bounds_ms(bound);
     for (const std::uint64_t n : status.latency.count) latency.add_counts(n);

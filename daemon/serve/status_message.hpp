@@ -4,13 +4,15 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/status/source.hpp"
+
+namespace google::protobuf {
+class Message;
+}  // namespace google::protobuf
 
 namespace vibrig::v1 {
 class Campaign;
 class Event;
-class Log;
-class Mqtt;
 class Parameters;
 class Plan;
 class Status;
@@ -22,15 +24,15 @@ class Verdict;
 namespace vibrig::serve {
 
 void fill(v1::Status& out, const StatusData& status);
-void fill(v1::Log& out, const LogStatus& log);
-void fill(v1::Mqtt& out, const MqttStatus& mqtt);
+/// Of a part of it, "journal.", what daemon/status/values.hpp has of it.
+void fill_values(google::protobuf::Message& out, std::string_view part, const StatusData& status);
 /// Part of it: guard and annunciator, where they are configured.
 void fill_outside(v1::Status& out, const StatusData& status);
 /// Likewise of the newest loop check and safe-state proof.
 void fill_checks(v1::Status& out, const StatusData& status);
 void fill(v1::Campaign& out, const StatusData& status);
 void fill(v1::Parameters& out, const estimator::Result& result);
-void fill(v1::Verdict& out, const VerdictStatus& verdict);
+void fill(v1::Verdict& out, const StatusData& status);
 void fill(v1::Plan& out, const PlanData& plan);
 void fill(v1::Event& out, const EventRecord& event);
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <string>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/serve/documents.hpp"
 #include "daemon/serve/socket_file.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig::serve {
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/serve/caller.hpp"
+#include "daemon/status/source.hpp"
 
 namespace vibrig::serve {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/domain/services.hpp"
 #include "proto/guard_words.hpp"
 
 namespace vibrig::watch {

@@ -19,6 +19,7 @@ namespace vibrig::drivers {
 namespace {
 
 constexpr std::uint32_t kMaxOpenSamples = 64;
+constexpr int kMaxSamplesPerFrame = 16;
 /// Rate error of the device that a silence may add up, 1.
 constexpr double kRateTolerance = 0.02;
 
@@ -38,6 +39,15 @@ double wrapped_radians(double degrees) noexcept {
     const double turns = degrees / 360.0;
     const double angle = (turns - std::floor(turns)) * kTurn;
     return angle < kTurn ? angle : 0.0;
+}
+
+/// A classic frame is as long as the DBC says; CAN FD has no frames of, say, 61 bytes: the next
+/// longer one carries them.
+bool has_length(const ReceivedFrame& frame, std::uint8_t size) noexcept {
+    if (frame.frame.len == size || !frame.fd || size <= CAN_MAX_DLEN)
+        return frame.frame.len == size;
+    constexpr std::array<std::uint8_t, 7> kLengths{12, 16, 20, 24, 32, 48, 64};
+    return frame.frame.len == *std::ranges::lower_bound(kLengths, size);
 }
 
 }  // namespace
@@ -69,9 +79,11 @@ struct SampleAssembler::Impl {
     Impl(const proto::Dbc& dbc, const AssemblerSettings& s, SampleHandler handler)
         : settings(s),
           on_sample(std::move(handler)),
-          plan(dbc, s.bindings),
+          plan(dbc, s.bindings, static_cast<std::uint32_t>(s.samples_per_frame)),
           clock(s.sample_period),
-          open(s.open_samples) {}
+          parts(static_cast<std::uint32_t>(s.samples_per_frame)),
+          // As many frames out of order as with one sample in each, but no more samples than that.
+          open(std::min(s.open_samples * parts, kMaxOpenSamples)) {}
 
     void feed(const ReceivedFrame& frame) noexcept;
     void take_sync(const MessagePlan& message, const ReceivedFrame& frame,
@@ -79,7 +91,9 @@ struct SampleAssembler::Impl {
     void take_without_count(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     void take_low(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     bool place(std::int64_t count, const MessagePlan& message, const ReceivedFrame& frame) noexcept;
-    void join(OpenSample& sample, const MessagePlan& message, const ReceivedFrame& frame) noexcept;
+    OpenSample& opened(std::int64_t count, const ReceivedFrame& frame) noexcept;
+    bool join(OpenSample& sample, const MessagePlan& message, const ReceivedFrame& frame,
+              std::uint32_t part) noexcept;
     void take_status(const MessagePlan& message, const ReceivedFrame& frame) noexcept;
     void suspect_restart(std::uint64_t raw, unsigned bits, const MessagePlan& message,
                          const ReceivedFrame& frame) noexcept;
@@ -89,6 +103,7 @@ struct SampleAssembler::Impl {
     void make_room(std::int64_t count) noexcept;
     void drain(Time now) noexcept;
     void give_out(OpenSample& sample) noexcept;
+    void count_joined(bool joined) noexcept { ++(joined ? counters.used : counters.duplicate); }
     [[nodiscard]] Quality judge(const OpenSample& sample, std::size_t channel) const noexcept;
     /// The earliest count not yet given out of which a frame has come.
     [[nodiscard]] OpenSample* first_shown() noexcept;
@@ -106,6 +121,7 @@ struct SampleAssembler::Impl {
     SampleHandler on_sample;
     FramePlan plan;
     SyncClock clock;
+    std::uint32_t parts;  ///< samples in a frame
     std::vector<OpenSample> open;
     Suspect suspect;
     bool begun = false;
@@ -132,7 +148,7 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
         ++counters.unknown;
         return;
     }
-    if (frame.frame.len != message->message->size) {
+    if (!has_length(frame, message->message->size)) {
         ++counters.wrong_length;
         return;
     }
@@ -140,7 +156,7 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
     // or not.
     drain(frame.time);
     take_status(*message, frame);
-    if (message->bit == 0) {
+    if (message->bits(std::span<const std::uint8_t>(frame.frame.data, frame.frame.len)) == 0) {
         ++counters.used;
         return;
     }
@@ -150,8 +166,10 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
         const std::span<const std::uint8_t> payload(frame.frame.data, frame.frame.len);
         const std::optional<std::int64_t> raw = proto::decode_raw(*message->count, payload);
         if (raw)
-            take_sync(*message, frame,
-                      low_bits(static_cast<std::uint64_t>(*raw), message->count->length));
+            // All below goes by the last sample of a frame, which is as old as the frame.
+            take_sync(
+                *message, frame,
+                low_bits(static_cast<std::uint64_t>(*raw) + parts - 1, message->count->length));
         else
             ++counters.wrong_length;
     } else {
@@ -162,7 +180,8 @@ void SampleAssembler::Impl::feed(const ReceivedFrame& frame) noexcept {
 
 void SampleAssembler::Impl::begin_at(std::int64_t count, Time time) noexcept {
     begun = true;
-    newest = next_out = count;
+    newest = count;
+    next_out = std::max(std::int64_t{0}, count - (parts - 1));
     newest_time = time;
 }
 
@@ -209,7 +228,8 @@ void SampleAssembler::Impl::suspect_restart(std::uint64_t raw, unsigned bits,
     suspect.sync_time = frame.time;
     suspect.sample = {};
     suspect.sample.count = static_cast<std::int64_t>(raw);
-    join(suspect.sample, message, frame);
+    // Of several samples in its frame the last one alone is kept until it is confirmed.
+    count_joined(join(suspect.sample, message, frame, parts - 1));
 }
 
 void SampleAssembler::Impl::drop_suspect() noexcept {
@@ -238,6 +258,7 @@ void SampleAssembler::Impl::take_low(const MessagePlan& message,
     if (message.low != nullptr) {
         low = proto::decode_raw(*message.low,
                                 std::span<const std::uint8_t>(frame.frame.data, frame.frame.len));
+        if (low) *low += parts - 1;
     }
     if (suspect.pending) {
         const bool of_suspect =
@@ -245,7 +266,7 @@ void SampleAssembler::Impl::take_low(const MessagePlan& message,
             low_bits(static_cast<std::uint64_t>(*low), message.low->length) ==
                 low_bits(static_cast<std::uint64_t>(suspect.sample.count), message.low->length);
         if (of_suspect && frame.time <= suspect.sample.first + settings.join_deadline) {
-            join(suspect.sample, message, frame);
+            count_joined(join(suspect.sample, message, frame, parts - 1));
             return;
         }
     }
@@ -265,7 +286,7 @@ void SampleAssembler::Impl::take_low(const MessagePlan& message,
     // A few bits cannot carry the count far: without its Sync a frame opens the next sample or the
     // one that is due, no other.
     if (count <= newest - static_cast<std::int64_t>(open.size()) ||
-        count > std::max(newest, expected) + 1) {
+        count > std::max(newest, expected) + parts) {
         ++counters.late;
         return;
     }
@@ -291,6 +312,19 @@ bool SampleAssembler::Impl::place(std::int64_t count, const MessagePlan& message
         return false;
     }
     make_room(count);
+    // The frame counts with its last sample; of the others those are left out that are given out.
+    for (std::uint32_t part = 0; part + 1 < parts; ++part) {
+        const std::int64_t earlier = count - (parts - 1) + part;
+        if (earlier < next_out) continue;
+        join(opened(earlier, frame), message, frame, part);
+    }
+    const bool joined = join(opened(count, frame), message, frame, parts - 1);
+    count_joined(joined);
+    return joined;
+}
+
+auto SampleAssembler::Impl::opened(std::int64_t count, const ReceivedFrame& frame) noexcept
+    -> OpenSample& {
     if (count > newest) {
         newest = count;
         newest_time = frame.time;
@@ -300,27 +334,23 @@ bool SampleAssembler::Impl::place(std::int64_t count, const MessagePlan& message
         sample = {};
         sample.count = count;
     }
-    const std::uint64_t before = sample.frames;
-    join(sample, message, frame);
-    return sample.frames != before;
+    return sample;
 }
 
-void SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
-                                 const ReceivedFrame& frame) noexcept {
+/// False: it has been there. A sample is shown from its first frame on.
+bool SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
+                                 const ReceivedFrame& frame, std::uint32_t part) noexcept {
     if (!sample.shown) {
         sample.shown = true;
         sample.first = frame.time;
     }
-    if ((sample.seen & message.bit) != 0) {
-        ++counters.duplicate;
-        return;
-    }
-    ++counters.used;
-    ++sample.frames;
-    sample.seen |= message.bit;
     const std::span<const std::uint8_t> payload(frame.frame.data, frame.frame.len);
+    const std::uint64_t bits = message.bits(payload);
+    if ((bits & ~sample.seen) == 0) return false;
+    ++sample.frames;
+    sample.seen |= bits;
     for (const MessagePlan::ChannelSignal& c : message.channels) {
-        if (!proto::present(*message.message, *c.signal, payload)) continue;
+        if (c.part != part || !proto::present(*message.message, *c.signal, payload)) continue;
         const std::optional<double> value = proto::decode(*c.signal, payload);
         if (!value) continue;
         if (c.validity) {
@@ -334,6 +364,7 @@ void SampleAssembler::Impl::join(OpenSample& sample, const MessagePlan& message,
             sample.time[c.channel] = frame.time;
         }
     }
+    return true;
 }
 
 void SampleAssembler::Impl::take_status(const MessagePlan& message,
@@ -477,6 +508,8 @@ SampleAssembler::SampleAssembler(const proto::Dbc& dbc, const AssemblerSettings&
             "more than 0 ns");
     require(settings.open_samples >= 1 && settings.open_samples <= kMaxOpenSamples,
             "can.open_samples", settings.open_samples, "1 to 64");
+    require(settings.samples_per_frame >= 1 && settings.samples_per_frame <= kMaxSamplesPerFrame,
+            "can.samples_per_frame", settings.samples_per_frame, "1 to 16");
     impl_ = std::make_unique<Impl>(dbc, settings, std::move(on_sample));
 }
 

@@ -69,6 +69,8 @@ struct AssemblerSettings {
         kMillisecond;  ///< a sample is given out, complete or not, this long after its first frame
     Time stale_deadline = 100 * kMillisecond;  ///< a channel without a value for longer is stale
     std::uint32_t open_samples = 8;            ///< sync counts joined at a time (reordering depth)
+    /// In each frame that carries a channel, 1 to 16; its count is that of the first one.
+    int samples_per_frame = 1;
 };
 
 /// received = used + unknown + duplicate + late + wrong_length

@@ -10,7 +10,19 @@
 
 namespace vibrig::drivers {
 
-FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(dbc) {
+std::uint64_t MessagePlan::bits(std::span<const std::uint8_t> payload) const noexcept {
+    if (multiplexor == nullptr) return bit;
+    const auto raw = proto::decode_raw(*multiplexor, payload);
+    if (!raw) return bit;
+    std::uint64_t all = bit;
+    for (const Group& group : groups)
+        if (group.first <= *raw && *raw <= group.last) all |= group.bit;
+    return all;
+}
+
+FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names,
+                     std::uint32_t samples_per_frame)
+    : dbc_(dbc) {
     // Another lab's DBC names most things otherwise: all that is missing is told at once.
     std::vector<BindingError> missing;
     const auto bind = [this, &missing](const char* key, const std::string& name) -> BoundSignal {
@@ -36,12 +48,22 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
                                : bind((c.name + std::string("_valid")).c_str(), names.*c.valid);
         if (!value) continue;
         bound_[index] = true;
-        plan_for(*value.message).channels.push_back({index, value.signal, false});
-        if (valid) {
-            has_validity_[index] = true;
-            plan_for(*valid.message).channels.push_back({index, valid.signal, true});
-        }
+        has_validity_[index] = static_cast<bool>(valid);
+        const auto add = [&](const std::string& key, const std::string& name, bool validity) {
+            for (std::uint32_t part = 0; part < samples_per_frame; ++part) {
+                const BoundSignal of_part =
+                    bind(key.c_str(), part == 0 ? name : name + '_' + std::to_string(part));
+                if (of_part)
+                    plan_for(*of_part.message)
+                        .channels.push_back({index, of_part.signal, validity, part});
+            }
+        };
+        add(c.name, names.*c.signal, false);
+        if (valid) add(c.name + std::string("_valid"), names.*c.valid, true);
     }
+    if (samples_per_frame > 1 && !has_count_ && missing.empty())
+        throw BindingError("can.signals.sync_count", names.sync_count,
+                           "a counter, where can.samples_per_frame is more than 1");
     if (missing.empty() && std::ranges::none_of(bound_, [](bool b) { return b; })) {
         throw BindingError("can.signals", "",
                            "at least one measured channel, such as outer = \"Resolvers.Outer\"");
@@ -89,14 +111,39 @@ FramePlan::FramePlan(const proto::Dbc& dbc, const SignalBindings& names) : dbc_(
 
     if (!missing.empty()) throw BindingError(std::move(missing));
 
+    number_messages(names);
+}
+
+/// Gives bits to what makes a sample complete, and puts the messages where find() looks.
+void FramePlan::number_messages(const SignalBindings& names) {
+    unsigned used = 0;
+    const auto next_bit = [&] {
+        if (used == 64)
+            throw BindingError("can.signals", "more than 64 messages and multiplex values",
+                               "at most 64 that carry channels");
+        complete_ |= std::uint64_t{1} << used;
+        return std::uint64_t{1} << used++;
+    };
     for (std::size_t i = 0; i < plans_.size(); ++i) {
         MessagePlan& plan = plans_[i];
-        if (plan.count != nullptr || !plan.channels.empty()) {
-            plan.bit = std::uint64_t{1} << i;  // at most 26 names can be bound
-            complete_ |= plan.bit;
-            if (has_count_ && plan.count == nullptr)
-                plan.low = plan.message->find(names.message_sync_signal);
+        bool always = plan.count != nullptr;
+        for (const auto& channel : plan.channels) {
+            const proto::Signal& signal = *channel.signal;
+            if (!signal.multiplex_value) {
+                always = true;
+                continue;
+            }
+            const std::uint32_t first = *signal.multiplex_value;
+            const std::uint32_t last = signal.multiplex_last.value_or(first);
+            const bool known = std::ranges::any_of(plan.groups, [&](const auto& group) {
+                return group.first == first && group.last == last;
+            });
+            if (!known) plan.groups.push_back({first, last, next_bit()});
         }
+        if (always) plan.bit = next_bit();
+        if (!plan.groups.empty()) plan.multiplexor = plan.message->multiplexor();
+        if ((always || !plan.groups.empty()) && has_count_ && plan.count == nullptr)
+            plan.low = plan.message->find(names.message_sync_signal);
         const auto entry = static_cast<std::uint16_t>(i + 1);
         if (plan.message->extended) {
             extended_.emplace_back(plan.message->id, entry);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -15,7 +16,13 @@ struct MessagePlan {
     struct ChannelSignal {
         std::size_t channel;
         const proto::Signal* signal;
-        bool validity;  ///< it says whether the channel is valid, and carries no value
+        bool validity;           ///< it says whether the channel is valid, and carries no value
+        std::uint32_t part = 0;  ///< sample of the frame, 0: the first
+    };
+    /// What a frame carries only when its multiplexor has these values.
+    struct Group {
+        std::uint32_t first = 0, last = 0;
+        std::uint64_t bit = 0;
     };
     enum class StatusField : std::uint8_t {
         loop_closed,
@@ -42,12 +49,19 @@ struct MessagePlan {
     std::vector<ChannelSignal> channels;
     std::vector<StatusSignal> status;
     std::uint64_t bit = 0;  ///< of this message in a sample's set; 0: not part of samples
+    const proto::Signal* multiplexor = nullptr;  ///< null: it has no groups
+    std::vector<Group> groups;                   ///< of its channels
+
+    /// In a sample's set, of a frame with this payload; 0: it is not part of samples.
+    [[nodiscard]] std::uint64_t bits(std::span<const std::uint8_t> payload) const noexcept;
 };
 
 /// All plans, found by CAN id in constant time (standard ids) or by bisection (extended).
 class FramePlan {
   public:
-    FramePlan(const proto::Dbc& dbc, const SignalBindings& bindings);
+    /// `samples_per_frame`: signal S carries the first one's value, S_1, S_2, ... the others'.
+    FramePlan(const proto::Dbc& dbc, const SignalBindings& bindings,
+              std::uint32_t samples_per_frame = 1);
 
     /// Null: nothing of this message is bound.
     [[nodiscard]] const MessagePlan* find(std::uint32_t id, bool extended) const noexcept;
@@ -61,6 +75,7 @@ class FramePlan {
 
   private:
     MessagePlan& plan_for(const proto::Message& message);
+    void number_messages(const SignalBindings& names);
 
     proto::Dbc dbc_;  // the plans point into it
     std::vector<MessagePlan> plans_;

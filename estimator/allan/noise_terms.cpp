@@ -28,19 +28,4 @@ double model_variance(const Terms& terms, double tau) {
     return sum;
 }
 
-Alpha dominant_noise(const Terms& terms, double tau) {
-    // A ramp is not noise: what it covers is judged as random walk.
-    constexpr std::array<Alpha, kTerms> kAlpha{2, 0, -1, -2, -2};
-    std::size_t most = 1;
-    double largest = 0;
-    for (std::size_t j = 0; j < kTerms; ++j) {
-        const double part = terms[j] * terms[j] * term_variance(static_cast<Term>(j), tau);
-        if (part > largest) {
-            largest = part;
-            most = j;
-        }
-    }
-    return kAlpha[most];
-}
-
 }  // namespace vibrig::estimator::allan

@@ -35,7 +35,5 @@ struct DwellPoint {
 /// tau/10800, tau^2/(2 3600^2) (IEEE Std 952; tau in s).
 [[nodiscard]] double term_variance(Term term, double tau);
 [[nodiscard]] double model_variance(const Terms& terms, double tau);
-/// The noise that contributes most at tau, as an exponent of the rate spectrum.
-[[nodiscard]] Alpha dominant_noise(const Terms& terms, double tau);
 
 }  // namespace vibrig::estimator::allan

@@ -20,12 +20,14 @@ void DwellMeans::add(const Measurement& m) noexcept {
     }
     const double t = m.time_s - first_s_;
     count_ += 1;
+    last_s_ = m.time_s;
     t_ += t;
     tt_ += t * t;
     for (std::size_t i = 0; i < 3; ++i) {
         last_[i] = wrap_next_to(m.angle_rad[i], last_[i]);
         const double a = last_[i] - first_[i];
         a_[i] += a;
+        aa_[i] += a * a;
         ta_[i] += t * a;
         force_[i] += m.force_g[i];
     }
@@ -37,11 +39,17 @@ DwellMean DwellMeans::mean(double kappa, bool level_known) const noexcept {
     DwellMean mean;
     mean.kappa = kappa;
     mean.level_known = level_known;
+    mean.begin_s = first_s_;
+    mean.duration_s = last_s_ - first_s_;
     constexpr double kDegPerHour = 3600 * 180 / kPi;
+    const double spread = tt_ - t_ * t_ / count_;  // of the times about their mean
     for (std::size_t i = 0; i < 3; ++i) {
         mean.encoder_rad[i] = first_[i] + a_[i] / count_;
-        mean.slope_deg_h[i] =
-            kDegPerHour * (count_ * ta_[i] - t_ * a_[i]) / (count_ * tt_ - t_ * t_);
+        const double slope = (ta_[i] - t_ * a_[i] / count_) / spread;
+        mean.slope_deg_h[i] = kDegPerHour * slope;
+        const double scatter = aa_[i] - a_[i] * a_[i] / count_ - slope * slope * spread;
+        mean.slope_variance[i] =
+            kDegPerHour * kDegPerHour * std::max(0.0, scatter) / (count_ - 2) / spread;
         mean.force_g[i] = force_[i] / count_;
     }
     return mean;
@@ -49,7 +57,7 @@ DwellMean DwellMeans::mean(double kappa, bool level_known) const noexcept {
 
 namespace {
 
-void hold_rates_against(const ConsistencyLimits& limits, Consistency& c) {
+void hold_rates_against(const ConsistencyLimits& limits, const RateFit& fit, Consistency& c) {
     const double allowed = std::max(limits.earth_deg_h, 5 * c.sigma_deg_h);
     const auto contradict = [&c](std::string what) { c.contradictions.push_back(std::move(what)); };
     if (std::abs(c.north_deg_h) > allowed || std::abs(c.east_deg_h) > allowed)
@@ -57,9 +65,10 @@ void hold_rates_against(const ConsistencyLimits& limits, Consistency& c) {
             words("Earth rate %.2f deg/h north, %.2f deg/h east off what the site's keys "
                   "say (%.2f allowed)",
                   c.north_deg_h, c.east_deg_h, allowed));
-    if (c.rest_deg_h > limits.rest_deg_h)
-        contradict(words("rates fit no coefficients: %.3g deg/h left, %g allowed", c.rest_deg_h,
-                         limits.rest_deg_h));
+    const double left = std::max(limits.rest_deg_h, fit.rest_by_chance);
+    if (fit.rest > left)
+        contradict(
+            words("rates fit no coefficients: %.3g deg/h left, %.3g allowed", fit.rest, left));
     if (std::abs(c.input_mean_deg_h_g) > limits.input_mean_deg_h_g)
         contradict(
             words("mean of the three input-axis terms %.1f deg/h/g, %g allowed: sign of "
@@ -92,7 +101,7 @@ Consistency consistency(const Settings& settings, const std::vector<DwellMean>& 
     c.sigma_deg_h = fit.sigma;
     c.rest_deg_h = fit.rest;
     c.input_mean_deg_h_g = fit.input_mean;
-    hold_rates_against(limits, c);
+    hold_rates_against(limits, fit, c);
     return c;
 }
 

@@ -13,7 +13,10 @@ namespace vibrig::estimator::commissioning {
 struct DwellMean {
     std::array<double, 3> encoder_rad{};  ///< mean readings
     std::array<double, 3> slope_deg_h{};  ///< of the readings
-    std::array<double, 3> force_g{};      ///< raw mean; of vibration only its mean is left
+    /// Of the slopes, by the readings' scatter about them, (deg/h)^2; 0: not known.
+    std::array<double, 3> slope_variance{};
+    double begin_s = 0, duration_s = 0;  ///< on the recording's clock
+    std::array<double, 3> force_g{};     ///< raw mean; of vibration only its mean is left
     double kappa = 1;
     bool level_known = true;  ///< else kappa means nothing, and the slopes are left out
 };
@@ -28,13 +31,15 @@ class DwellMeans {
 
   private:
     double count_ = 0, t_ = 0, tt_ = 0, first_s_ = 0;
-    std::array<double, 3> first_{}, last_{}, a_{}, ta_{}, force_{};
+    double last_s_ = 0;
+    std::array<double, 3> first_{}, last_{}, a_{}, aa_{}, ta_{}, force_{};
 };
 
 struct ConsistencyLimits {
-    double gravity_deg = 0.5;       ///< vertical by the encoders against the mean force
-    double earth_deg_h = 0.1;       ///< north and east against the site, or 5 sigma
-    double rest_deg_h = 0.2;        ///< rms of what 30 coefficients and the Earth leave
+    double gravity_deg = 0.5;  ///< vertical by the encoders against the mean force
+    double earth_deg_h = 0.1;  ///< north and east against the site, or 5 sigma
+    /// Rms of what 30 coefficients and the Earth leave, or 5 sigma of the noise's own.
+    double rest_deg_h = 0.2;
     double input_mean_deg_h_g = 5;  ///< mean of the three input-axis terms
     std::size_t dwells = 9;         ///< before, the Earth rate is not observable in Table 1
 };

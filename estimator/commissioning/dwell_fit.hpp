@@ -11,6 +11,7 @@ namespace vibrig::estimator::commissioning {
 struct RateFit {
     double north = 0, east = 0, sigma = 0;  ///< beyond the settings', deg/h
     double rest = 0;                        ///< rms of the residual per degree of freedom, deg/h
+    double rest_by_chance = 0;              ///< what noise alone exceeds once in 3 million times
     double input_mean = 0;                  ///< of the three input-axis terms, deg/h/g
     double cost = 0;                        ///< -2 ln posterior
     bool known = false;

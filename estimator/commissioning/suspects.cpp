@@ -176,8 +176,12 @@ class Search {
                                            {1000.0, "units of 1000 s"},
                                            {1 / 60.0, "1/60 s"}}) {
             auto scaled = dwells_;
-            for (DwellMean& dwell : scaled)
+            for (DwellMean& dwell : scaled) {
                 for (double& slope : dwell.slope_deg_h) slope /= factor;
+                for (double& variance : dwell.slope_variance) variance /= factor * factor;
+                dwell.begin_s *= factor;
+                dwell.duration_s *= factor;
+            }
             if (!judge_.fits(as_is_, scaled)) continue;
             found_.push_back(
                 {words("time_s: it is in %s", name), gravity(as_is_) + rates(as_is_, factor)});

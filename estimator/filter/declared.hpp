@@ -74,9 +74,14 @@ enum class Misfit : std::uint8_t {
     cubic,
     trend,
     step,
+    walk,
+    scatter,
     unbalance_trend,
-    unbalance_step
+    unbalance_step,
+    ramp,
+    gyro_noise
 };
+inline constexpr std::size_t kMisfits = 18;
 /// Of the structural ones, up to the cubic term: as the verdict names them, and as they are freed.
 inline constexpr std::array<const char*, 10> kStructuralNames{"cross-axis",
                                                               "azimuth",

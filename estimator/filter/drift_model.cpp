@@ -1,10 +1,24 @@
 #include "estimator/filter/drift_model.hpp"
 
 #include <Eigen/Geometry>
+#include <type_traits>
+#include <utility>
 
 #include "estimator/filter/product.hpp"
 
 namespace vibrig::estimator {
+namespace {
+
+/// `each` is called with each group as a constant: the filter's inner loop, written out.
+template <typename Each>
+void for_each_group(Each each) {
+    [&]<std::size_t... G>(std::index_sequence<G...>) {
+        (each(std::integral_constant<std::size_t, G>{}), ...);
+    }
+    (std::make_index_sequence<kGroups>{});
+}
+
+}  // namespace
 
 DriftModel::DriftModel(const Settings& settings) : axes_{}, sign_(settings.drift_sign) {
     for (std::size_t j = 0; j < kGyros; ++j) {
@@ -20,20 +34,17 @@ Regressors DriftModel::regressors(const Eigen::Vector3d& up,
     Regressors h{};
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        const auto product = [&](std::size_t p, std::size_t q) {
-            return g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
-        };
-        constexpr std::size_t kInput = 0, kOutput = 1, kSpin = 2;
-        h[kDt][j] = 1.0;
-        h[kDi][j] = g.sign[kInput] * up[g.axis[kInput]];
-        h[kDs][j] = g.sign[kSpin] * up[g.axis[kSpin]];
-        h[kDo][j] = g.sign[kOutput] * up[g.axis[kOutput]];
-        h[kDii][j] = product(kInput, kInput);
-        h[kDss][j] = product(kSpin, kSpin);
-        h[kDoo][j] = product(kOutput, kOutput);
-        h[kDis][j] = product(kInput, kSpin);
-        h[kDio][j] = product(kInput, kOutput);
-        h[kDos][j] = product(kSpin, kOutput);
+        for_each_group([&](auto group) {
+            constexpr CoefficientRow kRow = kCoefficientTable[group];
+            constexpr auto p = kRow.p, q = kRow.q;
+            if constexpr (kRow.order == 0) {
+                h[group][j] = 1.0;
+            } else if constexpr (kRow.order == 1) {
+                h[group][j] = g.sign[p] * up[g.axis[p]];
+            } else {
+                h[group][j] = g.sign[p] * g.sign[q] * moment(g.axis[p], g.axis[q]);
+            }
+        });
     }
     return h;
 }
@@ -58,21 +69,23 @@ Eigen::Matrix3d DriftModel::jacobian(const Pose& pose, const Eigen::Matrix3d& mo
     Eigen::Matrix3d turning;  // one gyro a row
     for (std::size_t j = 0; j < kGyros; ++j) {
         const GyroAxes& g = axes_[j];
-        const auto d = [&](std::size_t group) { return parameters[internal_index(group, j)]; };
-        const auto [i, o, s] = g.axis;
-        const auto [si, so, ss] = g.sign;
         Eigen::Vector3d linear;
-        linear[i] = si * d(kDi);
-        linear[o] = so * d(kDo);
-        linear[s] = ss * d(kDs);
-        Eigen::Matrix3d q;
-        q(i, i) = d(kDii);
-        q(o, o) = d(kDoo);
-        q(s, s) = d(kDss);
-        q(i, s) = q(s, i) = 0.5 * si * ss * d(kDis);
-        q(i, o) = q(o, i) = 0.5 * si * so * d(kDio);
-        q(o, s) = q(s, o) = 0.5 * so * ss * d(kDos);
-        const Eigen::Matrix3d a = product(moment, q);
+        Eigen::Matrix3d quadratic;
+        for_each_group([&](auto group) {
+            constexpr CoefficientRow kRow = kCoefficientTable[group];
+            constexpr auto p = kRow.p, q = kRow.q;
+            const double d = parameters[internal_index(group, j)];
+            if constexpr (kRow.order == 1) {
+                linear[g.axis[p]] = g.sign[p] * d;
+            } else if constexpr (kRow.order == 2 && p == q) {
+                quadratic(g.axis[p], g.axis[p]) = d;
+            } else if constexpr (kRow.order == 2) {
+                // A product of two axes stands twice in the symmetric matrix, half each time.
+                quadratic(g.axis[p], g.axis[q]) = quadratic(g.axis[q], g.axis[p]) =
+                    0.5 * g.sign[p] * g.sign[q] * d;
+            }
+        });
+        const Eigen::Matrix3d a = product(moment, quadratic);
         turning.row(static_cast<Eigen::Index>(j)) =
             pose.up.cross(linear) +
             2.0 * Eigen::Vector3d(a(1, 2) - a(2, 1), a(2, 0) - a(0, 2), a(0, 1) - a(1, 0));

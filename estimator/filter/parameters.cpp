@@ -1,26 +1,43 @@
 #include "estimator/filter/parameters.hpp"
 
+#include <string>
+
 namespace vibrig::estimator {
+namespace {
+
+const CoefficientRow& row_at(std::size_t public_index) noexcept {
+    return kCoefficientTable[kPublicGroup[public_index % kGroups]];
+}
+
+std::array<std::string, kParameters> made_names() {
+    std::array<std::string, kParameters> names;
+    for (std::size_t i = 0; i < kParameters; ++i)
+        names[i] = std::string("D_") + row_at(i).letters + "xyz"[i / kGroups];
+    return names;
+}
+
+}  // namespace
 
 const std::array<const char*, kParameters>& parameter_names() noexcept {
-    static constexpr std::array<const char*, kParameters> kNames{
-        "D_Fx", "D_Ix", "D_Ox", "D_Sx", "D_IIx", "D_OOx", "D_SSx", "D_IOx", "D_ISx", "D_OSx",
-        "D_Fy", "D_Iy", "D_Oy", "D_Sy", "D_IIy", "D_OOy", "D_SSy", "D_IOy", "D_ISy", "D_OSy",
-        "D_Fz", "D_Iz", "D_Oz", "D_Sz", "D_IIz", "D_OOz", "D_SSz", "D_IOz", "D_ISz", "D_OSz"};
+    static const auto kText = made_names();
+    static const auto kNames = [] {
+        std::array<const char*, kParameters> names{};
+        for (std::size_t i = 0; i < kParameters; ++i) names[i] = kText[i].c_str();
+        return names;
+    }();
     return kNames;
 }
 
 const char* parameter_unit(std::size_t index) noexcept {
-    const std::size_t group = kPublicGroup[index % kGroups];
-    return group == kDt ? "deg/h" : group <= kDo ? "deg/h/g" : "deg/h/g^2";
+    constexpr std::array<const char*, 3> kUnits{"deg/h", "deg/h/g", "deg/h/g^2"};
+    return kUnits[static_cast<std::size_t>(row_at(index).order)];
 }
 
 ParameterArray prior_sigma(const Settings& settings) noexcept {
+    const std::array by_order{settings.prior_bias, settings.prior_linear, settings.prior_quadratic};
     ParameterArray sigma{};
     for (std::size_t group = 0; group < kGroups; ++group) {
-        const double s = group == kDt   ? settings.prior_bias
-                         : group <= kDo ? settings.prior_linear
-                                        : settings.prior_quadratic;
+        const double s = by_order[static_cast<std::size_t>(kCoefficientTable[group].order)];
         for (std::size_t gyro = 0; gyro < kGyros; ++gyro) sigma[internal_index(group, gyro)] = s;
     }
     return sigma;

@@ -7,17 +7,13 @@
 
 namespace vibrig::estimator {
 
-inline constexpr std::size_t kGroups = 10;
-inline constexpr std::size_t kGyros = 3;
-
-/// Group order inside the filter (Tang et al. 2009): input, *spin*, output; the filter's index is 3
-/// * group + gyro.
-enum Group : std::size_t { kDt, kDi, kDs, kDo, kDii, kDss, kDoo, kDis, kDio, kDos };
-
 /// The only mapping between the filter's order and that of parameter_names(), where gyro x comes
 /// first as F I O S II OO SS IO IS OS.
-inline constexpr std::array<std::size_t, kGroups> kPublicGroup{kDt,  kDi,  kDo,  kDs,  kDii,
-                                                               kDoo, kDss, kDio, kDis, kDos};
+inline constexpr std::array<std::size_t, kGroups> kPublicGroup = [] {
+    std::array<std::size_t, kGroups> group{};
+    for (std::size_t g = 0; g < kGroups; ++g) group[kCoefficientTable[g].place] = g;
+    return group;
+}();
 
 [[nodiscard]] constexpr std::size_t internal_index(std::size_t group, std::size_t gyro) noexcept {
     return kGyros * group + gyro;

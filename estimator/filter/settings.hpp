@@ -6,11 +6,10 @@
 #include <stdexcept>
 #include <vector>
 
+#include "estimator/filter/coefficients.hpp"
 #include "estimator/filter/declared.hpp"
 
 namespace vibrig::estimator {
-
-inline constexpr std::size_t kParameters = 30;
 
 /// Settings that cannot work; the message names the key ("platform.up"), the value and what was
 /// expected.

@@ -1,13 +1,15 @@
 #pragma once
 
+#include "estimator/filter/coefficients.hpp"
+
 namespace vibrig::estimator {
 
 // Plain arrays only: files compiled for different instruction sets share these, and inline code of
 // a library would be compiled once for each of them with the linker keeping any one.
 
 inline constexpr int kUdAngles = 3;
-inline constexpr int kUdConstants = 30;
-inline constexpr int kUdPadded = 32;  ///< constants, padded to whole vectors
+inline constexpr int kUdConstants = static_cast<int>(kParameters);
+inline constexpr int kUdPadded = (kUdConstants + 7) / 8 * 8;  ///< to whole vectors of eight
 
 /// State of the filter, P = U diag(d) U^T with the angles first. What pads is zero.
 struct UdMemory {

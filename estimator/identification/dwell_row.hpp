@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "estimator/filter/coefficients.hpp"
 #include "estimator/filter/vibration_moment.hpp"
 
 namespace vibrig::estimator {
@@ -14,7 +15,7 @@ inline constexpr double kAssumedPause_s = 60;
 /// All that one dwell says of the coefficients and of what the model leaves out: the mean drift of
 /// each gyro about its input axis, Earth rate taken out, and how it changes along the dwell.
 struct DwellRow {
-    using Regression = Eigen::Matrix<double, 3, 10>;  ///< [gyro][group], filter order of the groups
+    using Regression = Eigen::Matrix<double, 3, kGroups>;  ///< [gyro][group], filter order
 
     int run = 0, position = 0;
     double table_g = -1;  ///< commanded; negative: not known

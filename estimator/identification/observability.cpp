@@ -77,10 +77,11 @@ namespace {
 /// As many coefficients as undetermined directions, such that fixing them would determine
 /// everything; squares along the output axis first, as in Tang et al. 2009, section 2.
 std::vector<std::size_t> pivots(const Observability& found) {
-    static constexpr std::array<std::size_t, kGroups> kPreference{kDoo, kDos, kDio, kDis, kDss,
-                                                                  kDii, kDo,  kDs,  kDi,  kDt};
+    std::vector<std::size_t> preference{kDoo};
+    for (std::size_t group = kGroups; group-- > 0;)
+        if (group != kDoo) preference.push_back(group);
     std::vector<std::size_t> candidates;
-    for (const std::size_t group : kPreference) {
+    for (const std::size_t group : preference) {
         for (std::size_t gyro = 0; gyro < kGyros; ++gyro) {
             if (!found.observable[internal_index(group, gyro)])
                 candidates.push_back(internal_index(group, gyro));

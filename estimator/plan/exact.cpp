@@ -178,40 +178,4 @@ Counts exact_design(const Problem& problem, std::size_t runs, const ExactSearch&
     return best;
 }
 
-Counts round_shares(const Effort& share, std::size_t runs) {
-    const auto support = static_cast<std::size_t>(
-        std::count_if(share.begin(), share.end(), [](double w) { return w > 0; }));
-    if (support == 0) throw PlanError("shares: found none above zero, expected some");
-    const double quota = static_cast<double>(runs) - static_cast<double>(support) / 2;
-    Counts counts(share.size(), 0);
-    std::size_t sum = 0;
-    for (std::size_t i = 0; i < share.size(); ++i) {
-        if (share[i] > 0)
-            counts[i] = static_cast<std::size_t>(std::max(0.0, std::ceil(quota * share[i])));
-        sum += counts[i];
-    }
-    const auto pick = [&](auto better, auto ratio, auto allowed) {
-        std::size_t best = share.size();
-        for (std::size_t i = 0; i < share.size(); ++i) {
-            if (share[i] > 0 && allowed(i) &&
-                (best == share.size() || better(ratio(i), ratio(best)))) {
-                best = i;
-            }
-        }
-        return best;
-    };
-    for (; sum < runs; ++sum) {
-        ++counts[pick(
-            std::less<>{}, [&](std::size_t i) { return static_cast<double>(counts[i]) / share[i]; },
-            [](std::size_t) { return true; })];
-    }
-    for (; sum > runs; --sum) {
-        --counts[pick(
-            std::greater<>{},
-            [&](std::size_t i) { return (static_cast<double>(counts[i]) - 1) / share[i]; },
-            [&](std::size_t i) { return counts[i] > 0; })];
-    }
-    return counts;
-}
-
 }  // namespace vibrig::estimator::plan

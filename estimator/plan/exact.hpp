@@ -24,7 +24,4 @@ struct ExactSearch {
 [[nodiscard]] Counts exact_design(const Problem& problem, std::size_t runs,
                                   const ExactSearch& search);
 
-/// Whole numbers of runs near the shares (efficient rounding, Pukelsheim and Rieder 1992).
-[[nodiscard]] Counts round_shares(const Effort& share, std::size_t runs);
-
 }  // namespace vibrig::estimator::plan

@@ -29,8 +29,9 @@ struct SpectralDwell {
     double relative_error = 0;             ///< of the mean square of its vibration, 1 sigma
 };
 
-/// Elastic and static columns of a gyro: 10 of the base model, 6 more of the elastic part.
-inline constexpr Eigen::Index kBase = 10, kElastic = 6, kColumns = kBase + kElastic;
+/// Elastic and static columns of a gyro: the base model, and its quadratic part once more.
+inline constexpr Eigen::Index kBase = kGroups, kElastic = kGroups - kDii,
+                              kColumns = kBase + kElastic;
 
 /// The dwells of a campaign as the analysis takes them.
 class SpectralTable {

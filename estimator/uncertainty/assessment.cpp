@@ -4,10 +4,13 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <span>
+#include <utility>
 
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
 #include "estimator/uncertainty/distributions.hpp"
+#include "estimator/uncertainty/doubtful_levels.hpp"
 #include "estimator/uncertainty/verdict.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -18,6 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr auto kAll = static_cast<Index>(kParameters);
+constexpr auto kOfGyro = static_cast<Index>(kGroups);
 
 Index index(std::size_t i) { return static_cast<Index>(i); }
 
@@ -64,15 +68,15 @@ std::array<GyroRates, 3> gyros_of(const DwellTable& table, const Settings& setti
         gyro.time_h = table.time_h;
         gyro.rate.resize(n);
         gyro.variance.resize(n);
-        gyro.regressors.resize(n, 10);
+        gyro.regressors.resize(n, kOfGyro);
         for (Index k = 0; k < n; ++k) {
             const DwellRow& row = table.rows[static_cast<std::size_t>(k)];
             gyro.rate[k] = row.rate[j];
             gyro.variance[k] = row.variance(j, j);
             gyro.regressors.row(k) = row.regressors.row(j);
         }
-        gyro.prior_information.resize(10);
-        for (Index g = 0; g < 10; ++g) gyro.prior_information[g] = prior[3 * g + j];
+        gyro.prior_information.resize(kOfGyro);
+        for (Index g = 0; g < kOfGyro; ++g) gyro.prior_information[g] = prior[3 * g + j];
         gyro.breaks = breaks_of(table, settings.drift);
     }
     return gyros;
@@ -89,10 +93,10 @@ Together join(const std::array<DriftAverage, 3>& gyros, const NullFit& fit, Inde
     all.gain = MatrixXd::Zero(kAll, 3 * dwells);
     for (Index j = 0; j < 3; ++j) {
         const DriftAverage& gyro = gyros[static_cast<std::size_t>(j)];
-        for (Index a = 0; a < 10; ++a) {
+        for (Index a = 0; a < kOfGyro; ++a) {
             all.value[3 * a + j] = gyro.value[a];
             for (Index k = 0; k < dwells; ++k) all.gain(3 * a + j, 3 * k + j) = gyro.gain(a, k);
-            for (Index b = 0; b < 10; ++b)
+            for (Index b = 0; b < kOfGyro; ++b)
                 all.covariance(3 * a + j, 3 * b + j) = gyro.covariance(a, b);
         }
     }
@@ -141,6 +145,21 @@ void declare(const MatrixXd& columns, std::array<GyroRates, 3>& gyros) {
     }
 }
 
+/// What the tests of fit work on.
+struct Tested {
+    DwellTable table;
+    std::array<GyroRates, 3> gyros;
+    NullFit fit;
+};
+
+Tested tested_with(const Settings& settings, DwellTable table, std::span<const DwellRow> rows,
+                   const MatrixXd& declared, const VectorXd& prior, const Freed& freed) {
+    table.rows = rows;
+    auto gyros = gyros_of(table, settings);
+    declare(declared, gyros);
+    return {table, std::move(gyros), NullFit(table, declared, prior, freed.determined)};
+}
+
 struct TypeB {
     MatrixXd sensitivity;  ///< 30 x m: G z
     MatrixXd covariance;   ///< 30 x 30
@@ -163,7 +182,8 @@ TypeB propagate(const Settings& settings, const Together& all, const MatrixXd& r
     b.covariance = b.sensitivity * u * b.sensitivity.transpose() +
                    of_g * of_g * b.local_g * b.local_g.transpose();
     if (settings.uncertainty.sync_motion == SyncMotionOf::platform)
-        b.covariance.diagonal().tail(18).array() += sync_bound * sync_bound / 3;
+        b.covariance.diagonal().tail(kAll - index(internal_index(kDii, 0))).array() +=
+            sync_bound * sync_bound / 3;
     return b;
 }
 
@@ -195,7 +215,7 @@ std::vector<Contribution> contributions(const Settings& settings, Index i, doubl
 void expand(const Settings& settings, const DwellTable& table, Coefficient& c) {
     const Inputs& in = settings.uncertainty;
     const double rho = std::min(1.0, c.sigma * c.sigma / (c.u_a * c.u_a));
-    const double spare = static_cast<double>(table.dwells()) - 10;
+    const double spare = static_cast<double>(table.dwells() - kOfGyro);
     double inverse = rho * rho / in.noise_dof;
     if (rho < 1) inverse += (1 - rho) * (1 - rho) / std::max(spare, 1.0);
     double sum = std::pow(c.u_a, 4) * inverse;
@@ -344,8 +364,12 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         scaled << inputs.rates * MatrixXd(root.matrixL()), freed.prior;
         declare(scaled, of.gyros);
         const NullFit fit(table, scaled, prior, freed.determined);
-        out.chi_square = fit.chi_square();
-        out.degrees = fit.degrees();
+        const auto in_doubt = with_doubtful_levels(settings, table, model);
+        const Tested tested = in_doubt.empty()
+                                  ? Tested{table, of.gyros, fit}
+                                  : tested_with(settings, table, in_doubt, scaled, prior, freed);
+        out.chi_square = tested.fit.chi_square();
+        out.degrees = tested.fit.degrees();
         if (out.degrees > 0) out.birge = std::sqrt(out.chi_square / out.degrees);
         if (out.degrees >= 9) {
             // Noise that is known to a relative r: 1/2 (1/r)^2 degrees of freedom.
@@ -362,7 +386,8 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         tell_cross_axis(table, out);
         out.worst_step = worst_step(of.gyros);
         tell_rates(table, fit.residual(all.value), fit.residual_variance(inputs.rates.cols()), out);
-        if (out.degrees >= 9) out.evidence = weigh_patterns(table, fit, out.ramps, model, of.gyros);
+        if (out.degrees >= 9)
+            out.evidence = weigh_patterns(tested.table, tested.fit, out.ramps, model, tested.gyros);
         const TypeB b = propagate(settings, all, inputs.rates, u, out.sync_bound);
         out.sensitivity = b.sensitivity;
         tell_coefficients(settings, result, table, fit, all, b, out);

@@ -74,8 +74,8 @@ Evidence weigh(Pattern pattern, const Signatures& of, const NullFit& fit) {
 }
 
 /// A step at any place from `first` to n - first.
-Evidence weigh_steps(Pattern pattern, Misfit misfit, int first, const DwellTable& table,
-                     const NullFit& fit, const ForwardModel& model, double s0) {
+Evidence weigh_steps(Pattern pattern, int first, const DwellTable& table, const NullFit& fit,
+                     const ForwardModel& model, double s0) {
     Evidence out;
     out.pattern = pattern;
     std::vector<double> logs;
@@ -83,7 +83,7 @@ Evidence weigh_steps(Pattern pattern, Misfit misfit, int first, const DwellTable
     const Index last = table.dwells() - first;
     const Index stride = std::max<Index>(1, (last - first + 1) / kMostTried * 3);
     for (Index k = first; k <= last; k += stride) {
-        const Signatures of = signatures(misfit, table, model, s0, static_cast<int>(k));
+        const Signatures of = signatures(pattern, table, model, s0, static_cast<int>(k));
         const auto projection = fit.project(of.z);
         const std::vector<double> here = log_odds(projection);
         logs.insert(logs.end(), here.begin(), here.end());
@@ -158,24 +158,15 @@ std::vector<Evidence> weigh_patterns(const DwellTable& table, const NullFit& fit
     for (const GyroRates& gyro : gyros) variance += gyro.variance.mean() / 3.0;
     const double s0 = std::sqrt(variance);
     std::vector<Evidence> all;
-    constexpr std::array<std::pair<Pattern, Misfit>, 12> kOne{
-        {{Pattern::cross_axis, Misfit::cross_axis},
-         {Pattern::azimuth, Misfit::azimuth},
-         {Pattern::latitude, Misfit::latitude},
-         {Pattern::time_base, Misfit::time_base},
-         {Pattern::encoder_zero, Misfit::encoder_zero},
-         {Pattern::non_orthogonality, Misfit::non_orthogonality},
-         {Pattern::resolver_1, Misfit::resolver_1},
-         {Pattern::resolver_2, Misfit::resolver_2},
-         {Pattern::resolver_16, Misfit::resolver_16},
-         {Pattern::cubic, Misfit::cubic},
-         {Pattern::trend, Misfit::trend},
-         {Pattern::unbalance_trend, Misfit::unbalance_trend}}};
-    for (const auto& [pattern, misfit] : kOne)
-        all.push_back(weigh(pattern, signatures(misfit, table, model, s0), fit));
-    all.push_back(weigh_steps(Pattern::step, Misfit::step, 2, table, fit, model, s0));
-    all.push_back(
-        weigh_steps(Pattern::unbalance_step, Misfit::unbalance_step, 3, table, fit, model, s0));
+    constexpr std::array kOne{
+        Pattern::cross_axis, Pattern::azimuth,      Pattern::latitude,
+        Pattern::time_base,  Pattern::encoder_zero, Pattern::non_orthogonality,
+        Pattern::resolver_1, Pattern::resolver_2,   Pattern::resolver_16,
+        Pattern::cubic,      Pattern::trend,        Pattern::unbalance_trend};
+    for (const Pattern pattern : kOne)
+        all.push_back(weigh(pattern, signatures(pattern, table, model, s0), fit));
+    all.push_back(weigh_steps(Pattern::step, 2, table, fit, model, s0));
+    all.push_back(weigh_steps(Pattern::unbalance_step, 3, table, fit, model, s0));
     Evidence scatter = of_state(Pattern::scatter,
                                 log_odds_of(gyros, {0.5, 1, 2, 4, 8},
                                             [](const DriftLikelihood& of, double size) {

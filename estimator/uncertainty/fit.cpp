@@ -20,7 +20,7 @@ MatrixXd all_regressors(const DwellTable& table) {
     MatrixXd h = MatrixXd::Zero(3 * table.dwells(), kCoefficients);
     for (Index k = 0; k < table.dwells(); ++k) {
         for (Index j = 0; j < 3; ++j) {
-            for (Index g = 0; g < 10; ++g)
+            for (Index g = 0; g < kCoefficients / 3; ++g)
                 h(3 * k + j, 3 * g + j) = table.rows[static_cast<std::size_t>(k)].regressors(j, g);
         }
     }
@@ -127,7 +127,7 @@ RampFit fit_ramps(const DwellTable& table, const VectorXd& coefficients) {
         for (std::size_t j = 0; j < 3; ++j) {
             const auto g = static_cast<Index>(j);
             double off = row.ramp[g];
-            for (Index i = 0; i < 10; ++i)
+            for (Index i = 0; i < kCoefficients / 3; ++i)
                 off -= row.ramp_regressors(g, i) * coefficients[3 * i + g];
             const double variance = row.ramp_variance(g, g);
             fit.chi_square += off * off / variance;

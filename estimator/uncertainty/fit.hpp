@@ -69,27 +69,9 @@ struct RampFit {
 };
 [[nodiscard]] RampFit fit_ramps(const DwellTable& table, const Eigen::VectorXd& coefficients);
 
-enum class Pattern {
-    cross_axis,
-    azimuth,
-    latitude,
-    time_base,
-    encoder_zero,
-    non_orthogonality,
-    resolver_1,
-    resolver_2,
-    resolver_16,
-    cubic,
-    trend,
-    step,
-    walk,
-    scatter,
-    unbalance_trend,
-    unbalance_step,
-    ramp,
-    gyro_noise
-};
-inline constexpr std::size_t kPatterns = 18;
+/// A misfit as the rates of a campaign show it.
+using Pattern = Misfit;
+inline constexpr std::size_t kPatterns = kMisfits;
 [[nodiscard]] const char* name_of(Pattern pattern) noexcept;
 /// It moves the coefficients, and no state of the drift takes it up.
 [[nodiscard]] bool is_structural(Pattern pattern) noexcept;
@@ -105,8 +87,9 @@ struct Evidence {
     Eigen::VectorXd change;    ///< of the coefficients of constant bias, filter order
     double smallest_seen = 0;  ///< of its best seen unknown, with 90 %
 
+    static constexpr double kNamedFrom = 4;
     /// Odds enough to be named.
-    [[nodiscard]] bool named() const { return log_odds > 4.0; }
+    [[nodiscard]] bool named() const { return log_odds > kNamedFrom; }
 };
 
 /// All patterns, the best first. `coefficients`: filter order, with which signatures are taken.

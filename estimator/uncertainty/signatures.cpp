@@ -194,8 +194,9 @@ Signatures signatures(Misfit misfit, const DwellTable& table, const ForwardModel
             return of_unbalance(table, model, trend(table), 0.01, "deg/h/g/h");
         case Misfit::unbalance_step:
             return of_unbalance(table, model, step_at(table, after_dwell), 3 * s0, "deg/h/g");
+        default:
+            return {};  // a state of the drift, not a disturbance of known shape
     }
-    return {};
 }
 
 }  // namespace vibrig::estimator::uncertainty

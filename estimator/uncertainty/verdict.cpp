@@ -172,7 +172,17 @@ std::string contradiction(const Settings& settings, const Evidence& e) {
     }
 }
 
-void add_patterns(const Settings& settings, const Assessment& a, std::vector<Reason>& list) {
+/// What the odds of a pattern must be above to make the dwells so far "not valid". With each dwell
+/// there is another look, and another chance of a false alarm: the l-th has a share of 1/l of what
+/// a single one has (docs/theory/uncertainty.md). Of a campaign that has ended there is one.
+double asked_of(const Assessment& a, Stage stage) {
+    if (stage == Stage::ended) return Evidence::kNamedFrom;
+    const int looks = 1 + std::max(0, a.degrees - kFewestDegrees) / static_cast<int>(kGyros);
+    return Evidence::kNamedFrom + std::log(static_cast<double>(looks));
+}
+
+void add_patterns(const Settings& settings, const Assessment& a, Stage stage,
+                  std::vector<Reason>& list) {
     std::vector<const Evidence*> structural;
     for (const Evidence& e : a.evidence) {
         if (!e.named() || e.log_odds < a.evidence.front().log_odds - kNearBest) continue;
@@ -201,10 +211,12 @@ void add_patterns(const Settings& settings, const Assessment& a, std::vector<Rea
     reason.largest_effect_u = worst.in_u;
     reason.coefficient = parameter_names()[worst.coefficient];
     reason.text += contradiction(settings, *structural.front());
-    reason.text +=
-        text(worst.in_u > 1 ? ": %s by %.1f u; correct or declare it" : ": %s by %.1f u at most",
-             parameter_names()[worst.coefficient], worst.in_u);
-    if (worst.in_u > 1) reason.level = Level::not_valid;
+    const bool sure = structural.front()->log_odds > asked_of(a, stage);
+    reason.text += text(worst.in_u <= 1 ? ": %s by %.1f u at most"
+                        : sure          ? ": %s by %.1f u; correct or declare it"
+                                        : ": %s by %.1f u; the dwells to come will tell",
+                        parameter_names()[worst.coefficient], worst.in_u);
+    if (worst.in_u > 1 && sure) reason.level = Level::not_valid;
     list.push_back(std::move(reason));
 }
 
@@ -253,9 +265,12 @@ void add_signs(const Assessment& a, std::vector<Reason>& list) {
                     Level::not_valid, mean, kNone, "deg/h/g"});
 }
 
-/// What the filter noticed dwell by dwell.
-void add_dwells(const Result& result, std::vector<Reason>& list) {
+/// What the filter noticed dwell by dwell: why one is flagged says what is wrong, innovations out
+/// of their band are what may follow from it.
+enum class Noticed : std::uint8_t { flag, innovations };
+void add_dwells(const Result& result, Noticed wanted, std::vector<Reason>& list) {
     int dwell = 0, bad = 0;
+    bool flagged = false;
     Reason first;
     for (const DwellSummary& d : result.dwells) {
         ++dwell;
@@ -270,11 +285,12 @@ void add_dwells(const Result& result, std::vector<Reason>& list) {
             what = text("innovations are correlated by %.2f", d.innovation_correlation);
         }
         if (what.empty() || ++bad > 1) continue;
+        flagged = d.flagged && !d.followed;
         first.code = "dwell";
         first.dwell = dwell;
         first.text = text("run %d position %d: ", d.run, d.position) + what;
     }
-    if (bad == 0) return;
+    if (bad == 0 || flagged != (wanted == Noticed::flag)) return;
     if (bad > 1) first.text += text(", and %d more dwells", bad - 1);
     list.push_back(std::move(first));
 }
@@ -338,19 +354,24 @@ Verdict judge(const Settings& settings, const Result& result, const Assessment& 
     Verdict verdict;
     std::vector<Reason>& list = verdict.reasons;
     if (stage == Stage::ended) add_observability(result, list);
-    add_cross_check(result.cross_check, list);
-    add_dwells(result, list);
+    add_dwells(result, Noticed::flag, list);
+    // Of reasons alike in level what names a cause comes first, then what may be its consequence:
+    // angles that move with the vibration look like noise.
     if (a.done) {
-        add_patterns(settings, a, list);
-        add_chi_square(a, list);
         add_sync(settings, a, list);
+        add_patterns(settings, a, stage, list);
+        add_chi_square(a, list);
         add_order(settings, a, list);
         add_signs(a, list);
+        add_dwells(result, Noticed::innovations, list);
+        add_cross_check(result.cross_check, list);
         if (a.widening > kMostWidening && !list.empty())
             list.push_back({"widening", text("u is %.1f times what the noise explains", a.widening),
                             Level::not_valid, a.widening});
-    } else if (settings.method == Method::joint) {
-        add_chi_square(a, list);
+    } else {
+        add_dwells(result, Noticed::innovations, list);
+        add_cross_check(result.cross_check, list);
+        if (settings.method == Method::joint) add_chi_square(a, list);
     }
     std::stable_sort(list.begin(), list.end(),
                      [](const Reason& x, const Reason& y) { return x.level > y.level; });

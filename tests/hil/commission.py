@@ -4,6 +4,7 @@ and armed; one that hides something ends undecided or refused, with the reason.
 
 usage: commission.py PROGRAMS [--soak]     killed at some steps; at all
 """
+import contextlib
 import hashlib
 import json
 import math
@@ -11,6 +12,7 @@ import os
 import random
 import re
 import socket
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -190,8 +192,29 @@ def whole(checks, programs, folder, seed):
             text = file.read()
         checks.check("# SIMULATED: ln LR" in text, "the configuration's comments say so, too", text)
         each_key_is_caught_twice(checks, u, text)
+        checks.check("commissioning: commissioning:" not in u.rig.daemon.text(), "no event names its source twice", u.rig.logs())
+        journal_has_it(checks, u)
     finally:
         u.rig.stop()
+
+
+def journal_has_it(checks, u):
+    """The table commissioning: each step, question and answer, who said so; chained with the rest."""
+    path = os.path.join(u.rig.results, "journal.sqlite3")
+    u.rig.daemon.end()
+    with contextlib.closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5)) as database:
+        rows = database.execute("SELECT part, step, by, identity, what, data_json FROM commissioning ORDER BY id").fetchall()
+    whats = {row[4] for row in rows}
+    checks.equal(sorted(whats - {"answer"}), ["accept", "begin", "hypothesis", "move", "permission", "question", "reading", "refused arm",
+                                              "verdict", "void"], "the journal has each kind of step")
+    checks.check(all(row[2] == "Ada" for row in rows if row[4] != "void") and
+                 any(row[3].startswith("uid ") for row in rows if row[4] == "permission") and all(json.loads(row[5]) for row in rows),
+                 "with the person and who the socket says it was", rows[:3])
+    signed = [json.loads(row[5]).get("signed_with") for row in rows if row[4] == "accept" and row[0] == "gimbals"]
+    with open(u.record, encoding="utf-8") as file:
+        checks.equal(signed, [json.load(file)["signature"]["public_key"]], "and the key of the record's signature")
+    verified = subprocess.run([u.rig.program("vibrig"), "journal", "verify", path], capture_output=True, text=True, check=False)
+    checks.equal(verified.returncode, 0, "and its chain holds: " + verified.stdout[-200:] + verified.stderr)
 
 
 def shaker_is_proven(checks, u):
@@ -202,8 +225,18 @@ def shaker_is_proven(checks, u):
                  "the shaker's parts are asked for", lacks.stderr)
     unknown = tool("commission", "watchdog", "earth", "--by", "Ada")
     checks.equal(unknown.returncode, 2, "parts of platform and shaker are not proven at once")
+    for lie, word in (("unit-rms", "g rms for g peak?"), ("unit-mps2", "m/s2 for g?"), ("dead-table readback-echo", "the platform does")):
+        for one in lie.split():
+            rig.order("fault " + one)
+        refused = tool("commission", "units", "--by", "Ada", timeout=120)
+        checks.check(refused.returncode == 1 and "REFUSED: not completed: ladder: at 0.03 g" in refused.stdout.replace("\n   ", " ") and
+                     word in refused.stdout.replace("\n   ", " "), f"the ladder ends at its first rung: {lie}", refused.stdout + refused.stderr + rig.logs())
+        rig.order("clear")
     plain = tool("commission", "watchdog", "units", "excitation", "--by", "Ada", "--json", timeout=120)
     found = json.loads(plain.stdout or "{}")
+    ladder = {name: value for name, value in found["parts"]["registers"].get("evidence", {}).items() if name.startswith("ladder")}
+    checks.check(sorted(ladder) == sorted(f"ladder, {g} g, {what}" for g in (0.03, 0.1, 0.3) for what in ("platform over expected", "table over command")) and
+                 all(0.9 < value < 1.1 for value in ladder.values()), "the first proof goes up by 0.03, 0.1 and 0.3 g", ladder)
     checks.check(plain.returncode == 0 and found["outcome"] == "decided" and found["simulated"] and
                  found["parts"]["watchdog"]["evidence"]["watchdog, the controller says fault"] == 1 and
                  found["parts"]["registers"]["proven"] and found["parts"]["units"]["evidence"]["hypotheses"][0]["unit"] == "g peak",
@@ -253,6 +286,15 @@ def each_key_is_caught_twice(checks, u, text):
         edited = u.rig.tool("arm", "--by", "Ada")
         checks.check(edited.returncode == 1 and f"{key} is " in edited.stderr and f"was proven as {was[1]} by Ada" in edited.stderr,
                      f"an edited {key} voids its part: {wrong}", edited.stderr)
+        if key == WRONG[0][0]:
+            forge(u, key, with_its_key=False)
+            u.restart()
+            forged = u.rig.tool("arm", "--by", "Ada")
+            checks.check(forged.returncode == 1 and "record.json: its signature is not that of what it says" in forged.stderr,
+                         "a record whose hashes were made anew is none without the key", forged.stderr)
+            with open(u.record, "w", encoding="utf-8") as file:
+                file.write(recorded)
+            u.restart()
         forge(u, key)
         u.restart()
         if u.rig.tool("arm", "--by", "Ada").returncode:
@@ -266,8 +308,9 @@ def each_key_is_caught_twice(checks, u, text):
                      not last["campaign"].get("dwells"), f"and {key} is caught before the table moves", reason)
 
 
-def forge(unknown, key):
-    """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit."""
+def forge(unknown, key, with_its_key=True):
+    """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit, and the signature, too, where the
+    forger is root and reads the daemon's key."""
     proven = unknown.rig.tool("commission", "status", "--json")
     now = [re.search(re.escape(key) + " is (.*), was proven as ", part["why"]) for part in json.loads(proven.stdout)["parts"].values()]
     value = next(found[1] for found in now if found)
@@ -282,6 +325,13 @@ def forge(unknown, key):
     whole_text = json.dumps(record, separators=(",", ":"), ensure_ascii=False)
     record["sha256"] = hashlib.sha256(whole_text.encode()).hexdigest()
     record["signature"] = signature
+    if with_its_key:
+        message = os.path.join(unknown.rig.folder, "message")
+        with open(message, "w", encoding="ascii") as file:
+            file.write(record["sha256"])
+        made = subprocess.run(["openssl", "pkeyutl", "-sign", "-rawin", "-inkey", os.path.join(os.path.dirname(unknown.record), "record.key"),
+                               "-in", message], capture_output=True, check=True)
+        record["signature"]["value"] = made.stdout.hex()
     with open(unknown.record, "w", encoding="utf-8") as file:
         json.dump(record, file)
 
@@ -362,6 +412,23 @@ def hard_ones(checks, programs):
             (south, {"latitude": 45.0, "compass": "-"}, "undecided", "latitude")):
         with tempfile.TemporaryDirectory() as folder:
             hidden(checks, programs, folder, truth, others, outcome, word)
+
+
+def counts_in_radians(checks, programs, folder):
+    """A reading that counts in another unit is found out, and nothing is accepted before the DBC says so."""
+    truth = drawn(15)
+    truth["platform"]["angle_unit"] = ["deg", "rad", "deg"]
+    truth["platform"]["encoder_zero_deg"][1] = 100.0
+    u = Unknown(checks, programs, folder, truth)
+    try:
+        run, found = u.commission()
+        checks.check(found["outcome"] == "decided" and run.returncode == 1 and len(found["corrections"]) == 1 and
+                     "Resolvers.Inner counts in rad, expected deg: multiply its factor by 57.2957795" in found["corrections"][0],
+                     "an angle in rad is named as a correction of the DBC", found)
+        refused = u.rig.tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
+        checks.check(refused.returncode == 1 and "the DBC first" in refused.stderr, "and nothing is accepted before", refused.stderr)
+    finally:
+        u.rig.stop()
 
 
 class Terminal:
@@ -450,6 +517,13 @@ def real(checks, programs, folder):
         heard = {message["id"]: message for message in json.loads(bus.stdout)["messages"]} if bus.returncode == 0 else {}
         checks.check(0x80 in heard and 20 < heard[0x80]["period_ms"] < 30 and 0 in heard[0x80]["counters"] and 4 in heard[0x101]["at_rest"],
                      "without a daemon and a DBC the bus is listed", bus.stdout + bus.stderr)
+        dbc = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "rig.dbc")
+        bus = subprocess.run([rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "1", "--turn", "--dbc", dbc, "--json"],
+                             capture_output=True, text=True, check=False)
+        signals = json.loads(bus.stdout or "{}")
+        checks.check(bus.returncode == 1 and signals["outcome"] == "undecided" and signals["answers"] == [] and
+                     "Sync.SyncCount" in signals["counters"] and "Resolvers.OuterValid" in signals["unproven"] and signals["unknown"] == [],
+                     "with a DBC its signals are, and nobody has turned any", bus.stdout + bus.stderr)
         rig.configure(CAMPAIGN, **r.PATIENT)
         check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
         stated = {}
@@ -500,6 +574,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)
+    with tempfile.TemporaryDirectory() as folder:
+        counts_in_radians(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         real(checks, programs, folder)
     return checks.end()

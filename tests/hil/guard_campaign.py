@@ -79,8 +79,12 @@ class Guarded(r.Rig):
         self.coils = Coils()
         self.start_plant(*WARM, *faults)
         self.be_punctual()
+        self.pager = pager
+        self.arrange()
+
+    def arrange(self, **tables):
         self.configure(CAMPAIGN, **r.PATIENT, guard={"socket": self.meeting},
-                       annunciator={"command": pager, "command_limit_s": 20})
+                       annunciator={"command": self.pager, "command_limit_s": 20}, **tables)
         with open(self.configuration, "a", encoding="utf-8") as file:
             file.write(f'[annunciator.modbus]\nhost = "127.0.0.1"\nport = {self.coils.port}\nlamp_coil = 1\n')
 
@@ -117,10 +121,10 @@ class Guarded(r.Rig):
             data += more
         return data
 
-    def drive(self, amplitude_g):
+    def drive(self, amplitude_g, run=1):
         """As another master would, past any daemon: 15 Hz, ramp of 0.5 s, run."""
         with self.modbus() as link:
-            words = struct.pack(">IIHH", 15000, int(amplitude_g * 1e4), 50, 1)
+            words = struct.pack(">IIHH", 15000, int(amplitude_g * 1e4), 50, run)
             self.ask(link, struct.pack(">BHHB", 16, 0, 6, len(words)) + words, None)
 
     def shakes(self):
@@ -373,6 +377,40 @@ def disobeyed(checks, programs, folder):
         rig.stop()
 
 
+def stuck_witness(checks, programs, folder):
+    """The platform's accelerometers are the only witness and stick with their valid bits, and the controller says idle while
+    the table shakes on: nobody measures rest, and the guard does not say so."""
+    what = "a stuck witness"
+    stuck = [word for axis in "xyz" for word in ("--fault", f"stuck:{axis}")]
+    rig = Guarded(programs, folder, *NO_WATCHDOG, "--fault", "stuck-contactor", *stuck)
+    liar = None
+    try:
+        rig.arrange(**{"can.signals": {"table_accel": ""}})
+        rig.start_guard()
+        wait_until(lambda: os.path.exists(rig.meeting))
+        liar = Liar(rig)
+        checks.check(wait_until(lambda: liar.heard is not None and liar.heard[1] & 0b1110 == 0b1110),
+                     f"{what}: while nobody shakes it is one at rest", f"{liar.heard}\n{rig.logs()}")
+        liar.flags, liar.level_g = 3, 5.0
+        rig.drive(5.0)
+        checks.check(wait_until(lambda: "accelerometer of the platform is stuck" in rig.guard.text()), f"{what}: is named", rig.logs())
+        checks.check(wait_until(lambda: liar.heard[1] & 0b0110 == 0), f"{what}: it sees nothing, and no rest", liar.heard)
+        checks.equal(liar.cause(), "none", f"{what}: the daemon, alive and armed, goes on")
+        rig.drive(0.0, run=0)
+        checks.check(wait_until(rig.rests), f"{what}: the controller says that it rests", rig.measured_g())
+        liar.flags = 4   # the daemon orders a stop
+        checks.check(wait_until(lambda: liar.heard[1] & 1), f"{what}: it says that the stop is not obeyed", f"{liar.heard}\n{rig.logs()}")
+        checks.check(wait_until(lambda: any("press the emergency stop" in text for text in rig.paged("disobeyed"))),
+                     f"{what}: the pager says: press the emergency stop", rig.logs())
+        rig.guard.process.send_signal(signal.SIGUSR1)
+        checks.check(wait_until(lambda: "not acknowledged: the table is not measured to be at rest" in rig.guard.text()),
+                     f"{what}: nor is it acknowledged by hand", rig.logs())
+    finally:
+        if liar:
+            liar.end()
+        rig.stop()
+
+
 def fast(checks, programs, folder):
     """The rig owns the time and is as fast as it can be: a whole campaign, and nothing is found."""
     what = "the rig owns the time"
@@ -399,7 +437,8 @@ def main():
     parts = (well, broken("SIGSTOP", stopped, continued, "daemon_silent"), broken("a stage hangs", hung, ended, "daemon_hangs"),
                  broken("SIGKILL", killed, by_hand, "daemon_silent"),
                  lies("it says idle, all well", 0, 0.0, 5.0, "unarmed_motion"),
-                 lies("armed for 2 g, it does 5 g", 3, 2.0, 5.0, "over_level"), disobeyed, fast)
+                 lies("armed for 2 g, it does 5 g", 3, 2.0, 5.0, "over_level"), disobeyed, stuck_witness,
+             fast)
     if "--part" in sys.argv:
         with tempfile.TemporaryDirectory() as folder:
             parts[int(sys.argv[sys.argv.index("--part") + 1])](checks, programs, folder)

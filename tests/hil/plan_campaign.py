@@ -153,10 +153,51 @@ def refused(checks, programs, folder):
                      f"{what}: --check prints the configuration and says the same", check.stdout + check.stderr)
 
 
+def unwritable(checks, programs, folder):
+    """What only the start would show is found before: results that cannot be kept (root is stopped by no permission) and
+    certificates that are not there or are none."""
+    path, nowhere = os.path.join(folder, "unwritable.toml"), os.path.join(folder, "file")
+    with open(nowhere, "w", encoding="utf-8"):
+        pass
+
+    def checked(**tables):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(r.toml({**tables, "clock": {"source": "rig"}, "shaker": {"host": "127.0.0.1"},
+                               "can": {"port": "seqpacket", "path": os.path.join(folder, "bus.sock")}}))
+        return subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True,
+                              text=True, timeout=30)
+    keys = {"remote": "127.0.0.1:0", "certificate": nowhere, "key": nowhere, "clients_ca": nowhere}
+    for server, told in (({**keys, "clients_ca": "gone.crt"}, f'unwritable.toml:5: server.clients_ca: found "{folder}/gone.crt", expected'),
+                         (keys, f"unwritable.toml:2: server.remote: certificate: found '{nowhere}': expected it in PEM")):
+        check = checked(server=server)
+        checks.check(check.returncode == 2 and told in check.stderr, "--check finds certificates that are not there or are none",
+                     check.stderr)
+    # A DBC of another rig: all that it does not have in one run, each with the line where it is mended.
+    dbc = os.path.join(folder, "another.dbc")
+    text = subprocess.run([os.path.join(programs, "vibrigd"), "--print-dbc"], capture_output=True, text=True, check=True).stdout
+    with open(dbc, "w", encoding="utf-8") as file:
+        file.write(text.replace("TableAccelerometer", "TableAcc").replace("GyrosAtSpeed", "AtSpeed"))
+    signals = {"can.signals": {"temperature": "Nobody.T"}}
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(r.toml({"clock": {"source": "rig"}, "shaker": {"host": "127.0.0.1"},
+                           "can": {"port": "seqpacket", "path": os.path.join(folder, "bus.sock"), "dbc": dbc}, **signals}))
+    check = subprocess.run([os.path.join(programs, "vibrigd"), "--config", path, "--check"], capture_output=True, text=True, timeout=30)
+    told = ['unwritable.toml:8: can.signals.table_accel: found "TableAccelerometer.Axial" (default), expected',
+            'unwritable.toml:8: can.signals.gyros_at_speed: found "PlatformStatus.GyrosAtSpeed" (default), expected',
+            'unwritable.toml:10: can.signals.temperature: found "Nobody.T", expected']
+    checks.check(check.returncode == 2 and all(line in check.stderr for line in told),
+                 "--check finds all signals that a DBC does not have, each with its line", check.stderr)
+    for results in ("/proc/nowhere", "/proc", nowhere, os.path.join(nowhere, "below")):
+        check = checked(campaign={"results": results})
+        told = f'unwritable.toml:2: campaign.results: found "{results}", expected a folder that can be written: '
+        checks.check(check.returncode == 2 and told in check.stderr, f"--check finds that results cannot be kept in {results.replace(folder, '...')}",
+                     check.stderr)
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
-    for part in (from_a_file, adaptively, restarted, at_other_rates, refused):
+    for part in (from_a_file, adaptively, restarted, at_other_rates, refused, unwritable):
         with tempfile.TemporaryDirectory() as folder:
             part(checks, programs, folder)
     return checks.end()

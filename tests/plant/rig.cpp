@@ -162,7 +162,10 @@ void Rig::read() {
     const Shake felt = truth_.latency_s > 0 ? shake_before(truth_.latency_s) : now;
     readings_ = sensors_.read(encoder, platform_.force(felt, truth_.vibration_gain),
                               isolator_.table_g(table_g()), tick_s_ * static_cast<double>(tick_));
-    const Vec3 shown = readings_.encoder_deg;
+    Vec3 shown = readings_.encoder_deg;
+    for (std::size_t i = 0; i < 3; ++i)
+        if (truth_.angle_unit[i] != AngleUnit::deg)
+            shown[i] = std::fmod(shown[i] * per_degree(truth_.angle_unit[i]), 360.0);
     for (std::size_t i = 0; i < 3; ++i)
         readings_.encoder_deg[i] = shown[static_cast<std::size_t>(truth_.channel[i])];
 }

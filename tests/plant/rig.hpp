@@ -49,7 +49,6 @@ class Rig {
     // what only a simulation can know
     [[nodiscard]] const PlatformModel& platform() const noexcept { return platform_; }
     [[nodiscard]] const Drift& drift() const noexcept { return drift_; }
-    [[nodiscard]] double platform_vibration_g() const noexcept { return isolator_.platform_g(); }
 
   private:
     void vibrate();

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -15,11 +16,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
-                                                     "OO", "SS", "IO", "IS", "OS"};
-
 constexpr std::array<const char*, 3> kGimbalNames{"outer", "inner", "azimuth"};
 constexpr std::array<std::string_view, 3> kAmplitudeUnits{"g_peak", "g_rms", "mps2_peak"};
+constexpr std::array<std::string_view, 7> kAngleUnits{"deg", "turn",  "rad", "arcmin",
+                                                      "gon", "twice", "half"};
 
 std::string text_of(const Json& json) {
     std::string text = json.dump();
@@ -86,6 +86,14 @@ struct Reader {
                  "found " + text_of(json) + ", expected \"g_peak\", \"g_rms\" or \"mps2_peak\"");
         out = static_cast<AmplitudeUnit>(at - kAmplitudeUnits.begin());
     }
+    void value(const std::string& key, const Json& json, AngleUnit& out, int, int) const {
+        const auto* const at = std::ranges::find(kAngleUnits, json);
+        if (at == kAngleUnits.end())
+            fail(key, "found " + text_of(json) +
+                          ", expected \"deg\", \"turn\", \"rad\", \"arcmin\", \"gon\", \"twice\" "
+                          "or \"half\"");
+        out = static_cast<AngleUnit>(at - kAngleUnits.begin());
+    }
     void value(const std::string& key, const Json& json, std::uint16_t& out, int low,
                int high) const {
         int number = 0;
@@ -128,6 +136,7 @@ struct Writer {
     static Json json(bool v) { return v; }
     static Json json(std::uint16_t v) { return v; }
     static Json json(AmplitudeUnit v) { return kAmplitudeUnits[static_cast<std::size_t>(v)]; }
+    static Json json(AngleUnit v) { return kAngleUnits[static_cast<std::size_t>(v)]; }
     static Json json(GimbalAxis v) { return kGimbalNames[static_cast<std::size_t>(v)]; }
     template <class T>
     static Json json(const std::optional<T>& v) {
@@ -215,6 +224,12 @@ void check(const Truth& truth, const std::string& file) {
 }
 
 }  // namespace
+
+double per_degree(AngleUnit unit) noexcept {
+    constexpr std::array kPerDegree{1.0, 1 / 360.0, std::numbers::pi / 180, 60.0, 400 / 360.0,
+                                    2.0, 0.5};
+    return kPerDegree[static_cast<std::size_t>(unit)];
+}
 
 std::string coefficient_name(std::size_t gyro, std::size_t term) {
     return std::string("D_") + kTermNames.at(term) + static_cast<char>('x' + gyro);

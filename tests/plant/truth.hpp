@@ -29,8 +29,15 @@ enum class GimbalAxis : std::uint8_t { outer, inner, azimuth };
 /// What a controller's amplitudes are in: peak g, rms g, peak m/s^2.
 enum class AmplitudeUnit : std::uint8_t { g_peak, g_rms, mps2_peak };
 
+/// What the reading of an angle counts in; twice, half: two per deg, one per 2 deg.
+enum class AngleUnit : std::uint8_t { deg, turn, rad, arcmin, gon, twice, half };
+/// Of these in a deg.
+[[nodiscard]] double per_degree(AngleUnit unit) noexcept;
+
 /// Positions within one gyro's ten coefficients; F fixed, I input, O output, S spin (IEEE Std 517).
 enum Term : std::size_t { kF, kI, kO, kS, kII, kOO, kSS, kIO, kIS, kOS, kTerms };
+inline constexpr std::array<const char*, kTerms> kTermNames{"F",  "I",  "O",  "S",  "II",
+                                                            "OO", "SS", "IO", "IS", "OS"};
 
 using GyroCoefficients = std::array<double, kTerms>;  ///< deg/h, deg/h/g x 3, deg/h/g^2 x 6
 
@@ -65,6 +72,8 @@ struct Truth {
     /// Whose angle the channels Outer, Inner, Azimuth show, and who obeys those commands.
     std::array<GimbalAxis, 3> channel{GimbalAxis::outer, GimbalAxis::inner, GimbalAxis::azimuth};
     std::array<GimbalAxis, 3> command_channel = channel;
+    /// By gimbal: what its reading counts in. The bus has 0 to 360 of them: then it begins anew.
+    std::array<AngleUnit, 3> angle_unit{AngleUnit::deg, AngleUnit::deg, AngleUnit::deg};
     Vec3 command_offset_deg{};                 ///< by gimbal: where it goes over where it was sent
     std::optional<GimbalAxis> stuck_gimbal{};  ///< does not move, and is never in position
     double slew_deg_per_s = 5;                 ///< per gimbal

@@ -20,6 +20,7 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "encoder_sign", t.encoder_sign, -1, 1);
     field("platform", "encoder_zero_deg", t.encoder_zero_deg, -360.0, 360.0);
     field("platform", "channel", t.channel, 0, 0);
+    field("platform", "angle_unit", t.angle_unit, 0, 0);
     field("platform", "command_channel", t.command_channel, 0, 0);
     field("platform", "command_offset_deg", t.command_offset_deg, -180.0, 180.0);
     field("platform", "stuck_gimbal", t.stuck_gimbal, 0, 0);

@@ -182,6 +182,28 @@ void warn(const allan::Inspection& found, std::vector<double>& values, AllanAnal
     }
 }
 
+/// Steps and values with which nothing overflows on the way.
+void check_range(const AllanRequest& request, const std::vector<double>& values) {
+    if (!(request.tau0 > 0) || !std::isfinite(request.tau0)) {
+        throw std::runtime_error(
+            "--tau0: the step between samples in s is needed (or --time COLUMN)");
+    }
+    if (request.tau0 < kShortestStep || request.tau0 > kLongestStep) {
+        std::ostringstream message;
+        message << request.file << ": steps of " << request.tau0
+                << " s found, expected 1e-9 to 1e9 s";
+        fail(message);
+    }
+    const auto large = std::find_if(values.begin(), values.end(),
+                                    [](double v) { return std::abs(v) > kLargestValue; });
+    if (large != values.end()) {
+        std::ostringstream message;
+        message << request.file << ": sample " << large - values.begin() + 1 << ": " << *large
+                << " found, expected at most " << kLargestValue;
+        fail(message);
+    }
+}
+
 }  // namespace
 
 double to_deg_per_hour(const std::string& unit, bool phase) {
@@ -225,24 +247,7 @@ AllanAnalysis analyse(const AllanRequest& asked) {
     analysis.column = file.column;
     std::vector<double> values =
         request.time.empty() ? std::move(file.values) : on_grid(file, request.file, request.tau0);
-    if (!(request.tau0 > 0) || !std::isfinite(request.tau0)) {
-        throw std::runtime_error(
-            "--tau0: the step between samples in s is needed (or --time COLUMN)");
-    }
-    if (request.tau0 < kShortestStep || request.tau0 > kLongestStep) {
-        std::ostringstream message;
-        message << request.file << ": steps of " << request.tau0
-                << " s found, expected 1e-9 to 1e9 s";
-        fail(message);
-    }
-    const auto large = std::find_if(values.begin(), values.end(),
-                                    [](double v) { return std::abs(v) > kLargestValue; });
-    if (large != values.end()) {
-        std::ostringstream message;
-        message << request.file << ": sample " << large - values.begin() + 1 << ": " << *large
-                << " found, expected at most " << kLargestValue;
-        fail(message);
-    }
+    check_range(request, values);
     // A phase wanders far without an outlier: its steps are what can be judged.
     std::vector<double> steps;
     if (request.phase) {

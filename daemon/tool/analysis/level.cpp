@@ -287,79 +287,94 @@ void plot_run(const std::string& path, const levelling::SimulatedStart& run) {
     plot::write_file((where / "rate.svg").string(), rate.svg());
 }
 
-/// Many starts with tilts and drifts up to those given and a step at any time before settling.
-int run_many(const Options& options) {
+/// What became of many starts.
+struct ManyStarts {
+    std::vector<double> times;  ///< of those that settled, ascending, s
+    double bound = 0;           ///< s, after the start or the step
+    double worst_tilt = 0;      ///< when declared, rad
+    std::size_t late = 0, never = 0, falsely = 0;
+
+    [[nodiscard]] double time_within(double part) const {
+        return times.empty()
+                   ? std::nan("")
+                   : times[static_cast<std::size_t>(part * static_cast<double>(times.size() - 1))];
+    }
+};
+
+/// A start with tilts and drifts up to those given and a step at any time before settling.
+levelling::Scenario random_start(const Options& options, double settling_s, std::size_t number) {
+    levelling::Scenario start = scenario_of(options);
+    start.seed = options.seed + number;
+    start.until_settled = true;
+    std::mt19937_64 generator(start.seed ^ 0x5eedU);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (std::size_t i = 0; i < 2; ++i) {
+        start.tilt[i] *= uniform(generator);
+        start.drift[i] *= uniform(generator);
+        start.step[i] = std::copysign(start.step[i], uniform(generator));
+    }
+    start.step_s = options.step != 0 ? settling_s * (1 + uniform(generator)) : -1;
+    return start;
+}
+
+ManyStarts simulate_many(const Options& options, const levelling::LevellerSettings& loop,
+                         double tolerance) {
     Progress progress("levelling");
-    std::vector<double> times;
-    double worst_tilt = 0;
-    std::size_t late = 0;
-    std::size_t never = 0;
-    const levelling::LevellerSettings loop = settings_of(options);
-    const levelling::Leveller leveller(loop);
+    ManyStarts many;
     const auto declared = declared_within(options, loop);
-    const double bound = declared ? 1.05 * *declared : levelling::kPatience * loop.settling_s;
-    std::size_t falsely = 0;
+    many.bound = declared ? 1.05 * *declared : levelling::kPatience * loop.settling_s;
     for (std::size_t n = 0; n < options.runs; ++n) {
         progress.show(n, options.runs);
-        levelling::Scenario start = scenario_of(options);
-        start.seed = options.seed + n;
-        start.until_settled = true;
-        std::mt19937_64 generator(start.seed ^ 0x5eedU);
-        std::uniform_real_distribution<double> uniform(-1, 1);
-        for (std::size_t i = 0; i < 2; ++i) {
-            start.tilt[i] *= uniform(generator);
-            start.drift[i] *= uniform(generator);
-            start.step[i] = std::copysign(start.step[i], uniform(generator));
-        }
-        start.step_s = options.step != 0 ? loop.settling_s * (1 + uniform(generator)) : -1;
+        const levelling::Scenario start = random_start(options, loop.settling_s, n);
         const levelling::SimulatedStart run = levelling::simulate(start);
         if (run.verdict != levelling::Verdict::settled) {
-            ++never;
+            ++many.never;
             continue;
         }
         const bool stepped = start.step_s >= 0 && start.step_s < run.settled_s;
-        late += run.settled_s - (stepped ? start.step_s : 0) > bound ? 1 : 0;
+        many.late += run.settled_s - (stepped ? start.step_s : 0) > many.bound ? 1 : 0;
         double tilt = 0;
         for (std::size_t i = 0; i < 2; ++i) {
             tilt = std::max(tilt,
                             std::abs(run.tilt_when_settled[i] + start.zero[i] / options.gravity));
         }
-        falsely += tilt > 2 * leveller.tolerance() ? 1U : 0U;
-        worst_tilt = std::max(worst_tilt, tilt);
-        times.push_back(run.settled_s);
+        many.falsely += tilt > 2 * tolerance ? 1U : 0U;
+        many.worst_tilt = std::max(many.worst_tilt, tilt);
+        many.times.push_back(run.settled_s);
     }
-    std::sort(times.begin(), times.end());
-    const auto at = [&](double part) {
-        return times.empty()
-                   ? std::nan("")
-                   : times[static_cast<std::size_t>(part * static_cast<double>(times.size() - 1))];
-    };
-    const bool good = never == 0 && 20 * late <= options.runs && falsely == 0;
+    std::sort(many.times.begin(), many.times.end());
+    return many;
+}
+
+int run_many(const Options& options) {
+    const levelling::LevellerSettings loop = settings_of(options);
+    const double tolerance = levelling::Leveller(loop).tolerance();
+    const ManyStarts many = simulate_many(options, loop, tolerance);
     if (options.json) {
         std::cout << Json{{"runs", options.runs},
-                          {"settled", times.size()},
-                          {"late", late},
-                          {"false", falsely},
-                          {"bound_s", bound},
-                          {"median_s", number(at(0.5))},
-                          {"p95_s", number(at(0.95))},
-                          {"longest_s", number(at(1))},
-                          {"worst_tilt_arcmin", worst_tilt / kArcmin},
-                          {"tolerance_arcmin", leveller.tolerance() / kArcmin}}
+                          {"settled", many.times.size()},
+                          {"late", many.late},
+                          {"false", many.falsely},
+                          {"bound_s", many.bound},
+                          {"median_s", number(many.time_within(0.5))},
+                          {"p95_s", number(many.time_within(0.95))},
+                          {"longest_s", number(many.time_within(1))},
+                          {"worst_tilt_arcmin", many.worst_tilt / kArcmin},
+                          {"tolerance_arcmin", tolerance / kArcmin}}
                          .dump()
                   << '\n';
     } else {
         std::cout << text(
                          "%zu of %zu settled, %zu later than %.5g s after the start or the step, "
                          "%zu declared falsely\n",
-                         times.size(), options.runs, late, bound, falsely)
+                         many.times.size(), options.runs, many.late, many.bound, many.falsely)
                   << text(
                          "time: median %.5g s, 95 %% within %.5g s, longest %.5g s; largest tilt "
                          "when declared %.3g' (tolerance %.3g')\n",
-                         at(0.5), at(0.95), at(1), worst_tilt / kArcmin,
-                         leveller.tolerance() / kArcmin);
+                         many.time_within(0.5), many.time_within(0.95), many.time_within(1),
+                         many.worst_tilt / kArcmin, tolerance / kArcmin);
     }
-    return good ? 0 : kNo;
+    return many.never == 0 && 20 * many.late <= options.runs && many.falsely == 0 ? 0 : kNo;
 }
 
 int run_simulate(const Options& options) {

@@ -6,10 +6,13 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 
 #include "daemon/commission/bus_list.hpp"
+#include "daemon/commission/bus_signals.hpp"
 #include "daemon/tool/commands.hpp"
 #include "drivers/can/can_port.hpp"
 #include "proto/candump.hpp"
@@ -19,8 +22,8 @@ namespace vibrig::tool {
 namespace {
 
 struct BusOptions {
-    std::string interface, seqpacket, candump;
-    double seconds = 10;
+    std::string interface, seqpacket, candump, dbc;
+    double seconds = 10, turn_at = 0;
     bool turn = false, json = false;
 };
 
@@ -34,7 +37,23 @@ void listen_for(drivers::CanPort& port, boost::asio::io_context& io, double seco
                                  ", expected it running");
 }
 
-void listen_live(const BusOptions& options, commission::BusList& bus) {
+/// Bytes, and where there is a DBC its signals.
+struct Heard {
+    commission::BusList bytes;
+    std::optional<commission::BusSignals> signals;
+
+    void add(std::uint32_t id, bool extended, std::span<const std::uint8_t> data,
+             drivers::Time time) {
+        bytes.add(id, extended, data, time);
+        if (signals) signals->add(id, extended, data);
+    }
+    void turned() {
+        bytes.turned();
+        if (signals) signals->turned();
+    }
+};
+
+void listen_live(const BusOptions& options, Heard& bus) {
     boost::asio::io_context io;
     drivers::CanPortSettings settings;
     if (options.interface.empty()) {
@@ -66,10 +85,13 @@ void listen_live(const BusOptions& options, commission::BusList& bus) {
     port->stop();
 }
 
-void read_log(const std::string& path, commission::BusList& bus) {
-    proto::CandumpReader reader(path);
+void read_log(const BusOptions& options, Heard& bus) {
+    proto::CandumpReader reader(options.candump);
+    std::optional<drivers::Time> turn;
     while (const auto frame = reader.next()) {
         if (frame->error || frame->remote) continue;
+        if (!turn) turn = frame->time_ns + drivers::from_seconds(options.turn_at);
+        if (options.turn_at > 0 && frame->time_ns >= *turn) bus.turned();
         bus.add(frame->id, frame->extended, {frame->data.data(), frame->size}, frame->time_ns);
     }
 }
@@ -81,19 +103,29 @@ int list_bus(const BusOptions& options) {
         throw std::runtime_error("found " + std::to_string(sources) +
                                  " of --interface, --seqpacket and --candump, expected one");
     if (options.turn && !options.candump.empty())
-        throw std::runtime_error("--turn: found a log, expected a bus to listen to");
-    commission::BusList bus;
+        throw std::runtime_error("--turn: found a log, expected a bus to listen to, or --turn-at");
+    if (options.turn_at > 0 && options.candump.empty())
+        throw std::runtime_error("--turn-at: found a bus, expected a log (--candump)");
+    Heard bus;
+    if (!options.dbc.empty()) bus.signals.emplace(proto::read_dbc(options.dbc));
+    const bool turned = options.turn || options.turn_at > 0;
     if (options.candump.empty())
         listen_live(options, bus);
     else
-        read_log(options.candump, bus);
-    if (options.json)
-        std::cout << commission::json_of(bus).dump(1) << '\n';
-    else
-        std::cout << commission::table_of(bus);
-    if (bus.frames() > 0) return 0;
-    std::cerr << "vibrig commission bus: no frame was heard\n";
-    return kNo;
+        read_log(options, bus);
+    if (options.json) {
+        auto all = commission::json_of(bus.bytes);
+        if (bus.signals) all.update(commission::json_of(*bus.signals, turned));
+        std::cout << all.dump(1) << '\n';
+    } else {
+        std::cout << commission::table_of(bus.bytes);
+        if (bus.signals) std::cout << commission::table_of(*bus.signals, turned);
+    }
+    if (bus.bytes.frames() == 0) {
+        std::cerr << "vibrig commission bus: no frame was heard\n";
+        return kNo;
+    }
+    return turned && bus.signals && !bus.signals->winner() ? kNo : 0;
 }
 
 }  // namespace
@@ -113,10 +145,18 @@ void add_commission_bus(CLI::App& commissioning, int& exit_code) {
     command.add_flag("--turn", options->turn,
                      "Listen as long once more while somebody turns one gimbal: which bytes change "
                      "only then");
+    command
+        .add_option("--turn-at", options->turn_at,
+                    "Of a log: s from its beginning on which one gimbal is turned")
+        ->check(CLI::Range(0.5, 1e5));
+    command.add_option(
+        "--dbc", options->dbc,
+        "Its signals, too: range and noise, and which one follows the gimbal that is "
+        "turned");
     command.add_flag("--json", options->json, "As JSON");
     command.footer(
-        "Example: vibrig commission bus --interface can0 --turn\n"
-        "Exit code 0: frames were heard; 1: none.");
+        "Example: vibrig commission bus --interface can0 --turn --dbc rig.dbc\n"
+        "Exit code 0: frames were heard, and if asked one signal follows; 1: not so.");
     command.callback([&exit_code, options] {
         exit_code = guarded([&] { return list_bus(*options); }, "vibrig commission bus: ");
     });

@@ -42,6 +42,8 @@ void unknown_unit(archive::Index& index, const std::string& serial) {
 
 int trend(const TrendOptions& o, const ArchiveOptions& where) {
     const auto index = open_index(where);
+    // An empty filter is none: campaigns of many units are no unit's history.
+    if (o.serial.empty()) unknown_unit(*index, o.serial);
     archive::Filter filter;
     filter.serial = o.serial;
     if (!o.since.empty()) filter.since_utc_ns = utc_of("--since", o.since);

@@ -399,6 +399,20 @@ TEST(Misfit, ChannelsAndCommandsGoToTheGimbalsTheyAreWiredTo) {
     EXPECT_NE(rig.readings().raw_g[0], 0);
 }
 
+TEST(Misfit, AReadingCountsInItsUnitAndBeginsAnewAfter360) {
+    Truth truth = quiet();
+    truth.angle_unit = {AngleUnit::turn, AngleUnit::rad, AngleUnit::twice};
+    Rig rig(truth);
+    rig.slew_to({90, 20, 200});  // commands count in deg
+    for (int i = 0; i < 2000; ++i) rig.advance();
+    expect_near(rig.readings().encoder_deg, {0.25, 20 / 57.29577951, 40}, 1e-3);
+    truth.angle_unit = {AngleUnit::gon, AngleUnit::arcmin, AngleUnit::half};
+    Rig other(truth);
+    other.slew_to({90, 5, 200});
+    for (int i = 0; i < 2000; ++i) other.advance();
+    expect_near(other.readings().encoder_deg, {100, 300, 100}, 0.05);
+}
+
 TEST(Misfit, AGimbalThatIsStuckStaysAndTheOthersMove) {
     Truth truth = quiet();
     truth.stuck_gimbal = GimbalAxis::inner;

@@ -32,6 +32,7 @@ TEST(Truth, SurvivesWritingAndReading) {
     truth.step_at_s = 1e3;
     truth.dead = Axis{2, 1};
     truth.stuck_gimbal = GimbalAxis::inner;
+    truth.angle_unit[2] = AngleUnit::gon;
     truth.channel = {GimbalAxis::azimuth, GimbalAxis::outer, GimbalAxis::inner};
     truth.cross_axis = {0.05, -0.1};
     truth.cubic_deg_h_g3[2] = {1e-3, 2e-3, 3e-3};
@@ -86,6 +87,10 @@ TEST(Truth, NamesTheKeyOfBadInput) {
            "drift.step_at_s: found \"soon\", expected a number from 0");
     expect(replaced(good, "\"step_after_dwell\": null", "\"step_after_dwell\": 1.5"),
            "drift.step_after_dwell: found 1.5, expected a whole number");
+    expect(
+        replaced(good, "\"deg\"", "\"grad\""),
+        "platform.angle_unit[0]: found \"grad\", expected \"deg\", \"turn\", \"rad\", \"arcmin\", "
+        "\"gon\", \"twice\" or \"half\"");
     expect(replaced(good, "\"stuck_gimbal\": null", "\"stuck_gimbal\": \"middle\""),
            "platform.stuck_gimbal: found \"middle\", expected \"outer\", \"inner\" or \"azimuth\"");
     expect(replaced(good, "\"dead\": null", "\"dead\": \"x\""),

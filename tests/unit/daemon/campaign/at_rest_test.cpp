@@ -45,11 +45,11 @@ void expect_honest_zeros(std::uint64_t seeds, const Draw& draw) {
                         draw.misalignment_arcsec * kRadPerArcsec * normal(generator);
             }
         }
-        LevellingStage levelling({}, {}, sample_s, 3000);
+        PositionLeveller levelling({}, {}, sample_s, 3000);
         ZeroingSettings settings;
         settings.both_ways = draw.both_ways;
         settings.second_axis = draw.second_axis;
-        ZeroingStage zeroing(settings, {}, sample_s);
+        ZeroCalibration zeroing(settings, {}, sample_s);
         RigAtRest rig(truth);
         zeroing.begin();
         ASSERT_EQ(rig.zero_all(zeroing, &levelling), "");

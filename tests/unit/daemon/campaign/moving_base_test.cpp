@@ -9,7 +9,7 @@
 #include <span>
 #include <string>
 
-#include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/position_leveller.hpp"
 #include "daemon/rt/stage_feed.hpp"
 #include "drivers/sample/assembler.hpp"
 #include "estimator/levelling/noise_budget.hpp"
@@ -59,7 +59,7 @@ Ride ride(std::uint64_t seed, bool configured, bool moves, double lost_from_s = 
     }
     const proto::Dbc& dbc = moving_dbc();
     rt::StageFeed feed(dbc, bound, nullptr);
-    LevellingStage stage(settings, rig, kBaseSample_s, 3000);
+    PositionLeveller stage(settings, rig, kBaseSample_s, 3000);
     EXPECT_EQ(stage.refusal(), "");
     const double heading = std::numbers::pi * any(random);
     const Vector ahead{std::cos(heading), 0, std::sin(heading)};

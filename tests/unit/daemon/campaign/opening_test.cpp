@@ -4,7 +4,7 @@
 #include <functional>
 #include <numbers>
 
-#include "daemon/campaign/opening_stage.hpp"
+#include "daemon/campaign/opening_check.hpp"
 #include "estimator/commissioning/opening.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "tests/plant/platform_model.hpp"

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <string>
 
-#include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/position_leveller.hpp"
 #include "daemon/campaign/rig_frame.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/zero_calibration.hpp"
 #include "tests/plant/rig.hpp"
 
 namespace vibrig::campaign {
@@ -27,7 +27,7 @@ class RigAtRest {
     }
 
     /// At these angles, as the campaign does it; the reason why not, else empty.
-    std::string level(LevellingStage& stage, const Vector& encoder_deg, const ZeroStatus& zeros,
+    std::string level(PositionLeveller& stage, const Vector& encoder_deg, const ZeroStatus& zeros,
                       Vector& encoder_rad, std::uint32_t block = 4) {
         rig_.release();
         stage.begin(encoder_deg, zeros);
@@ -52,7 +52,7 @@ class RigAtRest {
     }
 
     /// All ways that the stage asks for; begun before.
-    std::string zero_all(ZeroingStage& stage, LevellingStage* levelling) {
+    std::string zero_all(ZeroCalibration& stage, PositionLeveller* levelling) {
         auto why = zero(stage, levelling);
         while (why.empty() && stage.another()) {
             stage.begin_other_way();
@@ -62,7 +62,7 @@ class RigAtRest {
     }
 
     /// One run, begun before.
-    std::string zero(ZeroingStage& stage, LevellingStage* levelling) {
+    std::string zero(ZeroCalibration& stage, PositionLeveller* levelling) {
         slew(stage.target_deg(), plant::GimbalMode::slew);
         settle();
         if (levelling != nullptr) {

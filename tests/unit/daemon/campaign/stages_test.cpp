@@ -6,7 +6,7 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/zero_calibration.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
 #include "tests/unit/daemon/rt/fake_shaker.hpp"
@@ -371,7 +371,7 @@ TEST_F(StagesTest, AnAbortWhileLevellingLetsTheTorquersGo) {
 }
 
 /// Feeds one run, begun before, from the strapdown simulation of a unit.
-void feed_run(ZeroingStage& stage, const RigFrame& frame,
+void feed_run(ZeroCalibration& stage, const RigFrame& frame,
               const estimator::zeros::UnitErrors& errors, bool down, std::uint64_t seed) {
     estimator::zeros::CalibrationSettings unit;
     unit.site.latitude_rad = 45.75 * kRadPerDeg;
@@ -399,7 +399,8 @@ void feed_run(ZeroingStage& stage, const RigFrame& frame,
     }
 }
 
-void feed_unit(ZeroingStage& stage, const RigFrame& frame, double zero_x_mg, std::uint64_t seed) {
+void feed_unit(ZeroCalibration& stage, const RigFrame& frame, double zero_x_mg,
+               std::uint64_t seed) {
     estimator::zeros::UnitErrors errors;
     errors.zero_mg = {zero_x_mg, -3, 2};
     errors.azimuth_deg = 0;
@@ -416,7 +417,7 @@ estimator::Settings rig_of_the_unit() {
     return rig;
 }
 
-TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
+TEST(ZeroCalibration, WithZDownTooItTakesZeroAndScaleOfZApart) {
     // GIVEN scale errors of 200 ppm, twice what they are said to be, and misalignments of 100 and
     // -50 arcsec
     const estimator::Settings rig = rig_of_the_unit();
@@ -429,7 +430,7 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     errors.azimuth_deg = 0;
     ZeroingSettings settings;
     settings.both_ways = false;
-    ZeroingStage one_way(settings, rig, kSample_s);
+    ZeroCalibration one_way(settings, rig, kSample_s);
     one_way.begin();
     EXPECT_FALSE(one_way.another());
     feed_run(one_way, frame, errors, false, 11);
@@ -445,7 +446,7 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_THAT(one_way.words(), HasSubstr("zero + 1 g x misalignment"));
     // WHEN both runs are made
     settings.both_ways = true;
-    ZeroingStage stage(settings, rig, kSample_s);
+    ZeroCalibration stage(settings, rig, kSample_s);
     EXPECT_EQ(stage.expected_s(), 2 * one_way.expected_s());
     stage.begin();
     ASSERT_TRUE(stage.another());
@@ -473,7 +474,7 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_NEAR(stage.level_sigma({90, 0, 0}), 1e-3 * found.sigma_mg[2], 1e-9);
     EXPECT_GT(one_way.level_sigma({90, 0, 0}), 1e-4);
     // WHEN the second run fails, THEN nothing is taken over
-    ZeroingStage spoilt(settings, rig, kSample_s);
+    ZeroCalibration spoilt(settings, rig, kSample_s);
     spoilt.begin();
     feed_run(spoilt, frame, errors, false, 11);
     spoilt.begin_other_way();
@@ -481,17 +482,17 @@ TEST(ZeroingStage, WithZDownTooItTakesZeroAndScaleOfZApart) {
     EXPECT_FALSE(spoilt.status().known);
 }
 
-TEST(ZeroingStage, TakesTheNoiseOfOneSampleAsADensityAtItsOwnRate) {
+TEST(ZeroCalibration, TakesTheNoiseOfOneSampleAsADensityAtItsOwnRate) {
     estimator::Settings rig = rig_of_the_unit();
     rig.accelerometer_g = 1e-3;
     for (const double rate_hz : {40.0, 100.0, 1000.0}) {
         // white noise of sigma per sample has the density sigma sqrt(period)
-        EXPECT_DOUBLE_EQ(ZeroingStage({}, rig, 1 / rate_hz).plan().noise.velocity_random_walk,
+        EXPECT_DOUBLE_EQ(ZeroCalibration({}, rig, 1 / rate_hz).plan().noise.velocity_random_walk,
                          1e-3 / std::sqrt(rate_hz));
     }
 }
 
-TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
+TEST(ZeroCalibration, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     // GIVEN the zeros of a unit at the start
     estimator::Settings rig = rig_of_the_unit();
     const RigFrame frame(rig);
@@ -499,7 +500,7 @@ TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     EXPECT_NEAR(frame.up_at_deg(frame.azimuth_vertical_deg(37, true))[2], -1, 1e-12);
     ZeroingSettings one_way;
     one_way.both_ways = false;
-    ZeroingStage stage(one_way, rig, kSample_s);
+    ZeroCalibration stage(one_way, rig, kSample_s);
     feed_unit(stage, frame, 5, 1);
     ASSERT_EQ(stage.finish(false), "");
     const Vector found = stage.raw_zero_g();
@@ -520,7 +521,7 @@ TEST(ZeroingStage, AChangeAboveThreeStandardDeviationsMarksTheCampaign) {
     EXPECT_NEAR(stage.status().zero_mg[0], 5, 0.05);
     // AND an `up` that the gimbals cannot bring to the azimuth axis is refused
     rig.up = {0, 1};
-    EXPECT_THROW(ZeroingStage({}, rig, kSample_s), estimator::SettingsError);
+    EXPECT_THROW(ZeroCalibration({}, rig, kSample_s), estimator::SettingsError);
 }
 
 TEST(StageFeed, PairsIncrementsByTheirCounterAndAccountsForEveryFrame) {

@@ -41,6 +41,7 @@ class Commissioned : public ::testing::Test {
                                   : drivers::GimbalState::slewing;
         };
         p.keep = [this](const Json& log) { kept = log; };
+        p.note = [this](const Note& note) { notes.push_back(note); };
         p.event = [this](Severity, const std::string& text) { events.push_back(text); };
         return p;
     }
@@ -170,6 +171,7 @@ class Commissioned : public ::testing::Test {
     std::unique_ptr<Procedure> procedure;
     std::map<std::string, std::string> answers;
     std::vector<std::string> asked, events;
+    std::vector<Note> notes;
     Time now = 100 * kSecond, arrives = 0, drifting_since = 0;
     bool based = false, good = true, attended = true, azimuth_grew = false;
     double gain = 1, offset_deg = 0;

@@ -134,8 +134,7 @@ TEST_F(Moved, AnAnswerIsKeptWithWhoGaveIt) {
     procedure->begin("Ada", false, now);
     EXPECT_EQ(procedure->answer("Ada (uid 0)", "power", "yes"), "");
     ASSERT_FALSE(events.empty());
-    EXPECT_EQ(events.back(),
-              "commissioning: Is the shaker's power stage off? yes, says Ada (uid 0)");
+    EXPECT_EQ(events.back(), "Is the shaker's power stage off? yes, says Ada (uid 0)");
 }
 
 TEST_F(Moved, WhoIsGoneStopsAMeanToo) {

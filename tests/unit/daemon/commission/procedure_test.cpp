@@ -10,6 +10,7 @@ namespace vibrig::commission {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// Of the keys found, against the truth.
 void expect_right(const UnknownRig& rig, const Json& result, bool commanded = true) {
@@ -65,6 +66,30 @@ void expect_right(const UnknownRig& rig, const Json& result, bool commanded = tr
         if (commanded && rig.sign[g] * rig.direction[g] != 1) ++wrong;
     }
     EXPECT_EQ(result["corrections"].size(), wrong) << result["corrections"].dump(1);
+}
+
+TEST_F(Commissioned, EachStepIsNotedForTheJournalAndNoEventNamesItsSourceTwice) {
+    rig_of(1);
+    ASSERT_EQ(run()["result"]["outcome"], "decided");
+    std::map<std::string, int> count;
+    std::string steps;
+    for (const Note& note : notes) {
+        ++count[note.what];
+        EXPECT_EQ(note.by, "Ada");
+        EXPECT_EQ(note.part, note.step == "F" ? "earth" : "gimbals");
+        if (!steps.ends_with(note.step)) steps += note.step;
+    }
+    EXPECT_THAT(steps, ::testing::StartsWith("ABCD"));
+    EXPECT_THAT(steps, ::testing::EndsWith("F"));
+    EXPECT_EQ(count["begin"], 1);
+    EXPECT_EQ(count["verdict"], 1);
+    EXPECT_EQ(count["hypothesis"], 1);
+    EXPECT_EQ(count["permission"] + count["answer"], count["question"]);
+    EXPECT_GE(count["permission"], 5);  // power, hold, three gimbals
+    EXPECT_EQ(count["move"], slews);
+    EXPECT_GE(count["reading"], 23);
+    EXPECT_EQ(notes.back().data["outcome"], "decided");
+    for (const auto& event : events) EXPECT_THAT(event, Not(HasSubstr("commissioning:")));
 }
 
 TEST_F(Commissioned, RandomRigsAreNamedRightOrNotAtAll) {

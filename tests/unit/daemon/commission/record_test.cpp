@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "daemon/commission/acceptance.hpp"
+#include "daemon/journal/signing_key.hpp"
 
 namespace vibrig::commission {
 namespace {
@@ -261,6 +262,41 @@ TEST_F(Books, ARecordThatWasEditedIsNone) {
     EXPECT_THAT(Book(as).refusal(kNow), AllOf(HasSubstr("record.json"), HasSubstr("SHA-256")));
     std::ofstream(path) << "nonsense";
     EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("not a commissioning record"));
+}
+
+TEST_F(Books, ARecordWhoseHashesWereMadeAnewIsNotSigned) {
+    const auto as = loaded("[platform]\nencoder_sign = [1, -1, 1]\n");
+    prove_all(loaded());
+    const auto path = folder / "record.json";
+    const std::string genuine = text_of(path);
+    ASSERT_EQ(record_from_json(genuine).signed_with.size(), 64U);
+    EXPECT_EQ(Book(as).status(kNow)["signed_with"], record_from_json(genuine).signed_with);
+    // GIVEN one who knows how hashes are made, and has no key
+    Record forged = record_from_json(genuine);
+    for (auto& [part, r] : forged.parts)
+        if (r.keys.contains("platform.encoder_sign"))
+            r.keys["platform.encoder_sign"] = "[1, -1, 1]";
+    Json whole = Json::parse(to_json(forged));
+    whole["signature"] = Json::parse(genuine)["signature"];
+    std::ofstream(path) << whole.dump(1) << '\n';
+    // WHEN the daemon reads it THEN nothing is armed
+    EXPECT_THAT(Book(as).refusal(kNow), AllOf(HasSubstr("record.json: its signature is not that of "
+                                                        "what it says")));
+    // AND neither is it by a key of the forger's
+    journal::SigningKey own((folder / "own.key").string());
+    std::ofstream(path) << to_json(forged, &own);
+    EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("signed with another key than"));
+    // AND on a real rig without any
+    forged.simulated = false;
+    std::ofstream(path) << to_json(forged);
+    auto real = as;
+    real.configuration.commission.simulated = false;
+    EXPECT_THAT(Book(real).refusal(kNow), HasSubstr("it carries no signature, expected that of"));
+    // AND the genuine one not without its key
+    std::ofstream(path) << genuine;
+    EXPECT_EQ(Book(loaded()).refusal(kNow), "");
+    std::filesystem::remove(folder / "record.key");
+    EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("record.key, which has signed it, is gone"));
 }
 
 TEST_F(Books, ARecordOfASimulatedRigDoesNotCountOnARealOne) {

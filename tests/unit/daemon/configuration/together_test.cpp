@@ -137,6 +137,20 @@ TEST(Together, ThePageIsForThisMachineAlone) {
             << page;
 }
 
+TEST(Together, AnArchiveThatNothingReachesIsRefused) {
+    const std::string index = "archive.index = \"postgresql://db.lab/a\"\n";
+    const std::string folder = "archive.folder = \"/lab\"\n";
+    EXPECT_EQ(complaint(index + folder, true), "");
+    EXPECT_THAT(complaint(index, true),
+                AllOf(StartsWith("rig.toml:1:17: archive.index: found \"postgresql://db.lab/a\" "
+                                 "without archive.folder"),
+                      HasSubstr("nothing is delivered")));
+    EXPECT_THAT(complaint(folder + "record.enabled = false\n", true),
+                AllOf(StartsWith("rig.toml:1:18: archive.folder: found an archive with "
+                                 "record.enabled = false"),
+                      HasSubstr("cannot be delivered")));
+}
+
 TEST(Together, RemoteNeedsCertificates) {
     const std::string remote = "[server]\nremote = \"0.0.0.0:8443\"\n";
     const std::string certificate = "certificate = \"rig.crt\"\n", key = "key = \"rig.key\"\n";

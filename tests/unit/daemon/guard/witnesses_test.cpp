@@ -79,6 +79,82 @@ TEST(Witnesses, RestOnlyWhenAllOfThemDo) {
     EXPECT_TRUE(witnesses.sight(bus.now).moves(safety::kMoving_g));
 }
 
+/// What it shows of a table that shakes at 5 g, with the accelerometers' noise.
+struct Shown {
+    bool table_stuck = false, platform_stuck = false;
+    double noise_g = 1e-4;
+};
+
+/// As the guard does, a look every 50 ms.
+Sight watched(Witnesses& witnesses, Bus& bus, double table_g, double shaker_g, double seconds,
+              const Shown& shown) {
+    for (int i = 0; i < seconds * 40; ++i) {
+        bus.now += kPeriod;
+        const double wave =
+            table_g * std::sin(2 * std::numbers::pi * 15 * drivers::to_seconds(bus.now));
+        const double noise = shown.noise_g * (i % 3 - 1);
+        bus.sample(shown.table_stuck ? 0 : wave + noise,
+                   shown.platform_stuck ? 0 : 0.6667 * wave + noise, bus.now);
+        if (i % 2 == 0) witnesses.doubt(bus.now, shaker_g);
+    }
+    return witnesses.sight(bus.now);
+}
+
+TEST(Witnesses, ThatAreStuckWhileTheShakerSaysThatItShakesAreNotAtRest) {
+    WitnessSettings settings;
+    settings.table.clear();
+    Witnesses witnesses(settings);
+    Bus bus(witnesses);
+    // GIVEN the only witness, stuck while the controller does 5 g
+    const Shown stuck{.platform_stuck = true};
+    EXPECT_TRUE(watched(witnesses, bus, 0, 0, 2, stuck).rests(safety::kRest_g)) << "nobody shakes";
+    const auto sight = watched(witnesses, bus, 5, 5, 1.2, stuck);
+    EXPECT_TRUE(sight.platform_stuck);
+    EXPECT_FALSE(sight.rests(safety::kRest_g));
+    EXPECT_FALSE(sight.known()) << "nothing is armed with a guard that sees nothing";
+    // WHEN the controller says that it stopped THEN that is not believed
+    EXPECT_FALSE(watched(witnesses, bus, 5, 0, 10, stuck).rests(safety::kRest_g));
+    // but by its noise it is seen to live
+    EXPECT_TRUE(watched(witnesses, bus, 0, 0, 1, {}).rests(safety::kRest_g));
+}
+
+TEST(Witnesses, OfTwoTheOneThatIsNotStuckDecides) {
+    for (const bool table : {true, false}) {
+        Witnesses witnesses{WitnessSettings{}};
+        Bus bus(witnesses);
+        const Shown stuck{.table_stuck = table, .platform_stuck = !table};
+        // No word of the controller is needed: the other one moves.
+        const auto shaken = watched(witnesses, bus, 5, 0, 3, stuck);
+        EXPECT_EQ(shaken.table_stuck, table);
+        EXPECT_EQ(shaken.platform_stuck, !table);
+        EXPECT_TRUE(shaken.known());
+        EXPECT_FALSE(shaken.rests(safety::kRest_g));
+        EXPECT_NEAR(shaken.table_g, 5, 0.4);
+        EXPECT_TRUE(watched(witnesses, bus, 0, 0, 2, stuck).rests(safety::kRest_g));
+    }
+}
+
+TEST(Witnesses, WhatIsStillBecauseNothingShakesIsNotStuck) {
+    Witnesses witnesses{WitnessSettings{}};
+    Bus bus(witnesses);
+    // GIVEN readings without any noise, at rest, shaken, at rest
+    for (const double g : {0.0, 5.0, 0.0}) {
+        const auto sight = watched(witnesses, bus, g, g, 5, {.noise_g = 0});
+        EXPECT_FALSE(sight.table_stuck || sight.platform_stuck) << g;
+        EXPECT_EQ(sight.rests(safety::kRest_g), g == 0);
+    }
+}
+
+TEST(Witnesses, OneThatIsSilentIsNotCalledStuck) {
+    Witnesses witnesses{WitnessSettings{}};
+    Bus bus(witnesses);
+    watched(witnesses, bus, 5, 5, 2, {});
+    for (int i = 0; i < 60; ++i) witnesses.doubt(bus.now += kPeriod, 5);
+    const auto sight = witnesses.sight(bus.now);
+    EXPECT_FALSE(sight.table_stuck || sight.platform_stuck);
+    EXPECT_FALSE(sight.rests(safety::kRest_g)) << "what is not seen is not at rest";
+}
+
 TEST(Witnesses, AnAxisThatSaysInvalidIsNotBelieved) {
     Witnesses witnesses{WitnessSettings{}};
     Bus bus(witnesses);

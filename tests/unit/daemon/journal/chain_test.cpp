@@ -234,6 +234,33 @@ TEST_F(ChainTest, NamesWhatWasChangedByHand) {
     }
 }
 
+TEST_F(ChainTest, TheTableOfCommissioningCameLaterAndIsMissedOnceItSaysSomething) {
+    // GIVEN a file of a release that had no such table
+    live();
+    by_hand("DROP TABLE commissioning");
+    EXPECT_THAT(found(), IsEmpty());
+    // WHEN this one goes on with it
+    {
+        Journal journal(path, kRig);
+        EXPECT_THAT(journal.recovery().refused, IsEmpty());
+        journal.start();
+        journal.commissioned(
+            {"gimbals", "B", "Ada", "uid 0", "permission", R"({"value":"yes"})", 9});
+        journal.stop();
+    }
+    // THEN what was done is in it and in the chain
+    EXPECT_THAT(found(), IsEmpty());
+    {
+        Database database(path, Database::Mode::read);
+        const auto row = database.ask("SELECT part, identity, what FROM commissioning").at(0);
+        EXPECT_THAT(row.texts, testing::ElementsAre("gimbals", "uid 0", "permission"));
+    }
+    // AND is missed
+    by_hand("DROP TABLE commissioning");
+    EXPECT_THAT(found(), Contains(HasSubstr("table commissioning is missing")));
+    EXPECT_THAT(next_start(), HasSubstr("table commissioning is missing"));
+}
+
 TEST_F(ChainTest, NoticesWhatSomebodyAddsWhoKnowsTheChainAndHasNoKey) {
     live();
     {

@@ -200,26 +200,6 @@ TEST(Plan, AnExactPlanTakesMoreOfWhatCostsLess) {
     }
 }
 
-TEST(Plan, RoundingKeepsTheSumAndTheShares) {
-    // GIVEN shares; WHEN rounded to n runs (Pukelsheim and Rieder 1992)
-    const Effort share{0.5, 0.3, 0.2, 0.0};
-    EXPECT_EQ(round_shares(share, 10), (Counts{5, 3, 2, 0}));
-    const Optimum best = d_optimum(rig({0, 6}));
-    const auto support = static_cast<std::size_t>(
-        std::count_if(best.share.begin(), best.share.end(), [](double w) { return w > 0; }));
-    for (const std::size_t n : {support, support + 7, std::size_t{200}}) {
-        const Counts counts = round_shares(best.share, n);
-        EXPECT_EQ(sum(counts), n);
-        // THEN no count is a whole run or more away from its share, but for the quota's shift
-        for (std::size_t i = 0; i < counts.size(); ++i) {
-            EXPECT_LT(
-                std::abs(static_cast<double>(counts[i]) - best.share[i] * static_cast<double>(n)),
-                1.0 + best.share[i] * static_cast<double>(support) / 2);
-        }
-    }
-    EXPECT_THROW(static_cast<void>(round_shares({0, 0}, 3)), PlanError);
-}
-
 TEST(Plan, PositionsPutTheVerticalWhereItIsAsked) {
     for (int axis = 0; axis < 3; ++axis) {
         for (const int sign : {1, -1}) {

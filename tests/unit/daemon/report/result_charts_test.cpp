@@ -8,11 +8,22 @@
 #include <fstream>
 #include <sstream>
 
+#include "daemon/plot/chart.hpp"
+
 namespace vibrig::report {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+
+TEST(Legend, ANameThatWouldNotFitIsDrawnIn) {
+    tool::plot::Chart chart;
+    for (const char* name : {"short", "measured by the controller"})
+        chart.curves.push_back({.name = name, .x = {0, 1}, .y = {0, 1}, .low = {}, .high = {}});
+    const auto svg = chart.svg();
+    EXPECT_THAT(svg, HasSubstr("textLength=\"146.00\">measured by the controller<"));
+    EXPECT_EQ(svg.find("textLength"), svg.rfind("textLength")) << "and only that";
+}
 
 class PlotOfAResult : public ::testing::Test {
   protected:

@@ -228,5 +228,42 @@ TEST(EstimatorStage, CountsSamplesItIsDoneWithTooLate) {
     }
 }
 
+/// CPUs a thread may run on.
+cpu_set_t cpus_of(pthread_t thread) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    EXPECT_EQ(::pthread_getaffinity_np(thread, sizeof set, &set), 0);
+    return set;
+}
+
+TEST(EstimatorStage, WorksWhereItIsGivenSamples) {
+    // GIVEN a stage that stays by the giver, and as many CPUs as this machine lends us
+    const cpu_set_t all = cpus_of(::pthread_self());
+    StandingClock clock;
+    const auto self = clock.make_waiter(), control = clock.make_waiter();
+    Ring<drivers::Sample> ring(16);
+    estimator::Identification identification{estimator::Settings{}};
+    EstimatorStage stage(ring, *self, *control, identification);
+    HandOver& hand = stage.time_by(clock, kSecond);
+    stage.stay_by_giver();
+    std::thread thread([&] { stage.run(); });
+    const cpu_set_t at_first = cpus_of(thread.native_handle());
+    EXPECT_TRUE(CPU_EQUAL(&all, &at_first));
+    // WHEN samples come from one CPU after the other
+    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+        if (!CPU_ISSET(static_cast<std::size_t>(cpu), &all)) continue;
+        hand.given(clock.time, cpu);
+        self->notify();
+        // THEN it comes along
+        const auto there = [&] {
+            const cpu_set_t set = cpus_of(thread.native_handle());
+            return CPU_COUNT(&set) == 1 && CPU_ISSET(static_cast<std::size_t>(cpu), &set);
+        };
+        while (!there()) std::this_thread::yield();
+    }
+    stage.stop();
+    thread.join();
+}
+
 }  // namespace
 }  // namespace vibrig::rt

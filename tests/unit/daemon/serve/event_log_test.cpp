@@ -5,6 +5,8 @@
 #include <limits>
 #include <thread>
 
+#include "daemon/domain/campaign_state.hpp"
+
 namespace vibrig::serve {
 namespace {
 
@@ -16,7 +18,6 @@ EventRecord event(const std::string& text) {
 
 TEST(EventLog, NumbersEventsFromOneAndGivesThemOldestFirst) {
     EventLog log;
-    EXPECT_EQ(log.newest_id(), 0u);
     EXPECT_TRUE(log.after(0, 10).empty());
     EXPECT_EQ(log.append(event("a")), 1u);
     EXPECT_EQ(log.append(event("b")), 2u);
@@ -62,7 +63,7 @@ TEST(EventLog, LosesNothingBetweenThreads) {
             std::this_thread::yield();
         }
     }
-    EXPECT_EQ(log.newest_id(), 3u * kEach);
+    EXPECT_TRUE(log.after(3 * kEach, 1).empty());
 }
 
 TEST(Names, EveryCampaignStateAndSeverityHasOne) {

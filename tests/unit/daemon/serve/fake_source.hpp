@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/domain/status.hpp"
 #include "daemon/serve/event_log.hpp"
+#include "daemon/status/source.hpp"
 #include "estimator/identification/result.hpp"
 
 namespace vibrig::v1 {

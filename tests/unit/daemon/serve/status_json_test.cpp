@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "daemon/serve/status_message.hpp"
+#include "daemon/status/values.hpp"
 #include "proto/vibrig.pb.h"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 
@@ -38,6 +39,30 @@ void collect_empty(const google::protobuf::Message& message, const std::string& 
                                     : message.GetReflection()->GetMessage(message, field);
             collect_empty(inner, prefix + field->name() + '.', empty);
         }
+    }
+}
+
+TEST(StatusJson, EveryValueOfTheTableHasItsField) {
+    using Field = google::protobuf::FieldDescriptor;
+    for (const StatusValue& row : status_values()) {
+        EXPECT_TRUE(row.mqtt_name == nullptr || row.kind > 0) << row.mqtt_name;
+        std::string_view rest = row.field;
+        if (rest.empty()) continue;
+        const auto* message = v1::Status::descriptor();
+        if (const auto dot = rest.find('.'); dot != rest.npos) {
+            const auto* part = message->FindFieldByName(std::string(rest.substr(0, dot)));
+            ASSERT_NE(part, nullptr) << row.field;
+            message = part->message_type();
+            rest.remove_prefix(dot + 1);
+        }
+        const auto* field = message->FindFieldByName(std::string(rest));
+        ASSERT_NE(field, nullptr) << row.field;
+        const auto type = field->cpp_type();
+        const std::size_t kind = type == Field::CPPTYPE_BOOL     ? 1
+                                 : type == Field::CPPTYPE_DOUBLE ? 3
+                                 : type == Field::CPPTYPE_STRING ? 4
+                                                                 : 2;
+        EXPECT_EQ(row.kind, kind) << row.field;
     }
 }
 

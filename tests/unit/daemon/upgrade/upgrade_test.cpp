@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-#include "daemon/domain/upgrade.hpp"
+#include "daemon/status/upgrade.hpp"
 
 namespace vibrig {
 namespace {

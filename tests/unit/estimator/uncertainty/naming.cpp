@@ -71,6 +71,7 @@ Naming naming(const std::vector<PlannedRow>& plan, Misfit misfit,
     const VectorXd shift = fit.change(z).cwiseQuotient(fit.covariance().diagonal().cwiseSqrt());
     for (std::size_t i = 0; i < kParameters; ++i)
         out.shift[i] = shift[static_cast<Index>(internal_of(i))];
+    out.rates = z;
     out.chi_square = fit.project(z).f(0, 0);
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(fit.project(of.z).f);
     out.probability =

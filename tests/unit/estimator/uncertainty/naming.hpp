@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace vibrig::estimator::testing {
 struct Naming {
     std::array<double, kParameters> shift{};  ///< of the coefficients, in sigma
     double chi_square = 0;                    ///< F, by which it shows in the null fit
+    Eigen::VectorXd rates;                    ///< what it adds to the dwells' rates, deg/h
     double probability = 0;  ///< that the odds for its class, at its own place, are above exp(4)
 };
 

@@ -1,4 +1,4 @@
-#include "daemon/campaign/opening_stage.hpp"
+#include "daemon/campaign/opening_check.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -50,21 +50,21 @@ room::DwellMean mean_of(const std::vector<rt::MeanMotion>& seconds, bool drifts)
 
 }  // namespace
 
-OpeningStage::OpeningStage(const Settings& settings) : settings_(settings) {}
+OpeningCheck::OpeningCheck(const Settings& settings) : settings_(settings) {}
 
-void OpeningStage::begin() {
+void OpeningCheck::begin() {
     at_ = 0;
     stops_.clear();
     under_way_ = true;
 }
 
-std::string OpeningStage::words() const {
+std::string OpeningCheck::words() const {
     return fmt::format("opening check, position {} of {}", at_ + 1, settings_.opening.size());
 }
 
-std::size_t OpeningStage::wanted() const { return drifts() ? kDriftSeconds : kStillSeconds; }
+std::size_t OpeningCheck::wanted() const { return drifts() ? kDriftSeconds : kStillSeconds; }
 
-double OpeningStage::expected_s() const {
+double OpeningCheck::expected_s() const {
     double all = 0;
     for (const OpeningStop& stop : settings_.opening)
         all += kSlewGuess_s + drivers::to_seconds(kComesToRest) +
@@ -72,30 +72,30 @@ double OpeningStage::expected_s() const {
     return all;
 }
 
-void OpeningStage::arrived(drivers::Time now) {
+void OpeningCheck::arrived(drivers::Time now) {
     since_ = now + kComesToRest;
     stops_.push_back({here(), {}});
 }
 
-void OpeningStage::add(const rt::MeanMotion& second) {
+void OpeningCheck::add(const rt::MeanMotion& second) {
     auto& seconds = stops_.back().seconds;
     if (!second.good || second.from < since_ || measured()) return;
     if (!seconds.empty() && second.from <= seconds.back().from) return;
     seconds.push_back(second);
 }
 
-bool OpeningStage::measured() const { return stops_.back().seconds.size() >= wanted(); }
+bool OpeningCheck::measured() const { return stops_.back().seconds.size() >= wanted(); }
 
-bool OpeningStage::overdue(drivers::Time now) const {
+bool OpeningCheck::overdue(drivers::Time now) const {
     return now - since_ > drivers::from_seconds(static_cast<double>(wanted())) + kSpare;
 }
 
-bool OpeningStage::next() {
+bool OpeningCheck::next() {
     under_way_ = ++at_ < settings_.opening.size();
     return under_way_;
 }
 
-OpeningStage::Verdict OpeningStage::judge(const Vector& zero_g) const {
+OpeningCheck::Verdict OpeningCheck::judge(const Vector& zero_g) const {
     auto rig = settings_.rig;
     for (std::size_t i = 0; i < 3; ++i) rig.accelerometer_zero_g[i] += zero_g[i];
     room::OpeningLimits limits;

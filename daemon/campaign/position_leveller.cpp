@@ -1,4 +1,4 @@
-#include "daemon/campaign/levelling_stage.hpp"
+#include "daemon/campaign/position_leveller.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -37,15 +37,16 @@ level::LevellerSettings loop_of(const LevellingSettings& s, const estimator::Set
 
 }  // namespace
 
-LevellingStage::LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
-                               double sample_s, double torquer_limit_deg_h)
+PositionLeveller::PositionLeveller(const LevellingSettings& settings,
+                                   const estimator::Settings& rig, double sample_s,
+                                   double torquer_limit_deg_h)
     : settings_(settings),
       rig_(rig),
       frame_(rig),
       loop_(loop_of(settings, rig, sample_s, torquer_limit_deg_h)),
       leveller_(loop_) {}
 
-std::string LevellingStage::refusal() const {
+std::string PositionLeveller::refusal() const {
     const level::Leveller loop(loop_);
     if (loop.verdict() != level::Verdict::cannot_settle) return {};
     const auto window = loop.window_needed_s();
@@ -58,7 +59,7 @@ std::string LevellingStage::refusal() const {
         window ? fmt::format(", or levelling.window_s of at least {:.3g}", *window) : "");
 }
 
-void LevellingStage::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
+void PositionLeveller::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
     leveller_.emplace(loop_);
     largest_at_first_ = 0;
     counted_ = false;
@@ -87,7 +88,7 @@ void LevellingStage::begin(const Vector& encoder_deg, const ZeroStatus& zeros) {
     }
 }
 
-Vector LevellingStage::to_axes(const level::Pair& rate) const {
+Vector PositionLeveller::to_axes(const level::Pair& rate) const {
     // The vertical goes round against the platform: u' = u x w. So a turn about the second channel
     // takes the first down, and one about the first takes the second up.
     Vector axes{};
@@ -97,7 +98,7 @@ Vector LevellingStage::to_axes(const level::Pair& rate) const {
     return axes;
 }
 
-Vector LevellingStage::step(const rt::Motion& motion) {
+Vector PositionLeveller::step(const rt::Motion& motion) {
     level::LevelInput input;
     input.reference_age_s = motion.velocity_age_s;
     for (std::size_t i = 0; i < 2; ++i) {
@@ -124,13 +125,13 @@ Vector LevellingStage::step(const rt::Motion& motion) {
     return to_axes(output.rate);
 }
 
-bool LevellingStage::done() const {
+bool PositionLeveller::done() const {
     const auto& l = *leveller_;
     if (l.verdict() != level::Verdict::settled) return false;
     return !loop_.slow || l.time_s() - l.settled_s().value_or(0) >= loop_.ramp_s;
 }
 
-std::string LevellingStage::failure() const {
+std::string PositionLeveller::failure() const {
     const level::Verdict verdict = leveller_->verdict();
     if (verdict != level::Verdict::cannot_settle && verdict != level::Verdict::not_settled)
         return {};
@@ -146,7 +147,7 @@ std::string LevellingStage::failure() const {
     return why;
 }
 
-std::string LevellingStage::words() const {
+std::string PositionLeveller::words() const {
     const auto& l = *leveller_;
     const auto drift = l.drift();
     std::string text = fmt::format(
@@ -161,7 +162,7 @@ std::string LevellingStage::words() const {
     return text;
 }
 
-LevelDrift LevellingStage::drift(const Vector& encoder_rad) const {
+LevelDrift PositionLeveller::drift(const Vector& encoder_rad) const {
     LevelDrift found;
     found.encoder_rad = encoder_rad;
     found.direction = channel_;
@@ -172,7 +173,7 @@ LevelDrift LevellingStage::drift(const Vector& encoder_rad) const {
     return found;
 }
 
-void LevellingStage::fill(LevellingStatus& status) const {
+void PositionLeveller::fill(LevellingStatus& status) const {
     const auto& l = *leveller_;
     status.begun = l.time_s() > 0;
     status.verdict = level::name_of(l.verdict());
@@ -191,7 +192,7 @@ void LevellingStage::fill(LevellingStatus& status) const {
     if (status.message.empty()) status.message = l.message();
 }
 
-double LevellingStage::expected_s() const noexcept {
+double PositionLeveller::expected_s() const noexcept {
     return settings_.settling_s + settings_.window_s + 1 / level::mean_decay(loop_.fast) +
            (loop_.slow ? loop_.ramp_s : 0);
 }

@@ -5,19 +5,19 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "estimator/levelling/leveller.hpp"
 
 namespace vibrig::campaign {
 
 /// Levels the platform at one position: the two channels are the platform directions normal to the
 /// position's nominal vertical. Control thread only.
-class LevellingStage {
+class PositionLeveller {
   public:
     /// Throws estimator::levelling::DesignError.
-    LevellingStage(const LevellingSettings& settings, const estimator::Settings& rig,
-                   double sample_s, double torquer_limit_deg_h);
+    PositionLeveller(const LevellingSettings& settings, const estimator::Settings& rig,
+                     double sample_s, double torquer_limit_deg_h);
 
     /// Which key of [levelling] cannot work with the noise, what was found and expected; empty:
     /// none.

@@ -6,8 +6,8 @@
 
 #include "daemon/campaign/rig_frame.hpp"
 #include "daemon/campaign/settings.hpp"
-#include "daemon/domain/status.hpp"
 #include "daemon/rt/stage_feed.hpp"
+#include "daemon/status/status.hpp"
 #include "estimator/zeros/calibration.hpp"
 #include "estimator/zeros/observability.hpp"
 
@@ -21,11 +21,12 @@ namespace vibrig::campaign {
 /// One calibration of the accelerometers' zeros by azimuth slews: where the gimbals go next, what
 /// the filter makes of the increments, and the comparison of the end with the start. Control thread
 /// only.
-class ZeroingStage {
+class ZeroCalibration {
   public:
     /// Throws estimator::SettingsError or estimator::zeros::ZeroError if the plan cannot work.
     /// `sample_s`: between two samples, for which rig.accelerometer_g holds.
-    ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig, double sample_s);
+    ZeroCalibration(const ZeroingSettings& settings, const estimator::Settings& rig,
+                    double sample_s);
 
     /// Which key of [zeroing] cannot work with these figures, what was found and expected; empty:
     /// none. Runs a simulated unit.

@@ -12,9 +12,9 @@ namespace vibrig::campaign {
 
 /// The opening check: before anything shakes the configuration is held against free drift and
 /// gravity at rest (docs/commissioning.md). Control thread only.
-class OpeningStage {
+class OpeningCheck {
   public:
-    explicit OpeningStage(const Settings& settings);
+    explicit OpeningCheck(const Settings& settings);
 
     void begin();
     void end() { stops_.clear(), under_way_ = false; }

@@ -1,4 +1,4 @@
-#include "daemon/domain/upgrade.hpp"
+#include "daemon/status/upgrade.hpp"
 
 #include <cstdlib>
 #include <string_view>

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "daemon/domain/status.hpp"
+#include "daemon/status/status.hpp"
 
 namespace vibrig {
 

@@ -1,4 +1,4 @@
-#include "daemon/campaign/zeroing_stage.hpp"
+#include "daemon/campaign/zero_calibration.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -47,7 +47,7 @@ std::vector<Vector> slews_of(const zeros::Way& way, const RigFrame& frame) {
     return slews;
 }
 
-zeros::CalibrationSettings ZeroingStage::plan(const zeros::Way& way) const {
+zeros::CalibrationSettings ZeroCalibration::plan(const zeros::Way& way) const {
     zeros::CalibrationSettings s;
     s.site.latitude_rad = kRadian * rig_.latitude_deg;
     s.site.gravity_mps2 = rig_.gravity_mps2;
@@ -73,8 +73,8 @@ zeros::CalibrationSettings ZeroingStage::plan(const zeros::Way& way) const {
     return s;
 }
 
-ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Settings& rig,
-                           double sample_s)
+ZeroCalibration::ZeroCalibration(const ZeroingSettings& settings, const estimator::Settings& rig,
+                                 double sample_s)
     : settings_(settings), rig_(rig), sample_s_(sample_s), frame_(rig), ways_(ways_of(settings)) {
     for (const zeros::Way& way : ways_) {
         static_cast<void>(slews_of(way, frame_));
@@ -83,7 +83,7 @@ ZeroingStage::ZeroingStage(const ZeroingSettings& settings, const estimator::Set
     }
 }
 
-std::string ZeroingStage::refusal() const {
+std::string ZeroCalibration::refusal() const {
     const auto s = plan();
     const double sweep_s = s.plan.sweep_s();
     if (sweep_s > settings_.duration_s) {
@@ -129,19 +129,19 @@ std::string ZeroingStage::refusal() const {
                        s.target_mg[i], "xyz"[i], found());
 }
 
-void ZeroingStage::begin() {
+void ZeroCalibration::begin() {
     results_.clear();
     way_ = 0;
     start_run();
 }
 
-void ZeroingStage::begin_other_way() {
+void ZeroCalibration::begin_other_way() {
     results_.push_back(calibration_->result());
     ++way_;
     start_run();
 }
 
-void ZeroingStage::start_run() {
+void ZeroCalibration::start_run() {
     slews_ = slews_of(ways_[way_], frame_);
     target_ = 0;
     level_deg_.reset();
@@ -151,7 +151,7 @@ void ZeroingStage::start_run() {
     present_.running = true;
 }
 
-Vector ZeroingStage::target_deg() const {
+Vector ZeroCalibration::target_deg() const {
     const std::size_t n = slews_.size();
     const std::size_t k = target_ < n ? target_ : n - 2 + (target_ - n) % 2;
     if (!level_deg_) return slews_[k];
@@ -161,12 +161,12 @@ Vector ZeroingStage::target_deg() const {
     return target;
 }
 
-void ZeroingStage::levelled_at(const Vector& encoder_rad) {
+void ZeroCalibration::levelled_at(const Vector& encoder_rad) {
     level_deg_.emplace();
     for (std::size_t i = 0; i < 3; ++i) (*level_deg_)[i] = encoder_rad[i] / kRadian;
 }
 
-void ZeroingStage::add(const rt::Motion& motion) {
+void ZeroCalibration::add(const rt::Motion& motion) {
     if (first_time_ == 0) first_time_ = motion.time;
     const double dt = last_time_ == 0 ? 0 : drivers::to_seconds(motion.time - last_time_);
     last_time_ = motion.time;
@@ -179,13 +179,13 @@ void ZeroingStage::add(const rt::Motion& motion) {
     static_cast<void>(calibration_->add(in));
 }
 
-bool ZeroingStage::over() const {
+bool ZeroCalibration::over() const {
     return calibration_->given_up() || time_s() >= settings_.duration_s;
 }
 
-double ZeroingStage::time_s() const { return drivers::to_seconds(last_time_ - first_time_); }
+double ZeroCalibration::time_s() const { return drivers::to_seconds(last_time_ - first_time_); }
 
-std::string ZeroingStage::finish(bool at_end) {
+std::string ZeroCalibration::finish(bool at_end) {
     results_.push_back(calibration_->result());
     present_.running = false;
     for (const zeros::CalibrationResult& run : results_) {
@@ -240,7 +240,7 @@ std::string ZeroingStage::finish(bool at_end) {
     return {};
 }
 
-std::string ZeroingStage::words() const {
+std::string ZeroCalibration::words() const {
     std::string text = fmt::format("zeros after {:.0f} s:", time_s());
     for (std::size_t i = 0; i < 3; ++i) {
         text += fmt::format("{} {} {:+.4f} mg (sigma {:.4f})", i == 0 ? "" : ",", "xyz"[i],
@@ -258,20 +258,20 @@ std::string ZeroingStage::words() const {
     return text;
 }
 
-Vector ZeroingStage::raw_zero_g() const {
+Vector ZeroCalibration::raw_zero_g() const {
     if (!present_.known) return {};
     Vector zero{};
     for (std::size_t i = 0; i < 3; ++i) zero[i] = 1e-3 * present_.zero_mg[i];
     return frame_.to_raw(zero);
 }
 
-double ZeroingStage::level_sigma(const Vector& encoder_deg) const {
+double ZeroCalibration::level_sigma(const Vector& encoder_deg) const {
     if (!present_.known) return 0;
     const Vector up = frame_.up_at_deg(encoder_deg);
     return 1e-3 * std::sqrt(std::max(0.0, quadratic(present_.covariance_mg2, up)));
 }
 
-void ZeroingStage::fill(ZeroStatus& status) const {
+void ZeroCalibration::fill(ZeroStatus& status) const {
     status = present_;
     status.time_s = time_s();
     status.message = failure_;

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "daemon/campaign/ports.hpp"
+
+namespace vibrig::campaign {
+
+/// What comes of a stage's step.
+struct StageStep {
+    enum class Kind : std::uint8_t {
+        going_on,
+        level_first,  ///< the platform has to be levelled here before it goes on
+        done,
+        failed
+    } kind = Kind::going_on;
+    drivers::Time next = 0;  ///< going on: when to be called next at the latest
+    std::string why;         ///< failed
+
+    static StageStep going_on(drivers::Time next) { return {Kind::going_on, next, {}}; }
+    static StageStep done() { return {Kind::done, 0, {}}; }
+    static StageStep failed(std::string why) { return {Kind::failed, 0, std::move(why)}; }
+};
+
+/// A part of the campaign with the table at rest. It is begun, stepped until it is done or has
+/// failed, and left in every case. The campaign sees to it that the shaker rests meanwhile, and
+/// decides what follows. Control thread only; no call waits.
+class Stage {
+  public:
+    Stage() = default;
+    Stage(const Stage&) = delete;
+    Stage& operator=(const Stage&) = delete;
+    virtual ~Stage() = default;
+
+    virtual void begin(drivers::Time now) = 0;
+    [[nodiscard]] virtual StageStep step(drivers::Time now) = 0;
+    virtual void leave() = 0;
+};
+
+/// How often a stage looks when nothing calls it earlier.
+inline constexpr drivers::Time kStagePoll = 200 * drivers::kMillisecond;
+/// Blocks and increments come ten and a hundred times a second.
+inline constexpr drivers::Time kSilence = drivers::kSecond;
+
+/// Why the platform is not fit to be measured; empty: it is.
+[[nodiscard]] std::string platform_lacks(const drivers::PlatformStatus& platform,
+                                         drivers::Time now);
+/// A status older than that is no status.
+[[nodiscard]] bool platform_is_silent(const drivers::PlatformStatus& platform, drivers::Time now);
+/// By what the platform itself says.
+[[nodiscard]] bool torquing(const Rig& rig);
+/// Nothing is fed any more, and nothing is torqued.
+void let_go(Rig& rig);
+
+}  // namespace vibrig::campaign

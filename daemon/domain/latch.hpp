@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace vibrig {
+
+/// Latched until named persons acknowledge it; kept over restarts.
+struct Latch {
+    std::string name;          ///< under which it is acknowledged
+    std::string cause;         ///< in words
+    std::string armed_by;      ///< by whom the shaker was armed then; empty: it was not
+    std::string first;         ///< who acknowledged first, where two persons are needed
+    bool two_persons = false;  ///< another person than these acknowledges it too
+    std::int64_t utc_ns = 0;   ///< when it latched
+};
+
+}  // namespace vibrig

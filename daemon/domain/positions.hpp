@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+namespace vibrig {
+
+/// Of a position that is done, what an adaptive campaign needs to go on after a restart.
+struct StopDone {
+    std::array<double, 3> position_deg{};
+    double table_g = 0;
+    std::int32_t repeats = 0;  ///< of the position so far, because it was flagged
+    double used_s = 0;         ///< of the campaign's time
+    /// When its dwell began: since the campaign's first, NaN: not known; and UTC.
+    double begin_s = std::numeric_limits<double>::quiet_NaN();
+    std::int64_t begun_utc_ns = 0;
+    double frequency_hz = 0;  ///< 0: the configuration's
+    bool held_out = false;
+};
+
+/// What the platform drifted by at the end of a levelling, which torqued it out.
+struct LevelDrift {
+    int run = 0, position = 0;
+    std::array<double, 3> encoder_rad{};
+    std::array<std::array<double, 3>, 2> direction{};  ///< platform axes, across the vertical
+    std::array<double, 2> rate_deg_h{};                ///< along them, relative to the Earth
+    double sigma_deg_h = 0;                            ///< of either
+};
+
+}  // namespace vibrig
