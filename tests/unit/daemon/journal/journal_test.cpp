@@ -387,12 +387,12 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
 }
 
 /// As version 1 wrote it: without the four noise levels, position, repeats, time used, times of
-/// the beginning and whether power was lost.
+/// the beginning, whether power was lost, frequency and whether it was held out.
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
     bytes.erase(numbers,
-                (4 + 6) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 1);
+                (4 + 7) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 2);
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(
@@ -409,6 +409,19 @@ TEST_F(JournalTest, KnowsAfterWhichRestartThePowerWasLost) {
         ASSERT_EQ(decode(encode(one, kHash), kHash, read), "");
         EXPECT_EQ(read.info.power_lost, lost);
     }
+}
+
+TEST_F(JournalTest, KnowsFrequencyAndRoleOfADwell) {
+    estimator::Identification filter{estimator::Settings{}};
+    DwellCheckpoint one = dwell(filter, 1), read;
+    one.info.frequency_hz = 25.1;
+    one.info.held_out = true;
+    ASSERT_EQ(decode(encode(one, kHash), kHash, read), "");
+    EXPECT_EQ(read.info.frequency_hz, 25.1);
+    EXPECT_TRUE(read.info.held_out);
+    EXPECT_EQ(read.stop.frequency_hz, 25.1);
+    one.info.frequency_hz = -1;
+    EXPECT_EQ(decode(encode(one, kHash), kHash, read), "corrupt: frequency");
 }
 
 TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {
