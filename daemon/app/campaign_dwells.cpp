@@ -3,11 +3,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/start_checks.hpp"
+#include "daemon/commission/acceptance.hpp"
 #include "daemon/results/result_json.hpp"
 
 namespace vibrig {
@@ -216,6 +218,18 @@ void CampaignDwells::write_out(campaign::Campaign& campaign) {
                  campaign);
 }
 
+/// What marks the campaign, that its result is against the certificate included.
+std::string CampaignDwells::marked(std::string mark) {
+    auto value = result_.value;
+    for (std::size_t i = 0; i < value.size(); ++i)
+        if (!result_.observable[i]) value[i] = std::nan("");
+    against_certificate_ = commission::against_certificate(configuration_.commission.certificate,
+                                                           value, result_.sigma);
+    if (against_certificate_.empty()) return mark;
+    with_.events.log(Severity::alarm, "campaign", "campaign marked: " + against_certificate_);
+    return mark.empty() ? against_certificate_ : mark + "; " + against_certificate_;
+}
+
 void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& campaign) {
     const bool complete = std::exchange(to_write_, ToWrite::nothing) == ToWrite::complete;
     const auto& assessed = judged.assessed;
@@ -223,11 +237,11 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     if (!result_.dwells.empty())  // of no data nothing is to be said
         with_.events.log(severity_of(assessed.verdict.level), "campaign",
                          "result " + assessed.verdict.sentence);
+    const std::string mark = marked(campaign.mark());
     std::string text;
     {
         const std::lock_guard lock(mutex_);
-        if (!campaign.mark().empty())
-            result_.warnings.push_back("campaign marked: " + campaign.mark());
+        if (!mark.empty()) result_.warnings.push_back("campaign marked: " + mark);
         std::optional<tool::KnownType> type;
         if (type_prior_) type = tool::KnownType{type_prior_->type, type_prior_->of};
         text = tool::result_json(result_, assessed, configuration_.simulated(), nullptr,
@@ -240,8 +254,7 @@ void CampaignDwells::write_result(const Judged& judged, campaign::Campaign& camp
     // The journal first: the recording is closed with a head of it.
     if (with_.journal) with_.journal->campaign_ended(name_of(ended.state), ended.reason, text);
     if (with_.recorder)
-        with_.recorder->campaign_ended(
-            {name_of(ended.state), ended.reason, campaign.mark(), text, utc_now()});
+        with_.recorder->campaign_ended({name_of(ended.state), ended.reason, mark, text, utc_now()});
 }
 
 void CampaignDwells::write_result_file(const std::string& text, bool complete) {

@@ -70,6 +70,10 @@ class CampaignDwells final : public campaign::Dwells {
     /// Writes what is left to be written, now.
     void write_out(campaign::Campaign& campaign);
     /// No result waits to be written.
+    /// What the campaign found against the certificate, once.
+    [[nodiscard]] std::string take_against_certificate() {
+        return std::exchange(against_certificate_, {});
+    }
     [[nodiscard]] bool written() const { return to_write_ == ToWrite::nothing; }
     /// The campaign has ended, and its last verdict is being thought over.
     [[nodiscard]] bool concluding() const { return concluding_ && to_write_ == ToWrite::complete; }
@@ -115,6 +119,7 @@ class CampaignDwells final : public campaign::Dwells {
     void tell_verdict(const estimator::uncertainty::Assessment& assessed,
                       campaign::Campaign& campaign);
     void write_result(const Judged& judged, campaign::Campaign& campaign);
+    [[nodiscard]] std::string marked(std::string mark);
     void take_anew(const Judged& judged, campaign::Campaign& campaign);
     void write_result_file(const std::string& text, bool complete);
 
@@ -138,7 +143,7 @@ class CampaignDwells final : public campaign::Dwells {
     int with_estimator_ = 0;    ///< ordered, not yet reported done
     bool verdict_due_ = false;  ///< on the dwells so far
     bool concluding_ = false;   ///< the last verdict is asked for
-    std::string verdict_told_;
+    std::string verdict_told_, against_certificate_;
     enum class ToWrite : std::uint8_t { nothing, partial, complete } to_write_ = ToWrite::nothing;
 
     mutable std::mutex mutex_;  ///< guards what follows, which only this thread changes

@@ -117,6 +117,20 @@ void ControlLoop::keep_voided() {
                 {name_of(part.part), "", "", "", "void", Json{{"why", part.why}}.dump()});
 }
 
+/// By a campaign whose result has the certificate's coefficients with the other sign.
+void ControlLoop::void_gyros(const std::string& why) {
+    if (why.empty() || !book_.standing(utc_now())[static_cast<std::size_t>(Part::gyros)].record)
+        return;
+    try {
+        book_.withdraw(Part::gyros);
+        log(Severity::alarm, "commissioning", "gyros is to be proven anew: " + why);
+        keep_commissioned({name_of(Part::gyros), "", "", "", "void", Json{{"why", why}}.dump()});
+    } catch (const std::exception& error) {
+        log(Severity::alarm, "commissioning",
+            std::string("gyros is to be proven anew, and cannot be taken out: ") + error.what());
+    }
+}
+
 commission::Progress ControlLoop::progress() const {
     return {configuration_.commission.folder, Json(book_.keys(Part::bus))};
 }

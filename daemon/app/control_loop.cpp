@@ -45,6 +45,7 @@ void ControlLoop::run() {
         if (stirred || now >= next)
             next = std::min(campaign_.step(now), now + drivers::kSecond / 2);
         take_proof();
+        void_gyros(dwells_.take_against_certificate());
         const Time commissioning = step_commissioning(now);
         dwells_.take_done(campaign_);
         watch_arming();

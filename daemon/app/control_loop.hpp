@@ -110,6 +110,7 @@ class ControlLoop {
     [[nodiscard]] commission::Progress progress() const;
     void keep_commissioned(journal::Commissioned row);
     void keep_voided();
+    void void_gyros(const std::string& why);
     [[nodiscard]] bool first_shaking() const;
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,

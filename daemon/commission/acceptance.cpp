@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "daemon/journal/latches.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::commission {
 
@@ -44,6 +45,23 @@ std::string not_two(const std::string& by, const std::string& second) {
         return {};
     return fmt::format("second: found \"{}\", expected the name of another person than {}", second,
                        name_of_person(by));
+}
+
+std::string against_certificate(
+    const std::vector<configuration::Configuration::Commission::Coefficient>& certificate,
+    std::span<const double> value, std::span<const double> sigma) {
+    constexpr double kSigmas = 5;
+    const auto& names = estimator::parameter_names();
+    std::string words;
+    for (const auto& one : certificate) {
+        const auto i = static_cast<std::size_t>(std::ranges::find(names, one.name) - names.begin());
+        if (i >= value.size() || !(value[i] * one.value < 0) ||
+            !(std::abs(value[i]) > kSigmas * sigma[i]))
+            continue;
+        words += fmt::format("{}{} is {:.4g} +- {:.2g}, {:g} by the certificate",
+                             words.empty() ? "" : ", ", one.name, value[i], sigma[i], one.value);
+    }
+    return words.empty() ? words : words + ": sign of platform.drift_sign, or axes of the gyro?";
 }
 
 std::string not_as_found(const Finding& finding, const configuration::Loaded& file) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,12 @@ namespace vibrig::commission {
 /// the DBC's contents included: nobody has measured it. Empty: nothing.
 [[nodiscard]] std::string not_as_running(const std::vector<Part>& parts, const Finding& finding,
                                          const Book& running, const configuration::Loaded& file);
+
+/// Coefficients of the certificate that a campaign has found with the other sign at more than 5
+/// sigma, in words; empty: none. Values and sigmas by estimator::parameter_names(); NaN: not known.
+[[nodiscard]] std::string against_certificate(
+    const std::vector<configuration::Configuration::Commission::Coefficient>& certificate,
+    std::span<const double> value, std::span<const double> sigma);
 
 /// What a person says a positive drift coefficient is, and where that is written.
 struct SignStatement {

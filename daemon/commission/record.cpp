@@ -348,6 +348,17 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
         one.meaning = kMeaning;
         fresh.parts[part] = std::move(one);
     }
+    write(std::move(fresh));
+}
+
+void Book::withdraw(Part part) {
+    if (!record_ || !record_->parts.contains(part)) return;
+    Record fresh = *record_;
+    fresh.parts.erase(part);
+    write(std::move(fresh));
+}
+
+void Book::write(Record fresh) {
     std::error_code error;  // whatever it is, the file then says it
     std::filesystem::create_directories(loaded_.configuration.commission.folder, error);
     journal::SigningKey key(key_path());

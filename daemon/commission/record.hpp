@@ -105,6 +105,8 @@ class Book {
     /// Takes a part in and writes the file. Throws std::runtime_error that names the file.
     void prove(const std::vector<Part>& parts, const PartRecord& what,
                const configuration::Loaded& as);
+    /// Takes a part out, if it is in, and writes the file. Throws as prove().
+    void withdraw(Part part);
     [[nodiscard]] Json status(std::int64_t utc_ns) const;
     /// Public key of its signature; empty: there is none.
     [[nodiscard]] std::string signed_with() const { return record_ ? record_->signed_with : ""; }
@@ -115,6 +117,7 @@ class Book {
     [[nodiscard]] std::string path() const;
     [[nodiscard]] std::string key_path() const;
     [[nodiscard]] std::string doubt() const;
+    void write(Record fresh);
 
     const configuration::Loaded& loaded_;
     std::map<Part, Keys> keys_;  ///< now

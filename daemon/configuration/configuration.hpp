@@ -56,6 +56,12 @@ struct Configuration {
         double valid_days = 365;                 ///< so long a part of it counts
         double linear_sigma = 2;                 ///< of the gyros' linear drift terms, deg/h/g
         bool opening_check = true;  ///< before the first ramp, where the record is demanded
+        /// Of the maker's certificate, by parameter_names(): deg/h, deg/h/g, deg/h/g^2.
+        struct Coefficient {
+            std::string name;
+            double value = 0;
+        };
+        std::vector<Coefficient> certificate;
     } commission;
     /// Nothing that could hurt anybody: the rig is a program.
     [[nodiscard]] bool simulated() const { return clock == ClockKind::rig || commission.simulated; }

@@ -1,5 +1,9 @@
+#include <algorithm>
+
 #include "daemon/configuration/key.hpp"
 #include "daemon/configuration/rules.hpp"
+#include "daemon/configuration/value.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::configuration {
 
@@ -108,6 +112,58 @@ void add_mqtt_keys(std::vector<Key>& keys) {
                           [](C& c) -> double& { return c.mqtt.backoff_max_s; }));
 }
 
+using Coefficients = std::vector<C::Commission::Coefficient>;
+constexpr const char* kCertificate = "commission.certificate";
+constexpr const char* kCoefficientTable = "a table { name = \"D_Fx\", value = 1.2 }";
+
+/// One coefficient of a certificate, or a problem.
+void read_coefficient(const toml::node& node, const std::string& place, Coefficients& to,
+                      Problems& problems) {
+    const toml::table* table = node.as_table();
+    const toml::node* name = table == nullptr ? nullptr : table->get("name");
+    const toml::node* value = table == nullptr ? nullptr : table->get("value");
+    if (name == nullptr || value == nullptr || table->size() != 2)
+        return problems.add(place_of(node.source()), place, describe(node), kCoefficientTable);
+    const auto* text = name->as_string();
+    const auto& names = estimator::parameter_names();
+    const bool known = text != nullptr && std::ranges::find(names, text->get()) != names.end();
+    if (!known || std::ranges::find(to, text->get(), &C::Commission::Coefficient::name) != to.end())
+        return problems.add(place_of(name->source()), place + ".name", describe(*name),
+                            "a coefficient, D_Fx to D_OSz, each once");
+    if (const auto number = read_number(*value, place + ".value", {-1e3, 1e3}, "", problems))
+        to.push_back({text->get(), *number});
+}
+
+Key certificate() {
+    auto read = [](const toml::node& node, C& c, Problems& problems) {
+        const toml::array* all = read_array(node, kCertificate, 0, estimator::kParameters,
+                                            "tables { name = \"D_Fx\", value = 1.2 }", problems);
+        c.commission.certificate.clear();
+        for (std::size_t i = 0; all != nullptr && i < all->size(); ++i)
+            read_coefficient(*all->get(i), kCertificate + ("[" + std::to_string(i) + "]"),
+                             c.commission.certificate, problems);
+    };
+    auto write = [](C& c) {
+        std::string text;
+        for (const auto& one : c.commission.certificate)
+            text += (text.empty() ? "" : ", ") + std::string("{ name = ") + write_text(one.name) +
+                    ", value = " + write_number(one.value) + " }";
+        return "[" + text + "]";
+    };
+    return {kCertificate,
+            "tables",
+            "",
+            "up to 30 x { name, value }",
+            "coefficients of the maker's certificate, with their signs; a campaign that finds the "
+            "other sign is marked, and the part gyros is to be proven anew",
+            read,
+            write,
+            schema_of_array(
+                R"({"type":"object","required":["name","value"],"additionalProperties":false,)"
+                R"("properties":{"name":{"type":"string"},"value":{"type":"number"}}})",
+                0, estimator::kParameters)};
+}
+
 }  // namespace
 
 void add_daemon_keys(std::vector<Key>& keys) {
@@ -142,6 +198,7 @@ void add_daemon_keys(std::vector<Key>& keys) {
         "emergency-stop buttons of the rig; each is pressed once before the "
         "stop counts as proven",
         [](C & c) -> auto& { return c.campaign.proof.buttons; }));
+    keys.push_back(certificate());
     keys.push_back(number("commission.stop_s", "s", {0.1, 2},
                           "from the table's fall until the register shows a pressed button",
                           [](C& c) -> double& { return c.campaign.proof.seen_s; }));

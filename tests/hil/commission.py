@@ -405,30 +405,40 @@ def hard_ones(checks, programs):
         return truth
 
     south = rig_with(11, "site", latitude_deg=-45.0)
+    # A reading in rad commanded as deg: the first command, which is to move nothing, moves it, and is stopped.
+    radians = rig_with(15, "platform", angle_unit=["deg", "rad", "deg"])
+    radians["platform"]["encoder_zero_deg"][1] = 100.0
     for truth, others, outcome, word in (
             (rig_with(12, "platform", stuck_gimbal="inner"), {}, "undecided", "INNER"),
             (rig_with(13, "accelerometer", dead="+z"), {}, "refused", "accelerometer."),
             (rig_with(14, "platform", command_offset_deg=[0, 6, 0]), {}, "undecided", "by hand"),
+            (radians, {}, "undecided", "by hand"),
             (south, {"latitude": 45.0, "compass": "-"}, "undecided", "latitude")):
         with tempfile.TemporaryDirectory() as folder:
             hidden(checks, programs, folder, truth, others, outcome, word)
 
 
-def counts_in_radians(checks, programs, folder):
-    """A reading that counts in another unit is found out, and nothing is accepted before the DBC says so."""
-    truth = drawn(15)
-    truth["platform"]["angle_unit"] = ["deg", "rad", "deg"]
-    truth["platform"]["encoder_zero_deg"][1] = 100.0
-    u = Unknown(checks, programs, folder, truth)
+def against_its_certificate(checks, programs, folder):
+    """The maker says another sign than the campaign finds: it is marked."""
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        run, found = u.commission()
-        checks.check(found["outcome"] == "decided" and run.returncode == 1 and len(found["corrections"]) == 1 and
-                     "Resolvers.Inner counts in rad, expected deg: multiply its factor by 57.2957795" in found["corrections"][0],
-                     "an angle in rad is named as a correction of the DBC", found)
-        refused = u.rig.tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
-        checks.check(refused.returncode == 1 and "the DBC first" in refused.stderr, "and nothing is accepted before", refused.stderr)
+        rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45")
+        rig.configure({"name": "certified", "table_g": [9.0, 5.0], "dwell_s": 20.0, "settle_s": 2.0})
+        with open(rig.configuration, "a", encoding="utf-8") as file:   # the simulated gyros have +1 and +1
+            file.write('[commission]\ncertificate = [{ name = "D_Fx", value = 1.2 }, { name = "D_Fz", value = -1.2 }]\n')
+        rig.start_daemon()
+        rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("rest") == "at rest", 60)
+        rig.tool("arm", "--by", "Ada")
+        rig.tool("start", "--by", "Ada")
+        last = rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 120)
+        checks.equal(r.state_of(last), "finished", "a campaign")
+        rig.daemon.end()
+        warnings = json.loads(rig.result()[1] or "{}").get("warnings", [])
+        marked = [w for w in warnings if w.startswith("campaign marked: D_Fz is ") and "-1.2 by the certificate: sign of platform.drift_sign" in w]
+        checks.check(len(marked) == 1 and "D_Fx" not in marked[0] and marked[0] in rig.daemon.text(), "whose sign is against the certificate is marked",
+                     warnings + [rig.logs()])
     finally:
-        u.rig.stop()
+        rig.stop()
 
 
 class Terminal:
@@ -575,7 +585,7 @@ def main():
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)
     with tempfile.TemporaryDirectory() as folder:
-        counts_in_radians(checks, programs, folder)
+        against_its_certificate(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         real(checks, programs, folder)
     return checks.end()

@@ -70,6 +70,7 @@ class Bus:
             self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             self.listener.bind(rig.path)
             self.listener.listen(1)
+            self.listener.settimeout(30)   # a daemon that has ended does not come
         else:
             self.bus = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
             self.bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
@@ -91,6 +92,7 @@ class Bus:
     def stream(self, rate_hz, seconds, meanwhile=lambda: None):
         if self.bus is None:
             self.bus, _ = self.listener.accept()
+            self.bus.settimeout(30)
         first, begin, looked = self.sent, time.monotonic(), 0.0
         while (now := time.monotonic() - begin) < seconds and not self.end.is_set():
             while self.sent - first < now * rate_hz:
@@ -142,6 +144,8 @@ def stream(checks, programs, bus, rate_hz, seconds):
         try:
             running = rig.wait_for(lambda s: s["can"]["link"] == "running", 30)
             checks.check(running is not None, f"{bus}: the daemon listens", rig.logs())
+            if running is None:
+                return
             with platform.running(rate_hz):
                 status = rig.wait_for(as_sent, 30)
             checks.check(status is not None and as_sent(status), f"{bus}: samples are as they were sent", rig.logs())

@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/journal/signing_key.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::commission {
 namespace {
@@ -297,6 +300,30 @@ TEST_F(Books, ARecordWhoseHashesWereMadeAnewIsNotSigned) {
     EXPECT_EQ(Book(loaded()).refusal(kNow), "");
     std::filesystem::remove(folder / "record.key");
     EXPECT_THAT(Book(as).refusal(kNow), HasSubstr("record.key, which has signed it, is gone"));
+}
+
+TEST_F(Books, ASignAgainstTheCertificateTakesGyrosOut) {
+    // GIVEN values whose third has the other sign at 4, the first at 60 sigma
+    std::array<double, 30> value{}, sigma{};
+    sigma.fill(0.02);
+    value[0] = -1.2;
+    value[1] = 0.9;
+    value[2] = -0.08;
+    value[3] = std::nan("");
+    const auto& names = estimator::parameter_names();
+    EXPECT_EQ(against_certificate({{names[0], 1}, {names[1], 1}, {names[2], 1}, {names[3], -1}},
+                                  value, sigma),
+              std::string(names[0]) +
+                  " is -1.2 +- 0.02, 1 by the certificate: sign of platform.drift_sign, or axes of "
+                  "the gyro?");
+    EXPECT_EQ(against_certificate({}, value, sigma), "");
+    // WHEN it is taken out THEN it is missing, in the file, too, and the rest stands
+    const auto as = loaded();
+    prove_all(as);
+    Book book(as);
+    book.withdraw(Part::gyros);
+    EXPECT_THAT(book.refusal(kNow), HasSubstr("no record of gyros: vibrig commission gyros"));
+    EXPECT_EQ(Book(as).refusal(kNow), book.refusal(kNow));
 }
 
 TEST_F(Books, ARecordOfASimulatedRigDoesNotCountOnARealOne) {

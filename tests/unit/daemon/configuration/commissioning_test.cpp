@@ -62,6 +62,15 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"[commission]\nbutton = [\"rack\"]",
               "2:1: commission.button: found an unknown key, expected a known one, perhaps "
               "commission.buttons"},
+        Wrong{"[commission]\ncertificate = 7",
+              "2:15: commission.certificate: found 7, expected an array of 0 to 30 tables { name = "
+              "\"D_Fx\", value = 1.2 }"},
+        Wrong{"[commission]\ncertificate = [{ name = \"D_Fw\", value = 1 }]",
+              "2:25: commission.certificate[0].name: found \"D_Fw\" (a string), expected a "
+              "coefficient, D_Fx to D_OSz, each once"},
+        Wrong{"[commission]\ncertificate = [{ name = \"D_Fx\", value = \"1\" }]",
+              "2:41: commission.certificate[0].value: found \"1\" (a string), expected a number "
+              "from -1000 to 1000"},
         Wrong{"[gimbal]\ntravel_deg = 130",
               "2:14: gimbal.travel_deg: found 130, expected an array of 3 ranges [lowest, highest] "
               "of outer, inner, azimuth"},
@@ -85,6 +94,21 @@ INSTANTIATE_TEST_SUITE_P(
               "deg"},
         Wrong{"[site]\nelevation_deg = nan",
               "2:17: site.elevation_deg: found nan, expected a number from -2 to 2 deg"}));
+
+TEST(Certificate, IsReadAndPrinted) {
+    const std::string text =
+        "[commission]\ncertificate = [{ name = \"D_Fx\", value = 1.2 }, { value = -3, name = "
+        "\"D_OSz\" }]\n";
+    const auto loaded = parse(text, "rig.toml", false);
+    ASSERT_EQ(loaded.configuration.commission.certificate.size(), 2U);
+    EXPECT_EQ(loaded.configuration.commission.certificate[1].value, -3);
+    for (const auto& value : loaded.effective)
+        if (value.key == "commission.certificate") {
+            EXPECT_EQ(value.value,
+                      "[{ name = \"D_Fx\", value = 1.2 }, { name = \"D_OSz\", value = -3.0 }]");
+        }
+    EXPECT_EQ(complaint("[commission]\ncertificate = []\n"), "");
+}
 
 }  // namespace
 }  // namespace vibrig::configuration

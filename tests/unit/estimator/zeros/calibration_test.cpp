@@ -479,10 +479,9 @@ void expect_honest(std::uint64_t seeds, double slack) {
             std::cout << what << '\n';
             // THEN both ways the zeros are as sure as they say, whatever the misalignment
             EXPECT_NEAR(found.both_ways, 1, slack) << what;
-            // AND not surer than that where z stays up and a second axis is taken both ways. Slews
-            // of 60 deg tell a tilt less well than those of 90: part of its prior of 1 deg is left
-            // in sigma, and a base within 10' is better than that. Where units are drawn from what
-            // is assumed of them they are as sure as they say (the test below).
+            // AND not surer than that where z stays up and a second axis is taken both ways. Up to
+            // a tenth and more on the safe side: of tilt and of cross sensitivity (1e-3) the filter
+            // assumes more than these units have, and slews of 60 deg leave part of it in sigma.
             EXPECT_LE(found.second_axis, 1 + slack) << what;
             // AND one way they are not surer than they are, up to the size declared
             if (arcsec <= 50) {
@@ -498,53 +497,6 @@ TEST(ZeroMisalignment, BothWaysOfEitherAxisTheyArePureAndOneWaySigmaKnowsWhatIsI
 }
 
 TEST(ZeroMisalignmentSoak, AHundredUnitsOfEachMisalignment) { expect_honest(100, 0.1); }
-
-/// z-rms of the zeros with z up and y both ways, of units whose every error is drawn from what the
-/// filter assumes of it: theory has 1.
-double honesty_as_assumed(std::uint64_t seeds) {
-    double sum = 0;
-    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
-        std::mt19937_64 generator(seed);
-        std::normal_distribution<double> normal;
-        CalibrationSettings s = thirty_degrees_north();
-        s.initial.tilt_deg = 10.0 / 60;
-        s.initial.azimuth_deg = 0.5;
-        s.initial.gyro_bias_deg_h = 0.1;
-        s.initial.zero_mg = 3;
-        s.noise.scale_factor = 1e-3;
-        s.noise.misalignment = kDeclaredCross;
-        UnitErrors errors;
-        for (double& b : errors.zero_mg) b = s.initial.zero_mg * normal(generator);
-        errors.accelerometer_cross = drawn(generator, kDeclaredCross, 1e-3);
-        const auto run = [&](int upright, bool inverted, std::uint64_t noise) {
-            // The platform is levelled and the gyros are switched on anew for each run.
-            errors.tilt_east_deg = s.initial.tilt_deg * normal(generator);
-            errors.tilt_north_deg = s.initial.tilt_deg * normal(generator);
-            errors.azimuth_deg = s.initial.azimuth_deg * normal(generator);
-            for (double& b : errors.gyro_bias_deg_h)
-                b = s.initial.gyro_bias_deg_h * normal(generator);
-            s.upright = upright;
-            s.inverted = inverted;
-            s.plan.targets_deg = upright == 2 ? std::vector<double>{0, 90, -90, 90}
-                                              : std::vector<double>{0, 60, -60, 60};
-            const CalibrationResult r = simulate(s, errors, kPeriod, noise).result();
-            EXPECT_TRUE(r.valid) << "seed " << seed << ": " << all(r.problems);
-            return r;
-        };
-        const std::vector<CalibrationResult> runs{
-            run(2, false, 3 * seed), run(1, false, 3 * seed + 1), run(1, true, 3 * seed + 2)};
-        sum += z_squares(together(runs), errors) / (3 * static_cast<double>(seeds));
-    }
-    std::cout << "drawn as assumed, z up and y both ways, seeds 1 to " << seeds << ": "
-              << std::sqrt(sum) << '\n';
-    return std::sqrt(sum);
-}
-
-TEST(ZeroMisalignment, OfUnitsAsAssumedASecondAxisGivesZerosAsSureAsTheySay) {
-    EXPECT_NEAR(honesty_as_assumed(20), 1, 3.29 / std::sqrt(2 * 60.0));
-}
-
-TEST(ZeroMisalignmentSoak, AHundredUnitsAsAssumed) { EXPECT_NEAR(honesty_as_assumed(100), 1, 0.1); }
 
 TEST(ZeroCalibration, AWrongGainOfTheVerticalGyroDoesNotTurnTheTiltOfTheUnit) {
     // GIVEN a unit 14' off level without noise, its vertical gyro 1e-3 too large
