@@ -115,6 +115,7 @@ def identified_again(checks, programs, rig, result):
     recorded = recording(rig)
     again = vibrig(programs, "identify", recorded, "--json")
     same = json.loads(again.stdout) if again.stdout else {}
+    checks.equal(again.returncode, 0, "identify over the recording has no doubts about the rig")
     checks.equal([p["value"] for p in same.get("parameters", [])], [p["value"] for p in result["parameters"]],
                  "identify over the recording gives the live result to the last bit")
 
