@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "estimator/filter/parameters.hpp"
+#include "estimator/identification/dwell_row.hpp"
 
 namespace vibrig::noise {
 
