@@ -23,6 +23,7 @@ const std::set<std::string>& keys_of_the_daemon() {
     static const std::set<std::string> names = registers({
         "accelerometer.range_g",
         "can.join_deadline_ms",
+        "can.samples_per_frame",
         "can.signals.azimuth",
         "can.signals.azimuth_valid",
         "can.signals.command_echo",
@@ -45,6 +46,7 @@ const std::set<std::string>& keys_of_the_daemon() {
         "can.signals.temperature_gyro_z",
         "can.stale_deadline_ms",
         "commission.buttons",
+        "commission.certificate",
         "commission.enforce",
         "commission.folder",
         "commission.linear_sigma",

@@ -68,9 +68,11 @@ struct Found {
     std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
 };
 
-Found with_doubts(estimator::Result result, const RigDoubts& doubts) {
+/// `rows`: of all dwells.
+Found with_doubts(estimator::Result result, const std::vector<estimator::DwellRow>& rows,
+                  const RigDoubts& doubts) {
     Found found{std::move(result), {}, {}, {}, {}};
-    found.contradiction = doubts.tell(found.result);
+    found.contradiction = doubts.tell(found.result, rows);
     return found;
 }
 
@@ -95,7 +97,7 @@ class RowsIdentified {
         if (!held_out) plan_.tell();
         auto result = identification_.result();
         for (auto& row : result.rows) row.common_clock = common_clock_;
-        return with_doubts(std::move(result), doubts_);
+        return with_doubts(std::move(result), identification_.rows(), doubts_);
     }
 
   private:
@@ -273,7 +275,7 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
         }
     }
     if (!request.held_out) plan.tell();
-    Found whole = with_doubts(identification.result(), doubts);
+    Found whole = with_doubts(identification.result(), identification.rows(), doubts);
     found.result = std::move(whole.result);
     found.contradiction = std::move(whole.contradiction);
     return found;
@@ -306,7 +308,8 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }
-    Found found = with_doubts(anew ? anew->result() : identification.result(), doubts);
+    Found found =
+        with_doubts(anew ? anew->result() : identification.result(), identification.rows(), doubts);
     found.rows = identification.rows();
     return found;
 }

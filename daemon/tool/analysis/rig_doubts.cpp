@@ -16,16 +16,16 @@ namespace commissioning = estimator::commissioning;
 constexpr double kMeanForce_g = 0.02;
 
 /// What shook at another frequency, or is held out, drifts otherwise than the coefficients say.
-bool is_apart(const estimator::DwellSummary& dwell, const estimator::Result& result) {
-    return !result.rows.empty() && !dwell.left_out &&
-           std::ranges::none_of(result.rows, [&dwell](const estimator::DwellRow& row) {
-               return row.run == dwell.run && row.position == dwell.position;
-           });
+bool is_apart(const estimator::DwellSummary& dwell, const std::vector<estimator::DwellRow>& rows) {
+    return std::ranges::any_of(rows, [&dwell](const estimator::DwellRow& row) {
+        return row.apart && row.run == dwell.run && row.position == dwell.position;
+    });
 }
 
 }  // namespace
 
-std::string RigDoubts::tell(estimator::Result& result) const {
+std::string RigDoubts::tell(estimator::Result& result,
+                            const std::vector<estimator::DwellRow>& rows) const {
     for (const auto& doubt : estimator::doubtful_axes(settings_))
         result.warnings.push_back(doubt.key + ": found " + doubt.found + ", expected " +
                                   doubt.expected);
@@ -34,7 +34,7 @@ std::string RigDoubts::tell(estimator::Result& result) const {
     std::vector<commissioning::DwellMean> means;
     for (std::size_t i = 0; i < dwells_.size(); ++i) {
         const auto& summary = result.dwells[i];
-        if (!dwells_[i].known() || is_apart(summary, result)) continue;
+        if (!dwells_[i].known() || is_apart(summary, rows)) continue;
         const bool level = std::abs(summary.mean_force_g - 1) <= kMeanForce_g;
         means.push_back(dwells_[i].mean(level ? summary.kappa : 1, level));
     }

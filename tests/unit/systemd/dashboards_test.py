@@ -100,8 +100,10 @@ def main(root):
         if not good:
             failed.append(what)
 
-    with open(os.path.join(root, "daemon/serve/metrics.cpp"), encoding="utf-8") as file:
-        known = set(re.findall(r"\"(vibrig_\w+)\"", file.read())) | {"up"}
+    known = {"up"}
+    for source in ("daemon/serve/metrics.cpp", "daemon/status/values.cpp"):
+        with open(os.path.join(root, source), encoding="utf-8") as file:
+            known |= set(re.findall(r"\"(vibrig_\w+)\"", file.read()))
     uids, all_expressions = [], []
     for path in sorted(glob.glob(os.path.join(root, "systemd/prometheus/*dashboard.json"))):
         name = os.path.basename(path)
