@@ -93,8 +93,8 @@ Consistency consistency(const Settings& settings, const std::vector<DwellMean>& 
     if (usable < limits.dwells) return c;
     const RateFit fit = fit_rates(settings, dwells, {});
     // Few attitudes leave the Earth's rate to the coefficients: then nothing is said of it.
-    constexpr double kObservable_deg_h = 0.5;
-    if (!fit.known || !(fit.sigma < kObservable_deg_h)) return c;
+    constexpr double kObservable = 10;
+    if (!fit.known || !(fit.dilution < kObservable)) return c;
     c.earth_known = true;
     c.north_deg_h = fit.north;
     c.east_deg_h = fit.east;

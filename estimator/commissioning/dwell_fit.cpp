@@ -196,8 +196,10 @@ RateFit fit_rates(const Settings& settings, const std::vector<DwellMean>& dwells
     const double birge = std::max(1.0, fit.cost / degrees);
     const FittedSquare inverse = solver.solve(FittedSquare::Identity());
     const FittedSquare covariance = birge * inverse + of_the_walk(settings, rates, hours, inverse);
-    for (const int i : {kFitted - 2, kFitted - 1})
+    for (const int i : {kFitted - 2, kFitted - 1}) {
         fit.sigma = std::max(fit.sigma, std::sqrt(covariance(i, i)));
+        fit.dilution = std::max(fit.dilution, std::sqrt(inverse(i, i) / variance));
+    }
     return fit;
 }
 

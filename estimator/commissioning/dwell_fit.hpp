@@ -10,6 +10,7 @@ namespace vibrig::estimator::commissioning {
 /// Dwell-mean rates by 30 coefficients and the Earth's horizontal rate.
 struct RateFit {
     double north = 0, east = 0, sigma = 0;  ///< beyond the settings', deg/h
+    double dilution = 0;                    ///< sigma by the attitudes alone, in those of one rate
     double rest = 0;                        ///< rms of the residual per degree of freedom, deg/h
     double rest_by_chance = 0;              ///< what noise alone exceeds once in 3 million times
     double input_mean = 0;                  ///< of the three input-axis terms, deg/h/g
