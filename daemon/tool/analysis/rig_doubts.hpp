@@ -16,8 +16,8 @@ class RigDoubts {
 
     void begin_dwell() { dwells_.emplace_back(); }
     void add(const estimator::Measurement& measurement) { dwells_.back().add(measurement); }
-    /// Adds to the result's warnings. `rows`: of all dwells, those apart from the result's included.
-    /// The first contradiction; empty: the configuration fits.
+    /// Adds to the result's warnings. `rows`: of all dwells, those apart from the result's
+    /// included. The first contradiction; empty: the configuration fits.
     [[nodiscard]] std::string tell(estimator::Result& result,
                                    const std::vector<estimator::DwellRow>& rows) const;
 
