@@ -421,10 +421,12 @@ def sick_archive(checks, lab, disk, base):
     checks.check(run.returncode == 0 and not lab.half(), "healthy again it takes it", run.stderr)
 
 
-def until_delivered(lab, folder, rig):
-    """As the outbox does: again and again. How often it took."""
+def until_delivered(lab, folder, rig, told=None):
+    """As the outbox does: again and again. How often it took; `told` gets what came of each attempt."""
+    told = [] if told is None else told
     for attempt in range(1, 60):
-        if lab.add(folder, rig).returncode == 0:
+        told.append(lab.add(folder, rig).returncode == 0)
+        if told[-1]:
             return attempt
         time.sleep(0.2)
     return 0
@@ -439,12 +441,20 @@ def shared(checks, programs, folder, base):
     checks.check(until_delivered(lab, base, "rig-1") == 1 and len(lab.campaigns() or []) == 1, "what could not be registered then is now")
     campaigns = [(base, "rig-1")] + [(clone(base, os.path.join(folder, "many", f"{rig}-{i}"), i + 1, serial=f"{rig}-{i % 2}"), rig)
                  for i in range(8) for rig in ("rig-1", "rig-2")]
+    told = []   # of both rigs
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        rigs = [pool.submit(lambda mine: [until_delivered(lab, f, rig) for f, rig in mine], [c for c in campaigns if c[1] == rig])
+        rigs = [pool.submit(lambda mine: [until_delivered(lab, f, rig, told) for f, rig in mine], [c for c in campaigns if c[1] == rig])
                 for rig in ("rig-1", "rig-2")]
+
+        def until(come, good):
+            """One more attempt that went well, or did not, than `come`; or there are no more."""
+            while told.count(good) <= come and not all(rig.done() for rig in rigs):
+                time.sleep(0.02)
+
         for _ in range(3):
-            time.sleep(0.6)
+            until(told.count(True), True)
             server.kill()
+            until(told.count(False), False)
             server.start()
         attempts = [n for future in rigs for n in future.result()]
     checks.check(all(attempts) and max(attempts) > 1, "two rigs deliver at once, the server is killed three times under it",
