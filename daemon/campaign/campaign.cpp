@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <array>
 
-#include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/stages/dwelling.hpp"
 #include "daemon/campaign/stages/opening.hpp"
+#include "daemon/campaign/stages/stop_proof.hpp"
 #include "daemon/campaign/stages/waiting.hpp"
 #include "daemon/campaign/stages/zeroing.hpp"
 
@@ -42,9 +43,9 @@ const Campaign::StateRow& Campaign::row_of(State state) {
         StateRow{State::armed,         G::armed,      kNo,       kNo,       &Campaign::stand_by},
         StateRow{State::waiting,       G::armed,      kCampaign, kNo,       &Campaign::wait},
         StateRow{State::slewing,       G::armed,      kCampaign, kPosition, &Campaign::slew},
-        StateRow{State::ramping,       G::excitation, kCampaign, kPosition, &Campaign::ramp},
-        StateRow{State::settling,      G::excitation, kCampaign, kPosition, &Campaign::record},
-        StateRow{State::recording,     G::excitation, kCampaign, kPosition, &Campaign::record},
+        StateRow{State::ramping,       G::excitation, kCampaign, kPosition, &Campaign::dwell},
+        StateRow{State::settling,      G::excitation, kCampaign, kPosition, &Campaign::dwell},
+        StateRow{State::recording,     G::excitation, kCampaign, kPosition, &Campaign::dwell},
         StateRow{State::resting,       G::excitation, kCampaign, kPosition, &Campaign::rest},
         StateRow{State::paused,        G::armed,      kCampaign, kNo,       &Campaign::pause},
         StateRow{State::finished,      G::idle,       kNo,       kNo,       &Campaign::stand_by},
@@ -53,7 +54,7 @@ const Campaign::StateRow& Campaign::row_of(State state) {
         StateRow{State::zeroing,       G::armed,      kCampaign, kNo,       &Campaign::zeroing},
         StateRow{State::levelling,     G::armed,      kCampaign, kPosition, &Campaign::levelling},
         // It begins at rest, and has to learn where the gimbals are.
-        StateRow{State::checking,      G::armed,      kNo,       kNo,       &Campaign::check_loop},
+        StateRow{State::checking,      G::armed,      kNo,       kNo,       &Campaign::check},
         StateRow{State::commissioning, G::idle,       kNo,       kNo,       &Campaign::give_way}};
     // clang-format on
     static_assert(kRows.size() == static_cast<std::size_t>(kLastCampaignState) + 1);
@@ -70,9 +71,10 @@ Campaign::Campaign(const Settings& settings, const Ports& ports)
       ports_(ports),
       stop_(
           ports_.rig.shaker, [this](Time at) { return ports_.rig.rest(at); }, settings_.stop),
+      excitation_(settings_, ports_.rig, stop_),
       proof_(settings_.proof) {
-    excited_hz_ = settings_.frequency_hz;
     plan_stops();
+    excitation_.for_whom(highest_level(), true);
     make_stages();
 }
 
@@ -83,23 +85,16 @@ bool Campaign::done(Time now) const { return shutting_down_ && !active() && !sto
 void Campaign::enter(State state, Time now) {
     state_ = state;
     if (state == State::paused) ports_.rig.gimbal.forget_position();
-    if (state == State::ramping) excited_deg_ = here().stop.position_deg;
-    if (state == State::ramping || state == State::checking) {
-        const Stop stop = state == State::ramping ? here().stop : Stop{};
-        excited_hz_ = stop.frequency_hz > 0 ? stop.frequency_hz : settings_.frequency_hz;
-        excited_transmission_ = stop.transmission;
-    }
-    if (state == State::ramping || state == State::checking) {
-        // From rest: what the table was told last is over, and no witness may hold it to that.
-        asked_g_ = 0;
-        tell_ramp(0, now);
-    }
-    ports_.rig.commanded(state == State::settling ? table_g() : 0, excited_deg_);
+    excitation_.for_whom(highest_level(), state != State::checking);
+    if (state == State::ramping) excitation_.place(here().stop.position_deg);
+    if (state == State::ramping || state == State::checking)
+        excitation_.from_rest(state == State::ramping ? here().stop : Stop{}, now);
+    ports_.rig.commanded(state == State::settling ? table_g() : 0, excitation_.position_deg());
     ports_.rig.guard(row_of(state).guard);
     pace_.enter(row_of(state).position, now);
     entered_ = now;
-    requested_ = false;
-    stop_sent_ = false;
+    slew_ordered_ = false;
+    excitation_.begin_part(now);
 }
 
 /// From the position after the ones in offer_, which is empty for a new campaign.
@@ -122,7 +117,7 @@ void Campaign::begin(const std::string& by, Time now) {
     zeroing_ = ZeroingAt::none;
     mark_.clear();
     level_variances_.clear();
-    origin_.reset();
+    dwelling_->reset(offered_last_);
     if (zero_) zero_->reset();
     started_ = now;
     pace_.begin(now);
@@ -140,7 +135,7 @@ Time Campaign::step(Time now) {
 
 Time Campaign::step_once(Time now) {
     watch_stop(now);
-    if (pressed_ != Pressed::no) await_pressed(now);
+    if (proving_->pressed()) proving_->look(state_ == State::tripped, reason_, now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
         !ports_.rig.shaker.reading().valid) {
@@ -225,7 +220,7 @@ void Campaign::finish(Time now) {
 }
 
 void Campaign::abort(const std::string& why, Time now) {
-    order_stop(why);
+    excitation_.order_stop(why);
     end(State::aborted, why, now);
 }
 
@@ -233,17 +228,8 @@ void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
     const bool checking = state_ == State::checking;
     const bool commissioning = state_ == State::commissioning;
-    if (checking) {
-        loop_->not_completed(why);
-        if (check_ == Check::press &&
-            (state == State::tripped || ports_.rig.shaker.reading().emergency_stop_open)) {
-            begin_pressed(now);
-        } else {
-            conclude_proof("not completed: " + why + suspect_unit());
-        }
-    }
+    if (checking) end_check(state, why, now);
     const bool slewing = state_ == State::slewing || state_ == State::zeroing || opening();
-    leave_dwell();
     leave_stage();
     zeroing_ = ZeroingAt::none;
     armed_by_.clear();
@@ -263,19 +249,18 @@ void Campaign::end(State state, const std::string& why, Time now) {
 
 void Campaign::on_trip(const std::string& cause, Time now) {
     // Once more: whoever tripped has stopped it already, and a second stop costs one write.
-    order_stop("interlock: " + cause);
+    excitation_.order_stop("interlock: " + cause);
     end(State::tripped, cause, now);
 }
 
 void Campaign::shut_down(Time now) {
     if (shutting_down_) return;
     shutting_down_ = true;
-    if (pressed_ != Pressed::no) end_pressed("not completed: the daemon is shutting down");
+    if (proving_->pressed()) proving_->end_pressed("not completed: the daemon is shutting down");
     if (state_ == State::checking || state_ == State::commissioning)
         return abort("the daemon is shutting down", now);
     if (!active()) return;
     const bool slewing = state_ == State::slewing || opening();
-    leave_dwell();
     leave_stage();
     if (slewing) ports_.rig.gimbal.release(now);
     if (!stop_.excited()) return end(State::aborted, "the daemon is shutting down", now);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/campaign/excitation.hpp"
 #include "daemon/campaign/pace.hpp"
 #include "daemon/campaign/ports.hpp"
 #include "daemon/campaign/settings.hpp"
@@ -22,15 +23,18 @@
 #include "drivers/gimbal/gimbal.hpp"
 #include "drivers/gimbal/torquer.hpp"
 #include "drivers/shaker/shaker.hpp"
-#include "estimator/level/loop_response.hpp"
 
 namespace vibrig::campaign {
 
+class Dwelling;
 class GravityWatch;
 class Levelling;
 class LoopCheck;
+class LoopChecking;
 class Opening;
+class SmallLevel;
 class Stage;
+class StopProof;
 class Waiting;
 class ZeroCalibration;
 class Zeroing;
@@ -115,24 +119,6 @@ class Campaign {
     /// The zeroing that is under way, its levelling included.
     enum class ZeroingAt : std::uint8_t { none, start, end };
 
-    /// Within a loop check.
-    /// The last parts are the safe-state proof's.
-    enum class Check : std::uint8_t {
-        look,
-        climb,  ///< to the next rung of the ladder
-        rung,   ///< there
-        ramp,
-        settle,
-        measure,
-        stop,        ///< by order
-        again,       ///< up to the level once more
-        watchdog,    ///< is not fed
-        clear,       ///< its fault
-        press_ramp,  ///< up to the level for
-        press,       ///< the emergency stop
-        rest
-    };
-
     struct Doubt {
         std::string why;
         int run = 0, position = 0;
@@ -162,29 +148,11 @@ class Campaign {
     drivers::Time levelling(drivers::Time now);
     [[nodiscard]] bool for_zeroing() const { return zeroing_ != ZeroingAt::none; }
     [[nodiscard]] std::string not_fit_to_check(drivers::Time now) const;
-    CommandReply begin_loop_check(const CommandRequest& request, drivers::Time now);
-    drivers::Time check_loop(drivers::Time now);
-    [[nodiscard]] double check_level() const;
-    [[nodiscard]] Check after_rung() const;
-    void stand_on_rung(drivers::Time now);
-    void go_on_to(Check part, drivers::Time now);
-    void ramp_for_check(Check then, drivers::Time now);
-    void conclude_loop_check(drivers::Time now);
-    void order_proved_stop(drivers::Time now);
-    void prove_stop(drivers::Time now);
-    void prove_watchdog(drivers::Time now);
-    void prove_clearing(drivers::Time now);
-    void prove_emergency_stop(drivers::Time now);
+    CommandReply begin_check(const CommandRequest& request, drivers::Time now);
+    drivers::Time check(drivers::Time now);
     void prove_refusals(drivers::Time now);
-    void begin_pressed(drivers::Time now);
-    void see_pressed(drivers::Time now);
-    void await_pressed(drivers::Time now);
-    void end_pressed(const std::string& why);
-    void prove_quiet();
-    void keep_ring_down();
-    void conclude_proof(const std::string& why);
-    [[nodiscard]] std::string suspect_unit() const;
-    void proving(Proving what);
+    void end_check(CampaignState state, const std::string& why, drivers::Time now);
+    void conclude_check(drivers::Time now);
     [[nodiscard]] std::int64_t utc_ns() const { return ports_.log.utc_ns(); }
     void make_stages();
     [[nodiscard]] bool opening() const;  ///< it is being held against the rig at rest
@@ -193,29 +161,21 @@ class Campaign {
     void conclude_opening(drivers::Time now);
     [[nodiscard]] const ZeroCalibration* zeros() const;  ///< null: none are taken
     void begin_zeroing(bool at_end, drivers::Time now);
-    /// A stage at rest; it is left by leave_stage() at the latest.
+    /// It is left by leave_stage() at the latest.
     void begin(Stage& stage, CampaignState state, drivers::Time now);
     void leave_stage();
     void insist_on_zero_torque(drivers::Time now);
-    [[nodiscard]] bool take_motion(rt::Motion& motion, drivers::Time now);
     void fill_stages(StatusData& status) const;
     void fill_rest(StatusData& status, drivers::Time now) const;
-    drivers::Time ramp(drivers::Time now);
-    drivers::Time record(drivers::Time now);
+    void begin_dwell(drivers::Time now);
+    drivers::Time dwell(drivers::Time now);
     drivers::Time rest(drivers::Time now);
-    [[nodiscard]] bool come_to_rest(drivers::Time now);
     void enter(CampaignState state, drivers::Time now);
     void next_position(drivers::Time now);
     void start_position(drivers::Time now);
     void abort(const std::string& why, drivers::Time now);
     void end(CampaignState state, const std::string& why, drivers::Time now);
-    void leave_dwell();
-    void stop_shaker();
     void watch_gravity();
-    /// Before a ramp: not yet, or not at all.
-    [[nodiscard]] bool frequency_may_change(drivers::Time now);
-    void watch_vibration();
-    void look_at_vibration(drivers::Time now);
     /// Before a ramp: not yet, or not at all.
     [[nodiscard]] bool gravity_holds(drivers::Time now);
     void pause_at_rest(const std::string& why, drivers::Time now);
@@ -233,12 +193,8 @@ class Campaign {
     }
     /// True: it has paused, since that is asked for.
     [[nodiscard]] bool not_valid_so_far(drivers::Time now);
-    /// Asks the shaker for a level; whoever watches it knows what it was asked.
-    [[nodiscard]] bool ask_level(double table_g, drivers::Time now);
-    void tell_ramp(double table_g, drivers::Time now);
     /// That the arming is for, peak at the table.
     [[nodiscard]] double highest_level() const;
-    void order_stop(const std::string& by);
     void watch_stop(drivers::Time now);
     void begin(const std::string& by, drivers::Time now);
     void conclude(drivers::Time now);
@@ -250,9 +206,6 @@ class Campaign {
     [[nodiscard]] std::string not_fit_to_acknowledge(drivers::Time now) const;
     CommandReply acknowledge(const CommandRequest& request, drivers::Time now);
     void watch_arming(drivers::Time now);
-    [[nodiscard]] bool vibrating_as_commanded(const drivers::ShakerReading& reading,
-                                              double table_g) const;
-    [[nodiscard]] bool stopped_by_another(drivers::Time now);
     void plan_stops();
     [[nodiscard]] bool put_first(const std::vector<estimator::DwellSummary>& done);
     /// Runs and positions per run of a list; of a plan the levels and all its stops.
@@ -279,28 +232,15 @@ class Campaign {
     /// And with the slews between the stops.
     [[nodiscard]] double expected_stop_s() const;
     [[nodiscard]] const NumberedStop& here() const { return stops_[at_]; }
-    /// Of the dwell that is being done.
-    [[nodiscard]] estimator::DwellInfo dwell_info() const {
-        return {here().run,
-                here().position,
-                table_g(),
-                drivers::to_seconds(dwell_from_ - origin_.value_or(dwell_from_)),
-                power_lost_ && positions_done_ > 0,
-                here().stop.frequency_hz,
-                here().stop.verify};
-    }
     void watch_power();
-    void take_over_origin();
     [[nodiscard]] double table_g() const { return here().stop.table_g; }
     [[nodiscard]] bool active() const;
-
-    /// How much later than the ramp itself the controller may report the level as reached.
-    static constexpr drivers::Time kRampGrace = 10 * drivers::kSecond;
 
     Settings settings_;
     StageTimes times_;
     Ports ports_;
     StopMonitor stop_;
+    Excitation excitation_;
     CampaignState state_ = CampaignState::idle;
     drivers::Time entered_ = 0;  ///< when state_ began
     drivers::Time started_ = 0;  ///< when the campaign began
@@ -315,43 +255,26 @@ class Campaign {
     std::string armed_by_;
     std::string armed_for_, started_by_;
     drivers::Time armed_wall_ = 0;  ///< when it was armed, in people's time
-    /// Stops of the shaker when it was armed, and this thread's own since; and when one of another
-    /// thread was found, since when.
-    std::uint64_t armed_under_ = 0, stopped_under_ = 0;
-    drivers::Time stopped_since_ = 0;
     std::string reason_;
     bool pause_asked_ = false;
     bool shutting_down_ = false;
-    bool stop_sent_ = false;  ///< within rest(): the ramp down took too long
-    bool requested_ = false;  ///< within ramp() and rest(): the set-point was accepted
-    std::string stopped_by_ = "the start of the daemon";  ///< whose stop was the last
-    drivers::Time asked_at_ = 0;
-    double asked_g_ = 0;  ///< of the shaker, last
-    bool dwell_ordered_ = false;
-    bool dwell_done_ = false;
-    drivers::Time dwell_from_ = 0;
-    drivers::Time dwell_to_ = 0;
-    std::int64_t dwell_utc_ns_ = 0;        ///< of its beginning
-    std::optional<drivers::Time> origin_;  ///< when the campaign's first dwell began
-    /// Where the gimbals are while the table moves; at_ is ahead when it comes to rest.
-    std::array<double, 3> excited_deg_{};
-    double excited_hz_ = 0;            ///< what it is told then
-    double excited_transmission_ = 0;  ///< see Stop
-    bool watching_ = false;            ///< the accelerometers are to show it before the dwell
-    std::vector<estimator::LoopReading> shown_;
+    bool slew_ordered_ = false;  ///< within slew()
     std::size_t positions_done_ = 0;
     std::size_t positions_before_ = 0;  ///< of them before a restart
     double used_before_s_ = 0;          ///< of the campaign, before a restart
     std::vector<estimator::DwellSummary> offer_;
     std::vector<StopDone> offered_stops_;
     std::optional<StopDone> offered_last_;
-    bool power_lost_ = false;  ///< the gyros were seen run down since the dwell done last
     std::vector<estimator::DwellSummary> dwells_;
     // shared: their types are known where they are made
     std::shared_ptr<Waiting> waiting_;
     std::shared_ptr<Levelling> level_;
     std::shared_ptr<Zeroing> zero_;
+    std::shared_ptr<Dwelling> dwelling_;
     std::shared_ptr<LoopCheck> loop_;
+    std::shared_ptr<SmallLevel> small_level_;
+    std::shared_ptr<LoopChecking> checking_;
+    std::shared_ptr<StopProof> proving_;
     std::shared_ptr<GravityWatch> gravity_;
     std::shared_ptr<Opening> opening_;
     Stage* stage_ = nullptr;          ///< of them the one under way
@@ -362,24 +285,12 @@ class Campaign {
     int rejected_in_a_row_ = 0;               ///< dwells, the newest included
     std::string rejected_for_;
     std::optional<Doubt> doubted_;  ///< and nothing done about it yet
-    Check check_ = Check::look;
     SafetyProof proof_;
-    StopTimes stop_times_;
-    bool press_wanted_ = false;  ///< the emergency stop is to be proved, too
-    bool climbs_ = false;        ///< the next proof goes up a ladder
-    std::vector<double> rungs_;  ///< g at the table, of this one
-    std::size_t rung_ = 0;
-    bool rung_counts_ = false;
-    /// The emergency stop: not pressed, rest is awaited, the chain is still open, closed again.
-    enum class Pressed : std::uint8_t { no, rest, open, closed } pressed_ = Pressed::no;
-    drivers::Time pressed_at_ = 0;  ///< when that began
-    drivers::Time asked_wall_ = 0;  ///< when a person was asked, in people's time
-    bool press_felt_ = false;       ///< by the controller, too
-    bool press_seen_ = false;       ///< by the chain's register
+    bool climbs_ = false;  ///< the next proof goes up a ladder
     ZeroingAt zeroing_ = ZeroingAt::none;
     bool zeroed_ = false;  ///< in this campaign, before the first dwell
     bool opened_ = false;  ///< likewise, the opening check
-    drivers::Time last_motion_ = 0, torque_sent_ = 0;
+    drivers::Time torque_sent_ = 0;
     std::string mark_;  ///< why the campaign is marked
     /// Of each dwell in which zeros were in force: run, and variance of the relative level.
     std::vector<std::pair<int, double>> level_variances_;

@@ -23,7 +23,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
         case Kind::arm:
             if (const auto why = not_fit_to_arm(now); !why.empty()) return refuse(why);
             armed_by_ = request.by;
-            armed_under_ = ports_.rig.shaker.stops();
+            excitation_.armed();
             armed_wall_ = ports_.log.wall();
             reason_.clear();
             enter(State::armed, now);
@@ -57,13 +57,13 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
                 state_ == State::commissioning) {
                 abort("aborted by " + request.by, now);
             } else {
-                order_stop("stopped by " + request.by);
+                excitation_.order_stop("stopped by " + request.by);
             }
             return accept("stop sent");
         case Kind::acknowledge:
             return acknowledge(request, now);
         case Kind::selftest:
-            return begin_loop_check(request, now);
+            return begin_check(request, now);
         case Kind::commission:  // the daemon's, by begin_commissioning()
         case Kind::certificate:
             break;
@@ -90,10 +90,7 @@ CommandReply Campaign::acknowledge(const CommandRequest& request, Time now) {
         enter(State::idle, now);
     }
     stop_.acknowledge();
-    if (latched) {
-        stopped_by_ = "acknowledged by " + request.by;
-        stop_shaker();
-    }
+    if (latched) excitation_.stop("acknowledged by " + request.by);
     what = "acknowledged: " + what;
     ports_.log.event(Severity::info, fmt::format("{} by {}", what, request.by));
     return {true, what};

@@ -35,7 +35,7 @@ void Campaign::watch_gravity() {
         return;
     }
     second_from_ = second.from;
-    if (state_ == State::ramping && !requested_) gravity_->next_position();
+    if (state_ == State::ramping && !excitation_.asked()) gravity_->next_position();
     Vector zero_g = settings_.rig.accelerometer_zero_g;
     if (zeros() != nullptr && zeros()->status().known) {  // on top of the configuration's
         const Vector found = zeros()->raw_zero_g();
@@ -95,6 +95,7 @@ bool Campaign::not_valid_so_far(Time now) {
 
 void Campaign::pause_at_rest(const std::string& why, Time now) {
     pause_asked_ = true;
+    stage_ = nullptr;
     enter(State::paused, now);
     reason_ = why;
     ports_.log.event(Severity::alarm, "paused at rest, resume when it is put right: " + why);

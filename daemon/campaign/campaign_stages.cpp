@@ -1,9 +1,13 @@
-// What the campaign makes of its stages with the table at rest: which begins, what follows.
+// The campaign's stages, and what it makes of those with the table at rest: which begins, what
+// follows.
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/gravity_watch.hpp"
 #include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/stages/dwelling.hpp"
 #include "daemon/campaign/stages/levelling.hpp"
+#include "daemon/campaign/stages/loop_checking.hpp"
 #include "daemon/campaign/stages/opening.hpp"
+#include "daemon/campaign/stages/stop_proof.hpp"
 #include "daemon/campaign/stages/waiting.hpp"
 #include "daemon/campaign/stages/zeroing.hpp"
 
@@ -12,13 +16,18 @@ namespace vibrig::campaign {
 using drivers::kSecond;
 using drivers::Time;
 using State = CampaignState;
-using Kind = StageStep::Kind;
+using Came = StageStep::Kind;
 
 void Campaign::make_stages() {
     times_ = stage_times(settings_);
     gravity_ = std::make_shared<GravityWatch>(
         settings_.rig, GravityLimits{.refused_deg = settings_.gravity_refused_deg});
     loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
+    small_level_ =
+        std::make_shared<SmallLevel>(settings_, ports_, excitation_, stop_, *loop_, proof_);
+    checking_ = std::make_shared<LoopChecking>(*small_level_);
+    proving_ = std::make_shared<StopProof>(*small_level_);
+    dwelling_ = std::make_shared<Dwelling>(settings_, ports_, excitation_, stop_);
     waiting_ = std::make_shared<Waiting>(settings_, ports_.rig);
     if (settings_.levelling && ports_.rig.torquer != nullptr && ports_.rig.feed != nullptr)
         level_ = std::make_shared<Levelling>(settings_, ports_);
@@ -53,8 +62,8 @@ void Campaign::insist_on_zero_torque(Time now) {
 Time Campaign::wait_for_platform(Time now) {
     const StageStep step = waiting_->step(now);
     reason_ = waiting_->words();
-    if (step.kind == Kind::going_on) return step.next;
-    if (step.kind == Kind::failed) {
+    if (step.kind == Came::going_on) return step.next;
+    if (step.kind == Came::failed) {
         abort(step.why, now);
     } else {
         stage_ = nullptr;
@@ -77,8 +86,8 @@ Time Campaign::open(Time now) {
     }
     reason_ = opening_->check().words();
     const StageStep step = opening_->step(now);
-    if (step.kind == Kind::going_on) return step.next;
-    if (step.kind == Kind::failed) {
+    if (step.kind == Came::going_on) return step.next;
+    if (step.kind == Came::failed) {
         abort("opening check: " + step.why, now);
     } else {
         conclude_opening(now);
@@ -118,15 +127,15 @@ Time Campaign::zeroing(Time now) {
     }
     const StageStep step = zero_->step(now);
     switch (step.kind) {
-        case Kind::going_on:
+        case Came::going_on:
             return step.next;
-        case Kind::level_first:
+        case Came::asks:
             begin_levelling(now);
             break;
-        case Kind::failed:
+        case Came::failed:
             fail_zeroing(step.why, now);
             break;
-        case Kind::done:
+        case Came::done:
             stage_ = nullptr;
             if (zeroing_ == ZeroingAt::end) {
                 mark_ = zeros()->status().mark;
@@ -171,8 +180,8 @@ Time Campaign::levelling(Time now) {
         return now;
     }
     const StageStep step = level_->step(now);
-    if (step.kind == Kind::going_on) return step.next;
-    if (step.kind == Kind::failed) {
+    if (step.kind == Came::going_on) return step.next;
+    if (step.kind == Came::failed) {
         leave_stage();
         if (for_zeroing()) {
             fail_zeroing("levelling: " + step.why, now);
@@ -184,8 +193,7 @@ Time Campaign::levelling(Time now) {
         stage_ = zero_.get();
         enter(State::zeroing, now);
     } else {
-        stage_ = nullptr;
-        enter(State::ramping, now);
+        begin_dwell(now);
     }
     return now;
 }

@@ -4,7 +4,9 @@
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/stages/dwelling.hpp"
 #include "daemon/campaign/stages/levelling.hpp"
+#include "daemon/campaign/stages/stop_proof.hpp"
 #include "daemon/campaign/stages/zeroing.hpp"
 #include "estimator/identification/result.hpp"
 
@@ -38,36 +40,23 @@ void Campaign::fill(StatusData& status, Time now) const {
     }
     fill_stages(status);
     proof_.fill(status.proof, utc_ns());
-    const bool press = state_ == State::checking && check_ == Check::press && requested_;
-    const bool close = pressed_ == Pressed::open && ports_.rig.shaker.reading().emergency_stop_open;
-    status.proof.asks = press   ? "press the emergency stop" + proof_.named_button() + " now"
-                        : close ? "close the emergency-stop chain again"
-                                : "";
+    status.proof.asks = proving_->asks_for();
     fill_rest(status, now);
     // Of what has ended nothing is left and nothing is commanded.
+    const bool recording = state_ == State::recording;
     status.remaining_s = 0;
-    status.command_table_g = 0;
-    double done = static_cast<double>(positions_done_);
-    if (state_ == State::recording && dwell_to_ > dwell_from_) {
-        done += std::clamp(
-            static_cast<double>(now - dwell_from_) / static_cast<double>(dwell_to_ - dwell_from_),
-            0.0, 1.0);
-    }
+    status.command_table_g = stage_ != nullptr ? stage_->table_g() : 0;
+    const double done =
+        static_cast<double>(positions_done_) + (recording ? dwelling_->part_done(now) : 0);
     status.progress = begun ? done / total : 0;
     if (active()) {
-        const double dwell_s =
-            state_ == State::recording ? drivers::to_seconds(dwell_to_ - now) : settings_.dwell_s;
-        status.remaining_s = pace_.left_s(expected_ - std::min(positions_done_, expected_),
-                                          expected_stop_s(), std::max(dwell_s, 0.0), now) +
-                             times_.closing_s;
-        const bool vibrating =
-            state_ == State::ramping || state_ == State::settling || state_ == State::recording;
-        status.command_table_g = vibrating ? table_g() : 0;
-        status.command_frequency_hz = excited_hz_;
-    } else if (state_ == State::checking) {
-        status.command_table_g = check_ == Check::look || check_ == Check::rest ? 0 : check_level();
-        status.command_frequency_hz = excited_hz_;
+        status.remaining_s =
+            pace_.left_s(expected_ - std::min(positions_done_, expected_), expected_stop_s(),
+                         recording ? dwelling_->left_s(now) : settings_.dwell_s, now) +
+            times_.closing_s;
     }
+    if (active() || state_ == State::checking)
+        status.command_frequency_hz = excitation_.frequency_hz();
 }
 
 double Campaign::expected_stop_s() const {

@@ -2,9 +2,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/stages/dwelling.hpp"
 
 namespace vibrig::campaign {
 
@@ -177,22 +177,11 @@ std::string Campaign::resume_offer() const {
     return fmt::format("{} of {} positions done", offer_.size(), stops_.size());
 }
 
-/// After a restart the clock may be another one: what both have in common is UTC, unless that was
-/// set back meanwhile.
-void Campaign::take_over_origin() {
-    origin_ = dwell_from_;
-    if (!offered_last_ || !std::isfinite(offered_last_->begin_s)) return;
-    const Time before = drivers::from_seconds(offered_last_->begin_s);
-    const Time least = drivers::from_seconds(settings_.dwell_s);
-    const Time since = dwell_utc_ns_ - offered_last_->begun_utc_ns;
-    *origin_ -= before + std::max(since, least);
-}
-
 /// Gyros run down when they lose their power, between two dwells or while the daemon is away: what
 /// the bias does then no walk tells.
 void Campaign::watch_power() {
     const auto platform = ports_.rig.platform();
-    power_lost_ = power_lost_ || (platform.time > 0 && !platform.gyros_at_speed);
+    if (platform.time > 0 && !platform.gyros_at_speed) dwelling_->lost_power();
 }
 
 bool Campaign::offer(std::vector<estimator::DwellSummary> done, std::vector<StopDone> stops) {

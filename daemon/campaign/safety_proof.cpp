@@ -71,6 +71,24 @@ constexpr const char* kRemedy = ": prove it anew (vibrig selftest --by NAME)";
 
 }  // namespace
 
+void StopTimes::begin(drivers::Time now) {
+    *this = {};
+    from_ = now;
+}
+
+void StopTimes::look(const drivers::ShakerReading& reading, const rt::Rest& rest) {
+    if (!controller_s && reading.valid && reading.time > from_ && !reading.running &&
+        reading.still())
+        controller_s = drivers::to_seconds(reading.time - from_);
+    const auto stands = [this](const rt::RestWitness& witness, std::optional<double>& time_s) {
+        if (!time_s && witness.verdict == rt::RestVerdict::still && witness.from >= from_)
+            time_s = drivers::to_seconds(witness.from - from_);
+    };
+    stands(rest.table, table_s);
+    stands(rest.platform, platform_s);
+    table_known = table_known || rest.table.verdict != rt::RestVerdict::absent;
+}
+
 std::string sha256(const std::string& text) {
     std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
     unsigned int length = 0;

@@ -12,7 +12,7 @@ namespace vibrig::campaign {
 struct StageStep {
     enum class Kind : std::uint8_t {
         going_on,
-        level_first,  ///< the platform has to be levelled here before it goes on
+        asks,  ///< before it goes on the campaign has its part to do, which the stage names
         done,
         failed
     } kind = Kind::going_on;
@@ -20,12 +20,13 @@ struct StageStep {
     std::string why;         ///< failed
 
     static StageStep going_on(drivers::Time next) { return {Kind::going_on, next, {}}; }
+    static StageStep asks() { return {Kind::asks, 0, {}}; }
     static StageStep done() { return {Kind::done, 0, {}}; }
     static StageStep failed(std::string why) { return {Kind::failed, 0, std::move(why)}; }
 };
 
-/// A part of the campaign with the table at rest. It is begun, stepped until it is done or has
-/// failed, and left in every case. The campaign sees to it that the shaker rests meanwhile, and
+/// A part of the campaign. It is begun, stepped until it is done or has failed, and left in every
+/// case but after `done`. The campaign sees to it that the shaker rests where it has to, and
 /// decides what follows. Control thread only; no call waits.
 class Stage {
   public:
@@ -37,6 +38,8 @@ class Stage {
     virtual void begin(drivers::Time now) = 0;
     [[nodiscard]] virtual StageStep step(drivers::Time now) = 0;
     virtual void leave() = 0;
+    /// Where the table is to be meanwhile, or is on its way to, peak.
+    [[nodiscard]] virtual double table_g() const { return 0; }
 };
 
 /// How often a stage looks when nothing calls it earlier.

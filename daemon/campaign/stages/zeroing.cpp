@@ -29,7 +29,7 @@ StageStep Zeroing::step(Time now) {
     if (there && levels_ && !calibration_.levelled()) {
         rig_.gimbal.release(now);
         part_ = Part::go;
-        return {StageStep::Kind::level_first, 0, {}};
+        return StageStep::asks();
     }
     if (there) {
         rig_.feed->order(rt::StageFeed::Mode::increments);

@@ -11,7 +11,8 @@ namespace vibrig::campaign {
 /// the last one.
 class Zeroing : public Stage {
   public:
-    /// `levels`: each way is levelled before its slews. Throws as ZeroCalibration does.
+    /// `levels`: it asks for the platform to be levelled before the slews of each way. Throws as
+    /// ZeroCalibration does.
     Zeroing(const Settings& settings, Rig& rig, Log& log, bool levels)
         : rig_(rig),
           log_(log),

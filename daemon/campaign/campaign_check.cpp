@@ -1,0 +1,143 @@
+// What the campaign makes of loop check and safe-state proof: about a minute at a small level, its
+// own arming.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/loop_check.hpp"
+#include "daemon/campaign/stages/loop_checking.hpp"
+#include "daemon/campaign/stages/opening.hpp"
+#include "daemon/campaign/stages/stop_proof.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::Time;
+using State = CampaignState;
+using Came = StageStep::Kind;
+
+void Campaign::take_over_loop_check(const std::string& out_of_band) {
+    loop_->take_over(out_of_band);
+}
+
+void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
+    proof_.take_over(std::move(history));
+    stop_.pads(proof_.pads());
+    // The witnesses go on with what was measured; a key that has changed since asks for a new one.
+    const auto transmission = proof_.transmission();
+    if (!transmission) return;
+    ports_.rig.transmission(*transmission);
+    ports_.log.event(Severity::info,
+                     fmt::format("transmission {:.4g}, as the loop check of the newest "
+                                 "proof measured it",
+                                 *transmission));
+}
+
+std::string Campaign::not_fit_to_check(Time now) const {
+    if (active()) return "a campaign is running";
+    if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
+    if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
+    if (state_ == State::armed) return "armed for a campaign: abort that first";
+    if (ports_.rig.feed == nullptr) return "no samples to look at";
+    if (auto why = not_fit_to_excite(now); !why.empty()) return why;
+    if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) return why;
+    if (torquing(ports_.rig)) return "the platform is torqued, expected free drift";
+    return LoopCheck::beyond_limits(settings_);
+}
+
+CommandReply Campaign::begin_check(const CommandRequest& request, Time now) {
+    constexpr std::string_view kPress = "emergency_stop";
+    const bool press = request.argument.starts_with(kPress);
+    std::string button;
+    if (press && request.argument.size() > kPress.size() + 1)
+        button = request.argument.substr(kPress.size() + 1);
+    const auto& buttons = settings_.proof.buttons;
+    if (!press && !request.argument.empty())
+        return {false,
+                "selftest: found \"" + request.argument + "\", expected nothing or emergency_stop"};
+    if (!button.empty() && std::ranges::find(buttons, button) == buttons.end())
+        return {false, "selftest: found the button \"" + button +
+                           "\", expected one of commission.buttons"};
+    if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
+    armed_by_ = request.by;
+    armed_for_ = arming_text(request);
+    excitation_.armed();
+    reason_.clear();
+    checking_->aim(request.by, climbs_);
+    proving_->with_press(press);
+    begin(*checking_, State::checking, now);
+    // There is but one.
+    proof_.record().button = press && button.empty() && buttons.size() == 1 ? buttons[0] : button;
+    const std::string text =
+        fmt::format("loop check and safe-state proof at {:g} g", settings_.loop.table_g);
+    ports_.log.event(Severity::info, fmt::format("{} by {}", text, request.by));
+    return {true, text};
+}
+
+Time Campaign::check(Time now) {
+    const StageStep step = stage_->step(now);
+    switch (step.kind) {
+        case Came::going_on:
+            return step.next;
+        case Came::asks:
+            prove_refusals(now);
+            break;
+        case Came::failed:
+            abort(step.why, now);
+            break;
+        case Came::done:
+            if (stage_ == proving_.get()) {
+                conclude_check(now);
+            } else {
+                stage_ = proving_.get();
+                stage_->begin(now);
+            }
+    }
+    return now + kStagePoll;
+}
+
+/// Every order that must not be followed while the table moves, tried.
+void Campaign::prove_refusals(Time now) {
+    const auto tried = command({CommandRequest::Kind::arm, proof_.record().by, ""}, now);
+    proof_.row("arming is refused while it moves", !tried.accepted);
+    proof_.row("a slew is refused while it moves", !may_slew(ports_.rig, stop_).empty());
+    proof_.row("another frequency is refused while it moves",
+               excitation_.refuses_frequency(settings_.frequency_hz + 1, settings_.loop.table_g));
+}
+
+/// It ends before it is done, in this state.
+void Campaign::end_check(State state, const std::string& why, Time now) {
+    loop_->not_completed(why);
+    if (proving_->waits_for_press() &&
+        (state == State::tripped || ports_.rig.shaker.reading().emergency_stop_open)) {
+        proving_->begin_pressed(now);
+    } else {
+        proving_->conclude("not completed: " + why + checking_->suspect_unit());
+    }
+}
+
+void Campaign::conclude_check(Time now) {
+    leave_stage();
+    loop_->conclude();
+    proving_->conclude({});
+    armed_by_.clear();
+    enter(State::idle, now);
+    const auto& found = loop_->status();
+    for (const auto& row : found.rows) {
+        ports_.log.event(
+            Severity::info,
+            fmt::format("loop check: {} {:.4g}{}{}, band {:.4g} to {:.4g}", row.name, row.value,
+                        *row.unit == '\0' ? "" : " ", row.unit, row.low, row.high));
+    }
+    if (found.message.empty()) {
+        ports_.log.event(Severity::info, "loop check in band");
+    } else {
+        ports_.log.event(Severity::alarm,
+                         "loop check out of band, no campaign is armed: " + found.message);
+    }
+}
+
+}  // namespace vibrig::campaign

@@ -1,0 +1,108 @@
+#include "daemon/campaign/excitation.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <cmath>
+#include <utility>
+
+#include "daemon/campaign/rig_frame.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::from_seconds;
+using drivers::Time;
+
+void Excitation::from_rest(const Stop& stop, Time now) {
+    frequency_hz_ = stop.frequency_hz > 0 ? stop.frequency_hz : settings_.frequency_hz;
+    transmission_ = stop.transmission;
+    asked_g_ = 0;
+    tell_ramp(0, now);
+}
+
+bool Excitation::ask(double table_g, Time now) {
+    stop_.excited(table_g);
+    if (!rig_.shaker.request({frequency_hz_, table_g, settings_.ramp_s}, armed_under_))
+        return false;
+    asked_ = true;
+    tell_ramp(table_g, now);
+    return true;
+}
+
+std::string Excitation::climb(double table_g, Time now, bool& reached) {
+    reached = false;
+    if (!asked_) return ask(table_g, now) ? "" : "the shaker takes no set-point";
+    reached = !rig_.shaker.busy() && as_commanded(table_g);
+    if (reached || now - since_ <= from_seconds(settings_.ramp_s) + kRampGrace) return {};
+    return fmt::format("shaker: measured {:.3f} g, expected {:g} g within {:g} %",
+                       rig_.shaker.reading().measured_g, table_g,
+                       100 * settings_.amplitude_tolerance);
+}
+
+void Excitation::tell_ramp(double table_g, Time now) {
+    const double start_g = std::exchange(asked_g_, table_g);
+    asked_at_ = now;
+    const RigFrame frame(settings_.rig);
+    rig_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_g_, campaign_,
+                  frame.to_raw(frame.up_at_deg(position_deg_)), frequency_hz_, transmission_});
+}
+
+Excitation::Rests Excitation::come_to_rest(Time now) {
+    const auto reading = rig_.shaker.reading();
+    if (!rig_.shaker.busy() && !stop_.stopping() && reading.at_rest() && reading.time > since_ &&
+        stop_.rest(now).measured_since(since_)) {
+        stop_.at_rest();
+        return Rests::at_rest;
+    }
+    if (!asked_ && !stop_.stopping() && !ask(0, now)) {  // no ramp to be had: the hard way
+        stop_sent_ = true;
+        tell_ramp(0, now);
+        stop("no ramp down was to be had");
+    }
+    if (stop_sent_ || now - since_ <= from_seconds(settings_.ramp_s + settings_.stop.deadline_s))
+        return Rests::not_yet;
+    stop_sent_ = true;
+    return Rests::overdue;
+}
+
+void Excitation::stop(const std::string& by) {
+    stopped_by_ = by;
+    rig_.shaker.stop_now();
+    ++armed_under_;
+    asked_g_ = 0;
+    tell_ramp(0, rig_.shaker.reading().time);
+}
+
+void Excitation::order_stop(const std::string& by) {
+    stopped_by_ = by;
+    rig_.shaker.stop_now();
+}
+
+bool Excitation::stopped_by_another(Time now) {
+    if (rig_.shaker.stops() == armed_under_) return false;
+    if (stopped_under_ != rig_.shaker.stops()) {
+        stopped_under_ = rig_.shaker.stops();
+        stopped_since_ = now;
+    }
+    return now - stopped_since_ < drivers::kSecond;
+}
+
+bool Excitation::as_commanded(double table_g) const {
+    constexpr double kFrequencyToleranceHz = 0.01;  // read back; a register resolves 1 mHz
+    const auto reading = rig_.shaker.reading();
+    return reading.valid && reading.running && reading.state == drivers::kShakerRunning &&
+           std::abs(reading.frequency_hz - frequency_hz_) <= kFrequencyToleranceHz &&
+           std::abs(reading.measured_g - table_g) <= settings_.amplitude_tolerance * table_g;
+}
+
+std::string Excitation::off_command(double table_g, Time now) {
+    if (as_commanded(table_g) || stopped_by_another(now)) return {};
+    const auto reading = rig_.shaker.reading();
+    return fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
+                       reading.state, reading.measured_g, table_g);
+}
+
+bool Excitation::refuses_frequency(double frequency_hz, double table_g) {
+    return !rig_.shaker.request({frequency_hz, table_g, settings_.ramp_s}, armed_under_);
+}
+
+}  // namespace vibrig::campaign

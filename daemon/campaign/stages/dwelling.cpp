@@ -1,0 +1,192 @@
+#include "daemon/campaign/stages/dwelling.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "daemon/campaign/rig_frame.hpp"
+
+namespace vibrig::campaign {
+
+using drivers::from_seconds;
+using drivers::kSecond;
+using drivers::Time;
+
+namespace {
+
+// The order of a dwell goes out this long before its first sample; the last part of settling.
+constexpr Time kOrderLead = kSecond;
+// How much later than the last sample of a dwell the estimator may report it as done.
+constexpr Time kDoneGrace = 2 * kSecond;
+constexpr double kAtRestG = 1e-9;
+constexpr double kWritten_hz = 1e-3;  // a register resolves 1 mHz
+// Of the settling, left for what follows when the vibration is not shown.
+constexpr Time kAhead = 200 * drivers::kMillisecond;
+
+}  // namespace
+
+void Dwelling::reset(std::optional<StopDone> before) {
+    before_ = before;
+    origin_.reset();
+}
+
+void Dwelling::aim(const Aim& aim, const ZeroCalibration* zeros) {
+    aim_ = aim;
+    zeros_ = zeros;
+}
+
+CampaignState Dwelling::state() const {
+    return part_ == Part::ramp     ? CampaignState::ramping
+           : part_ == Part::settle ? CampaignState::settling
+                                   : CampaignState::recording;
+}
+
+StageStep Dwelling::step(Time now) {
+    if (part_ != Part::ramp) return settled_or_recording(now);
+    drivers::Gimbal& gimbal = ports_.rig.gimbal;
+    const auto at = gimbal.update(ports_.rig.platform(), now);
+    if (at == drivers::GimbalState::commanding)
+        return StageStep::going_on(std::min(gimbal.next_deadline(), now + kStagePoll));
+    if (at != drivers::GimbalState::idle)
+        return StageStep::failed(fmt::format("gimbals not released: {}", drivers::name_of(at)));
+    return excitation_.asked() ? ramp(now) : StageStep::asks();
+}
+
+StageStep Dwelling::ramp(Time now) {
+    bool reached = table_g() <= kAtRestG;
+    if (!reached) {
+        bool may = excitation_.asked();
+        std::string why = may ? "" : frequency_may_change(now, may);
+        if (may) why = excitation_.climb(table_g(), now, reached);
+        if (!why.empty()) return StageStep::failed(std::move(why));
+    }
+    if (!reached) return StageStep::going_on(now + kStagePoll);
+    part_ = Part::settle;
+    return StageStep::going_on(now);
+}
+
+std::string Dwelling::frequency_may_change(Time now, bool& may) const {
+    const auto reading = ports_.rig.shaker.reading();
+    const double wanted_hz = excitation_.frequency_hz();
+    const bool same = reading.valid && std::abs(reading.frequency_hz - wanted_hz) <= kWritten_hz;
+    may = same || (reading.at_rest() && stop_.rest(now).measured());
+    if (may || now - excitation_.since() <= Excitation::kRampGrace) return {};
+    return fmt::format("rest is not measured ({}): {:g} Hz are not written", stop_.what_moves(now),
+                       wanted_hz);
+}
+
+StageStep Dwelling::settled_or_recording(Time now) {
+    if (!ordered_) return order(now);
+    if (table_g() > kAtRestG)
+        if (auto why = excitation_.off_command(table_g(), now); !why.empty())
+            return StageStep::failed(std::move(why));
+    if (torquing(ports_.rig))
+        return StageStep::failed("the platform is torqued during a dwell, expected free drift");
+    if (part_ == Part::settle) {
+        look_at_vibration(now);
+        if (now < from_) return StageStep::going_on(std::min(from_, now + kStagePoll));
+        part_ = Part::record;
+    }
+    if (done_) {
+        ordered_ = power_lost_ = false;
+        return StageStep::done();
+    }
+    if (now > to_ + kDoneGrace) return StageStep::failed("samples ceased during the dwell");
+    return StageStep::going_on(std::min(now < to_ ? to_ : now + kStagePoll, now + kStagePoll));
+}
+
+StageStep Dwelling::order(Time now) {
+    // On a whole millisecond: how often clocks were read on the way here does not show.
+    const Time settled =
+        excitation_.since() + std::max(from_seconds(settings_.settle_s), kOrderLead);
+    from_ = (settled + drivers::kMillisecond - 1) / drivers::kMillisecond * drivers::kMillisecond;
+    to_ = from_ + from_seconds(settings_.dwell_s);
+    done_ = false;
+    ordered_ = true;
+    rt::DwellOrder order;
+    order.from = from_;
+    order.to = to_;
+    utc_ns_ = ports_.log.utc_ns() + (from_ - now);
+    if (!origin_) take_over_origin();
+    order.dwell = info();
+    if (zeros_ != nullptr) {
+        order.zero_g = zeros_->raw_zero_g();
+        order.level_sigma_g = zeros_->level_sigma(aim_.stop.position_deg);
+    }
+    watch_vibration();
+    if (!ports_.dwells.order(order)) return StageStep::failed("the estimator takes no order");
+    return StageStep::going_on(now + kStagePoll);
+}
+
+/// After a restart the clock may be another one: what both have in common is UTC, unless that was
+/// set back meanwhile.
+void Dwelling::take_over_origin() {
+    origin_ = from_;
+    if (!before_ || !std::isfinite(before_->begin_s)) return;
+    const Time least = from_seconds(settings_.dwell_s);
+    const Time since = utc_ns_ - before_->begun_utc_ns;
+    *origin_ -= from_seconds(before_->begin_s) + std::max(since, least);
+}
+
+estimator::DwellInfo Dwelling::info() const {
+    return {aim_.run,
+            aim_.position,
+            table_g(),
+            drivers::to_seconds(from_ - origin_.value_or(from_)),
+            power_lost_ && !aim_.first,
+            aim_.stop.frequency_hz,
+            aim_.stop.verify};
+}
+
+void Dwelling::leave() {
+    if (std::exchange(watching_, false)) ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    if (std::exchange(ordered_, false)) {
+        rt::DwellOrder cancel;
+        cancel.cancel = true;
+        static_cast<void>(ports_.dwells.order(cancel));
+    }
+}
+
+double Dwelling::part_done(Time now) const {
+    if (to_ <= from_) return 0;
+    return std::clamp(static_cast<double>(now - from_) / static_cast<double>(to_ - from_), 0.0,
+                      1.0);
+}
+
+double Dwelling::left_s(Time now) const { return std::max(drivers::to_seconds(to_ - now), 0.0); }
+
+/// Of a plan that says no frequency there is one only, which the loop check has measured.
+void Dwelling::watch_vibration() {
+    watching_ = aim_.stop.frequency_hz > 0 && table_g() > kAtRestG && ports_.rig.feed != nullptr;
+    shown_.clear();
+    if (watching_) ports_.rig.feed->order(rt::StageFeed::Mode::samples);
+}
+
+void Dwelling::look_at_vibration(Time now) {
+    if (!watching_) return;
+    const RigFrame frame(settings_.rig);
+    rt::Motion motion;
+    while (ports_.rig.feed->pop(motion)) {
+        if (motion.good)
+            shown_.push_back({drivers::to_seconds(motion.time), frame.force(motion.force, 1),
+                              motion.table, motion.table_good});
+    }
+    if (now < from_ - kAhead) return;
+    watching_ = false;
+    ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    const double asked_hz = excitation_.frequency_hz();
+    const auto found = estimator::loop_response(shown_, asked_hz);
+    if (found.platform_g > 0 &&
+        std::abs(found.frequency_hz - asked_hz) <= settings_.loop.frequency_tolerance_hz)
+        return;
+    ports_.log.event(Severity::trip,
+                     fmt::format("the accelerometers show {:.3f} Hz, {:.3f} Hz were asked for and "
+                                 "read back",
+                                 found.frequency_hz, asked_hz));
+    ports_.rig.wrong_vibration();
+    excitation_.order_stop("another vibration than was asked for");
+}
+
+}  // namespace vibrig::campaign

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/excitation.hpp"
+#include "daemon/campaign/stages/stage.hpp"
+#include "daemon/campaign/zero_calibration.hpp"
+#include "estimator/level/loop_response.hpp"
+
+namespace vibrig::campaign {
+
+/// One dwell on the rig: the table ramps up, settles, and what comes then is the estimator's.
+/// Leaves the table vibrating. Asks, before the ramp, whether gravity is where the encoders say:
+/// ramp() goes on.
+class Dwelling : public Stage {
+  public:
+    struct Aim {
+        Stop stop;
+        int run = 0, position = 0;
+        bool first = false;  ///< no dwell of this campaign before it
+    };
+
+    Dwelling(const Settings& settings, const Ports& ports, Excitation& excitation,
+             const StopMonitor& stop)
+        : settings_(settings), ports_(ports), excitation_(excitation), stop_(stop) {}
+
+    /// A new campaign, or one that goes on after `before`, its last dwell of an earlier life.
+    void reset(std::optional<StopDone> before);
+    /// What begins next; `zeros` in force, null: none are taken.
+    void aim(const Aim& aim, const ZeroCalibration* zeros);
+    void begin(drivers::Time /*now*/) override { part_ = Part::ramp; }
+    [[nodiscard]] StageStep step(drivers::Time now) override;
+    void leave() override;
+    [[nodiscard]] double table_g() const override { return aim_.stop.table_g; }
+
+    [[nodiscard]] StageStep ramp(drivers::Time now);
+    /// The state that this is for people and the interlock.
+    [[nodiscard]] CampaignState state() const;
+    /// The estimator has it whole.
+    void done() { done_ = true; }
+    /// The gyros were seen run down since the dwell before.
+    void lost_power() { power_lost_ = true; }
+    [[nodiscard]] estimator::DwellInfo info() const;
+    [[nodiscard]] std::int64_t utc_ns() const { return utc_ns_; }  ///< of its beginning
+    /// While it records: how much of it is done, 0 to 1, and what is left, s.
+    [[nodiscard]] double part_done(drivers::Time now) const;
+    [[nodiscard]] double left_s(drivers::Time now) const;
+
+  private:
+    enum class Part : std::uint8_t { ramp, settle, record };
+
+    [[nodiscard]] StageStep settled_or_recording(drivers::Time now);
+    [[nodiscard]] StageStep order(drivers::Time now);
+    void take_over_origin();
+    /// Why it may not, else empty; `may` once it may.
+    [[nodiscard]] std::string frequency_may_change(drivers::Time now, bool& may) const;
+    void watch_vibration();
+    void look_at_vibration(drivers::Time now);
+
+    const Settings& settings_;
+    Ports ports_;
+    Excitation& excitation_;
+    const StopMonitor& stop_;
+    Aim aim_;
+    const ZeroCalibration* zeros_ = nullptr;
+    Part part_ = Part::ramp;
+    bool ordered_ = false, done_ = false;
+    bool power_lost_ = false;
+    drivers::Time from_ = 0, to_ = 0;
+    std::int64_t utc_ns_ = 0;
+    std::optional<drivers::Time> origin_;  ///< when the campaign's first dwell began
+    std::optional<StopDone> before_;
+    bool watching_ = false;  ///< the accelerometers are to show it before the dwell
+    std::vector<estimator::LoopReading> shown_;
+};
+
+}  // namespace vibrig::campaign

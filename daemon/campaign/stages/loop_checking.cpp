@@ -1,0 +1,173 @@
+#include "daemon/campaign/stages/loop_checking.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace vibrig::campaign {
+
+using drivers::from_seconds;
+using drivers::kSecond;
+using drivers::Time;
+
+namespace {
+constexpr Time kLook = 2 * kSecond;  // at rest, before
+// Peak at the table: a tenth of a g is beyond doubt only after a thirtieth.
+constexpr std::array kLadder_g{0.03, 0.1, 0.3};
+constexpr Time kRung = 5 * kSecond;    // how long each counts
+constexpr double kLadderUnit = 1.122;  // 1 dB: the table's own accelerometer is good to 2 %
+// What is called rest has to be so many times the noise.
+constexpr double kNoises = 6;
+}  // namespace
+
+void LoopChecking::aim(const std::string& by, bool climbs) {
+    by_ = by;
+    rungs_.clear();
+    for (const double rung_g : kLadder_g)
+        if (climbs && rung_g < level_.settings.loop.table_g) rungs_.push_back(rung_g);
+}
+
+void LoopChecking::begin(Time now) {
+    level_.loop.begin(by_);
+    level_.proof.begin(by_, level_.settings.loop.table_g);
+    rung_ = 0;
+    level_.begin(now);
+    part_ = Part::look;
+}
+
+void LoopChecking::go_on_to(Part part, Time now) {
+    part_ = part;
+    rung_counts_ = false;
+    level_.begin_part(part == Part::settle || part == Part::measure, Proving::nothing, now);
+}
+
+double LoopChecking::table_g() const {
+    if (part_ == Part::none || part_ == Part::look) return 0;
+    return part_ == Part::climb || part_ == Part::rung ? rungs_[rung_]
+                                                       : level_.settings.loop.table_g;
+}
+
+StageStep LoopChecking::step(Time now) {
+    if (auto why = level_.lacks(now); !why.empty()) return StageStep::failed(std::move(why));
+    const Time since = now - level_.excitation.since();
+    if (part_ == Part::settle || part_ == Part::measure)
+        if (auto why = level_.off_command(now); !why.empty())
+            return StageStep::failed(std::move(why));
+    switch (part_) {
+        case Part::none:
+            break;
+        case Part::look:
+            if (since >= kLook) return look(now);
+            break;
+        case Part::climb:
+            return ramp(Part::rung, now);
+        case Part::rung:
+            return stand_on_rung(now);
+        case Part::ramp:
+            return ramp(Part::settle, now);
+        case Part::settle:
+            if (since < from_seconds(level_.settings.settle_s)) break;
+            level_.loop.measure();
+            go_on_to(Part::measure, now);
+            return StageStep::asks();
+        case Part::measure:
+            if (since >= from_seconds(level_.settings.loop.measure_s)) return measured();
+            break;
+    }
+    return StageStep::going_on(now + kStagePoll);
+}
+
+StageStep LoopChecking::look(Time now) {
+    auto position_deg = level_.excitation.position_deg();
+    auto still = level_.loop.look(position_deg);
+    level_.excitation.place(position_deg);
+    if (!still.empty()) return StageStep::failed(std::move(still));
+    if (!level_.stop.rest(now).measured())
+        return StageStep::failed("not at rest: " + level_.stop.what_moves(now));
+    if (!quiet()) return StageStep::failed("the noise at rest is too near to shaker.rest_g");
+    go_on_to(rungs_.empty() ? Part::ramp : Part::climb, now);
+    return StageStep::going_on(now + kStagePoll);
+}
+
+/// Rest is called by what is well above the noise of those who call it.
+bool LoopChecking::quiet() {
+    level_.loop.rests();
+    const auto noise = level_.loop.noise();
+    const double limit_g = level_.settings.rest.limit_g / kNoises;
+    auto& proof = level_.proof;
+    if (noise.table_g > 0) proof.row("noise at rest, table", "g", noise.table_g, 0, limit_g);
+    proof.row("noise at rest, platform", "g", noise.platform_g, 0, limit_g);
+    return proof.record().rows.back().passed();
+}
+
+StageStep LoopChecking::ramp(Part then, Time now) {
+    bool reached = false;
+    if (auto why = level_.excitation.climb(table_g(), now, reached); !why.empty())
+        return StageStep::failed(std::move(why));
+    if (reached) go_on_to(then, now);
+    return StageStep::going_on(now + kStagePoll);
+}
+
+/// One step of the ladder: what table and platform do is held against the command before more is
+/// asked for. A wrong unit shows itself here, while the worst confusion makes 0.42 g of 0.03.
+StageStep LoopChecking::stand_on_rung(Time now) {
+    const double rung_g = table_g();
+    const Time since = now - level_.excitation.since();
+    const Time settled = from_seconds(level_.settings.settle_s);
+    if (const auto why = level_.excitation.off_command(rung_g, now); !why.empty())
+        return StageStep::failed("ladder: " + why);
+    auto& loop = level_.loop;
+    auto& proof = level_.proof;
+    if (since >= settled && !std::exchange(rung_counts_, true)) loop.measure();
+    if (since < settled + kRung) return StageStep::going_on(now + kStagePoll);
+    const auto peak = loop.peak();
+    const double platform = peak.platform_g / (level_.settings.rig.transmission * rung_g);
+    const double table = peak.table_g / rung_g;
+    const bool table_known = loop.noise().table_g > 0;  // zero where it has none
+    const std::string at = fmt::format("ladder, {:g} g, ", rung_g);
+    proof.row(at + "platform over expected", "", platform, 0.5, 2);
+    bool passed = proof.record().rows.back().passed();
+    if (table_known) {
+        proof.row(at + "table over command", "", table, 1 / kLadderUnit, kLadderUnit);
+        passed = passed && proof.record().rows.back().passed();
+    }
+    if (!passed) {
+        const auto unit = unit_of_ratio(table_known ? table : platform);
+        return StageStep::failed(fmt::format(
+            "ladder: at {:g} g the platform does {:.3g} times, the table {} what was expected{}{}",
+            rung_g, platform, table_known ? fmt::format("{:.3g} times", table) : "unseen",
+            unit.empty() ? "" : ": ", unit));
+    }
+    ++rung_;
+    go_on_to(rung_ < rungs_.size() ? Part::climb : Part::ramp, now);
+    return StageStep::going_on(now + kStagePoll);
+}
+
+StageStep LoopChecking::measured() {
+    auto& loop = level_.loop;
+    auto& proof = level_.proof;
+    loop.finish(level_.ports.rig.shaker.reading().measured_g);
+    level_.ports.log.loop_checked(by_, loop.out_of_band());
+    if (loop.out_of_band().empty()) {
+        proof.record().transmission = loop.transmission();
+        level_.ports.rig.transmission(loop.transmission());
+    }
+    proof.row("loop check in band", loop.out_of_band().empty());
+    for (const auto& row : loop.status().rows) {  // the ratios
+        if (std::isfinite(row.value) && std::isfinite(row.low) && std::isfinite(row.high))
+            proof.row(row.name, row.unit, row.value, row.low, row.high);
+    }
+    return StageStep::done();
+}
+
+std::string LoopChecking::suspect_unit() const {
+    const Time asked = level_.excitation.asked_at();
+    if (part_ != Part::ramp || asked == 0) return {};
+    const double ratio = level_.loop.over_command(asked, level_.settings.ramp_s);
+    const auto suspect = unit_of_ratio(ratio);
+    return suspect.empty() ? "" : fmt::format("; {:.2f} times the command: {}", ratio, suspect);
+}
+
+}  // namespace vibrig::campaign
