@@ -287,7 +287,8 @@ ApiAnswer Api::answer_at_once(const ApiRequest& request, const Caller& caller) {
         if (documents_) return document(request, path, query);
         const bool takes_commands = path == kCommands;
         if (caller.browser && request.method == "GET") {
-            if (const auto* file = page_file(path)) {
+            const auto* const file = path == "/values.js" ? &page_values() : page_file(path);
+            if (file != nullptr) {
                 ApiAnswer page;
                 page.content_type = file->content_type;
                 page.body = file->text;

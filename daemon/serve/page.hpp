@@ -12,4 +12,8 @@ struct PageFile {
 /// A part of the live page as it was built in; null: no such file.
 [[nodiscard]] const PageFile* page_file(std::string_view path) noexcept;
 
+/// "/values.js": the single values that the page shows line by line, as daemon/status/values.hpp
+/// has them.
+[[nodiscard]] const PageFile& page_values();
+
 }  // namespace vibrig::serve

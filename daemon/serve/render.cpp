@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <ctime>
 
+#include "daemon/serve/value_lines.hpp"
 #include "proto/vibrig.pb.h"
 
 namespace vibrig::serve {
@@ -29,17 +30,6 @@ constexpr int kGyros = 3;
 
 std::string labelled(const char* label, const std::string& text) {
     return format("%-*s", kLabel, label) + text;
-}
-
-std::string number(bool known, double value, const char* pattern, const char* unit) {
-    if (!known) return std::string("- ") + unit;
-    char text[64];
-    // The patterns are this file's own.
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wformat-nonliteral"
-    std::snprintf(text, sizeof text, pattern, value);
-#pragma GCC diagnostic pop
-    return std::string(text) + ' ' + unit;
 }
 
 std::string upper(std::string text) {
@@ -118,7 +108,6 @@ std::string shaker_line(const v1::Status& status) {
     std::string text = shaker_state(shaker);
     text += ", link " + v1::Link::State_Name(shaker.link());
     if (shaker.fault() != 0) text += format(", fault bits 0x%04x", shaker.fault());
-    if (shaker.emergency_stop_open()) text += ", EMERGENCY STOP OPEN";
     if (shaker.rest() == "stop not obeyed") {
         text += ", STOP NOT OBEYED, PRESS THE EMERGENCY STOP: " + shaker.not_at_rest();
     } else if (!shaker.rest().empty()) {
@@ -128,19 +117,9 @@ std::string shaker_line(const v1::Status& status) {
     return text;
 }
 
-std::string platform_line(const v1::Platform& platform) {
+std::string platform_head(const v1::Platform& platform) {
     if (platform.quality() == "silent") return "SILENT";
-    if (!platform.has_ready()) return "no status yet";
-    std::string text = platform.ready() ? "ready" : "NOT READY";
-    if (!platform.loop_closed()) text += ", loop open";
-    if (!platform.gyros_at_speed()) text += ", gyros not at speed";
-    if (platform.fault()) text += ", FAULT";
-    if (platform.has_temperature_c()) text += format(", %.2f degC", platform.temperature_c());
-    if (platform.slewing())
-        text += ", slewing";
-    else if (platform.in_position())
-        text += ", in position";
-    return text;
+    return platform.has_ready() ? "" : "no status yet";
 }
 
 std::string rates_line(const v1::Status& status, const Rates& rates) {
@@ -152,14 +131,6 @@ std::string rates_line(const v1::Status& status, const Rates& rates) {
 }
 
 unsigned long long count(std::uint64_t value) { return value; }
-
-std::string losses_line(const v1::Status& status) {
-    const v1::Assembler& assembler = status.assembler();
-    return format("kernel %llu, ring %llu, gaps %llu, incomplete %llu, late %llu, duplicate %llu",
-                  count(status.can().kernel_dropped()), count(status.estimator_ring().dropped()),
-                  count(assembler.gaps()), count(assembler.incomplete()), count(assembler.late()),
-                  count(assembler.duplicate()));
-}
 
 /// Empty: nothing was measured.
 std::string latency_line(const v1::Latency& latency) {
@@ -202,13 +173,6 @@ std::string channels_line(const v1::Sample& sample) {
     return bad.empty() ? "all good" : bad;
 }
 
-std::string estimate_line(const v1::Estimate& estimate) {
-    return format("%llu used, %llu rejected of %llu samples, NIS ", count(estimate.used()),
-                  count(estimate.rejected()), count(estimate.samples())) +
-           (estimate.has_nis_per_dof() ? format("%.3f", estimate.nis_per_dof()) : "-") +
-           format(", %u dwells", estimate.dwells());
-}
-
 std::string noise_line(const v1::Noise& noise) {
     std::string text = "N";
     for (const v1::GyroNoise& gyro : noise.gyros()) {
@@ -216,8 +180,25 @@ std::string noise_line(const v1::Noise& noise) {
         const v1::NoiseTerm& n = gyro.fit().n();
         text += n.has_value() ? format(" %.2e", n.value()) : format(" <%.1e", n.below());
     }
-    return text + format(" deg/rt-h in %u dwells, %llu alarms", noise.dwells(),
-                         count(noise.alarms_total()));
+    return text + " deg/rt-h";
+}
+
+std::string guard_line(const v1::Guard& guard) {
+    if (!guard.heard()) return "NOT HEARD, " + guard.note();
+    return guard.text().empty() ? "watches" : guard.cause() + ": " + guard.text();
+}
+
+std::string broker_line(const v1::Mqtt& mqtt) {
+    return mqtt.broker() + (mqtt.connected()
+                                ? format(": %llu messages, %llu left out", count(mqtt.messages()),
+                                         count(mqtt.left_out()))
+                                : ": DOWN, " + mqtt.note());
+}
+
+/// Empty: all is well, or nothing is archived.
+std::string archive_head(const v1::Archive& archive) {
+    if (!archive.good() && !archive.note().empty()) return "DOWN: " + archive.note();
+    return archive.delivering().empty() ? "" : "on its way: " + archive.delivering();
 }
 
 std::string cell(const v1::Parameter& parameter) {
@@ -268,87 +249,48 @@ Rates rates_between(const v1::Status& before, const v1::Status& after, double wa
 
 Lines render_summary(const v1::Status& status, const Rates& rates, int width) {
     const v1::Campaign& campaign = status.campaign();
-    const v1::Shaker& shaker = status.shaker();
+    ValueLines values(status);
     Lines lines;
+    const auto line = [&](const char* label, const std::string& head = {}) {
+        const std::string text = values.take(label, head);
+        if (!text.empty()) lines.push_back(labelled(label, text));
+    };
     std::string head = upper(v1::Campaign::State_Name(campaign.state()));
     const std::string where = place(campaign);
     if (!where.empty()) head += "  " + where + ' ' + angles(campaign.position_angles());
     lines.push_back(head);
     if (!campaign.reason().empty()) lines.push_back("why: " + campaign.reason());
-    if (const std::string stage = stage_line(campaign); !stage.empty())
-        lines.push_back(labelled("stage", stage));
+    line("stage", stage_line(campaign));
     lines.push_back(progress_line(campaign, room(status, width)));
-    lines.push_back(labelled(
-        "campaign",
-        campaign.name() + (campaign.armed_by().empty() ? std::string(", not armed")
-                                                       : ", armed by " + campaign.armed_by())));
-    if (!campaign.armed_for().empty()) lines.push_back(labelled("armed for", campaign.armed_for()));
-    if (campaign.has_arming_left_s())
-        lines.push_back(
-            labelled("expires", number(true, campaign.arming_left_s(), "in %.0f", "s")));
-    for (const auto& latch : status.interlock().latches()) {
-        lines.push_back(labelled(
-            "latched", latch.name() + ": " + latch.cause() + ": vibrig ack " + latch.name()));
-    }
-    lines.push_back(labelled(
-        "table", number(campaign.has_command_table_g(), campaign.command_table_g(), "%.4f", "g") +
-                     " commanded, " +
-                     number(shaker.has_measured_g(), shaker.measured_g(), "%.4f", "g") +
-                     " measured, " +
-                     number(shaker.has_frequency_hz(), shaker.frequency_hz(), "%.3f", "Hz")));
-    lines.push_back(labelled("shaker", shaker_line(status)));
-    const v1::Estimate& estimate = status.estimate();
-    lines.push_back(
-        labelled("vibration",
-                 number(estimate.has_amplitude_g(), estimate.amplitude_g(), "%.4f", "g") +
-                     " on the platform, " +
-                     number(estimate.has_frequency_hz(), estimate.frequency_hz(), "%.3f", "Hz")));
-    lines.push_back(labelled("platform", platform_line(status.platform())));
-    lines.push_back(labelled(
-        "can", v1::Link::State_Name(status.can().link()) +
-                   format(", %llu frames, %llu error frames", count(status.can().received()),
-                          count(status.can().error_frames()))));
-    lines.push_back(labelled("rates", rates_line(status, rates)));
-    lines.push_back(labelled("dropped", losses_line(status)));
-    if (const std::string latency = latency_line(status.acquisition_latency()); !latency.empty())
-        lines.push_back(labelled("latency", latency));
-    if (const std::string line = real_time_line(status.real_time()); !line.empty())
-        lines.push_back(labelled("real time", line));
-    lines.push_back(labelled("channels", channels_line(status.sample())));
-    if (!status.clock_misfit().empty())
-        lines.push_back(labelled("clock", "MISFIT: " + status.clock_misfit()));
-    lines.push_back(labelled("filter", estimate_line(estimate)));
-    lines.push_back(labelled("noise", noise_line(status.noise())));
-    if (status.has_verdict()) lines.push_back(labelled("verdict", status.verdict().sentence()));
-    if (status.has_guard()) {
-        const v1::Guard& guard = status.guard();
-        lines.push_back(labelled("guard", !guard.heard() ? "NOT HEARD, " + guard.note()
-                                          : !guard.text().empty()
-                                              ? guard.cause() + ": " + guard.text()
-                                              : std::string("watches")));
-    }
+    line("campaign");
+    line("armed for");
+    line("expires");
+    for (const auto& latch : status.interlock().latches())
+        line("latched", latch.name() + ": " + latch.cause() + ": vibrig ack " + latch.name());
+    line("table");
+    line("shaker", shaker_line(status));
+    line("vibration");
+    line("platform", platform_head(status.platform()));
+    line("CAN", v1::Link::State_Name(status.can().link()));
+    line("rates", rates_line(status, rates));
+    line("samples");
+    line("dropped");
+    line("latency", latency_line(status.acquisition_latency()));
+    line("real time", real_time_line(status.real_time()));
+    line("channels", channels_line(status.sample()));
+    line("clock");
+    line("filter");
+    line("noise", noise_line(status.noise()));
+    line("verdict");
+    if (status.has_guard()) line("guard", guard_line(status.guard()));
     if (const v1::Annunciator& horn = status.annunciator(); horn.horn())
-        lines.push_back(labelled(
-            "horn", horn.pattern() + (horn.confirms() ? "" : ", SILENT: " + horn.horn_note())));
-    if (const v1::Mqtt& mqtt = status.mqtt(); !mqtt.broker().empty())
-        lines.push_back(labelled(
-            "broker", mqtt.broker() + (mqtt.connected() ? ": " : ": DOWN, ") +
-                          (mqtt.connected() ? format("%llu messages, %llu left out",
-                                                     count(mqtt.messages()), count(mqtt.left_out()))
-                                            : mqtt.note())));
-    if (status.has_archive()) {
-        const v1::Archive& archive = status.archive();
-        lines.push_back(labelled(
-            "archive",
-            format("%llu waiting, %llu delivered", count(archive.waiting()),
-                   count(archive.delivered())) +
-                (!archive.good()                ? ", DOWN: " + archive.note()
-                 : archive.delivering().empty() ? ""
-                                                : ", on its way: " + archive.delivering())));
-    }
-    lines.push_back(labelled("daemon", "vibrigd " + status.version() + ", clock " + status.clock() +
-                                           ", up " + render_duration(status.uptime_s())));
-    for (std::string& line : lines) line = marked(status, line, width);
+        line("horn", horn.pattern() + (horn.confirms() ? "" : ", SILENT: " + horn.horn_note()));
+    if (!status.mqtt().broker().empty()) line("broker", broker_line(status.mqtt()));
+    line("archive", archive_head(status.archive()));
+    const std::string daemon = values.take("daemon");
+    for (const auto& [label, text] : values.left()) lines.push_back(labelled(label.c_str(), text));
+    lines.push_back(labelled("daemon", daemon));
+    for (std::string& one : lines) one = marked(status, one, width);
     return lines;
 }
 

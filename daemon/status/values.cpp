@@ -74,24 +74,32 @@ bool platform_good(const S& s) { return s.platform_state() == ChannelState::good
 
 // clang-format off
 const auto kValues = std::to_array<StatusValue>({
-    row("version", "", [](auto& s) { return s.version; }).mqtt("Properties/Version"),
-    row("clock", "", [](auto& s) { return s.clock; }).mqtt("Properties/Clock"),
+    row("version", "", [](auto& s) { return s.version; }).mqtt("Properties/Version")
+        .shown("daemon", "vibrigd {}"),
+    row("clock", "", [](auto& s) { return s.clock; }).mqtt("Properties/Clock")
+        .shown("daemon", "clock {}"),
     row("simulated", "", [](auto& s) { return s.simulated; }).mqtt("Properties/SIMULATED")
         .gauge("vibrig_simulated", "1: the rig is a program."),
     row("time_s", "s", [](auto& s) { return drivers::to_seconds(s.time); }),
     row("uptime_s", "s", [](auto& s) { return drivers::to_seconds(s.uptime); }).mqtt("Uptime")
-        .gauge("vibrig_uptime_seconds", "Since the start, by the daemon's clock."),
-    row("clock_misfit", "", [](auto& s) { return s.clock_misfit; }),
+        .gauge("vibrig_uptime_seconds", "Since the start, by the daemon's clock.")
+        .shown("daemon", "up {}").as_duration(),
+    row("clock_misfit", "", [](auto& s) { return s.clock_misfit; })
+        .shown("clock", "MISFIT: {}").off_page(),
     row("", "", [](auto& s) { return !s.clock_misfit.empty(); })
         .gauge("vibrig_clock_misfit", "1 where rig and daemon have no time in common."),
 
-    row("campaign.name", "", [](auto& s) { return s.campaign_name; }).mqtt("Campaign/Name"),
+    row("campaign.name", "", [](auto& s) { return s.campaign_name; }).mqtt("Campaign/Name")
+        .shown("campaign", "{}").off_page(),
     row("", "", [](auto& s) { return name_of(s.state); }).mqtt("Campaign/State"),
     row("campaign.reason", "", [](auto& s) { return s.reason; }).mqtt("Campaign/Reason"),
-    row("campaign.armed_by", "", [](auto& s) { return s.armed_by; }).mqtt("Campaign/Armed by"),
-    row("campaign.armed_for", "", [](auto& s) { return s.armed_for; }),
+    row("campaign.armed_by", "", [](auto& s) { return s.armed_by; }).mqtt("Campaign/Armed by")
+        .shown("campaign", "armed by {}", "not armed").off_page(),
+    row("campaign.armed_for", "", [](auto& s) { return s.armed_for; })
+        .shown("armed for", "{}").off_page(),
     row("campaign.arming_left_s", "s",
-        [](auto& s) { return only(s.arming_left_s > 0, s.arming_left_s); }),
+        [](auto& s) { return only(s.arming_left_s > 0, s.arming_left_s); })
+        .shown("expires", "in {}", "").with_decimals(0).off_page(),
     row("campaign.started_by", "", [](auto& s) { return s.started_by; }),
     row("campaign.resume_offer", "", [](auto& s) { return s.resume_offer; }),
     row("campaign.run", "", [](auto& s) { return s.run; }).mqtt("Campaign/Run")
@@ -113,7 +121,8 @@ const auto kValues = std::to_array<StatusValue>({
     row("campaign.command_table_g", "g", [](auto& s) { return s.command_table_g; })
         .mqtt("Shaker/Command")
         .gauge("vibrig_shaker_command_meters_per_second_squared",
-               "Commanded peak acceleration of the table.", kGravity),
+               "Commanded peak acceleration of the table.", kGravity)
+        .shown("table", "{} commanded").with_decimals(4).off_page(),
     row("campaign.command_frequency_hz", "Hz", [](auto& s) { return s.command_frequency_hz; }),
     row("shaker.reading_time_s", "s",
         [](auto& s) { return only(s.shaker.valid, drivers::to_seconds(s.shaker.time)); }),
@@ -122,11 +131,13 @@ const auto kValues = std::to_array<StatusValue>({
     row("shaker.measured_g", "g", [](auto& s) { return only(s.shaker.valid, s.shaker.measured_g); })
         .mqtt("Shaker/Measured")
         .gauge("vibrig_shaker_measured_meters_per_second_squared",
-               "Measured peak acceleration of the table.", kGravity),
+               "Measured peak acceleration of the table.", kGravity)
+        .shown("table", "{} measured").with_decimals(4).off_page(),
     row("shaker.frequency_hz", "Hz",
         [](auto& s) { return only(s.shaker.valid, s.shaker.frequency_hz); })
         .mqtt("Shaker/Frequency")
-        .gauge("vibrig_shaker_frequency_hertz", "Set-point as read back."),
+        .gauge("vibrig_shaker_frequency_hertz", "Set-point as read back.")
+        .shown("table", "{}").with_decimals(3).off_page(),
     row("shaker.running", "", [](auto& s) { return only(s.shaker.valid, s.shaker.running); })
         .mqtt("Shaker/Running")
         .gauge("vibrig_shaker_running", "1 while the run register is set."),
@@ -137,10 +148,12 @@ const auto kValues = std::to_array<StatusValue>({
     row("shaker.emergency_stop_open", "",
         [](auto& s) { return only(s.shaker.valid, s.shaker.emergency_stop_open); })
         .mqtt("Shaker/Emergency stop open").gauge("vibrig_emergency_stop_open",
-               "1 while the emergency-stop chain is open."),
+               "1 while the emergency-stop chain is open.")
+        .shown("shaker", "EMERGENCY STOP OPEN").off_page(),
     row("shaker.requests", "", [](auto& s) { return s.shaker_counters.requests; }),
     row("shaker.replies", "", [](auto& s) { return s.shaker_counters.replies; }),
-    row("shaker.timeouts", "", [](auto& s) { return s.shaker_counters.timeouts; }),
+    row("shaker.timeouts", "", [](auto& s) { return s.shaker_counters.timeouts; })
+        .shown("shaker", "{} timeouts"),
     row("shaker.exceptions", "", [](auto& s) { return s.shaker_counters.exceptions; }),
     row("shaker.wrong_replies", "", [](auto& s) { return s.shaker_counters.wrong_replies; }),
     row("shaker.lost", "", [](auto& s) { return s.shaker_counters.lost; }),
@@ -184,13 +197,16 @@ const auto kValues = std::to_array<StatusValue>({
     row("", "", [](auto& s) { return s.can == drivers::PortState::running; }).mqtt("CAN/Link up")
         .gauge("vibrig_can_link_up", "1 while the CAN port runs."),
     row("can.received", "", [](auto& s) { return s.can_counters.received; }).mqtt("CAN/Received")
-        .counter("vibrig_can_received_frames_total", "Frames read from the CAN port."),
+        .counter("vibrig_can_received_frames_total", "Frames read from the CAN port.")
+        .shown("CAN", "{} frames"),
     row("can.delivered", "", [](auto& s) { return s.can_counters.delivered; }),
     row("can.own", "", [](auto& s) { return s.can_counters.own; }),
-    row("can.error_frames", "", [](auto& s) { return s.can_counters.error_frames; }),
+    row("can.error_frames", "", [](auto& s) { return s.can_counters.error_frames; })
+        .shown("CAN", "{} errors"),
     row("can.malformed", "", [](auto& s) { return s.can_counters.malformed; }),
     row("can.kernel_dropped", "", [](auto& s) { return s.can_counters.kernel_dropped; })
-        .mqtt("CAN/Dropped"),
+        .mqtt("CAN/Dropped")
+        .shown("dropped", "kernel {}").alarms(),
     row("can.sent", "", [](auto& s) { return s.can_counters.sent; })
         .counter("vibrig_can_sent_frames_total", "Frames sent."),
     row("can.send_failed", "", [](auto& s) { return s.can_counters.send_failed; })
@@ -200,24 +216,31 @@ const auto kValues = std::to_array<StatusValue>({
 
     row("assembler.received", "", [](auto& s) { return s.assembler.received; }),
     row("assembler.used", "", [](auto& s) { return s.assembler.used; }),
-    row("assembler.unknown", "", [](auto& s) { return s.assembler.unknown; }),
-    row("assembler.duplicate", "", [](auto& s) { return s.assembler.duplicate; }),
-    row("assembler.late", "", [](auto& s) { return s.assembler.late; }),
+    row("assembler.unknown", "", [](auto& s) { return s.assembler.unknown; })
+        .shown("dropped", "unknown {}"),
+    row("assembler.duplicate", "", [](auto& s) { return s.assembler.duplicate; })
+        .shown("dropped", "duplicate {}"),
+    row("assembler.late", "", [](auto& s) { return s.assembler.late; })
+        .shown("dropped", "late {}"),
     row("assembler.wrong_length", "", [](auto& s) { return s.assembler.wrong_length; }),
     row("assembler.samples", "", [](auto& s) { return s.assembler.samples; }).mqtt("Samples/Taken")
-        .counter("vibrig_samples_total", "Samples put together."),
+        .counter("vibrig_samples_total", "Samples put together.")
+        .shown("samples", "{} taken"),
     row("assembler.incomplete", "", [](auto& s) { return s.assembler.incomplete; })
         .mqtt("Samples/Incomplete")
-        .counter("vibrig_samples_incomplete_total", "Samples with a missing channel."),
+        .counter("vibrig_samples_incomplete_total", "Samples with a missing channel.")
+        .shown("dropped", "incomplete {}"),
     row("assembler.gaps", "", [](auto& s) { return s.assembler.gaps; }).mqtt("Samples/Gaps")
-        .counter("vibrig_sample_gaps_total", "Sync counts that never showed."),
+        .counter("vibrig_sample_gaps_total", "Sync counts that never showed.")
+        .shown("dropped", "gaps {}").alarms(),
     row("assembler.resyncs", "", [](auto& s) { return s.assembler.resyncs; }),
     row("assembler.rig_ticks", "", [](auto& s) { return s.rig_ticks; }),
     row("assembler.increments", "", [](auto& s) { return s.increment_frames; }),
     row("estimator_ring.pushed", "", [](auto& s) { return s.estimator_ring.pushed; }),
     row("estimator_ring.popped", "", [](auto& s) { return s.estimator_ring.popped; }),
     row("estimator_ring.dropped", "", [](auto& s) { return s.estimator_ring.dropped; })
-        .mqtt("Samples/Dropped"),
+        .mqtt("Samples/Dropped")
+        .shown("dropped", "ring {}").alarms(),
     row("estimator_ring.in_dwell", "", [](auto& s) { return s.estimator_in_dwell; }),
     row("estimator_ring.idle", "", [](auto& s) { return s.estimator_idle; }),
     row("sample.time_s", "s", [](auto& s) { return drivers::to_seconds(s.sample.time); }),
@@ -225,7 +248,8 @@ const auto kValues = std::to_array<StatusValue>({
     row("sample.dropped_before", "", [](auto& s) { return s.sample.dropped_before; }),
     row("sample.rate_hz", "Hz",
         [](auto& s) { return only(s.sample_rate_hz > 0, s.sample_rate_hz); })
-        .gauge("vibrig_sample_rate_hertz", "Measured over ten seconds at most."),
+        .gauge("vibrig_sample_rate_hertz", "Measured over ten seconds at most.")
+        .shown("samples", "{}").with_decimals(1),
     row("real_time.memory_locked", "", [](auto& s) { return s.real_time.memory_locked; })
         .gauge("vibrig_memory_locked", "1 while the daemon's memory is locked."),
     row("real_time.deadline_ms", "ms", [](auto& s) { return s.real_time.deadline_ms; }),
@@ -240,23 +264,30 @@ const auto kValues = std::to_array<StatusValue>({
     row("platform.time_s", "s",
         [](auto& s) { return only(s.platform.time != 0, drivers::to_seconds(s.platform.time)); }),
     row("platform.ready", "", [](auto& s) { return only(platform_good(s), s.platform.ready); })
-        .gauge("vibrig_platform_ready", "1 while the platform says so."),
+        .gauge("vibrig_platform_ready", "1 while the platform says so.")
+        .shown("platform", "ready", "NOT READY").off_page(),
     row("platform.loop_closed", "",
         [](auto& s) { return only(platform_good(s), s.platform.loop_closed); })
-        .gauge("vibrig_platform_loop_closed", "1 while its loop is closed."),
+        .gauge("vibrig_platform_loop_closed", "1 while its loop is closed.")
+        .shown("platform", "", "loop open").off_page(),
     row("platform.gyros_at_speed", "",
-        [](auto& s) { return only(platform_good(s), s.platform.gyros_at_speed); }),
+        [](auto& s) { return only(platform_good(s), s.platform.gyros_at_speed); })
+        .shown("platform", "", "gyros not at speed").off_page(),
     row("platform.fault", "", [](auto& s) { return only(platform_good(s), s.platform.fault); })
-        .gauge("vibrig_platform_fault", "1 while it reports a fault."),
+        .gauge("vibrig_platform_fault", "1 while it reports a fault.")
+        .shown("platform", "FAULT").off_page(),
     row("platform.temperature_c", "degC",
         [](auto& s) { return only(platform_good(s), s.platform.temperature_c); })
-        .gauge("vibrig_platform_temperature_celsius", "As the platform says."),
+        .gauge("vibrig_platform_temperature_celsius", "As the platform says.")
+        .shown("platform", "{}", "").with_decimals(2).off_page(),
     row("platform.gimbal_time_s", "s", [](auto& s) {
         return only(s.platform.gimbal_time != 0, drivers::to_seconds(s.platform.gimbal_time)); }),
     row("platform.in_position", "",
-        [](auto& s) { return only(s.platform.gimbal_time != 0, s.platform.in_position); }),
+        [](auto& s) { return only(s.platform.gimbal_time != 0, s.platform.in_position); })
+        .shown("platform", "in position").off_page(),
     row("platform.slewing", "",
-        [](auto& s) { return only(s.platform.gimbal_time != 0, s.platform.slewing); }),
+        [](auto& s) { return only(s.platform.gimbal_time != 0, s.platform.slewing); })
+        .shown("platform", "slewing").off_page(),
     row("platform.gimbal_command_echo", "", [](auto& s) {
         return only(s.platform.gimbal_time != 0, s.platform.gimbal_command_echo); }),
 
@@ -294,25 +325,34 @@ const auto kValues = std::to_array<StatusValue>({
     row("recorder.frames_dropped", "", [](auto& s) { return s.recorder.frames_dropped; }),
     row("recorder.entries_dropped", "", [](auto& s) { return s.recorder.entries_dropped; }),
 
-    row("estimate.amplitude_g", "g", [](auto& s) { return s.estimate.amplitude_g; }),
-    row("estimate.frequency_hz", "Hz", [](auto& s) { return s.estimate.frequency_hz; }),
+    row("estimate.amplitude_g", "g", [](auto& s) { return s.estimate.amplitude_g; })
+        .shown("vibration", "{} on the platform").with_decimals(4),
+    row("estimate.frequency_hz", "Hz", [](auto& s) { return s.estimate.frequency_hz; })
+        .shown("vibration", "{}").with_decimals(3),
     row("estimate.kappa", "", [](auto& s) { return s.estimate.kappa; }),
-    row("estimate.samples", "", [](auto& s) { return s.estimate.samples; }),
-    row("estimate.used", "", [](auto& s) { return s.estimate.used; }),
-    row("estimate.rejected", "", [](auto& s) { return s.estimate.rejected; }),
+    row("estimate.samples", "", [](auto& s) { return s.estimate.samples; })
+        .shown("filter", "{} samples").off_page(),
+    row("estimate.used", "", [](auto& s) { return s.estimate.used; })
+        .shown("filter", "{} used").off_page(),
+    row("estimate.rejected", "", [](auto& s) { return s.estimate.rejected; })
+        .shown("filter", "{} rejected").off_page(),
     row("estimate.nis_per_dof", "", [](auto& s) { return s.estimate.nis_per_dof; })
         .mqtt("Filter/NIS per degree of freedom")
-        .gauge("vibrig_filter_nis_ratio", "Normalised innovation squared per degree of freedom."),
-    row("estimate.dwells", "", [](auto& s) { return s.estimate.dwells; }),
+        .gauge("vibrig_filter_nis_ratio", "Normalised innovation squared per degree of freedom.")
+        .shown("filter", "NIS {}").with_decimals(3).off_page(),
+    row("estimate.dwells", "", [](auto& s) { return s.estimate.dwells; })
+        .shown("filter", "{} dwells").off_page(),
     row("noise.angle_in_force_arcsec", "arcsec",
         [](auto& s) { return s.noise.angle_in_force_arcsec; }),
     row("noise.block_s", "s", [](auto& s) { return only(s.noise.dwells > 0, s.noise.block_s); }),
     row("noise.dwells", "", [](auto& s) { return s.noise.dwells; })
-        .gauge("vibrig_noise_dwells", "Dwells the noise is known from."),
+        .gauge("vibrig_noise_dwells", "Dwells the noise is known from.")
+        .shown("noise", "in {} dwells").off_page(),
     row("noise.dwells_left_out", "", [](auto& s) { return s.noise.dwells_left_out; }),
     row("noise.alarms_total", "", [](auto& s) { return s.noise.alarms_total; })
         .counter("vibrig_noise_alarms_total",
-               "Dwells whose noise was not that of the earlier ones."),
+               "Dwells whose noise was not that of the earlier ones.")
+        .shown("noise", "{} alarms").off_page(),
     row("", "", [](auto& s) { return only(s.verdict.dwells > 0, s.verdict.level); })
         .gauge("vibrig_verdict_level", "Of the campaign so far: 0 valid, 1 doubtful, 2 not valid."),
     row("", "", [](auto& s) { return only(s.verdict.dwells > 0, s.verdict.dwells); })
@@ -322,7 +362,8 @@ const auto kValues = std::to_array<StatusValue>({
                "Uncertainty of a coefficient over that of noise alone, median."),
     row("verdict.level", "", [](auto& s) { return s.verdict.level; }),
     row("verdict.word", "", [](auto& s) { return s.verdict.word; }),
-    row("verdict.sentence", "", [](auto& s) { return s.verdict.sentence; }),
+    row("verdict.sentence", "", [](auto& s) { return s.verdict.sentence; })
+        .shown("verdict", "{}").off_page(),
     row("verdict.dwells", "", [](auto& s) { return s.verdict.dwells; }),
     row("verdict.widening", "", [](auto& s) { return s.verdict.widening; }),
     row("verdict.complete", "", [](auto& s) { return s.verdict.complete; }),
@@ -366,11 +407,13 @@ const auto kValues = std::to_array<StatusValue>({
     row("archive.delivering", "", [](auto& s) { return s.archive.delivering; }),
     row("archive.waiting", "",
         [](auto& s) { return only(!s.archive.folder.empty(), s.archive.waiting); })
-        .gauge("vibrig_archive_waiting", "Campaigns that are over and not delivered."),
+        .gauge("vibrig_archive_waiting", "Campaigns that are over and not delivered.")
+        .shown("archive", "{} waiting", "").off_page(),
     row("archive.waiting_bytes", "",
         [](auto& s) { return only(!s.archive.folder.empty(), s.archive.waiting_bytes); })
         .gauge("vibrig_archive_waiting_bytes", "Bytes of them."),
-    row("archive.delivered", "", [](auto& s) { return s.archive.delivered; }),
+    row("archive.delivered", "", [](auto& s) { return s.archive.delivered; })
+        .shown("archive", "{} delivered", "").off_page(),
     row("archive.failures", "", [](auto& s) { return s.archive.failures; }),
     row("archive.removed", "", [](auto& s) { return s.archive.removed; }),
     row("mqtt.broker", "", [](auto& s) { return s.mqtt.broker; }),

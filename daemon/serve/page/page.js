@@ -1,7 +1,7 @@
 'use strict';
 // Follows /api/v1/stream and shows what it says; loud when it says nothing.
 (() => {
-  const {byId} = Draw;
+  const {byId} = Draw, {duration} = Watch;
   const kKept = 2400, kStale_ms = 4000, kRate_hz = 2, kHidden_hz = 0.2, kEvents = 300;
   let direction = null, status = null, plan = null, targets = {}, role = 'viewer', instance = '', lastEvent = 0;
   let known = '';   // whose history is here
@@ -11,12 +11,6 @@
 
   const number = x => (x === undefined ? NaN : Number(x));
   const fixed = (x, n, unit) => (Number.isFinite(number(x)) ? number(x).toFixed(n) + ' ' + unit : '– ' + unit);
-  function duration(s) {
-    s = Math.round(s);
-    if (!(s >= 0)) return '–';
-    return s >= 3600 ? `${Math.floor(s / 3600)} h ${String(Math.floor(s / 60) % 60).padStart(2, '0')} min`
-      : s >= 60 ? `${Math.floor(s / 60)} min ${String(s % 60).padStart(2, '0')} s` : `${s} s`;
-  }
   function set(id, text) { const e = byId(id); if (e.textContent !== text) e.textContent = text; }
 
   function merge(target, patch) {   // RFC 7396
@@ -56,8 +50,9 @@
         e.append(dt, document.createElement('dd'));
       }
     }
-    items.forEach(([, text, bad], i) => {
-      const dd = e.children[2 * i + 1];
+    items.forEach(([name, text, bad], i) => {
+      const dt = e.children[2 * i], dd = e.children[2 * i + 1];
+      if (dt.textContent !== name) dt.textContent = name;
       if (dd.textContent !== text) dd.textContent = text;
       dd.className = bad ? 'bad-value' : '';
     });
@@ -273,19 +268,23 @@
       return [kind, Watch.person(c.name), [...(c.quality === 'good' ? [] : [c.quality]), ...(c.value === undefined ? [] : [`${c.value.toFixed(4)} ${c.unit}`]),
         ...(c.age_s === undefined ? [] : [`${c.age_s.toFixed(2)} s ago`])].join(', ')];
     })));
-    const i = s.interlock;
-    const a = s.assembler, stopped = (i.reaction_counts || []).reduce((n, c) => n + Number(c), 0);
-    const dropped = number(s.can.kernel_dropped) + number(s.estimator_ring.dropped);
+    const i = s.interlock, stopped = (i.reaction_counts || []).reduce((n, c) => n + Number(c), 0), lines = Watch.lines(s);
+    const line = (name, head, bad) => {   // what the code knows of it, then its single values
+      const values = lines.get(name) || {text: '', bad: false};
+      lines.delete(name);
+      return [name, [head, values.text].filter(x => x).join(', '), bad || values.bad];
+    };
+    const about = line('daemon', '', false)[1];
     table('links', [
-      ['CAN', s.can.link, s.can.link !== 'running'], ['shaker', s.shaker.link, s.shaker.link !== 'running'],
+      line('CAN', s.can.link, s.can.link !== 'running'), line('shaker', s.shaker.link, s.shaker.link !== 'running'),
       ['rest', (s.shaker.rest || 'unknown') + (s.shaker.rest === 'stop not obeyed' ? ': PRESS THE EMERGENCY STOP' : ''), s.shaker.stop_pending || s.shaker.rest === 'stop not obeyed'],
       ['emergency stop', s.shaker.emergency_stop_open === undefined ? 'not read' : s.shaker.emergency_stop_open ? 'OPEN' : 'closed', s.shaker.emergency_stop_open !== false],
       ['journal', s.journal.path ? (s.journal.running ? 'writes' : 'WAITS: ' + s.journal.note) : 'none', s.journal.path && !s.journal.running],
-      ['samples', a.samples], ['dropped', String(dropped), dropped > 0], ['gaps, incomplete', `${a.gaps}, ${a.incomplete}`, number(a.gaps) > 0],
-      ['late, duplicate, unknown', `${a.late}, ${a.duplicate}, ${a.unknown}`],
-      ['frame to ring', latency(s.acquisition_latency)], ...(s.mqtt.broker ? [['broker', s.mqtt.connected ? 'connected' : 'DOWN: ' + s.mqtt.note, !s.mqtt.connected]] : []),
-      ['Modbus timeouts', s.shaker.timeouts], ['stops', `${stopped}, slowest ${number(i.reaction_largest_ms || 0).toFixed(2)} ms`]]);
-    set('footer', `vibrigd ${s.version}, clock ${s.clock}, up ${duration(s.uptime_s)}; you are ${/^[ao]/.test(role) ? "an" : "a"} ${role}`);
+      line('samples', '', false), line('dropped', '', false), ['frame to ring', latency(s.acquisition_latency)],
+      ...(s.mqtt.broker ? [['broker', s.mqtt.connected ? 'connected' : 'DOWN: ' + s.mqtt.note, !s.mqtt.connected]] : []),
+      ['stops', `${stopped}, slowest ${number(i.reaction_largest_ms || 0).toFixed(2)} ms`],
+      ...[...lines].map(([name, values]) => [name, values.text, values.bad])]);
+    set('footer', `${about}; you are ${/^[ao]/.test(role) ? "an" : "a"} ${role}`);
   }
 
   function show() {

@@ -10,6 +10,32 @@ const Watch = (() => {
   const clock = utc => new Date(utc).toISOString().slice(11, 19);
   const element = (tag, kind, ...inside) => { const e = document.createElement(tag); if (kind) e.className = kind; e.append(...inside); return e; };
 
+  function duration(s) {
+    s = Math.round(s);
+    if (!(s >= 0)) return '–';
+    return s >= 3600 ? `${Math.floor(s / 3600)} h ${String(Math.floor(s / 60) % 60).padStart(2, '0')} min`
+      : s >= 60 ? `${Math.floor(s / 60)} min ${String(s % 60).padStart(2, '0')} s` : `${s} s`;
+  }
+
+  // The single values of a status, as the daemon's table of them says (/values.js): by line, what it says and whether
+  // that is alarming.
+  const value = (s, v) => v.field.split('.').reduce((part, name) => (part === undefined ? part : part[name]), s);
+  function said(v, x) {
+    const put = text => v.words.replace('{}', () => text), unit = v.unit && !v.duration ? ' ' + v.unit : '';
+    if (typeof x === 'boolean') return x ? v.words : v.otherwise || '';
+    if (x === undefined || x === '') return v.number && v.otherwise === null ? put('–' + unit) : v.otherwise || '';
+    return put(!v.number ? x : (v.duration ? duration(Number(x)) : v.decimals < 0 ? String(x) : Number(x).toFixed(v.decimals)) + unit);
+  }
+  function lines(s) {
+    const all = new Map();
+    for (const v of kValues) {
+      const x = value(s, v), text = said(v, x), line = all.get(v.line) || {text: '', bad: false};
+      if (!text) continue;
+      all.set(v.line, {text: line.text + (line.text && ', ') + text, bad: line.bad || (v.alarming && Number(x) > 0)});
+    }
+    return all;
+  }
+
   function strip(s) {
     const rows = s.interlock.rows || [], raised = rows.filter(r => r.raised);
     const lost = number(s.can.kernel_dropped) + number(s.estimator_ring.dropped);
@@ -154,5 +180,5 @@ const Watch = (() => {
   });
   const alarmed = event => { if (event.severity === 'alarm' && !playing) sound('alarm'); };
 
-  return {person, clock, strip, locks, next, sirens, alarmed, show(s) { strip(s); proof(s); locks(s); next(s); sirens(s); byId('simulated').hidden = s.simulated !== true; byId('utc').textContent = clock(s.utc) + ' UTC'; }};
+  return {person, clock, duration, lines, strip, locks, next, sirens, alarmed, show(s) { strip(s); proof(s); locks(s); next(s); sirens(s); byId('simulated').hidden = s.simulated !== true; byId('utc').textContent = clock(s.utc) + ' UTC'; }};
 })();

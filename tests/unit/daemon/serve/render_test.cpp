@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "daemon/serve/page.hpp"
+#include "daemon/status/values.hpp"
 #include "proto/vibrig.pb.h"
 #include "tests/unit/daemon/serve/fake_source.hpp"
 
@@ -72,6 +74,44 @@ TEST(Render, ShowsWhatCountsOnAWideTerminal) {
                              "D_OSz",
                              "deg/h/g^2"}) {
         EXPECT_TRUE(has(text, part)) << "missing: " << part << '\n' << text;
+    }
+}
+
+TEST(Render, SaysEachSingleValueThatTheTableHasALineFor) {
+    // GIVEN a status with a number, a text or a flag for everything
+    const v1::Status status = message_of(full_status());
+    const Lines lines = render_summary(status, {}, 2000);
+    std::size_t rows = 0;
+    for (const StatusValue& row : status_values()) {
+        if (row.line == nullptr) continue;
+        ++rows;
+        // THEN the words of a row stand in its line, whatever the code of that line says
+        const std::string label = row.line;
+        const auto line = std::ranges::find_if(lines, [&](const std::string& one) {
+            return one.starts_with(label) && one.at(label.size()) == ' ';
+        });
+        ASSERT_NE(line, lines.end()) << row.field;
+        const std::string words = row.words;
+        const auto place = words.find("{}");
+        const auto is_said = [&](std::string part) {
+            return part.empty() || line->find(part) != std::string::npos;
+        };
+        if (place == words.npos) {
+            EXPECT_TRUE(is_said(words) || (row.otherwise != nullptr && is_said(row.otherwise)))
+                << row.field << " in " << *line;
+        } else {
+            EXPECT_TRUE(is_said(words.substr(0, place)) && is_said(words.substr(place + 2)))
+                << row.field << " in " << *line;
+        }
+    }
+    EXPECT_GT(rows, 40u);
+    // AND the page gets those that it shows
+    const std::string script(page_values().text);
+    for (const StatusValue& row : status_values()) {
+        if (*row.field == '\0') continue;
+        EXPECT_EQ(has(script, '"' + std::string(row.field) + '"'),
+                  row.line != nullptr && row.on_page)
+            << row.field;
     }
 }
 
