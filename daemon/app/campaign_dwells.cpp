@@ -3,6 +3,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -43,6 +44,7 @@ void CampaignDwells::begin() {
     planning_.abandon();  // of a campaign that was aborted
     assessing_.abandon();
     with_.identification = estimator::Identification(configuration_.estimator);
+    with_.identification.reserve(planned_dwells());
     noise_monitor_.reset();
     verdict_told_.clear();
     take_type_prior();
@@ -51,6 +53,13 @@ void CampaignDwells::begin() {
     result_ = {};
     for (const std::string& line : check_plan(configuration_))
         with_.events.log(Severity::warning, "campaign", line);
+}
+
+/// Of an adaptive campaign only those that are its beginning.
+std::size_t CampaignDwells::planned_dwells() const {
+    const auto& campaign = configuration_.campaign;
+    return std::max(campaign.stops.size(),
+                    campaign.table_g.size() * campaign.positions_deg.size());
 }
 
 bool CampaignDwells::order(const rt::DwellOrder& order) {
@@ -123,6 +132,7 @@ void CampaignDwells::resume(const std::string& by) {
     planning_.abandon();
     take_type_prior();
     with_.identification = std::move(interrupted_->identification);
+    with_.identification.reserve(planned_dwells());
     noise_monitor_.continue_from(std::move(interrupted_->noise));
     if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
     interrupted_.reset();

@@ -107,6 +107,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] static std::vector<estimator::DwellRow> assess(
         Judged& out, const estimator::Settings& settings, const estimator::Result& result,
         const std::optional<Again>& again, estimator::uncertainty::Stage stage);
+    [[nodiscard]] std::size_t planned_dwells() const;
     [[nodiscard]] bool verdict_wanted();
     void take_noise(estimator::DwellSummary& dwell);
     void record_dwell(const estimator::DwellSummary& summary);

@@ -85,7 +85,7 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
     if (auto why = outside_.refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
-        return changed->cause + ": vibrig ack journal";
+        return changed->cause + kJournalToDo;
     if (const auto why = journal_being_verified(); !why.empty()) return why;
     if (arming_) return "another arming is being written to the journal";
     if (journal_ || rig_clock_) return {};

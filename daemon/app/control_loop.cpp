@@ -137,7 +137,8 @@ void ControlLoop::take_over_latches() {
     for (const Latch& latch : journal_->recovery().latches) {
         latches_.add(latch);
         log(Severity::alarm, "journal",
-            fmt::format("not acknowledged: {}: {}", latch.name, latch.cause));
+            fmt::format("not acknowledged: {}: {}{}", latch.name, latch.cause,
+                        latch.name == journal::kJournalLatch ? kJournalToDo : ""));
         // Whose word it was is not kept: each witness has to show anew that it lives.
         if (latch.name == rt::condition_of(rt::Trip::stuck).name ||
             latch.name == rt::condition_of(rt::Trip::amplitude_witness).name) {

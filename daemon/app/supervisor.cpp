@@ -169,7 +169,7 @@ void Supervisor::tell_journal() {
     for (const std::string& found : journal_->take_found()) {
         // In the new file it stands already.
         latches_.add({journal::kJournalLatch, found, {}, {}, false, utc_now()});
-        log(Severity::alarm, "journal", found + ": vibrig ack journal");
+        log(Severity::alarm, "journal", found + kJournalToDo);
     }
     const auto status = journal_->status();
     if (std::exchange(journal_was_running_, status.running) == status.running) return;

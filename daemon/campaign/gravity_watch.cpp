@@ -49,6 +49,7 @@ GravityWatch::Verdict GravityWatch::judge(const rt::MeanMotion& second, const Ve
                   kDegreesPerRadian;
     newest_.vibration_told = !(newest_.vibration_deg <= limits_.vibration_deg);
     const bool size = !at_rest || std::abs(newest_.size_g - 1) <= limits_.size;
+    newest_.size_told = !size;
     newest_.told = !(newest_.angle_deg <= limits_.told_deg) || !size;
     newest_.refused = !(newest_.angle_deg <= limits_.refused_deg) || !size;
     if (std::exchange(fresh_, false) || looks_.empty()) {
@@ -83,6 +84,9 @@ double GravityWatch::worst_deg(const estimator::Settings& rig) const {
 }
 
 std::string GravityWatch::suspects() const {
+    // What turns or swaps axes leaves the size as it is.
+    if (newest_.size_told)
+        return "suspects, by the size of gravity: accelerometer.zero_g; accelerometer.matrix";
     std::vector<std::pair<double, std::string>> found;
     const auto consider = [&](double worst, std::string words) {
         if (worst <= limits_.told_deg) found.emplace_back(worst, std::move(words));

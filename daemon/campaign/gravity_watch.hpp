@@ -30,6 +30,7 @@ class GravityWatch {
         bool known = false;
         double angle_deg = 0, size_g = 1;
         bool told = false, refused = false;
+        bool size_told = false;  ///< it is the size that is wrong, or that as well
         double vibration_g = 0, vibration_deg = 0;  ///< peak; off the vertical, 0 when too small
         bool vibration_told = false;
     };

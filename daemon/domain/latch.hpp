@@ -5,6 +5,10 @@
 
 namespace vibrig {
 
+/// What a person does about the journal's latch, behind its cause.
+inline constexpr const char* kJournalToDo =
+    ": look at it (vibrig journal verify), then vibrig ack journal --by NAME";
+
 /// Latched until named persons acknowledge it; kept over restarts.
 struct Latch {
     std::string name;          ///< under which it is acknowledged

@@ -87,9 +87,7 @@ void ChainedFile::open_database(const FoundHead& beside, std::vector<std::string
         found.push_back(fmt::format("{}, expected {} as its signed head and its key say", says,
                                     kSchemaVersion));
     } else if (size_of(path_) <= kWholeAtStart) {
-        for (const Row& row : database_->ask("PRAGMA integrity_check(1)")) {
-            if (row.texts.at(0) != "ok") found.push_back(path_ + ": damaged: " + row.texts.at(0));
-        }
+        for (const std::string& what : database_->damage(1)) found.push_back(path_ + ": " + what);
         intact_ = true;
     }
     if (!found.empty()) return;

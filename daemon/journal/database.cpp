@@ -1,7 +1,9 @@
 #include "daemon/journal/database.hpp"
 
+#include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 
@@ -71,6 +73,15 @@ Database::~Database() = default;
 
 void Database::fail(const char* doing) const {
     const int code = database_ ? sqlite3_extended_errcode(database_.get()) : SQLITE_NOMEM;
+    // Whatever was to be done with it: who has to look at the file is helped by its state.
+    const int primary = code & 0xff;
+    if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB)
+        throw DatabaseError(fmt::format("{}: is damaged: {} (SQLite: {})", path_,
+                                        primary == SQLITE_NOTADB
+                                            ? "it does not begin as an SQLite file does"
+                                            : "a part of it is missing or was overwritten",
+                                        sqlite3_errmsg(database_.get())),
+                            code);
     throw DatabaseError(path_ + ": cannot " + doing + ": " +
                             (database_ ? sqlite3_errmsg(database_.get()) : "out of memory"),
                         code);
@@ -128,6 +139,20 @@ std::vector<Row> Database::ask(const char* sql, const std::vector<Value>& values
             }
         }
     }
+}
+
+std::vector<std::string> Database::damage(int at_most) {
+    std::vector<std::string> found;
+    for (const Row& row :
+         ask(fmt::format("PRAGMA integrity_check({})", at_most).c_str())) {
+        std::string text = row.texts.at(0);
+        if (text == "ok") continue;
+        // "*** in database main ***" stands in a line of its own before the first.
+        if (text.starts_with("***")) text.erase(0, text.find('\n') + 1);
+        std::ranges::replace(text, '\n', ';');
+        found.push_back("is damaged: " + text);
+    }
+    return found;
 }
 
 std::string Database::row_bytes(const std::string& table, std::int64_t row) {

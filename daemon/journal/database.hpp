@@ -49,6 +49,8 @@ class Database {
     void execute(const char* sql);
     void run(const char* sql, const std::vector<Value>& values);
     [[nodiscard]] std::vector<Row> ask(const char* sql, const std::vector<Value>& values = {});
+    /// What SQLite's own check of the whole file finds, each in one line; empty: nothing.
+    [[nodiscard]] std::vector<std::string> damage(int at_most);
     [[nodiscard]] std::int64_t last_id() const noexcept;
     /// A row as bytes, with the types of its columns; empty: there is no such row.
     [[nodiscard]] std::string row_bytes(const std::string& table, std::int64_t row);

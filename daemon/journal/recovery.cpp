@@ -141,6 +141,7 @@ void Journal::recover_dwells(Unfinished& campaign) {
 }
 
 void Journal::begin_anew(const std::vector<std::string>& found) {
+    std::string why = joined(found);
     std::vector<Row> campaign;
     try {
         if (started_) {  // what is latched and armed is known
@@ -152,9 +153,10 @@ void Journal::begin_anew(const std::vector<std::string>& found) {
             read_safety(database());
         }
     } catch (const DatabaseError&) {  // without it
+        if (!started_) why += "; what was latched or armed in it cannot be read";
     }
-    const std::string why = joined(found);
     file_.replace(found, [&] {
+        if (!file_.aside().empty()) why += "; put aside as " + file_.aside();
         carry_over(why);
         carry_campaign(campaign);
     });
@@ -162,8 +164,7 @@ void Journal::begin_anew(const std::vector<std::string>& found) {
     proof_head_.clear();
     follow({kLatched, kJournalLatch, {}, why, false, utc_now()});
     const std::lock_guard lock(mutex_);
-    found_.push_back(
-        file_.aside().empty() ? why : fmt::format("{}; put aside as {}", why, file_.aside()));
+    found_.push_back(why);
 }
 
 /// What is latched and armed stands in the new file before anything else, and why there is one.

@@ -119,9 +119,7 @@ void walk(Database& database, const Expectation& expected, Verdict& verdict) {
 void look_at(Database& database, const std::string& path, const Expectation& expected,
              Verdict& verdict) {
     if (!look_at_version(database, path, verdict)) return;
-    for (const Row& row : database.ask("PRAGMA integrity_check(20)")) {
-        if (row.texts.at(0) != "ok") verdict.found.push_back("damaged: " + row.texts.at(0));
-    }
+    verdict.found = database.damage(20);
     // The head first: the picture is one of later, whatever a daemon writes meanwhile.
     const auto beside = read_head(path + kHeadSuffix);
     const Snapshot snapshot(database);

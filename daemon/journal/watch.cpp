@@ -184,9 +184,7 @@ void Watch::look_at_rows(Pass& pass, std::vector<std::string>& found) {
     Database reader(path_, Database::Mode::read);
     reader.end_when(stop_);
     if (!std::exchange(pass.intact, true)) {
-        for (const Row& row : reader.ask("PRAGMA integrity_check(1)")) {
-            if (row.texts.at(0) != "ok") found.push_back("damaged: " + row.texts.at(0));
-        }
+        for (std::string& what : reader.damage(1)) found.push_back(std::move(what));
     }
     {
         const Snapshot snapshot(reader);

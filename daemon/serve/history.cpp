@@ -77,6 +77,10 @@ void History::add(const StatusData& status) {
     was_active_ = active;
     if (begins || steps_.empty() || now_s < newest_s_) {
         steps_.clear();
+        // All that it will ever have, now: it would come by pieces, when depends on how often
+        // somebody looked.
+        steps_.resize(kMostSteps);
+        steps_.clear();
         begin_s_ = now_s;
         step_s_ = kFirstStep_s;
     }

@@ -26,7 +26,7 @@ Readiness::Check journal_check(const StatusData& status) {
     const char* const name = "journal";
     if (journal.path.empty()) return {name, true, "none is kept"};
     for (const Latch& latch : status.interlock.latches) {
-        if (latch.name == name) return {name, false, latch.cause + ": vibrig ack journal"};
+        if (latch.name == name) return {name, false, latch.cause + kJournalToDo};
     }
     if (!journal.running) return {name, false, journal.note};
     if (!journal.not_watched.empty())

@@ -43,6 +43,13 @@ std::vector<double> in_rows(const Covariance& covariance) {
     return rows;
 }
 
+template <class T>
+void bring_in(std::vector<T>& all, std::size_t most) {
+    const std::size_t size = all.size();
+    all.resize(std::max(size, most));
+    all.resize(size);
+}
+
 template <class Container>
 bool finite(const Container& values) noexcept {
     return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -473,7 +480,11 @@ void Identification::Impl::tell(const ParameterArray& value, const ParameterArra
 
 Identification::Identification(const Settings& settings, std::size_t max_dwells)
     : impl_(std::make_unique<Impl>(settings, max_dwells)) {}
-void Identification::reserve(std::size_t max_dwells) { impl_->reserve(max_dwells); }
+void Identification::reserve(std::size_t max_dwells) {
+    impl_->reserve(max_dwells);
+    bring_in(impl_->dwells, max_dwells);
+    if (impl_->settings.method == Method::joint) bring_in(impl_->rows, max_dwells);
+}
 Identification::~Identification() = default;
 Identification::Identification(Identification&&) noexcept = default;
 Identification& Identification::operator=(Identification&&) noexcept = default;

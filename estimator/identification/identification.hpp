@@ -57,7 +57,8 @@ class Identification {
   public:
     /// Throws SettingsError. Room for `max_dwells` dwell summaries is taken here.
     explicit Identification(const Settings& settings, std::size_t max_dwells = 4096);
-    /// Room for so many in all; between dwells only. Allocates.
+    /// Room for so many in all, brought into memory: of those no dwell's end waits for a page.
+    /// Between dwells only. Allocates.
     void reserve(std::size_t max_dwells);
     ~Identification();
     Identification(Identification&&) noexcept;

@@ -97,6 +97,26 @@ def while_it_runs(checks, rig, journal):
                  str(os.listdir(rig.results)))
 
 
+def halved(checks, rig, journal):
+    """Between two lives; what to do about it is said wherever it is met."""
+    rig.daemon.end()
+    os.truncate(journal.path, os.path.getsize(journal.path) // 2)
+    code, verdict = journal.verify()
+    checks.check(code == 1 and "is damaged: a part of it is missing" in verdict["found"][0], "halved: verify says damaged",
+                 str(verdict))
+    rig.start()
+    cause, _ = journal.latch()
+    checks.check("is damaged: a part of it is missing" in cause and "; put aside as " in cause and "cannot write" not in cause,
+                 "halved: the next start names it as damaged, and where it is now", cause)
+    to_do = "vibrig ack journal --by NAME"
+    says = {"arm": rig.tool("arm", "--by", "Ada").stderr, "selftest": rig.tool("selftest").stdout, "log": rig.logs()}
+    checks.equal([place for place, text in says.items() if to_do not in text], [], "halved: what to do is said")
+    answer = rig.tool("ack", "journal", "--by", "Grace")
+    armed = rig.tool("arm", "--by", "Ada")
+    checks.check(answer.returncode == 0 and armed.returncode == 0, "halved: acknowledged it arms", answer.stderr + armed.stderr)
+    rig.tool("abort", "--by", "Ada")
+
+
 def killed_at_random(checks, rig, journal, seed):
     chance, broken, latched = random.Random(seed), [], []
     for number in range(KILLS):
@@ -163,6 +183,7 @@ def main():
             rig.start()
             whole(checks, rig, journal)
             while_it_runs(checks, rig, journal)
+            halved(checks, rig, journal)
             killed_at_random(checks, rig, journal, seed)
             recorded(checks, rig, journal)
         finally:

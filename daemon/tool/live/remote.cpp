@@ -183,9 +183,10 @@ int self_test(const TestOptions& options) {
     if (options.json) {
         std::cout << reply.body << '\n';
     } else {
+        constexpr int kLongestLine = 1000;  // what to do stands at its end
         for (const v1::Readiness::Check& check : found.checks()) {
             std::cout << mark_of(check.passed())
-                      << serve::clipped(check.name() + ": " + check.text(), 200) << '\n';
+                      << serve::clipped(check.name() + ": " + check.text(), kLongestLine) << '\n';
         }
         std::cout << (found.ready() ? colour::good("ready for a campaign")
                                     : colour::bad("not ready for a campaign"))

@@ -81,8 +81,12 @@ void print_json(const std::string& file, const journal::Verdict& verdict) {
 }
 
 void print_words(const std::string& file, const journal::Verdict& verdict, bool anchored) {
-    std::cout << file << ": " << verdict.entries << " entries"
-              << (verdict.begins.empty() ? "" : "; its chain begins " + verdict.begins) << '\n';
+    if (verdict.begins.empty()) {
+        std::cout << file << ": cannot be read as a whole\n";
+    } else {
+        std::cout << file << ": " << verdict.entries << " entries; its chain begins "
+                  << verdict.begins << '\n';
+    }
     if (!verdict.head.empty()) {
         std::cout << "signed with " << journal::fingerprint(verdict.public_key) << " ("
                   << verdict.public_key << ")\n"

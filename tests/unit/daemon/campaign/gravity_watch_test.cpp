@@ -129,6 +129,19 @@ TEST(GravityWatch, NamesTheKeyThatIsWrong) {
     }
 }
 
+TEST(GravityWatch, OfASizeThatIsWrongOnlyWhatChangesSizesIsSuspected) {
+    estimator::Settings truth;
+    const auto believed = truth;
+    truth.accelerometer_zero_g = {0, 0.05, 0};
+    GravityWatch watch(believed, {});
+    // along the zero that is wrong there is no angle to be seen
+    const auto verdict = watch.judge(second_at(truth, {0, 0, 0}), {}, true);
+    EXPECT_TRUE(verdict.refused);
+    EXPECT_NEAR(verdict.angle_deg, 0, 1e-9);
+    EXPECT_NE(watch.suspects().find("accelerometer.zero_g"), std::string::npos) << watch.suspects();
+    EXPECT_EQ(watch.suspects().find("encoder"), std::string::npos) << watch.suspects();
+}
+
 TEST(GravityWatch, TellsBeforeItRefuses) {
     estimator::Settings truth, believed;
     for (const auto& [off, told, refused] : {std::tuple{0.19, false, false},

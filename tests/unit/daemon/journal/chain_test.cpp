@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 using namespace std::chrono_literals;
 
@@ -87,6 +88,12 @@ struct ChainTest : testing::Test {
         stream.put(static_cast<char>(byte ^ (1 << bit)));
     }
     static void cut(const std::string& file) { fs::resize_file(file, fs::file_size(file) / 2); }
+    /// From its middle on, a page of SQLite.
+    static void overwrite(const std::string& file) {
+        std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+        stream.seekp(static_cast<std::streamoff>(fs::file_size(file) / 2 / 4096 * 4096));
+        stream << std::string(4096, '\xa5');
+    }
     static void pipe_for(const std::string& file) {
         fs::remove(file);
         ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
@@ -301,8 +308,11 @@ TEST_F(ChainTest, NoticesFilesThatAreGoneCutOrOthers) {
              Database(path).execute("CREATE TABLE event (id INTEGER)");
          },
          "found version 0"},
-        {"no database", false, [&] { std::ofstream(path) << std::string(9000, 'x'); }, ""},
-        {"halved", false, [&] { cut(path); }, ""},
+        {"no database", false, [&] { std::ofstream(path) << std::string(9000, 'x'); },
+         "is damaged: it does not begin as an SQLite file does"},
+        {"halved", false, [&] { cut(path); },
+         "is damaged: a part of it is missing or was overwritten"},
+        {"overwritten", false, [&] { overwrite(path); }, "is damaged: "},
         {"its log gone", true, [&] { fs::remove(path + "-wal"); }, ""},
         {"its log halved", true, [&] { cut(path + "-wal"); }, ""},
         {"both halved", true,
@@ -330,6 +340,8 @@ TEST_F(ChainTest, NoticesFilesThatAreGoneCutOrOthers) {
         const auto said = next_start({kept});
         EXPECT_NE(said, "") << c.what;
         EXPECT_THAT(said, HasSubstr(c.says)) << c.what;
+        EXPECT_THAT(said, Not(HasSubstr("cannot write"))) << c.what;
+        EXPECT_THAT(said, Not(HasSubstr("\n"))) << c.what;
         EXPECT_EQ(next_start({kept}), "") << c.what << ": goes on with a new one";
         EXPECT_THAT(found(), IsEmpty()) << c.what;
         struct stat key {};
