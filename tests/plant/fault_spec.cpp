@@ -16,6 +16,7 @@ enum class Value : std::uint8_t {
     seconds,
     factor,
     slowness,
+    decibels,
     whole,
     word
 };
@@ -28,7 +29,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 29> kDescriptions{{
+constexpr std::array<Description, 32> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -84,6 +85,13 @@ constexpr std::array<Description, 29> kDescriptions{{
      "dead-table            the table does not move, measured amplitude 0 (but readback-echo)"},
     {FaultKind::frequency_ignored, "frequency-ignored", Value::none, false,
      "frequency-ignored     another frequency is taken and read back, the table keeps the old one"},
+    {FaultKind::wrong_profile, "wrong-profile", Value::whole, false,
+     "wrong-profile=NUMBER  random: this profile is loaded, whatever number is written and read "
+     "back"},
+    {FaultKind::profile_level_wrong, "profile-level-wrong", Value::decibels, false,
+     "profile-level-wrong=DB  random: the table does so much more than is told and read back"},
+    {FaultKind::no_abort_bands, "no-abort-bands", Value::none, false,
+     "no-abort-bands        random: the controller has none, and its control_state says so"},
     {FaultKind::timeout_register, "timeout-register", Value::whole, false,
      "timeout-register=MS   another master keeps this in the watchdog's timeout register; 0: off"},
     {FaultKind::latched_fault, "latched-fault", Value::none, false,
@@ -157,6 +165,9 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
             break;
         case Value::slowness:
             fault.value = number(spec, first, "a factor from 1 to 1000", 1, 1000);
+            break;
+        case Value::decibels:
+            fault.value = number(spec, first, "decibels from -60 to 20", -60, 20);
             break;
         case Value::whole:
             fault.value = number(spec, first, "a whole number from 0 to 65535", 0, 65535);

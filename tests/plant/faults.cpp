@@ -40,6 +40,10 @@ ShakerLies lies_at(double time_s, ShakerLies lies, const Faults& faults) noexcep
     yes(FaultKind::unit_mps2, lies.unit_mps2);
     yes(FaultKind::dead_table, lies.dead_table);
     yes(FaultKind::frequency_ignored, lies.frequency_ignored);
+    if (const Fault* fault = faults.active(FaultKind::wrong_profile, time_s))
+        lies.wrong_profile = static_cast<std::uint16_t>(fault->value);
+    value(FaultKind::profile_level_wrong, lies.profile_level_wrong);
+    yes(FaultKind::no_abort_bands, lies.no_abort_bands);
     if (const Fault* fault = faults.active(FaultKind::timeout_register, time_s))
         lies.timeout_register = static_cast<std::uint16_t>(fault->value);
     yes(FaultKind::latched_fault, lies.latched_fault);

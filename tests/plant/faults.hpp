@@ -44,6 +44,9 @@ enum class FaultKind : std::uint8_t {
     unit_mps2,
     dead_table,
     frequency_ignored,
+    wrong_profile,
+    profile_level_wrong,
+    no_abort_bands,
     timeout_register,
     latched_fault
 };

@@ -53,6 +53,12 @@ Isolator::Isolator(double omega0, double damping, double step_s)
     const double c = decay * std::cos(omega_d * step_s);
     const double s = decay * std::sin(omega_d * step_s) / omega_d;
     transition_ = {{{c + sigma * s, s}, {-omega0_ * omega0_ * s, c - sigma * s}}};
+    // The motion under a constant force is the one towards its rest; under one that grows, the
+    // mean of those.
+    const double stiff = omega0_ * omega0_, lag = 2 * damping_ / omega0_;
+    held_ = {(1 - transition_[0][0]) / stiff, -transition_[1][0] / stiff};
+    risen_ = {(step_s - lag * (1 - transition_[0][0]) - transition_[0][1]) / (stiff * step_s),
+              held_[0] / step_s};
 }
 
 double Isolator::natural_frequency_hz() const noexcept { return omega0_ / kTwoPi; }
@@ -190,6 +196,20 @@ void Isolator::leap(double begin_g, double slope_g, std::span<Shake> after) noex
         motion_.cosine[k] = next[1];
     }
     phasor = turned(phasor, leap_.turn);
+}
+
+void Isolator::follow(std::span<const Shake> table, std::span<Shake> after) noexcept {
+    steady_ = false;
+    const auto moved = [this](std::array<double, 2>& m, double begin, double end) {
+        const auto& t = transition_;
+        m = {t[0][0] * m[0] + t[0][1] * m[1] + held_[0] * begin + risen_[0] * (end - begin),
+             t[1][0] * m[0] + t[1][1] * m[1] + held_[1] * begin + risen_[1] * (end - begin)};
+    };
+    for (std::size_t i = 0; i < after.size(); ++i) {
+        moved(motion_.sine, table[i].in_phase, table[i + 1].in_phase);
+        moved(motion_.cosine, table[i].quadrature, table[i + 1].quadrature);
+        after[i] = shake();
+    }
 }
 
 void Isolator::kick(double g) noexcept { motion_.sine[0] += g / (omega0_ * omega0_); }

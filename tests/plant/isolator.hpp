@@ -43,6 +43,9 @@ class Isolator {
     /// is linear in what it is before, so that for a drive of one line each step follows from
     /// numbers found once for a drive and not from the step before it.
     void advance(double begin_g, double slope_g, std::span<Shake> after);
+    /// A step for each of `after` under any motion of the table, which is given at the ends of the
+    /// steps (one more than of `after`) and straight in between.
+    void follow(std::span<const Shake> table, std::span<Shake> after) noexcept;
     /// The platform gets a push: its acceleration jumps by this much and then rings down.
     void kick(double g) noexcept;
 
@@ -91,6 +94,7 @@ class Isolator {
     double damping_;
     double step_s_;
     Transition transition_{};
+    std::array<double, 2> held_{}, risen_{};  ///< of one step under a force that is 1, or gets so
     Motion motion_;
     std::array<Harmonic, 5> harmonics_{};
     std::size_t used_ = harmonics_.size();  ///< those behind are not there

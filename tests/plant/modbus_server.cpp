@@ -35,7 +35,7 @@ struct Write {
 };
 
 Write parse_write(const std::uint8_t* pdu, std::size_t length,
-                  const std::array<std::uint16_t, 8>& holding) {
+                  const std::array<std::uint16_t, ShakerController::kHolding>& holding) {
     Write write;
     const auto list = [&](std::size_t address_at, std::size_t count_at, std::size_t data_at) {
         if (length < data_at) return;

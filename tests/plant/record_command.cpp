@@ -43,6 +43,11 @@ void add_record_command(CLI::App& app, int& exit_code) {
         ->delimiter(',')
         ->check(proto::finite(1.0, 200.0))
         ->capture_default_str();
+    command
+        ->add_option("--profile", o->plan.profile,
+                     "random vibration: the number of one of the truth's shaker.profiles, for each "
+                     "of --table-g, which is its rms (to 0.1 dB) then; 0 for a sine")
+        ->delimiter(',');
     command->add_option("--dwell", o->plan.dwell_s, "recorded at each position, s")
         ->check(proto::finite(0.025, 1e5))
         ->capture_default_str();

@@ -1,5 +1,6 @@
 #include "tests/plant/recording.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -40,6 +41,31 @@ void set_shaker(ShakerController& shaker, const proto::Register& reg, double val
     }
 }
 
+proto::Register holding(std::size_t address, proto::RegisterType type, double scale) {
+    proto::Register reg;
+    reg.address = static_cast<std::uint16_t>(address);
+    reg.type = type;
+    reg.scale = scale;
+    return reg;
+}
+
+/// At rest: the kind of vibration of a run, and for random vibration its rms.
+void choose_vibration(Rig& rig, const CampaignPlan& plan, std::size_t run) {
+    if (plan.profile.empty()) return;
+    using proto::RegisterType;
+    const auto mode = holding(ShakerController::kMode, RegisterType::u16, 1);
+    const auto number = holding(ShakerController::kProfileNumber, RegisterType::u16, 1);
+    const auto level = holding(ShakerController::kProfileLevel, RegisterType::i16, 0.1);
+    const std::uint16_t chosen = plan.profile_of(run);
+    set_shaker(rig.shaker(), mode, 0);
+    if (chosen == 0) return;
+    set_shaker(rig.shaker(), number, chosen);
+    const auto& all = rig.truth().profiles;
+    const auto profile = std::ranges::find(all, chosen, &ShakerProfile::number);
+    set_shaker(rig.shaker(), level, 20 * std::log10(plan.table_g[run - 1] / profile->rms_g()));
+    set_shaker(rig.shaker(), mode, 1);
+}
+
 // Slews with the shaker at rest, then ramps it up and waits until the isolators have rung down.
 void prepare(Rig& rig, const CampaignPlan& plan, const Vec3& position, std::size_t run) {
     const double table_g = plan.table_g[run - 1];
@@ -56,6 +82,7 @@ void prepare(Rig& rig, const CampaignPlan& plan, const Vec3& position, std::size
     rig.slew_to(position);
     wait_until([&] { return rig.gimbals().in_position(); });
     rig.release();
+    choose_vibration(rig, plan, run);
     set_shaker(rig.shaker(), map.frequency, plan.hz_of(run));
     set_shaker(rig.shaker(), map.ramp_time, plan.ramp_s);
     set_shaker(rig.shaker(), map.amplitude, table_g);
@@ -133,6 +160,10 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
         throw PlantError("--frequency: found " + std::to_string(plan.frequency_hz.size()) +
                          " frequencies, expected one, or one for each of " +
                          std::to_string(plan.table_g.size()) + " levels");
+    if (!plan.profile.empty() && plan.profile.size() != plan.table_g.size())
+        throw PlantError("--profile: found " + std::to_string(plan.profile.size()) +
+                         " numbers, expected one for each of " +
+                         std::to_string(plan.table_g.size()) + " levels");
     Rig rig(truth);
     std::uint64_t samples = 0;
     std::size_t dwell = 0;
@@ -183,9 +214,9 @@ std::vector<std::pair<std::size_t, std::size_t>> parse_order(const std::string& 
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
                      std::array<GyroCoefficients, 3>* mean,
                      const std::function<void(std::size_t, std::size_t)>& progress) {
-    const bool several = plan.frequency_hz.size() > 1;
+    const bool random = !plan.profile.empty(), several = plan.frequency_hz.size() > 1 || random;
     out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g"
-        << (several ? ",frequency_hz\n" : "\n");
+        << (several ? ",frequency_hz" : "") << (random ? ",profile\n" : "\n");
     std::array<GyroCoefficients, 3> sum{};
     const auto write = [&](const PlannedSample& s) {
         std::array<char, 400> row{};
@@ -203,7 +234,12 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
         for (const double angle : s.readings.encoder_deg) fixed(angle, 7, ',');
         for (std::size_t i = 0; i < 3; ++i)
             fixed(s.readings.raw_g[i], 7, i < 2 || several ? ',' : '\n');
-        if (several) fixed(plan.table_g[s.run - 1] > 0 ? plan.hz_of(s.run) : 0, 4, '\n');
+        const bool sine = plan.table_g[s.run - 1] > 0 && plan.profile_of(s.run) == 0;
+        if (several) fixed(sine ? plan.hz_of(s.run) : 0, 4, random ? ',' : '\n');
+        if (random) {
+            at = std::to_chars(at, end, plan.profile_of(s.run)).ptr;
+            *at++ = '\n';
+        }
         out.write(row.data(), at - row.data());
         for (std::size_t g = 0; g < 3; ++g) {
             for (std::size_t t = 0; t < kTerms; ++t) sum[g][t] += s.coefficients[g][t];

@@ -17,6 +17,9 @@ struct CampaignPlan {
     std::vector<Vec3> positions_deg = table1();  ///< outer, inner, azimuth, as the encoders count
     std::vector<double> table_g{9, 7};           ///< peak at the table, 0 for a run at rest
     std::vector<double> frequency_hz{15};        ///< one for all runs, or one each
+    /// Random vibration of this number in the truth, table_g its rms (to 0.1 dB); one each, 0 for
+    /// sine. Empty: sines.
+    std::vector<std::uint16_t> profile{};
     double dwell_s = 100;
     double ramp_s = 2;
     double settle_s = 3;  ///< after the ramp, not recorded
@@ -26,6 +29,9 @@ struct CampaignPlan {
 
     /// Table 1 of Tang et al. 2009.
     [[nodiscard]] static std::vector<Vec3> table1();
+    [[nodiscard]] std::uint16_t profile_of(std::size_t run) const {
+        return profile.empty() ? std::uint16_t{0} : profile[run - 1];
+    }
     /// Run from 1.
     [[nodiscard]] double hz_of(std::size_t run) const {
         return frequency_hz[frequency_hz.size() == 1 ? 0 : run - 1];
@@ -56,7 +62,7 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
                        const std::function<void(std::size_t done, std::size_t all)>& progress = {});
 
 /// Writes the recording as CSV (time_s, run, position, alpha_deg ... az_g, and with a frequency for
-/// each run frequency_hz). Returns the number of
+/// each run frequency_hz, and where one is random profile: its number, or 0). Returns the number of
 /// samples. `progress` hears of every finished dwell. `mean` becomes the coefficients' mean over
 /// all samples.
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,

@@ -17,19 +17,21 @@ Rig::Rig(const Truth& truth)
       tick_us_(std::llround(1e6 / truth.sample_rate_hz)),
       tick_s_(1e-6 * static_cast<double>(tick_us_)),
       passing_s_(tick_s_ / (1 + truth.time_base)),
-      steps_((truth.elastic_share == Vec3{} ? 2 : 8) *
+      steps_((truth.elastic_share == Vec3{} && truth.profiles.empty() ? 2 : 8) *
              static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
       gimbals_(truth.slew_deg_per_s, truth.stuck_gimbal),
       isolator_(truth.hard ? Isolator::hard(passing_s_ / static_cast<double>(steps_))
                            : Isolator(truth.transmission, truth.frequency_hz, truth.damping,
                                       passing_s_ / static_cast<double>(steps_))),
-      shaker_(truth.limit_g, truth.limit_mm),
+      random_drive_(truth.seed, passing_s_ / static_cast<double>(steps_)),
+      shaker_(truth.limit_g, truth.limit_mm, truth.profiles),
       sensors_(truth, truth.seed),
       increments_(truth, tick_us_),
       drift_(truth),
       gyro_noise_(truth.seed, 0),
       slew_noise_(truth.seed, 7),
+      played_(steps_ + 1),
       shakes_(steps_ + 1) {
     shaker_.lie(truth.shaker_lies);
     read();
@@ -102,6 +104,10 @@ void Rig::vibrate() {
     shaker_.advance(tick_s_);
     shaking_s_ = shaker_.at_rest() ? 0 : shaking_s_ + passing_s_;
     const double end = table_g();
+    if (const ShakerProfile* profile = shaker_.played())
+        return vibrate_at_random(*profile, begin, end);
+    if (shaped_ != nullptr) frequency_hz_ = 0;  // a sine begins anew
+    shaped_ = nullptr;
     if (shaker_.table_hz() != frequency_hz_) {
         frequency_hz_ = shaker_.table_hz();
         isolator_.set_drive(frequency_hz_, {truth_.second_harmonic, truth_.third_harmonic,
@@ -117,6 +123,33 @@ void Rig::vibrate() {
     shakes_[0] = isolator_.shake();
     const double slope = (end - begin) / static_cast<double>(steps_);
     isolator_.advance(begin, slope, std::span(shakes_).subspan(1));
+}
+
+void Rig::vibrate_at_random(const ShakerProfile& profile, double begin_g, double end_g) {
+    if (shaped_ != &profile) {
+        shaped_ = &profile;
+        random_drive_.shape(profile);
+        played_.assign(played_.size(), {});
+    }
+    still_ = begin_g == 0 && end_g == 0 && isolator_.at_rest();
+    if (still_) {
+        std::ranges::fill(shakes_, Shake{});
+        std::ranges::fill(played_, Shake{});
+        return;
+    }
+    played_.front() = played_.back();
+    const std::span<Shake> next = std::span(played_).subspan(1);
+    random_drive_.next(next);
+    double mean_square = 0;
+    for (std::size_t i = 0; i < next.size(); ++i) {
+        const double part = static_cast<double>(i + 1) / static_cast<double>(next.size());
+        const double rms = begin_g + part * (end_g - begin_g);
+        mean_square += next[i].in_phase * next[i].in_phase / static_cast<double>(next.size());
+        next[i] = {rms * next[i].in_phase, rms * next[i].quadrature};
+    }
+    shaker_.felt(mean_square);
+    shakes_[0] = isolator_.shake();
+    isolator_.follow(played_, std::span(shakes_).subspan(1));
 }
 
 Shake Rig::shake_before(double seconds) const noexcept {
@@ -160,8 +193,10 @@ void Rig::read() {
     for (std::size_t i = 0; i < 3; ++i)
         encoder[i] += truth_.encoder_sign[i] * rocking[i] * kDegPerRad;
     const Shake felt = truth_.latency_s > 0 ? shake_before(truth_.latency_s) : now;
-    readings_ = sensors_.read(encoder, platform_.force(felt, truth_.vibration_gain),
-                              isolator_.table_g(table_g()), tick_s_ * static_cast<double>(tick_));
+    readings_ =
+        sensors_.read(encoder, platform_.force(felt, truth_.vibration_gain),
+                      shaped_ != nullptr ? played_.back().in_phase : isolator_.table_g(table_g()),
+                      tick_s_ * static_cast<double>(tick_));
     Vec3 shown = readings_.encoder_deg;
     for (std::size_t i = 0; i < 3; ++i)
         if (truth_.angle_unit[i] != AngleUnit::deg)

@@ -8,6 +8,7 @@
 #include "tests/plant/increments.hpp"
 #include "tests/plant/isolator.hpp"
 #include "tests/plant/platform_model.hpp"
+#include "tests/plant/random_drive.hpp"
 #include "tests/plant/sensors.hpp"
 #include "tests/plant/shaker_controller.hpp"
 
@@ -52,6 +53,7 @@ class Rig {
 
   private:
     void vibrate();
+    void vibrate_at_random(const ShakerProfile& profile, double begin_g, double end_g);
     void move();
     void read();
     [[nodiscard]] double table_g() const noexcept;
@@ -63,10 +65,11 @@ class Rig {
     double tick_s_;      ///< by the rig's clock
     double passing_s_;   ///< really, in a tick
     std::size_t steps_;  ///< of the vibration per tick, even, 0.5 ms or a little less; 0.125 ms
-                         ///< where a gyro is elastic
+                         ///< where a gyro is elastic or the table shakes at random
     PlatformModel platform_;
     Gimbals gimbals_;
     Isolator isolator_;
+    RandomDrive random_drive_;
     ShakerController shaker_;
     Sensors sensors_;
     Increments increments_;
@@ -77,8 +80,10 @@ class Rig {
     Vec3 torque_{};
     Vec3 commanded_deg_{};  ///< of the last slew, and its error
     Vec3 slew_error_deg_{};
-    double frequency_hz_ = 0;  ///< the isolator is set to
-    double shaking_s_ = 0;     ///< since the table was last at rest
+    double frequency_hz_ = 0;                ///< the isolator is set to
+    double shaking_s_ = 0;                   ///< since the table was last at rest
+    const ShakerProfile* shaped_ = nullptr;  ///< that the drive has
+    std::vector<Shake> played_;              ///< of the table, as shakes_; the last one is now
     std::vector<Shake> shakes_;
     bool still_ = true;  ///< no vibration in this tick
     std::int64_t tick_ = 0;

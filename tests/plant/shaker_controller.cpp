@@ -1,6 +1,7 @@
 #include "tests/plant/shaker_controller.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -12,6 +13,10 @@ namespace {
 const proto::ShakerRegisters kMap;
 constexpr double kWatchdogStop = 0.5;    ///< s, the table comes down on a watchdog trip
 constexpr double kEmergencyStop = 0.05;  ///< s, power amplifier cut off
+constexpr double kRandomStop = 0.05;     ///< s, there is no way down through the levels
+// The controller's own abort bands: of the mean square over a second, for so long, once it has one.
+constexpr double kMean_s = 1, kBands = 2, kBands_s = 0.3, kSettled_s = 3;
+constexpr std::int16_t kLeastLevel = -600, kMostLevel = 60;  // 0.1 dB
 constexpr double kMetrePerSecond2 = 9.80665;
 
 std::uint32_t joined(std::span<const std::uint16_t> words, std::size_t address) {
@@ -40,7 +45,40 @@ double ShakerController::amplitude_g() const noexcept {
     const double unit = lies_.unit_rms    ? std::numbers::sqrt2
                         : lies_.unit_mps2 ? 1 / kMetrePerSecond2
                                           : 1;
-    return lies_.amplitude_scaled * unit * std::max(drive_g_, held_g_);
+    const double level = played() != nullptr ? std::pow(10, lies_.profile_level_wrong / 20) : 1;
+    return lies_.amplitude_scaled * unit * level * std::max(drive_g_, held_g_);
+}
+
+const ShakerProfile* ShakerController::of_number(std::uint16_t number) const noexcept {
+    const auto found = std::ranges::find(profiles_, number, &ShakerProfile::number);
+    return found == profiles_.end() ? nullptr : &*found;
+}
+
+const ShakerProfile* ShakerController::played() const noexcept {
+    if (holding_[kMode] != 1) return nullptr;
+    return of_number(lies_.wrong_profile.value_or(holding_[kProfileNumber]));
+}
+
+double ShakerController::profile_level_db() const noexcept {
+    return 0.1 * std::bit_cast<std::int16_t>(holding_[kProfileLevel]);
+}
+
+double ShakerController::commanded_g() const noexcept {
+    const ShakerProfile* profile = played();
+    return profile == nullptr ? set_point_g()
+                              : profile->rms_g() * std::pow(10, profile_level_db() / 20);
+}
+
+/// What chooses the vibration changes only with the table at rest.
+bool ShakerController::may_be(const std::array<std::uint16_t, kHolding>& next) const noexcept {
+    const bool moving = state_ != ShakerState::idle || drive_g_ > 0;
+    const auto changed = [&](std::size_t at) { return next[at] != holding_[at]; };
+    if (moving && (changed(kMode) || changed(kProfileNumber) || changed(kProfileLevel)))
+        return false;
+    const auto level = std::bit_cast<std::int16_t>(next[kProfileLevel]);
+    if (next[kMode] > 1 || level < kLeastLevel || level > kMostLevel) return false;
+    return (next[kProfileNumber] == 0 && next[kMode] == 0) ||
+           of_number(next[kProfileNumber]) != nullptr;
 }
 
 ShakerController::Answer ShakerController::write(std::size_t address,
@@ -56,7 +94,7 @@ ShakerController::Answer ShakerController::write(std::size_t address,
     const bool moving = state_ != ShakerState::idle || drive_g_ > 0;
     if (frequency != frequency_hz() && (moving || frequency < 1 || frequency > 200))
         return Answer::illegal_value;
-    if (amplitude > limit_g_) return Answer::illegal_value;
+    if (amplitude > limit_g_ || !may_be(next)) return Answer::illegal_value;
     if (next[kMap.run.address] > 1) return Answer::illegal_value;
     if (run && !was_running &&
         (emergency_stop_open_ || state_ == ShakerState::fault || drive_g_ > 0)) {
@@ -71,10 +109,13 @@ ShakerController::Answer ShakerController::write(std::size_t address,
     if (run && !was_running) {
         since_feed_s_ = 0;
         state_ = ShakerState::ramping;
-        ramp_to(amplitude, ramp_s());
+        outside_bands_s_ = at_level_s_ = aborted_ = 0;
+        ramp_to(commanded_g(), ramp_s());
     } else if (!run && was_running) {
-        if (!lies_.ack_without_stop) stop(ShakerState::stopping, ramp_s());
-    } else if (run && amplitude != old_amplitude && state_ != ShakerState::fault) {
+        if (!lies_.ack_without_stop)
+            stop(ShakerState::stopping, played() != nullptr ? kRandomStop : ramp_s());
+    } else if (run && amplitude != old_amplitude && played() == nullptr &&
+               state_ != ShakerState::fault) {
         state_ = ShakerState::ramping;
         ramp_to(amplitude, ramp_s());
     } else if (!run && state_ == ShakerState::fault && drive_g_ == 0 && !emergency_stop_open_ &&
@@ -93,7 +134,39 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     double measured = lies_.dead_table ? 0 : drive_g_;
     if (lies_.readback_echo) measured = holding_[kMap.run.address] != 0 ? set_point_g() : 0;
     split(words, kMap.measured_amplitude.address, measured / kMap.measured_amplitude.scale);
+    const ShakerProfile* profile = played();
+    const std::uint32_t checksum = profile != nullptr ? profile->checksum() : 0;
+    words[kProfileChecksum] = static_cast<std::uint16_t>(checksum >> 16);
+    words[kProfileChecksum + 1] = static_cast<std::uint16_t>(checksum);
+    split(words, kMeasuredRms, std::sqrt(mean_square_) / 1e-4);
+    words[kControlState] = control_state();
     return words;
+}
+
+std::uint16_t ShakerController::control_state() const noexcept {
+    if (played() == nullptr) return 0;
+    const std::uint16_t armed = lies_.no_abort_bands ? 0 : kBandsArmed;
+    const auto of = [&](RandomState state) {
+        return static_cast<std::uint16_t>(static_cast<std::uint16_t>(state) | armed);
+    };
+    if (aborted_ != 0) return static_cast<std::uint16_t>(of(RandomState::aborted) | aborted_ << 8);
+    if (state_ == ShakerState::ramping) return of(RandomState::levelling);
+    return of(state_ == ShakerState::running ? RandomState::at_level : RandomState::idle);
+}
+
+/// The controller's own accelerometer: what the drive does, or whoever else has the table.
+void ShakerController::watch_bands(double dt_s) noexcept {
+    const double now = outside_g_ ? *outside_g_ * *outside_g_ : felt_ * drive_g_ * drive_g_;
+    mean_square_ += (now - mean_square_) * (1 - std::exp(-dt_s / kMean_s));
+    if (drive_g_ == 0 && !outside_g_) mean_square_ = 0;
+    if (played() == nullptr) return;
+    at_level_s_ = state_ == ShakerState::running ? at_level_s_ + dt_s : 0;
+    const double over = mean_square_ / (commanded_g() * commanded_g());
+    const bool off = at_level_s_ > kSettled_s && (over > kBands || over < 1 / kBands);
+    outside_bands_s_ = off ? outside_bands_s_ + dt_s : 0;
+    if (outside_bands_s_ < kBands_s || lies_.no_abort_bands) return;
+    aborted_ = over > 1 ? kAbortAbove : kAbortBelow;
+    trip(kFaultLimit, kRandomStop);
 }
 
 void ShakerController::open_emergency_stop(bool open) noexcept {
@@ -120,6 +193,7 @@ void ShakerController::ramp_to(double target_g, double time_s) noexcept {
 
 void ShakerController::trip(std::uint16_t fault, double stop_s) noexcept {
     faults_ |= fault;
+    if (played() != nullptr && aborted_ == 0) aborted_ = kAbortStopped;
     holding_[kMap.run.address] = 0;
     stop(ShakerState::fault, stop_s);
 }
@@ -148,8 +222,12 @@ void ShakerController::advance(double dt_s) noexcept {
         if (state_ == ShakerState::ramping) state_ = ShakerState::running;
         if (state_ == ShakerState::stopping) state_ = ShakerState::idle;
     }
+    watch_bands(dt_s);
     const double omega = 2 * std::numbers::pi * table_hz_;
-    const double peak_mm = 1e3 * amplitude_g() * kMetrePerSecond2 / (omega * omega);
+    const ShakerProfile* profile = played();
+    const double peak_mm = profile != nullptr
+                               ? 3 * amplitude_g() * profile->rms_mm() / profile->rms_g()
+                               : 1e3 * amplitude_g() * kMetrePerSecond2 / (omega * omega);
     if (peak_mm > limit_mm_ && state_ != ShakerState::fault) trip(kFaultLimit, kWatchdogStop);
 }
 

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "tests/plant/shaker_lies.hpp"
+#include "tests/plant/shaker_profile.hpp"
 
 namespace vibrig::plant {
 
@@ -16,16 +18,26 @@ inline constexpr std::uint16_t kFaultEmergencyStop = 2;
 inline constexpr std::uint16_t kFaultLimit = 4;
 inline constexpr std::uint16_t kFaultInternal = 8;
 
+/// Of the register control_state: what the random control does, with kBandsArmed, and from bit 8 on
+/// why it aborted.
+enum class RandomState : std::uint16_t { idle, levelling, at_level, aborted };
+inline constexpr std::uint16_t kBandsArmed = 0x10;
+inline constexpr std::uint16_t kAbortAbove = 1, kAbortBelow = 2, kAbortStopped = 3;
+
 /// The shaker's controller as its Modbus registers show it: set-points, ramps, watchdog, emergency
 /// stop; and the table it drives, which need not do what they say. Addresses are those of
-/// proto::ShakerRegisters.
+/// proto::ShakerRegisters, and for random vibration kMode to kControlState.
 class ShakerController {
   public:
-    static constexpr std::size_t kHolding = 8;
-    static constexpr std::size_t kInput = 5;
+    static constexpr std::size_t kHolding = 11;
+    static constexpr std::size_t kInput = 10;
+    /// Holding: 0 sine, 1 random; a number; i16, 0.1 dB. Input: u32; u32, 1e-4 g; u16.
+    static constexpr std::size_t kMode = 8, kProfileNumber = 9, kProfileLevel = 10;
+    static constexpr std::size_t kProfileChecksum = 5, kMeasuredRms = 7, kControlState = 9;
     enum class Answer : std::uint8_t { accepted, illegal_address, illegal_value };
 
-    ShakerController(double limit_g, double limit_mm) : limit_g_(limit_g), limit_mm_(limit_mm) {}
+    ShakerController(double limit_g, double limit_mm, std::vector<ShakerProfile> profiles = {})
+        : limit_g_(limit_g), limit_mm_(limit_mm), profiles_(std::move(profiles)) {}
 
     /// All or nothing, as one Modbus request.
     [[nodiscard]] Answer write(std::size_t address, std::span<const std::uint16_t> values) noexcept;
@@ -40,25 +52,37 @@ class ShakerController {
     void drive_from_outside(std::optional<double> table_g) noexcept { outside_g_ = table_g; }
     /// From now on.
     void lie(const ShakerLies& lies) noexcept;
+    /// What is played where random vibration is asked for; none: sine.
+    [[nodiscard]] const ShakerProfile* played() const noexcept;
+    /// The mean square of what is played over the last tick, of a mean of 1.
+    void felt(double mean_square) noexcept { felt_ = mean_square; }
     /// Time goes on by dt; the table's amplitude follows its ramp.
     void advance(double dt_s) noexcept;
 
     [[nodiscard]] ShakerState state() const noexcept { return state_; }
     [[nodiscard]] std::uint16_t faults() const noexcept { return faults_; }
-    [[nodiscard]] double amplitude_g() const noexcept;   ///< of the table now, peak, in truth
-    [[nodiscard]] double frequency_hz() const noexcept;  ///< as its register says
+    /// Of the table now in truth: peak of a sine, rms of random vibration.
+    [[nodiscard]] double amplitude_g() const noexcept;
+    [[nodiscard]] double frequency_hz() const noexcept;                   ///< as its register says
     [[nodiscard]] double table_hz() const noexcept { return table_hz_; }  ///< in truth
     [[nodiscard]] double set_point_g() const noexcept;
     [[nodiscard]] double ramp_s() const noexcept;
     [[nodiscard]] bool at_rest() const noexcept { return amplitude_g() == 0; }
 
   private:
+    [[nodiscard]] const ShakerProfile* of_number(std::uint16_t number) const noexcept;
+    [[nodiscard]] double profile_level_db() const noexcept;
+    [[nodiscard]] bool may_be(const std::array<std::uint16_t, kHolding>& next) const noexcept;
+    [[nodiscard]] double commanded_g() const noexcept;
+    void watch_bands(double dt_s) noexcept;
+    [[nodiscard]] std::uint16_t control_state() const noexcept;
     void ramp_to(double target_g, double time_s) noexcept;
     void trip(std::uint16_t fault, double stop_s) noexcept;
     void stop(ShakerState state, double time_s) noexcept;
 
     double limit_g_;
     double limit_mm_;
+    std::vector<ShakerProfile> profiles_;
     std::array<std::uint16_t, kHolding> holding_{0,   15000, 0, 0,
                                                  200, 0,     0, 0};  // 15 Hz, 0 g, 2 s, stopped
     ShakerState state_ = ShakerState::idle;
@@ -72,6 +96,10 @@ class ShakerController {
     double held_g_ = 0;         ///< what a contactor that is stuck keeps up when the drive goes
     double since_feed_s_ = 0;
     double table_hz_ = 15;
+    double felt_ = 1;         ///< of the last tick
+    double mean_square_ = 0;  ///< of the table as the controller's accelerometer has it, g^2
+    double outside_bands_s_ = 0, at_level_s_ = 0;
+    std::uint16_t aborted_ = 0;  ///< why
 };
 
 }  // namespace vibrig::plant

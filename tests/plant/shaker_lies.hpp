@@ -20,6 +20,11 @@ struct ShakerLies {
     bool unit_mps2 = false;          ///< amplitudes are m/s^2 peak
     bool dead_table = false;         ///< the table does not move; the measured amplitude is 0
     bool frequency_ignored = false;  ///< a new frequency is taken and read back, not done
+    /// Of random vibration: this profile is loaded, whatever number is written and read back; the
+    /// checksum is of what is loaded.
+    std::optional<std::uint16_t> wrong_profile{};
+    double profile_level_wrong = 0;  ///< dB, the table does so much more than is told and measured
+    bool no_abort_bands = false;     ///< the controller has none, and says so
     /// Another master keeps this in the watchdog's timeout register, which obeys it; ms, 0: off.
     std::optional<std::uint16_t> timeout_register{};
     bool latched_fault = false;  ///< trips by itself when this begins

@@ -195,6 +195,36 @@ void read_coefficients(const Json& root, const std::string& file, Truth& truth) 
     }
 }
 
+/// shaker.profiles: [{"number", "psd": [[hz, g2_hz], ..]}, ..].
+void read_profiles(const Json& root, Reader& reader, Truth& truth) {
+    reader.known["shaker"].insert("profiles");
+    const auto shaker = root.find("shaker");
+    if (shaker == root.end() || !shaker->contains("profiles")) return;
+    const Json& list = (*shaker)["profiles"];
+    const std::string key = "shaker.profiles";
+    if (!list.is_array()) reader.fail(key, "found " + text_of(list) + ", expected a list");
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        const std::string at = key + "[" + std::to_string(i) + "]";
+        ShakerProfile profile;
+        if (!list[i].is_object() || list[i].size() != 2 || !list[i].contains("psd") ||
+            !list[i].contains("number"))
+            reader.fail(at, "found " + text_of(list[i]) + ", expected {number, psd}");
+        reader.value(at + ".number", list[i]["number"], profile.number, 1, 65535);
+        const Json& psd = list[i]["psd"];
+        if (!psd.is_array() || psd.size() < 2)
+            reader.fail(at + ".psd", "found " + text_of(psd) + ", expected [[hz, g2_hz], ..]");
+        for (std::size_t k = 0; k < psd.size(); ++k) {
+            const std::string point = at + ".psd[" + std::to_string(k) + "]";
+            std::array<double, 2> pair{};
+            reader.value(point, psd[k], pair, 1e-9, 1e6);
+            if (k > 0 && !(pair[0] > profile.psd.back().first))
+                reader.fail(point, "found " + text_of(psd[k]) + ", expected growing frequencies");
+            profile.psd.emplace_back(pair[0], pair[1]);
+        }
+        truth.profiles.push_back(std::move(profile));
+    }
+}
+
 void check(const Truth& truth, const std::string& file) {
     for (std::size_t gyro = 0; gyro < 3; ++gyro) {
         std::array<bool, 3> used{};
@@ -263,6 +293,7 @@ Truth parse_truth(std::string_view text, const std::string& file) {
     read_coefficients(root, file, truth);
     Reader reader{root, file};
     for_each_field(truth, reader);
+    read_profiles(root, reader, truth);
     ShakerLies& lies = truth.shaker_lies;
     lies.timeout_ignored = lies.timeout_ignored || !truth.watchdog_works;
     lies.unit_rms = lies.unit_rms || truth.amplitude_unit == AmplitudeUnit::g_rms;
@@ -309,6 +340,8 @@ std::string to_json(const Truth& truth) {
         }
     }
     for_each_field(truth, Writer{root});
+    for (const ShakerProfile& profile : truth.profiles)
+        root["shaker"]["profiles"].push_back({{"number", profile.number}, {"psd", profile.psd}});
     root["seed"] = truth.seed;
     return root.dump(2) + "\n";
 }

@@ -6,8 +6,10 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tests/plant/shaker_lies.hpp"
+#include "tests/plant/shaker_profile.hpp"
 #include "tests/plant/vec3.hpp"
 
 namespace vibrig::plant {
@@ -147,6 +149,7 @@ struct Truth {
     Vec3 elastic_damping{0.05, 0.05, 0.05};
 
     // shaker
+    std::vector<ShakerProfile> profiles{};  ///< random vibrations that its controller knows
     double second_harmonic = 0;  ///< of the table's acceleration, relative to the fundamental
     double third_harmonic = 0;
     double fourth_harmonic = 0;

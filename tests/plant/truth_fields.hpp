@@ -100,6 +100,9 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "unit_mps2", t.shaker_lies.unit_mps2, 0, 0);
     field("shaker", "dead_table", t.shaker_lies.dead_table, 0, 0);
     field("shaker", "frequency_ignored", t.shaker_lies.frequency_ignored, 0, 0);
+    field("shaker", "wrong_profile", t.shaker_lies.wrong_profile, 0, 65535);
+    field("shaker", "profile_level_wrong", t.shaker_lies.profile_level_wrong, -60.0, 20.0);
+    field("shaker", "no_abort_bands", t.shaker_lies.no_abort_bands, 0, 0);
     field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
     field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
 }

@@ -77,8 +77,8 @@ TEST(ShakerController, RefusesAFrequencyWhileMoving) {
 
 TEST(ShakerController, RefusesAddressesAndValuesItDoesNotHave) {
     ShakerController shaker(20, 25);
-    EXPECT_EQ(write(shaker, 8, {0}), Answer::illegal_address);
-    EXPECT_EQ(write(shaker, 7, {0, 0}), Answer::illegal_address);
+    EXPECT_EQ(write(shaker, 11, {0}), Answer::illegal_address);
+    EXPECT_EQ(write(shaker, 10, {0, 0}), Answer::illegal_address);
     EXPECT_EQ(write(shaker, 0, {}), Answer::illegal_address);
     EXPECT_EQ(write(shaker, 2, {0xffff, 0xffff}), Answer::illegal_value);
     EXPECT_EQ(write(shaker, 0, {0, 0}), Answer::illegal_value);
