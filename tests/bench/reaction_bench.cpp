@@ -10,7 +10,7 @@
 #include "daemon/rt/real_clock.hpp"
 #include "test_bench.hpp"
 #include "tests/bench/rig_bus.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 // How long it takes from what comes in to what goes out: a sample that trips to the stop confirmed
 // by a Modbus server, a frame to the filter's estimate. tests/bench/report holds them against the

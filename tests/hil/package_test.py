@@ -431,6 +431,8 @@ def package(checks, build, folder, version):
     desk = os.path.join(folder, f"python3-vibrig_{version}_all.deb")
     checks.check(os.path.exists(desk) and "./usr/lib/python3/dist-packages/vibrig/__init__.py" in output("dpkg-deb", "-c", desk)[1],
                  "and python3-vibrig beside it", str(os.listdir(folder)))
+    status, said = output("lintian", "--allow-root", "--fail-on", "error,warning", desk)
+    checks.check(status == 0, "lintian finds neither errors nor warnings in it", said[-2000:])
     return path
 
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 namespace vibrig::campaign {
 using drivers::kMillisecond;

@@ -12,7 +12,7 @@
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/rig_frame.hpp"
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 namespace vibrig::campaign {
 namespace {

@@ -9,7 +9,7 @@
 #include "daemon/campaign/zero_calibration.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 namespace vibrig::campaign {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/daemon/campaign/fake_accelerometers.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 namespace vibrig::campaign {
 namespace {

@@ -12,7 +12,7 @@
 #include "daemon/rt/acquisition.hpp"
 #include "daemon/rt/estimator_stage.hpp"
 #include "daemon/rt/real_clock.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 #include "tests/unit/support/allocation_count.hpp"
 
 namespace vibrig::rt {

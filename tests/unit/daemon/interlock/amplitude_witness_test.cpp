@@ -14,7 +14,7 @@
 #include "daemon/rt/real_clock.hpp"
 #include "proto/register_map.hpp"
 #include "tests/plant/rig.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 namespace vibrig::rt {
 namespace {

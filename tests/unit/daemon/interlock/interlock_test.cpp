@@ -11,7 +11,7 @@
 
 #include "daemon/rt/real_clock.hpp"
 #include "test_bench.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 
 namespace vibrig::rt {
 namespace {

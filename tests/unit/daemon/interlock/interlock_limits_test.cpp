@@ -14,7 +14,7 @@
 
 #include "daemon/interlock/interlock.hpp"
 #include "daemon/rt/real_clock.hpp"
-#include "tests/unit/daemon/rt/fake_shaker.hpp"
+#include "tests/unit/daemon/interlock/fake_shaker.hpp"
 #include "tests/unit/drivers/rig_frames.hpp"
 
 namespace vibrig::rt {
