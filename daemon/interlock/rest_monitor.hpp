@@ -70,7 +70,8 @@ class RestWindow {
         double value = 0;
     };
     [[nodiscard]] const Entry& at(std::size_t i) const noexcept {
-        return ring_[(first_ + i) % ring_.size()];
+        const std::size_t there = first_ + i;  // a division for each would be half of the sum
+        return ring_[there < ring_.size() ? there : there - ring_.size()];
     }
     drivers::Time window_, sample_period_;
     std::vector<Entry> ring_;

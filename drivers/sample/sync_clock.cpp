@@ -18,6 +18,13 @@ double median(std::span<double> values) noexcept {
     return *middle;  // the lower of two: delays are never negative
 }
 
+/// Beyond it a residual is an outlier's. Whatever the median, none within the tolerance is one.
+double limit_of(std::span<const double> residual, std::span<double> scratch) noexcept {
+    if (std::ranges::max(residual) <= kTolerance) return kTolerance;
+    std::ranges::copy(residual, scratch.begin());
+    return kThreeSigmaPerMad * median(scratch) + kTolerance;
+}
+
 }  // namespace
 
 SyncClock::SyncClock(Time nominal_period) noexcept
@@ -78,16 +85,24 @@ void SyncClock::fit() noexcept {
     const auto first = [this](auto& values) { return std::span(values).first(size_); };
 
     // Start from the nominal rate through the median, which up to half of the stamps being late
-    // does not move.
+    // does not move. Through any of them, where all are within the tolerance of each other.
+    const auto [least, most] = std::ranges::minmax(first(y));
     std::ranges::copy(first(y), scratch.begin());
-    offset_ = median(first(scratch));
+    offset_ = most - least <= kTolerance ? y[0] : median(first(scratch));
     slope_ = 0;
+    std::uint64_t used_before = 0;
+    static_assert(kWindow <= 64, "a bit for each point");
     for (int pass = 0; pass < 3; ++pass) {
         for (std::size_t i = 0; i < size_; ++i) {
             residual[i] = std::abs(y[i] - offset_ - slope_ * x[i]);
         }
-        std::ranges::copy(first(residual), scratch.begin());
-        const double limit = kThreeSigmaPerMad * median(first(scratch)) + kTolerance;
+        const double limit = limit_of(first(residual), first(scratch));
+        std::uint64_t used = 0;
+        for (std::size_t i = 0; i < size_; ++i) {
+            if (residual[i] <= limit) used |= std::uint64_t{1} << i;
+        }
+        if (used == used_before) return;  // the same points have the same line
+        used_before = used;
         double n = 0, sx = 0, sy = 0;
         for (std::size_t i = 0; i < size_; ++i) {
             if (residual[i] > limit) continue;

@@ -4,12 +4,17 @@
 //   growth_bench make-index FOLDER CAMPAIGNS     an index of so many campaigns
 //   growth_bench open-index FOLDER               opened, and one campaign looked up
 //   growth_bench make-campaign FOLDER POSITIONS DWELL_S    a recorded campaign
-//   growth_bench verdict DWELLS                  what follows a dwell
-//   growth_bench chart FILE.json FILE.svg
+//   growth_bench make-recording FOLDER MB        a recording of at least that size, as the daemon
+//   writes it growth_bench verdict DWELLS                  what follows a dwell growth_bench
+//   adaptive DWELLS                 the choice of the next one growth_bench history HOURS the
+//   page's curves; says the processor time of a look, s growth_bench status DWELLS a status as
+//   JSON; likewise growth_bench chart FILE.json FILE.svg
 #include <cstdio>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -18,10 +23,16 @@
 
 #include "daemon/journal/database.hpp"
 #include "daemon/journal/journal.hpp"
+#include "daemon/plan/adaptive.hpp"
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/index.hpp"
 #include "daemon/record/replay.hpp"
+#include "daemon/serve/history.hpp"
+#include "daemon/serve/status_json.hpp"
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
+#include "estimator/identification/crlb.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
@@ -129,7 +140,40 @@ void make_campaign(const std::string& folder, std::size_t positions, double dwel
     writer.end({"finished", "", "", "", 0});
 }
 
-void verdict(std::size_t dwells) {
+/// A platform at rest, with noise in all digits.
+void make_recording(const std::string& folder, std::uintmax_t megabytes) {
+    constexpr drivers::Time kPeriod = drivers::kMillisecond;
+    constexpr std::size_t kAtOnce = 100'000, kDwell = 100'000;
+    record::Head head;
+    head.name = head.campaign = "growth";
+    head.clock = "real";
+    head.simulated = true;
+    const std::string path = folder + "/campaign.h5";
+    record::CampaignWriter writer(path, head);
+    std::minstd_rand random(1);
+    drivers::Sample sample;
+    for (std::size_t n = 0;; ++n) {
+        sample.time = static_cast<drivers::Time>(n) * kPeriod;
+        for (double& angle : sample.angle) angle = 1e-9 * static_cast<double>(random());
+        for (double& force : sample.force) force = 1e-9 * static_cast<double>(random());
+        writer.sample(sample);
+        if (n % kDwell == 0) {
+            record::Order order;
+            order.announced = order.from = sample.time;
+            order.to = order.from + static_cast<drivers::Time>(kDwell) * kPeriod;
+            order.run = 1 + static_cast<int>(n / kDwell / 14);
+            order.position = 1 + static_cast<int>(n / kDwell % 14);
+            order.table_g = 7;
+            writer.order(order);
+        }
+        if (n % kAtOnce != kAtOnce - 1) continue;
+        writer.commit();
+        if (fs::file_size(path) >= megabytes * 1'000'000) break;
+    }
+    writer.end({"finished", "", "", "", 0});
+}
+
+estimator::Result result_of(std::size_t dwells) {
     namespace rows = estimator::testing;
     const auto order = rows::balanced(6, 14.0 / 3);
     std::vector<rows::PlannedRow> plan;
@@ -137,7 +181,82 @@ void verdict(std::size_t dwells) {
     auto all = rows::theory_rows({}, plan);
     std::mt19937_64 noise(1);
     rows::add_noise(all, noise);
-    static_cast<void>(estimator::uncertainty::assess({}, rows::result_of(std::move(all))));
+    return rows::result_of(std::move(all));
+}
+
+void verdict(std::size_t dwells) {
+    static_cast<void>(estimator::uncertainty::assess({}, result_of(dwells)));
+}
+
+/// Towards targets so far away that as many dwells are foreseen as ever are: what costs most.
+void adaptive(std::size_t dwells) {
+    namespace planning = estimator::plan;
+    constexpr double kDwell_s = 100, kPeriod_s = 0.025;
+    const estimator::Settings settings;
+    std::vector<planning::Experiment> done;
+    for (const auto& direction : planning::cube_directions()) {
+        for (const double level_g : {0.0, 14.0 / 3}) {
+            const auto position = planning::position_for(settings, direction, {});
+            if (!position) continue;
+            done.push_back({estimator::rate_rows(settings,
+                                                 {estimator::gimbal_deg(settings, *position),
+                                                  planning::kappa_of(level_g), kDwell_s},
+                                                 {}, kPeriod_s),
+                            1});
+        }
+    }
+    const auto prior = estimator::prior_sigma(settings);
+    std::vector<double> prior_sigma;
+    for (std::size_t i = 0; i < estimator::kParameters; ++i)
+        prior_sigma.push_back(prior[estimator::internal_of(i)]);
+    const double times = static_cast<double>(dwells) / static_cast<double>(done.size());
+    const auto covariance =
+        planning::covariance_after(prior_sigma, done, std::vector<double>(done.size(), times));
+    plan::AdaptiveSettings wanted;
+    wanted.table_g = {0, 2, 4, 7};
+    wanted.target = {1e-9, 1e-9, 1e-9};
+    wanted.timing.dwell_s = kDwell_s;
+    wanted.period_s = kPeriod_s;
+    const plan::AdaptivePlan chooser(settings, wanted);
+    const auto next =
+        chooser.next(plan::widened(covariance, settings, result_of(dwells)), {}, 0, dwells);
+    if (next.verdict != plan::AdaptivePlan::Verdict::go_on) throw std::runtime_error(next.words);
+}
+
+/// Prints the processor time, s, of one of many calls.
+void say_cost(const std::function<std::size_t()>& call) {
+    constexpr int kCalls = 20;
+    const auto cpu_s = [] {
+        timespec t{};
+        ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+        return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    };
+    const double begin = cpu_s();
+    std::size_t bytes = 0;
+    for (int i = 0; i < kCalls; ++i) bytes += call();
+    std::printf("%.9f\n", (cpu_s() - begin) / kCalls);
+    if (bytes == 0) throw std::runtime_error("found nothing to measure");
+}
+
+/// Twice a second a status, then the curves that the page asks for when it is opened.
+void history(double hours) {
+    serve::History history;
+    StatusData status;
+    status.state = CampaignState::recording;
+    for (std::int64_t half = 0; half < static_cast<std::int64_t>(hours * 7200); ++half) {
+        status.time = half * drivers::kSecond / 2;
+        status.command_table_g = static_cast<double>(half % 7);
+        status.progress = 0.5;
+        history.add(status);
+    }
+    say_cost([&] { return history.json("measured_g,command_g,progress", -1).size(); });
+}
+
+void status(std::size_t dwells) {
+    StatusData status;
+    status.state = CampaignState::recording;
+    status.dwells = result_of(dwells).dwells;
+    say_cost([&] { return serve::status_json(status).size(); });
 }
 
 /// {"title", "x", "y", "curves": [{"name", "x": [...], "y": [...]}]}, both axes logarithmic.
@@ -177,8 +296,16 @@ int main(int argc, char** argv) {
             open_index(words[1]);
         } else if (is("make-campaign", 3)) {
             make_campaign(words[1], std::stoul(words[2]), std::stod(words[3]));
+        } else if (is("make-recording", 2)) {
+            make_recording(words[1], std::stoull(words[2]));
         } else if (is("verdict", 1)) {
             verdict(std::stoul(words[1]));
+        } else if (is("adaptive", 1)) {
+            adaptive(std::stoul(words[1]));
+        } else if (is("history", 1)) {
+            history(std::stod(words[1]));
+        } else if (is("status", 1)) {
+            status(std::stoul(words[1]));
         } else if (is("chart", 2)) {
             chart(words[1], words[2]);
         } else {

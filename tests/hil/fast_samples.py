@@ -117,7 +117,7 @@ def memory_kb(pid):
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
 
 
-def configured(programs, bus, rate_hz, folder):
+def configured(programs, bus, rate_hz, folder, **tables):
     """A rig without a shaker on this bus, and the platform's end of it."""
     rig = r.Rig(programs, bus, "real", folder)
     rig.modbus_port = 1   # nobody is there
@@ -128,7 +128,7 @@ def configured(programs, bus, rate_hz, folder):
                        "join_deadline_ms": 5000.0, "stale_deadline_ms": 10_000.0},
                   **{"can.signals": {"sync_count": "Motion.Count",
                                      **{key: "Motion." + name for key, name in CHANNELS.items()},
-                                     **{key + "_valid": "" for key in CHANNELS if key != "table_accel"}}})
+                                     **{key + "_valid": "" for key in CHANNELS if key != "table_accel"}}, **tables})
     return rig, Bus(rig)
 
 
@@ -174,18 +174,25 @@ def stream(checks, programs, bus, rate_hz, seconds):
 
 
 def cost(programs, rate_hz, seconds):
-    """Processor time of the daemon for a second of samples, s, and its memory, MB; for tests/bench/growth."""
+    return cost_beside(programs, rate_hz, seconds, lambda rig: None)[0]
+
+
+def cost_beside(programs, rate_hz, seconds, begin_other):
+    """Processor time of the daemon for a second of samples, s, and its memory, MB; for tests/bench/growth. What the program
+    said that was begun beside it."""
     with tempfile.TemporaryDirectory() as folder:
-        rig, platform = configured(programs, "seqpacket", rate_hz, folder)
+        rig, platform = configured(programs, "seqpacket", rate_hz, folder, server={"page": "127.0.0.1:0"})
         rig.start_daemon()
         try:
             if rig.wait_for(lambda s: s["can"]["link"] == "running", 30) is None:
                 raise RuntimeError("vibrigd does not answer: " + rig.daemon.text())
+            other = begin_other(rig)
             platform.stream(rate_hz, 1)
             pid = rig.daemon.process.pid
             before, begin = processor_s(pid), time.monotonic()
             platform.stream(rate_hz, seconds)
-            return {"cpu_s": (processor_s(pid) - before) / (time.monotonic() - begin), "memory_mb": memory_kb(pid) / 1024}
+            used = {"cpu_s": (processor_s(pid) - before) / (time.monotonic() - begin), "memory_mb": memory_kb(pid) / 1024}
+            return used, other.communicate(timeout=60)[0] if other else ""
         finally:
             rig.stop()
 

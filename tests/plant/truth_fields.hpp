@@ -28,7 +28,7 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
     field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);
     field("platform", "increment_sign", t.increment_sign, -1, 1);
-    field("platform", "sample_rate_hz", t.sample_rate_hz, 1.0, 1000.0);
+    field("platform", "sample_rate_hz", t.sample_rate_hz, 1.0, 10'000.0);
     field("platform", "non_orthogonality_arcsec", t.non_orthogonality_arcsec, -36e3, 36e3);
     field("platform", "rocking_arcsec_g", t.platform_rocking_arcsec_g, -1e3, 1e3);
     field("platform", "rocking_quadrature_arcsec_g", t.platform_rocking_quadrature_arcsec_g, -1e3,

@@ -110,7 +110,9 @@ def test_older_recordings_have_no_conditions(recording):
     assert vibrig.open(recording.folder).conditions.rows == 0
 
 
-def test_rows_that_never_reached_the_disk_are_left_out(recording):
+@pytest.mark.parametrize("piece", [1, 7, 2**20])   # rows looked at in one go
+def test_rows_that_never_reached_the_disk_are_left_out(recording, monkeypatch, piece):
+    monkeypatch.setattr("vibrig._campaign.PIECE", piece)
     path = recording.part(1, 0, [1], 1, state="running")
     with h5py.File(path, "r+") as file:
         file["samples/time_ns"][390:] = np.iinfo(np.int64).min

@@ -22,6 +22,7 @@ except ImportError:  # before Python 3.11
 FORMAT_VERSION = 2
 UNWRITTEN = np.iinfo(np.int64).min  # a row that never reached the disk
 SECOND = 10**9
+PIECE = 2**20  # rows looked at in one go
 TABLES = ("samples", "orders", "dwells", "estimates", "conditions", "events", "gaps")
 TIMES = {"time_ns", "announced_ns", "from_ns", "to_ns"}
 LABELS: dict[str, Sequence[str]] = {
@@ -308,9 +309,14 @@ def _rows_of(group: h5py.Group) -> int:
     """Of a group that may be growing: what every column has."""
     rows = min((column.shape[0] for column in group.values()), default=0)
     for column in group.values():
-        if column.dtype == np.int64 and rows:
-            unwritten = np.flatnonzero((column[:rows] == UNWRITTEN).reshape(rows, -1).any(axis=1))
-            rows = int(unwritten[0]) if len(unwritten) else rows
+        if column.dtype != np.int64:
+            continue
+        for begin in range(0, rows, PIECE):   # recordings may be larger than memory
+            piece = column[begin:min(begin + PIECE, rows)] == UNWRITTEN
+            unwritten = np.flatnonzero(piece.reshape(len(piece), -1).any(axis=1))
+            if len(unwritten):
+                rows = begin + int(unwritten[0])
+                break
     return int(rows)
 
 
