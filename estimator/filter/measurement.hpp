@@ -15,6 +15,14 @@ struct Measurement {
     bool force_good = true;
 };
 
+/// A random vibration as its profile has it at the platform, along the vertical.
+struct RandomVibration {
+    double mean_square_g2 = 0;  ///< 0: there is none; a sine, or rest
+    double bandwidth_hz = 0;    ///< square of the PSD's integral over the integral of its square
+    double gain_error = 0;      ///< of the mean square that was played, relative, 1 sigma
+    double highest_hz = 0;      ///< up to which there is any power
+};
+
 struct DwellInfo {
     int run = 1;          ///< from 1; the two-step route joins two runs
     int position = 1;     ///< from 1
@@ -24,6 +32,7 @@ struct DwellInfo {
     bool power_lost = false;  ///< the gyros were without power since the dwell before
     double frequency_hz = 0;  ///< of the vibration, commanded; 0: Settings::frequency_hz
     bool held_out = false;    ///< to try a result on: the coefficients take nothing of it
+    RandomVibration random{};
 };
 
 enum class StepOutcome : std::uint8_t {

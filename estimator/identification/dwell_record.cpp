@@ -21,7 +21,9 @@ constexpr double kLeastReadings = 0.5;  ///< of those that a steady rate would g
 constexpr double kCrowdedTolerance = 0.25;
 constexpr double kCrowdedFrom = 0.1, kCrowdedTo = 0.6;
 constexpr double kOffFrequency_hz = 0.05;  ///< where a frequency was commanded
-constexpr double kShaken = 1.001;          ///< kappa; below, its error does no harm
+// Of random vibration: what a mean or a level strays by where all is well.
+constexpr double kForceSigmas = 5, kLevelSigmas = 4;
+constexpr double kShaken = 1.001;  ///< kappa; below, its error does no harm
 
 constexpr const char* kSaturated[3] = {"accelerometer x is saturated: dwell rejected",
                                        "accelerometer y is saturated: dwell rejected",
@@ -71,6 +73,30 @@ void DwellRecord::note_interval(double periods) noexcept {
     if (periods >= kCrowdedFrom && periods < kCrowdedTo) ++crowded;
 }
 
+/// In place of what a sine's level says.
+RandomLevel::Level take_random_level(const DwellRecord& r, const Settings& settings,
+                                     DwellSummary& s) noexcept {
+    const auto level =
+        r.random_level.level(r.info.random, settings.accelerometer_g, r.period_s, r.span_s);
+    s.kappa = 1 + level.mean_square_g2;
+    s.relative_error = level.relative_error;
+    s.mean_force_g = level.mean_force_g;
+    s.amplitude_g = std::sqrt(2 * level.mean_square_g2);
+    s.frequency_hz = 0;
+    return level;
+}
+
+/// What is wrong with the level of a random vibration; empty: nothing.
+const char* random_misfit(const RandomLevel::Level& level) noexcept {
+    if (!(std::abs(level.mean_force_g - 1) <=
+          std::max(kForceTolerance, kForceSigmas * level.mean_force_sigma_g)))
+        return "mean vertical specific force is not 1 g: dwell rejected";
+    if (!(level.sigmas_apart <= kLevelSigmas))
+        return "accelerometers and profile disagree on the level of the random vibration: dwell "
+               "rejected";
+    return "";
+}
+
 DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     DwellVerdict verdict;
     DwellSummary& s = verdict.summary;
@@ -92,6 +118,8 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     }
     s.amplitude_g = std::sqrt(2.0 * std::max(0.0, s.kappa - 1.0));
     s.frequency_hz = r.frequency_samples > 0 ? r.frequency_sum / r.frequency_samples : 0.0;
+    const bool random = r.info.random.mean_square_g2 > 0;
+    const auto random_level = random ? take_random_level(r, settings, s) : RandomLevel::Level{};
     s.nis_per_dof = r.nis_count > 0 ? r.nis_sum / (3.0 * r.nis_count) : 0.0;
     s.innovation_correlation =
         r.innovation_square > 0 ? r.innovation_product / r.innovation_square : 0.0;
@@ -114,12 +142,14 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("too many readings are missing to know the vibration level: dwell rejected", true);
     } else if (r.saturated_axis >= 0) {
         flag(kSaturated[r.saturated_axis], true);
-    } else if (!(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
+    } else if (const char* misfit = random ? random_misfit(random_level) : ""; *misfit != '\0') {
+        flag(misfit, true);
+    } else if (!random && !(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
         flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
-    } else if (r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
+    } else if (!random && r.largest_kappa > (1.0 + kLevelTolerance) * r.least_kappa) {
         // The level lags behind by its window: second-order terms would take up the difference.
         flag("the vibration level changed by more than 10 % of kappa: dwell rejected", true);
-    } else if (s.kappa > 1.0 && r.period_s > 0 &&
+    } else if (!random && s.kappa > 1.0 && r.period_s > 0 &&
                VibrationLevel::excluded(nominal_hz, r.period_s, window_s)) {
         flag(
             "vibration.frequency_hz is too close to a multiple of half the sample rate: dwell "
@@ -130,7 +160,7 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("the vibration is not at its commanded frequency within 0.05 Hz: dwell rejected",
              true);
     } else if (const char* alias =
-                   s.kappa > 1.0 && r.period_s > 0
+                   !random && s.kappa > 1.0 && r.period_s > 0
                        ? VibrationLevel::aliasing(frequency_hz, r.period_s, window_s)
                        : "";
                *alias != '\0') {
@@ -139,7 +169,7 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("a resolver stood still", false);
     } else if (s.rejected > kRejectedTolerance * s.samples) {
         flag("more than 1 % of the samples rejected", false);
-    } else if (r.largest_kappa > (1.0 + kLevelDrift) * r.least_kappa &&
+    } else if (!random && r.largest_kappa > (1.0 + kLevelDrift) * r.least_kappa &&
                r.forces > (1.0 - kMostFilled) * r.slots) {
         flag("the vibration level drifted by more than 2.5 % of kappa: followed", false);
         s.followed = true;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "estimator/identification/identification.hpp"
+#include "estimator/level/random_level.hpp"
 
 namespace vibrig::estimator {
 
@@ -23,6 +24,7 @@ struct DwellRecord {
     double shape_weight = 0;  ///< samples times kappa - 1
     LevelTensor shape_sum{};
     double period_s = 0, span_s = 0;
+    RandomLevel random_level;                   ///< fed under random vibration
     double least_kappa = 0, largest_kappa = 0;  ///< of the streaming level; 0: none yet
     std::uint32_t stuck = 0;                    ///< samples with a resolver that stands still
     int saturated_axis = -1;                    ///< of the accelerometers; -1: none

@@ -35,11 +35,13 @@ struct DwellRow {
     Regression ramp_regressors = Regression::Zero();
     double nis_per_dof = 0, innovation_correlation = 0;
     std::uint32_t used = 0;
-    double sync_arcsec = 0;   ///< motion of the angles in step with the vibration
-    bool flagged = false;     ///< and not merely followed
-    double commanded_hz = 0;  ///< 0: nobody said
-    bool held_out = false;    ///< as DwellInfo
-    bool apart = false;       ///< held out, or of another frequency: the coefficients lack it
+    double sync_arcsec = 0;     ///< motion of the angles in step with the vibration
+    bool flagged = false;       ///< and not merely followed
+    double commanded_hz = 0;    ///< 0: nobody said
+    bool held_out = false;      ///< as DwellInfo
+    bool random = false;        ///< random vibration: `regressors` are with its profile's level
+    double relative_error = 0;  ///< of the vibration's mean square, 1 sigma; known of random alone
+    bool apart = false;         ///< held out, or of another frequency: the coefficients lack it
 };
 
 /// Those that the coefficients at the reference frequency rest on.

@@ -128,7 +128,9 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     walked_.reset();
     power_lost_ = power_lost_ || dwell.power_lost;
     const double hz = dwell.frequency_hz > 0 ? dwell.frequency_hz : settings.frequency_hz;
-    apart_ = settings.method == Method::joint && (dwell.held_out || !at_reference(settings, hz));
+    random_ = dwell.random.mean_square_g2 > 0;
+    apart_ = settings.method == Method::joint &&
+             (dwell.held_out || random_ || !at_reference(settings, hz));
     level_.nominal(hz);
     sync_.nominal(hz);
     active_ = filter_of(dwell.run);
@@ -242,6 +244,7 @@ StepResult Identification::Impl::replay() noexcept {
             const Eigen::Vector3d force = level.transpose() * reading.force;
             level_.add_first(force[1]);
             tensor_.add(force);
+            if (random_) record_.random_level.add(force[1]);
             ++good;
         } else {
             level_.add_first_missing();
@@ -298,6 +301,7 @@ void Identification::Impl::to_level(const Reading& reading) noexcept {
         const Eigen::Vector3d force = active_->filter.level().transpose() * reading.force;
         level_.add(force[1]);
         tensor_.add(force);
+        if (random_) record_.random_level.add(force[1]);
     } else {
         level_.add_missing();
         tensor_.add_missing();
@@ -308,6 +312,11 @@ void Identification::Impl::to_level(const Reading& reading) noexcept {
 
 /// The shape follows the level; the two-step route has none.
 void Identification::Impl::refresh_vibration() noexcept {
+    if (random_) {
+        // Of the level over seconds the samples know less than the profile does.
+        vibration_ = {1 + record_.info.random.mean_square_g2, kVertical};
+        return;
+    }
     if (vibration_.kappa == level_.kappa()) return;
     vibration_.kappa = level_.kappa();
     if (settings.second_moment == SecondMoment::vertical || settings.method != Method::joint ||
@@ -361,7 +370,7 @@ void Identification::Impl::end_stretch() noexcept {
         record_.kappa_sum += weight * whole.kappa;
         record_.mean_force_sum += weight * whole.mean_force_g;
         note_shape(weight * (whole.kappa - 1.0));
-        if (level_.frequency_hz() > 0) {
+        if (!random_ && level_.frequency_hz() > 0) {
             record_.frequency_samples += weight;
             record_.frequency_sum += weight * level_.frequency_hz();
         }
@@ -388,6 +397,8 @@ void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
     row.commanded_hz = record_.info.frequency_hz;
     row.held_out = record_.info.held_out;
     row.apart = apart_;
+    row.random = random_;
+    row.relative_error = summary.relative_error;
     if (row.frequency_hz > 0)
         row.sync_arcsec =
             sync_.amplitude_arcsec(row.frequency_hz, noise.angle_arcsec * noise.angle_arcsec);

@@ -112,6 +112,7 @@ struct Identification::Impl {
     bool power_lost_ = false;  ///< since the row kept last
     bool in_dwell_ = false;
     bool apart_ = false;   ///< this dwell: see DwellRow
+    bool random_ = false;  ///< likewise
     bool primed_ = false;  ///< the level of this stretch is known
     /// Of the biases' walk since the dwell kept before, (deg/h)^2; none: not in the filter yet.
     std::optional<double> walked_;

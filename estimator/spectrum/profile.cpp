@@ -100,6 +100,13 @@ std::vector<Band> bands_of(const Profile& profile, int per_decade) {
     return bands;
 }
 
+double bandwidth_hz(std::span<const Band> bands) noexcept {
+    double square = 0;
+    for (const Band& band : bands)
+        if (band.width_hz > 0) square += band.share * band.share / band.width_hz;
+    return square > 0 ? 1 / square : 0;
+}
+
 double pads_power(double hz, const Resonance& pads) noexcept {
     const double r = hz / pads.hz, damped = 2 * pads.damping * r;
     return (1 + damped * damped) / ((1 - r * r) * (1 - r * r) + damped * damped);

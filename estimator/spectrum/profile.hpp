@@ -31,6 +31,9 @@ void check(const Profile& profile, const std::string& path = {});
 /// its exact power, and the sines.
 [[nodiscard]] std::vector<Band> bands_of(const Profile& profile, int per_decade = 800);
 
+/// B_e: the power of a time T strays by 1 / sqrt(B_e T) of it. Of sines alone 0: it does not.
+[[nodiscard]] double bandwidth_hz(std::span<const Band> bands) noexcept;
+
 /// The isolators' |platform over table|^2 at a frequency.
 [[nodiscard]] double pads_power(double hz, const Resonance& pads) noexcept;
 /// Natural frequency of pads with this damping whose transmission at `hz` is `ratio` (below 1).

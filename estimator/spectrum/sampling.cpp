@@ -25,8 +25,4 @@ double nearest_free(double hz, double sample_hz, double window_s, int harmonics,
     return hz;
 }
 
-double realised_error(double n, double sample_hz, double highest_hz) noexcept {
-    return sample_hz >= 2 * highest_hz ? 0 : std::sqrt(2 / n);
-}
-
 }  // namespace vibrig::estimator::spectrum

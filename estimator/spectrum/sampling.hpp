@@ -15,8 +15,4 @@ inline constexpr int kHarmonicsPlanned = 8;
 [[nodiscard]] double nearest_free(double hz, double sample_hz, double window_s,
                                   int harmonics = kHarmonics, double step_hz = 0.1) noexcept;
 
-/// Relative standard error of the mean square of a random vibration up to `highest_hz` over `n`
-/// samples: they are independent when they are slow, and know everything when they are fast.
-[[nodiscard]] double realised_error(double n, double sample_hz, double highest_hz) noexcept;
-
 }  // namespace vibrig::estimator::spectrum

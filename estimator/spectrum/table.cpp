@@ -74,6 +74,8 @@ SpectralTable::SpectralTable(const Settings& settings, std::vector<SpectralDwell
         const Attitude at = attitude(settings, dwell.row.angles, level_moment(dwell.row.vibration));
         for (std::size_t j = 0; j < kGyros; ++j) {
             base_[j].row(i) = dwell.row.regressors.row(static_cast<Index>(j));
+            // What happened, not what was to happen.
+            if (dwell.row.random) base_[j].row(i) = at.base[j];
             if (dwell.kind) vibration_[j].row(i) = at.vibration[j];
         }
     }

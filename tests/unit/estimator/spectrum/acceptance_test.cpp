@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/level/random_level.hpp"
 #include "estimator/spectrum/analysis.hpp"
 #include "estimator/spectrum/sampling.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"

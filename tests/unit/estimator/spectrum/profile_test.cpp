@@ -1,4 +1,5 @@
 #include "estimator/spectrum/profile.hpp"
+#include "estimator/level/random_level.hpp"
 
 #include <gtest/gtest.h>
 
