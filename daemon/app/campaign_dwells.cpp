@@ -58,8 +58,7 @@ void CampaignDwells::begin() {
 /// Of an adaptive campaign only those that are its beginning.
 std::size_t CampaignDwells::planned_dwells() const {
     const auto& campaign = configuration_.campaign;
-    return std::max(campaign.stops.size(),
-                    campaign.table_g.size() * campaign.positions_deg.size());
+    return std::max(campaign.stops.size(), campaign.table_g.size() * campaign.positions_deg.size());
 }
 
 bool CampaignDwells::order(const rt::DwellOrder& order) {

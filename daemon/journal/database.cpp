@@ -76,12 +76,12 @@ void Database::fail(const char* doing) const {
     // Whatever was to be done with it: who has to look at the file is helped by its state.
     const int primary = code & 0xff;
     if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB)
-        throw DatabaseError(fmt::format("{}: is damaged: {} (SQLite: {})", path_,
-                                        primary == SQLITE_NOTADB
-                                            ? "it does not begin as an SQLite file does"
-                                            : "a part of it is missing or was overwritten",
-                                        sqlite3_errmsg(database_.get())),
-                            code);
+        throw DatabaseError(
+            fmt::format("{}: is damaged: {} (SQLite: {})", path_,
+                        primary == SQLITE_NOTADB ? "it does not begin as an SQLite file does"
+                                                 : "a part of it is missing or was overwritten",
+                        sqlite3_errmsg(database_.get())),
+            code);
     throw DatabaseError(path_ + ": cannot " + doing + ": " +
                             (database_ ? sqlite3_errmsg(database_.get()) : "out of memory"),
                         code);
@@ -143,8 +143,7 @@ std::vector<Row> Database::ask(const char* sql, const std::vector<Value>& values
 
 std::vector<std::string> Database::damage(int at_most) {
     std::vector<std::string> found;
-    for (const Row& row :
-         ask(fmt::format("PRAGMA integrity_check({})", at_most).c_str())) {
+    for (const Row& row : ask(fmt::format("PRAGMA integrity_check({})", at_most).c_str())) {
         std::string text = row.texts.at(0);
         if (text == "ok") continue;
         // "*** in database main ***" stands in a line of its own before the first.
