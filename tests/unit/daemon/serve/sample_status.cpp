@@ -203,6 +203,7 @@ StatusData full_status() {
                         estimator::kVertical,
                         5.98,
                         15.0,
+                        0.03,
                         1.001,
                         0.99,
                         0.05,
