@@ -179,79 +179,79 @@ TEST(Readiness, NamesWhatIsNotWell) {
         const char* words;
         void (*spoil)(StatusData&);
     };
-    for (const Row& row : {
-             Row{"can: link fault", [](StatusData& s) { s.can = drivers::PortState::fault; }},
-             Row{"shaker: link connecting",
-                 [](StatusData& s) { s.shaker_link = drivers::LinkState::connecting; }},
-             Row{"emergency stop: open",
-                 [](StatusData& s) { s.shaker.emergency_stop_open = true; }},
-             Row{"rest: stopping: table 0.300 g rms",
-                 [](StatusData& s) {
-                     s.stop_pending = true;
-                     s.rest = {"stopping", {}, false, "table 0.300 g rms"};
-                 }},
-             Row{"rest: stop not obeyed, press the emergency stop",
-                 [](StatusData& s) {
-                     s.rest = {"stop not obeyed", {}, true, ""};
-                 }},
-             Row{"annunciator: pager: /p: Permission denied",
-                 [](StatusData& s) {
-                     s.annunciator.command = true;
-                     s.annunciator.command_note = "/p: Permission denied";
-                 }},
-             Row{"watchdog: timeout reads 60.0 s, not what was written",
-                 [](StatusData& s) {
-                     s.shaker.watchdog = drivers::WatchdogTimeout::changed;
-                     s.shaker.watchdog_timeout_s = 60;
-                 }},
-             Row{"channels: inner silent, last good 5.0 s ago",
-                 [](StatusData& s) {
-                     s.channel_age_s[1] = 5;
-                     s.sample.quality[1] = drivers::Quality::stale;
-                 }},
-             Row{"channels: outer never, inner never",
-                 [](StatusData& s) {
-                     s.sample = {};
-                     s.channel_age_s.fill(-1);
-                 }},
-             Row{"platform: silent for 2.0 s",
-                 [](StatusData& s) { s.platform.time -= 2 * drivers::kSecond; }},
-             Row{"clock: no time in common",
-                 [](StatusData& s) { s.clock_misfit = "no time in common"; }},
-             Row{"sample rate: 80 is not 40",
-                 [](StatusData& s) { s.rate_misfit = "80 is not 40"; }},
-             Row{"platform: not ready", [](StatusData& s) { s.platform.ready = false; }},
-             Row{"loop check: none yet", [](StatusData& s) { s.loop_check = {}; }},
-             Row{"doors: control: another vibrigd answers",
-                 [](StatusData& s) {
-                     s.server.doors[0].open = false;
-                     s.server.doors[0].note = "another vibrigd answers";
-                 }},
-             Row{"certificates: server EXPIRED 2023-11-14",
-                 [](StatusData& s) { s.server.certificates[0].expires = 1'700'000'000; }},
-             Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
-             Row{"journal: disk full",
-                 [](StatusData& s) {
-                     s.journal = {};
-                     s.journal.path = "j";
-                     s.journal.note = "disk full";
-                 }},
-             Row{"journal: being verified, 34 % done",
-                 [](StatusData& s) {
-                     s.journal = {};
-                     s.journal.path = "j";
-                     s.journal.running = true;
-                     s.journal.verified_part = 0.34;
-                 }},
-             Row{"journal: event 2 was changed: vibrig ack journal",
-                 [](StatusData& s) {
-                     s.journal = {};
-                     s.journal.path = "j";
-                     s.journal.running = true;
-                     s.journal.verified = true;
-                     s.interlock.latches = {{"journal", "event 2 was changed", "", "", false, 0}};
-                 }},
-         }) {
+    for (
+        const Row& row : {
+            Row{"can: link fault", [](StatusData& s) { s.can = drivers::PortState::fault; }},
+            Row{"shaker: link connecting",
+                [](StatusData& s) { s.shaker_link = drivers::LinkState::connecting; }},
+            Row{"emergency stop: open", [](StatusData& s) { s.shaker.emergency_stop_open = true; }},
+            Row{"rest: stopping: table 0.300 g rms",
+                [](StatusData& s) {
+                    s.stop_pending = true;
+                    s.rest = {"stopping", {}, false, "table 0.300 g rms"};
+                }},
+            Row{"rest: stop not obeyed, press the emergency stop",
+                [](StatusData& s) {
+                    s.rest = {"stop not obeyed", {}, true, ""};
+                }},
+            Row{"annunciator: pager: /p: Permission denied",
+                [](StatusData& s) {
+                    s.annunciator.command = true;
+                    s.annunciator.command_note = "/p: Permission denied";
+                }},
+            Row{"watchdog: timeout reads 60.0 s, not what was written",
+                [](StatusData& s) {
+                    s.shaker.watchdog = drivers::WatchdogTimeout::changed;
+                    s.shaker.watchdog_timeout_s = 60;
+                }},
+            Row{"channels: inner silent, last good 5.0 s ago",
+                [](StatusData& s) {
+                    s.channel_age_s[1] = 5;
+                    s.sample.quality[1] = drivers::Quality::stale;
+                }},
+            Row{"channels: outer never, inner never",
+                [](StatusData& s) {
+                    s.sample = {};
+                    s.channel_age_s.fill(-1);
+                }},
+            Row{"platform: silent for 2.0 s",
+                [](StatusData& s) { s.platform.time -= 2 * drivers::kSecond; }},
+            Row{"clock: no time in common",
+                [](StatusData& s) { s.clock_misfit = "no time in common"; }},
+            Row{"sample rate: 80 is not 40", [](StatusData& s) { s.rate_misfit = "80 is not 40"; }},
+            Row{"platform: not ready", [](StatusData& s) { s.platform.ready = false; }},
+            Row{"loop check: none yet", [](StatusData& s) { s.loop_check = {}; }},
+            Row{"doors: control: another vibrigd answers",
+                [](StatusData& s) {
+                    s.server.doors[0].open = false;
+                    s.server.doors[0].note = "another vibrigd answers";
+                }},
+            Row{"certificates: server EXPIRED 2023-11-14",
+                [](StatusData& s) { s.server.certificates[0].expires = 1'700'000'000; }},
+            Row{"interlock: tripped: hot", [](StatusData& s) { s.interlock.tripped = "hot"; }},
+            Row{"journal: disk full",
+                [](StatusData& s) {
+                    s.journal = {};
+                    s.journal.path = "j";
+                    s.journal.note = "disk full";
+                }},
+            Row{"journal: being verified, 34 % done",
+                [](StatusData& s) {
+                    s.journal = {};
+                    s.journal.path = "j";
+                    s.journal.running = true;
+                    s.journal.verified_part = 0.34;
+                }},
+            Row{"journal: event 2 was changed: look at it (vibrig journal verify), then vibrig ack "
+                "journal --by NAME",
+                [](StatusData& s) {
+                    s.journal = {};
+                    s.journal.path = "j";
+                    s.journal.running = true;
+                    s.journal.verified = true;
+                    s.interlock.latches = {{"journal", "event 2 was changed", "", "", false, 0}};
+                }},
+        }) {
         StatusData spoilt = well;
         row.spoil(spoilt);
         EXPECT_TRUE(holds(readiness(spoilt).failures(), row.words)) << readiness(spoilt).failures();
