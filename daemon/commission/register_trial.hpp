@@ -84,6 +84,13 @@ class RegisterTrial {
     using Place = std::pair<proto::RegisterTable, std::uint16_t>;
     using Image = std::map<Place, std::uint16_t>;
 
+    static constexpr double kPoll_s = 0.1;
+    static constexpr double kStill_g = 0.01;  ///< of the table, by the controller's own word
+    static constexpr double kRamping = 1, kRunning = 2, kStopping = 3;  ///< states
+    static constexpr int kAsked = 3;  ///< how often before it ends
+
+    [[nodiscard]] static std::string place_of(const proto::Register& reg);
+    // register_trial.cpp: reading, and the chain
     void lay_out();
     [[nodiscard]] Image read(bool all);
     [[nodiscard]] Image read_all() { return read(true); }
@@ -93,6 +100,11 @@ class RegisterTrial {
     [[nodiscard]] std::string what_moves(const Image& image) const;
     [[nodiscard]] std::string role_at(std::uint16_t address) const;
 
+    void chain_is(bool open, const std::string& asked);
+    void nothing_starts(const std::string& button);
+    void row(std::string name, bool passed, std::string found);
+
+    // register_writes.cpp: writing
     void begin_writing();
     void look_for_others(const Image& now);
     /// The chain is open, the controller at rest, and nobody else has written: else it ends.
@@ -105,10 +117,7 @@ class RegisterTrial {
     void write_one(const Role& role);
     void try_value(const Role& role, double value);
     void try_run(const Role& role);
-    void chain_is(bool open, const std::string& asked);
-    void nothing_starts(const std::string& button);
     [[nodiscard]] bool named(const Role& role);
-    void row(std::string name, bool passed, std::string found);
 
     proto::ShakerRegisters map_;
     TrialPort& port_;
