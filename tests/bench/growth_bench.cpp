@@ -4,11 +4,13 @@
 //   growth_bench make-index FOLDER CAMPAIGNS     an index of so many campaigns
 //   growth_bench open-index FOLDER               opened, and one campaign looked up
 //   growth_bench make-campaign FOLDER POSITIONS DWELL_S    a recorded campaign
-//   growth_bench make-recording FOLDER MB        a recording of at least that size, as the daemon
-//   writes it growth_bench verdict DWELLS                  what follows a dwell growth_bench
-//   adaptive DWELLS                 the choice of the next one growth_bench history HOURS the
-//   page's curves; says the processor time of a look, s growth_bench status DWELLS a status as
-//   JSON; likewise growth_bench chart FILE.json FILE.svg
+//   growth_bench make-recording FOLDER MB        a recording so large, as the daemon writes it
+//   growth_bench verdict DWELLS                  what follows a dwell
+//   growth_bench adaptive DWELLS                 the choice of the next one
+//   growth_bench history HOURS                   the page's curves; says a look's time, s
+//   growth_bench status DWELLS                   a status as JSON; likewise
+//   growth_bench serve                           a status server, until standard input ends
+//   growth_bench chart FILE.json FILE.svg
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -34,6 +36,7 @@
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "tests/bench/growth_server.hpp"
 #include "tests/plant/recording.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
@@ -306,6 +309,8 @@ int main(int argc, char** argv) {
             history(std::stod(words[1]));
         } else if (is("status", 1)) {
             status(std::stoul(words[1]));
+        } else if (is("serve", 0)) {
+            bench::serve_status();
         } else if (is("chart", 2)) {
             chart(words[1], words[2]);
         } else {
