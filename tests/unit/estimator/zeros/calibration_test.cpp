@@ -505,6 +505,7 @@ TEST(ZeroMisalignmentSoak, AHundredUnitsOfEachMisalignment) {
 /// filter assumes of it: theory has 1.
 double honesty_as_assumed(std::uint64_t seeds) {
     double sum = 0;
+    int outside = 0;
     for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
         std::mt19937_64 generator(seed);
         std::normal_distribution<double> normal;
@@ -512,7 +513,7 @@ double honesty_as_assumed(std::uint64_t seeds) {
         s.initial.tilt_deg = 10.0 / 60;
         s.initial.azimuth_deg = 0.5;
         s.initial.gyro_bias_deg_h = 0.1;
-        s.initial.zero_mg = 3;
+        s.initial.zero_mg = 2;  // 10 is refused
         s.noise.scale_factor = s.initial.gain;
         s.noise.misalignment = kDeclaredCross;
         UnitErrors errors;
@@ -530,13 +531,18 @@ double honesty_as_assumed(std::uint64_t seeds) {
             s.plan.targets_deg = upright == 2 ? std::vector<double>{0, 90, -90, 90}
                                               : std::vector<double>{0, 60, -60, 60};
             const CalibrationResult r = simulate(s, errors, kPeriod, noise).result();
-            EXPECT_TRUE(r.valid) << "seed " << seed << ": " << all(r.problems);
+            EXPECT_TRUE(r.valid || all(r.problems).find("innovations") == 0)
+                << "seed " << seed << ": " << all(r.problems);
+            outside += r.valid ? 0 : 1;
             return r;
         };
         const std::vector<CalibrationResult> runs{
             run(2, false, 3 * seed), run(1, false, 3 * seed + 1), run(1, true, 3 * seed + 2)};
         sum += z_squares(together(runs), errors) / (3 * static_cast<double>(seeds));
     }
+    // The last block of innovations is outside its band of 99.9 % in one of a thousand runs: of 300
+    // more than 3 are with probability 3e-4.
+    EXPECT_LE(outside, 3) << "seeds 1 to " << seeds;
     std::cout << "drawn as assumed, z up and y both ways, seeds 1 to " << seeds << ": "
               << std::sqrt(sum) << '\n';
     return std::sqrt(sum);
