@@ -513,6 +513,12 @@ def dialogue(checks, programs, folder):
                                capture_output=True, text=True, check=False)
         checks.check(other.returncode == 1 and "the platform's parts first: bus: no record" in other.stderr, "nothing shakes before the platform is known",
                      other.stderr)
+        u.configure(platform={"gyro_y_axes": ["+x", "+y", "+z"], "gyro_z_axes": ["+z", "+y", "+x"]})
+        check = subprocess.run([u.rig.program("vibrigd"), "--check", "--config", u.rig.configuration], capture_output=True, text=True, check=False)
+        u.restart()
+        told = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', "platform.gyro_z_axes: found +z +y +x, left-handed")
+        checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and each in u.rig.daemon.text() for each in told),
+                     "gyro axes that are hardly meant are told by --check and at the start", check.stderr + u.rig.logs())
     finally:
         u.rig.stop()
 

@@ -1,13 +1,16 @@
 // What is demanded of a rig that can hurt somebody, on the real clock.
 #include <string>
 
+#include "daemon/configuration/warnings.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
 
 namespace vibrig::configuration {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 const std::string kMap = R"(
@@ -81,8 +84,12 @@ TEST(RealRig, TwoGyrosOnOneInputAxisAreRefused) {
     EXPECT_THAT(real_complaint(axes + kMap),
                 HasSubstr("platform.gyro_y_axes[0]: found \"+x\", the input axis of gyro x too, "
                           "expected \"+y\" or \"-y\": gyro y drifts about platform y"));
-    EXPECT_EQ(complaint(axes, true), "") << "a simulated rig";
     EXPECT_EQ(complaint(axes, false), "") << "a recording: identify warns";
+    // BUT of a simulated rig it is a warning, with its place
+    EXPECT_THAT(
+        warnings(parse(as_simulated(axes, true), "rig.toml", true)),
+        ElementsAre("rig.toml:1: platform.gyro_y_axes[0]: found \"+x\", the input axis of "
+                    "gyro x too, expected \"+y\" or \"-y\": gyro y drifts about platform y"));
     // the letter of another gyro, though no two are alike
     const std::string swapped =
         "platform.gyro_x_axes = [\"+y\", \"+z\", \"+x\"]\n"
@@ -96,6 +103,10 @@ TEST(RealRig, ALeftHandedTriadIsRefused) {
     EXPECT_THAT(real_complaint(axes + kMap),
                 AllOf(HasSubstr("platform.gyro_z_axes: found +z +y +x, left-handed"),
                       HasSubstr("right-handed")));
+    EXPECT_THAT(warnings(parse(as_simulated(axes, true), "rig.toml", true)),
+                ElementsAre(AllOf(HasSubstr("rig.toml:1: platform.gyro_z_axes: found +z +y +x, "),
+                                  HasSubstr("left-handed"))));
+    EXPECT_THAT(warnings(parse(as_simulated("", true), "rig.toml", true)), IsEmpty());
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"+z\", \"-y\", \"+x\"]\n" + kMap), "");
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"-z\", \"+y\", \"+x\"]\n" + kMap), "");
 }
