@@ -20,7 +20,7 @@ struct Column {
     const char* unit = "";
 };
 
-constexpr std::array<Column, 10> kColumns = {{{"time_s", 1e12, "s"},
+constexpr std::array<Column, 12> kColumns = {{{"time_s", 1e12, "s"},
                                               {"run", 0, ""},
                                               {"position", 0, ""},
                                               {"alpha_deg", 1e4, "deg"},
@@ -29,9 +29,12 @@ constexpr std::array<Column, 10> kColumns = {{{"time_s", 1e12, "s"},
                                               {"ax_g", 1e3, "g"},
                                               {"ay_g", 1e3, "g"},
                                               {"az_g", 1e3, "g"},
-                                              {"frequency_hz", 2e3, "Hz"}}};
+                                              {"frequency_hz", 2e3, "Hz"},
+                                              {"profile", 0, ""},
+                                              {"level_db", 100, "dB"}}};
 constexpr std::size_t kNeeded = 9;  ///< the others may be missing
-constexpr std::size_t kFrequency = 9;
+constexpr std::size_t kFrequency = 9, kProfile = 10, kLevel = 11;
+constexpr std::size_t kMostProfiles = 1000;
 constexpr std::size_t kTime = 0;
 constexpr std::size_t kRun = 1;
 constexpr std::size_t kPosition = 2;
@@ -79,6 +82,7 @@ class RecordingReader::Rows {
         simulated_ =
             std::ranges::any_of(fields_, [](auto name) { return same("simulated", name); });
         frequency_ = std::ranges::count(roles_, kFrequency) > 0;
+        profile_ = std::ranges::count(roles_, kProfile) > 0;
     } catch (const RecordingError&) {
         throw;
     } catch (const std::runtime_error& error) {
@@ -97,6 +101,8 @@ class RecordingReader::Rows {
     }
     [[nodiscard]] bool simulated() const { return simulated_; }
     [[nodiscard]] bool has_frequency() const { return frequency_; }
+    [[nodiscard]] bool has_profile() const { return profile_; }
+    [[nodiscard]] const std::vector<std::string>& profiles() const { return profiles_; }
     [[nodiscard]] std::uint64_t bytes() const { return lines_.bytes(); }
 
   private:
@@ -234,6 +240,12 @@ class RecordingReader::Rows {
                 case kFrequency:
                     row.frequency_hz = frequency(field);
                     break;
+                case kProfile:
+                    row.profile = profile(field);
+                    break;
+                case kLevel:
+                    row.level_db = field.empty() ? 0 : real(role, field);
+                    break;
                 default:
                     if (role < kForces) {
                         row.angle_deg.at(role - kAngles) = real(role, field);
@@ -251,6 +263,21 @@ class RecordingReader::Rows {
         if (hz < 0)
             fail(kColumns.at(kFrequency).name, "found " + quoted(field) + ", expected 0 or above");
         return hz;
+    }
+
+    std::uint16_t profile(std::string_view field) {
+        double number = 1;
+        if (field.empty() || (read_number(field, number) && number == 0)) return 0;
+        const auto known = std::ranges::find(profiles_, field);
+        const auto place = known - profiles_.begin();
+        if (known == profiles_.end()) {
+            if (profiles_.size() >= kMostProfiles)
+                fail(kColumns.at(kProfile).name, "found " + quoted(field) + " after " +
+                                                     std::to_string(kMostProfiles) +
+                                                     " others, expected a profile of some dwells");
+            profiles_.emplace_back(field);
+        }
+        return static_cast<std::uint16_t>(place + 1);
     }
 
     double real(std::size_t role, std::string_view field) const {
@@ -306,7 +333,8 @@ class RecordingReader::Rows {
     std::string path_;
     LineReader lines_;
     bool simulated_ = false;
-    bool frequency_ = false;
+    bool frequency_ = false, profile_ = false;
+    std::vector<std::string> profiles_;  ///< by the numbers of the rows, from 1
     char separator_ = ',';
     std::vector<std::string_view> fields_;
     std::vector<std::size_t> roles_;  ///< index into kColumns by field, kNone: ignored
@@ -323,6 +351,8 @@ RecordingReader::~RecordingReader() = default;
 bool RecordingReader::next(RecordingRow& row) { return rows_->next(row); }
 bool RecordingReader::simulated() const { return rows_->simulated(); }
 bool RecordingReader::has_frequency() const { return rows_->has_frequency(); }
+bool RecordingReader::has_profile() const { return rows_->has_profile(); }
+const std::vector<std::string>& RecordingReader::profiles() const { return rows_->profiles(); }
 std::uint64_t RecordingReader::bytes() const { return rows_->bytes(); }
 
 }  // namespace vibrig::proto

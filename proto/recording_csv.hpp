@@ -7,6 +7,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace vibrig::proto {
 
@@ -20,6 +21,9 @@ struct RecordingRow {
     std::size_t line = 0;               ///< where the row stands in its file, from 1
     /// Of the vibration, 0 at rest; negative: the file has no such column.
     double frequency_hz = -1;
+    /// Of random vibration: its place in RecordingReader::profiles, from 1; 0: none.
+    std::uint16_t profile = 0;
+    double level_db = 0;  ///< of it about its profile
 };
 
 /// A recording that cannot be read or written: "file:line: column X: found Y, expected Z".
@@ -37,11 +41,12 @@ class RecordingError : public std::runtime_error {
 };
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
-/// ax_g, ay_g, az_g, and if it likes frequency_hz, in any order and any case, row by row in bounded
-/// memory; other columns are ignored. Fields are separated by commas, or by semicolons or tabs as
-/// the header says; then numbers may have decimal commas. Lines of comment (#) may come before the
-/// header. A (run, position) pair that comes back after another one begins a new dwell. Throws
-/// RecordingError.
+/// ax_g, ay_g, az_g, and if it likes frequency_hz, profile and level_db, in any order and any case,
+/// row by row in bounded memory; other columns are ignored. A profile is a name or a number; 0 or
+/// nothing: the dwell was at rest or under a sine. Fields are separated by commas, or by semicolons
+/// or tabs as the header says; then numbers may have decimal commas. Lines of comment (#) may come
+/// before the header. A (run, position) pair that comes back after another one begins a new dwell.
+/// Throws RecordingError.
 class RecordingReader {
   public:
     /// Reads the header.
@@ -56,6 +61,10 @@ class RecordingReader {
     [[nodiscard]] bool simulated() const;
     /// There is a column frequency_hz.
     [[nodiscard]] bool has_frequency() const;
+    /// There is a column profile.
+    [[nodiscard]] bool has_profile() const;
+    /// As the rows have named them so far.
+    [[nodiscard]] const std::vector<std::string>& profiles() const;
     [[nodiscard]] std::uint64_t bytes() const;  ///< read so far
 
   private:

@@ -13,11 +13,11 @@
 
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/daemon.hpp"
-#include "daemon/app/rig_lock.hpp"
 #include "daemon/app/start_checks.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/configuration/forms.hpp"
 #include "daemon/configuration/warnings.hpp"
+#include "daemon/lock/rig_lock.hpp"
 #include "daemon/log/log_sink.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/serve/openapi.hpp"

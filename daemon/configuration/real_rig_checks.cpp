@@ -67,7 +67,7 @@ void CrossCheck::registers_stated() {
         for (const auto& [part, needed] : {std::pair{"address", true},
                                            {"type", true},
                                            {"word_order", words},
-                                           {"scale", role.quantity && type != RegisterType::f32},
+                                           {"scale", role.quantity},
                                            {"mask", type == RegisterType::bits},
                                            {"table", !own_table}})
             if (needed && !stated(part)) miss(key + "." + part);

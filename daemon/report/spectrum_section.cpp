@@ -2,14 +2,26 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "daemon/plot/chart.hpp"
+#include "estimator/spectrum/elastic.hpp"
 
 namespace vibrig::report {
 
 namespace {
 
 using SpectrumJson = nlohmann::json;
+
+/// In the order of the result's numbers.
+constexpr std::array<const char*, 6> kTerms{"II", "SS", "OO", "IS", "IO", "OS"};
+constexpr std::size_t kQuadratic = 4, kBase = 10;  ///< places in a hypothesis' numbers
+constexpr double kNinetyFive = 1.96;
 
 std::string shown(const SpectrumJson& value, const char* precision = "{:.5f}") {
     return value.is_number() ? fmt::format(fmt::runtime(precision), value.get<double>()) : "-";
@@ -43,7 +55,6 @@ void add_evidence(Page& page, const SpectrumJson& spectrum) {
 
 /// Six coefficients of each gyro, as the dwells of each frequency have them.
 void add_groups(Page& page, const SpectrumJson& frequencies) {
-    constexpr std::array<const char*, 6> kTerms{"II", "OO", "SS", "IO", "IS", "OS"};
     std::vector<std::vector<std::string>> rows{{"coefficient"}};
     for (const SpectrumJson& at : frequencies)
         rows.front().push_back(fmt::format("{:g} Hz ({} dwells)", at.at("hz").get<double>(),
@@ -55,6 +66,89 @@ void add_groups(Page& page, const SpectrumJson& frequencies) {
         rows.push_back(row);
     }
     page.table(rows);
+}
+
+/// What a hypothesis makes of a quadratic coefficient at a frequency: value and variance.
+std::pair<double, double> at_frequency(const SpectrumJson& one, std::size_t term, double hz) {
+    const SpectrumJson &x = one.at("x"), &p = one.at("p");
+    // Of each of its numbers so much.
+    std::vector<double> weight(x.size(), 0.0);
+    weight.at(kQuadratic + term) = 1;
+    const auto add = [&](std::size_t r, double f, double zeta) {
+        weight.at(kBase + kTerms.size() * r + term) =
+            estimator::spectrum::in_phase(hz, {f, zeta}) - 1;
+    };
+    const SpectrumJson &f = one.at("hz"), &zeta = one.at("damping");
+    if (f.is_number()) add(0, f.get<double>(), zeta.get<double>());
+    for (std::size_t r = 0; f.is_array() && r < f.size(); ++r)
+        add(r, f.at(r).get<double>(), zeta.at(r).get<double>());
+    double value = 0, variance = 0;
+    for (std::size_t a = 0; a < weight.size(); ++a) {
+        if (weight[a] == 0) continue;
+        value += weight[a] * x.at(a).get<double>();
+        for (std::size_t b = 0; b < weight.size(); ++b) {
+            if (weight[b] != 0) variance += weight[a] * weight[b] * p.at(a).at(b).get<double>();
+        }
+    }
+    return {value, variance};
+}
+
+/// Over the frequencies, with its band of 95 %; the inputs that are declared are not in it.
+tool::plot::Curve curve_of(const SpectrumJson& mixture, std::size_t term, double low, double high) {
+    constexpr int kPoints = 200;
+    tool::plot::Curve curve;
+    curve.name = kTerms[term];
+    for (int i = 0; i <= kPoints; ++i) {
+        const double hz = low * std::pow(high / low, static_cast<double>(i) / kPoints);
+        double mean = 0, square = 0;
+        for (const SpectrumJson& one : mixture) {
+            const auto [value, variance] = at_frequency(one, term, hz);
+            const double w = one.at("w").get<double>();
+            mean += w * value;
+            square += w * (variance + value * value);
+        }
+        const double wide = kNinetyFive * std::sqrt(std::max(0.0, square - mean * mean));
+        curve.x.push_back(hz);
+        curve.y.push_back(mean);
+        curve.low.push_back(mean - wide);
+        curve.high.push_back(mean + wide);
+    }
+    return curve;
+}
+
+/// Each gyro's coefficients over frequency, and as the dwells of each frequency have them.
+void add_charts(Page& page, const SpectrumJson& spectrum) {
+    const SpectrumJson& frequencies = spectrum.at("frequencies");
+    double low = 1e9, high = 0;
+    for (const SpectrumJson& at : frequencies) {
+        low = std::min(low, at.at("hz").get<double>());
+        high = std::max(high, at.at("hz").get<double>());
+    }
+    if (!(high > low)) return;
+    for (std::size_t j = 0; j < 3; ++j) {
+        for (std::size_t term = 0; term < kTerms.size(); ++term) {
+            tool::plot::Chart chart;
+            chart.title = fmt::format("D_{}{} over frequency", kTerms[term], "xyz"[j]);
+            chart.x = tool::plot::Axis("Hz", true);
+            chart.y = tool::plot::Axis("deg/h/g^2");
+            chart.curves.push_back(
+                curve_of(spectrum.at("mixture").at(j), term, low / 1.5, 1.5 * high));
+            chart.curves.back().name = "model, 95 %";
+            tool::plot::Curve dwells;
+            dwells.name = "dwells of one frequency, 95 %";
+            dwells.look = tool::plot::Look::dots;
+            for (const SpectrumJson& at : frequencies) {
+                const double value = at.at("coefficients").at(6 * j + term).get<double>();
+                const double wide = kNinetyFive * at.at("sigma").at(6 * j + term).get<double>();
+                dwells.x.push_back(at.at("hz").get<double>());
+                dwells.y.push_back(value);
+                dwells.low.push_back(value - wide);
+                dwells.high.push_back(value + wide);
+            }
+            chart.curves.push_back(std::move(dwells));
+            page.figure(chart.svg(), chart.title);
+        }
+    }
 }
 
 }  // namespace
@@ -69,14 +163,18 @@ void add_spectrum(Page& page, const record::Campaign& campaign) {
         page.paragraph(fmt::format(
             "The dwells shook at {} frequencies. The coefficients above are those at the reference "
             "frequency; the result has {}. An elastic part of 20 % would have been seen up to {} "
-            "Hz; beyond it nothing is known. A platform that moves in step with the vibration, "
-            "elliptic motion and terms beyond the second order are not told apart from it.",
+            "Hz; beyond it nothing is known.",
             spectrum.at("frequencies").size(),
             resonates ? "static quadratic coefficients and an elastic part" : "them as they are",
             shown(spectrum.at("highest_hz"), "{:g}")));
         add_evidence(page, spectrum);
         page.paragraph("Quadratic coefficients, deg/h/g^2, from the dwells of each frequency:");
         add_groups(page, spectrum.at("frequencies"));
+        if (spectrum.at("model") != "groups") add_charts(page, spectrum);
+        std::string limits = "What such a campaign does not tell:";
+        for (const SpectrumJson& one : spectrum.value("not_told", SpectrumJson::array()))
+            limits += " " + one.get<std::string>() + ".";
+        if (!limits.ends_with(':')) page.paragraph(limits);
     } catch (const SpectrumJson::exception& error) {
         page.paragraph(std::string("The recorded result cannot be read: ") + error.what());
     }

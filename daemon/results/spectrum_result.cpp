@@ -66,7 +66,9 @@ Json groups_json(const SpectrumResult& of) {
                 sigma.push_back(number_or_null(of.analysis.groups.sigma(begin + q, j)));
             }
         }
+        const std::string& profile = of.table.kinds()[k].profile;
         list.push_back({{"hz", of.table.kinds()[k].hz()},
+                        {"profile", profile.empty() ? Json(nullptr) : Json(profile)},
                         {"dwells", of.table.dwells_of(k)},
                         {"coefficients", std::move(value)},
                         {"sigma", std::move(sigma)}});
@@ -279,7 +281,7 @@ std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
     std::vector<Kind> kinds;
     for (const estimator::DwellRow& row : rows) {
         if (row.held_out) continue;
-        dwells.push_back({row, {}, 0});
+        dwells.push_back({row, {}, row.relative_error});
         if (!(row.vibration.kappa > 1)) continue;
         const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
         const auto known =
@@ -318,11 +320,16 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
             const SpectralDwell& dwell = of.table.list()[k];
             Json lines = Json::array();
             const double moment = dwell.row.vibration.kappa - 1;
-            if (dwell.kind) {
-                for (const Band& band : of.table.kinds()[*dwell.kind].bands)
-                    lines.push_back({band.hz, std::sqrt(2 * moment * band.share)});
+            const Kind* kind = dwell.kind ? &of.table.kinds()[*dwell.kind] : nullptr;
+            if (kind != nullptr && !kind->profile.empty()) {
+                root["dwell_rates"][k]["profile"] = kind->profile;
+            } else {
+                if (kind != nullptr) {
+                    for (const Band& band : kind->bands)
+                        lines.push_back({band.hz, std::sqrt(2 * moment * band.share)});
+                }
+                root["dwell_rates"][k]["lines"] = std::move(lines);
             }
-            root["dwell_rates"][k]["lines"] = std::move(lines);
             root["dwell_rates"][k]["r_relative_error"] = dwell.relative_error;
         }
     }
@@ -346,17 +353,40 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
         {"lowest_hz", a.model.lowest_hz},
         {"highest_hz", a.model.highest_hz},
         {"refusal", a.model.refusal.empty() ? Json(nullptr) : Json(a.model.refusal)},
+        {"not_told", not_told()},
         {"effects", effects_json(a.model.effects)},
         {"platform", frame_json(a.model.frame)}};
+}
+
+std::span<const char* const> not_told() {
+    static constexpr std::array kStatements{
+        "motion of the platform in step with the vibration is drift (coning), and in random "
+        "vibration it is not seen by slow samples",
+        "elliptic motion, vibration in quadrature between two axes, is not excited by a shaker "
+        "along one line",
+        "angular vibration is not in a linear test",
+        "resonances above the highest frequency are not found",
+        "terms beyond the second order weigh otherwise in random vibration than in a sine; two "
+        "levels at one frequency are the only guard, and of a resonance that depends on the level "
+        "too",
+        "the shape of a random vibration at the platform is its profile's: slow samples have it "
+        "aliased",
+        "profiles that are not stationary, shock and temperature are not in the model",
+        "coefficients at one frequency are not flat because nothing contradicts",
+        "a resonance of the fixture between accelerometers and gyros is taken for the gyro's"};
+    return kStatements;
 }
 
 std::string spectrum_text(const SpectrumResult& of) {
     if (!of.several()) return "";
     const Analysis& a = of.analysis;
     std::string text = "\nOver frequency: ";
-    for (std::size_t k = 0; k < of.table.kinds().size(); ++k)
-        text += (k > 0 ? ", " : "") + std::to_string(of.table.dwells_of(k)) + " dwells at " +
-                line("%.4g Hz", of.table.kinds()[k].hz()).substr(0, 20);
+    for (std::size_t k = 0; k < of.table.kinds().size(); ++k) {
+        const Kind& kind = of.table.kinds()[k];
+        text += (k > 0 ? ", " : "") + std::to_string(of.table.dwells_of(k)) + " dwells " +
+                (kind.profile.empty() ? "at " + line("%.4g Hz", kind.hz()).substr(0, 20)
+                                      : "under " + kind.profile);
+    }
     std::erase(text, '\n');
     text = "\n" + text + "\n";
     text += line("flat: chi-square %.1f of %d, p = %.2g%s", a.flat.chi_square, a.flat.degrees,
@@ -382,7 +412,9 @@ std::string spectrum_text(const SpectrumResult& of) {
         "An elastic part of 20 %% would have been seen up to %.4g Hz; beyond it nothing "
         "is known.",
         a.flat.highest_hz);
-    return text;
+    text += "Not told either:";
+    for (const char* one : not_told()) text += std::string("\n  ") + one;
+    return text + "\n";
 }
 
 Model read_model(const nlohmann::json& root, const std::string& path) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,9 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
 void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 /// For people; empty with one frequency.
 [[nodiscard]] std::string spectrum_text(const SpectrumResult& spectrum);
+
+/// What a campaign of linear vibration does not tell, one statement each.
+[[nodiscard]] std::span<const char* const> not_told();
 
 /// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,

@@ -65,21 +65,30 @@ double share_outside(const Model& model, const Situation& in, bool above_only) {
 }
 
 /// Variance of the mean over the dwell: a band of a random vibration has 2 df T degrees of freedom.
+/// Of a realised mean square only how it lies over the bands varies.
 double realisation(const Situation& in, const Attitude& at, std::size_t gyro,
                    const Hypothesis& of) {
-    if (!(in.duration_s > 0) || in.realised) return 0;
+    if (!(in.duration_s > 0)) return 0;
     const double still = at.vibration[gyro].dot(of.x.segment<kElastic>(kBase - kElastic));
     std::vector<double> elastic;
     for (std::size_t r = 0; r < of.resonances.size(); ++r)
         elastic.push_back(at.vibration[gyro].dot(
             of.x.segment<kElastic>(kBase + kElastic * static_cast<Index>(r))));
-    double sum = 0;
+    std::vector<double> drifts;
+    double mean = 0;
     for (const Band& band : in.bands) {
-        if (!(band.width_hz > 0)) continue;
         double drift = still;
         for (std::size_t r = 0; r < elastic.size(); ++r)
             drift += elastic[r] * (in_phase(band.hz, of.resonances[r]) - 1);
-        sum += drift * drift * band.share * band.share / (band.width_hz * in.duration_s);
+        drifts.push_back(drift);
+        mean += band.share * drift;
+    }
+    double sum = 0;
+    for (std::size_t b = 0; b < drifts.size(); ++b) {
+        const Band& band = in.bands[b];
+        if (!(band.width_hz > 0)) continue;
+        const double varies = drifts[b] - (in.realised ? mean : 0);
+        sum += varies * varies * band.share * band.share / (band.width_hz * in.duration_s);
     }
     return sum;
 }

@@ -33,7 +33,7 @@ struct Situation {
     Eigen::Matrix3d moment;  ///< level frame, g^2
     std::vector<Band> bands;
     double duration_s = 0;  ///< of which the drift is the mean; 0: for ever
-    bool realised = false;  ///< `moment` is what happened: then nothing of it varies
+    bool realised = false;  ///< `moment` is what happened: only the bands' shares in it vary
 };
 
 struct PredictionOptions {

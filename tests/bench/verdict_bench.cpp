@@ -3,10 +3,12 @@
 #include <random>
 
 #include "estimator/identification/result.hpp"
+#include "estimator/spectrum/analysis.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "tests/unit/estimator/spectrum/survey.hpp"
 #include "tests/unit/estimator/uncertainty/theory_rows.hpp"
 
-// What follows each dwell, outside the real-time threads.
+// What follows each dwell, or a campaign over frequency, outside the real-time threads.
 
 namespace vibrig::bench {
 namespace {
@@ -36,6 +38,20 @@ void verdict_2000(benchmark::State& state) { verdict(state, 2000); }
 BENCHMARK(verdict_28);
 BENCHMARK(verdict_250);
 BENCHMARK(verdict_2000);
+
+/// A survey of 63 dwells of a rig that resonates: test, mixtures, declared inputs.
+void survey_63(benchmark::State& state) {
+    namespace spectrum = estimator::spectrum;
+    namespace made = spectrum::testing;
+    const estimator::Settings settings;
+    auto dwells = made::dwells_of(settings, made::Truth::common(0.5, made::kSixty), made::survey());
+    std::mt19937_64 random(1);
+    made::add_noise(dwells, random);
+    const spectrum::SpectralTable table(settings, dwells.list, dwells.kinds);
+    for (auto unused : state)
+        benchmark::DoNotOptimize(spectrum::analyse(settings, table, spectrum::Form::automatic));
+}
+BENCHMARK(survey_63);
 
 }  // namespace
 }  // namespace vibrig::bench

@@ -49,6 +49,14 @@ proto::Register holding(std::size_t address, proto::RegisterType type, double sc
     return reg;
 }
 
+/// Of a run under random vibration about its profile, as the controller's register has it, dB.
+double level_db(const Truth& truth, const CampaignPlan& plan, std::size_t run) {
+    const auto profile =
+        std::ranges::find(truth.profiles, plan.profile_of(run), &ShakerProfile::number);
+    if (profile == truth.profiles.end()) return 0;
+    return std::round(200 * std::log10(plan.table_g[run - 1] / profile->rms_g())) / 10;
+}
+
 /// At rest: the kind of vibration of a run, and for random vibration its rms.
 void choose_vibration(Rig& rig, const CampaignPlan& plan, std::size_t run) {
     if (plan.profile.empty()) return;
@@ -60,9 +68,7 @@ void choose_vibration(Rig& rig, const CampaignPlan& plan, std::size_t run) {
     set_shaker(rig.shaker(), mode, 0);
     if (chosen == 0) return;
     set_shaker(rig.shaker(), number, chosen);
-    const auto& all = rig.truth().profiles;
-    const auto profile = std::ranges::find(all, chosen, &ShakerProfile::number);
-    set_shaker(rig.shaker(), level, 20 * std::log10(plan.table_g[run - 1] / profile->rms_g()));
+    set_shaker(rig.shaker(), level, level_db(rig.truth(), plan, run));
     set_shaker(rig.shaker(), mode, 1);
 }
 
@@ -216,7 +222,7 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
                      const std::function<void(std::size_t, std::size_t)>& progress) {
     const bool random = !plan.profile.empty(), several = plan.frequency_hz.size() > 1 || random;
     out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g"
-        << (several ? ",frequency_hz" : "") << (random ? ",profile\n" : "\n");
+        << (several ? ",frequency_hz" : "") << (random ? ",profile,level_db\n" : "\n");
     std::array<GyroCoefficients, 3> sum{};
     const auto write = [&](const PlannedSample& s) {
         std::array<char, 400> row{};
@@ -238,7 +244,8 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
         if (several) fixed(sine ? plan.hz_of(s.run) : 0, 4, random ? ',' : '\n');
         if (random) {
             at = std::to_chars(at, end, plan.profile_of(s.run)).ptr;
-            *at++ = '\n';
+            *at++ = ',';
+            fixed(level_db(truth, plan, s.run), 1, '\n');
         }
         out.write(row.data(), at - row.data());
         for (std::size_t g = 0; g < 3; ++g) {

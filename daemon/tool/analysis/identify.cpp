@@ -126,7 +126,8 @@ class RowsIdentified {
 
 /// A file of any length, in memory that does not grow with it: another thread reads ahead.
 Found identify(proto::RecordingReader& file, std::uint64_t size,
-               const estimator::Settings& settings, const std::string& path, bool held_out) {
+               const configuration::Configuration& rig, const std::string& path, bool held_out) {
+    const estimator::Settings& settings = rig.estimator;
     struct Block {
         std::vector<RecordingRow> rows;
         std::uint64_t bytes = 0;  ///< of the file, up to its end
@@ -152,9 +153,9 @@ Found identify(proto::RecordingReader& file, std::uint64_t size,
     Found found = identified.found(held_out);
     // All that shook did so at the frequency of the configuration.
     const Spectra none;
-    DwellKinds kinds(settings.frequency_hz, none);
+    DwellKinds kinds(rig, none);
     const RecordingRow any;
-    kinds.add({&any}, path);
+    kinds.add({&any}, {}, path);
     found.kinds = kinds.kinds();
     for (const estimator::DwellRow& row : found.result.rows)
         found.spectral.push_back({row, row.vibration.kappa > 1 ? kinds.of(0) : std::nullopt, 0});
@@ -195,10 +196,15 @@ bool has_common_clock(const std::vector<Dwell>& dwells) {
     return true;
 }
 
-DwellKinds kinds_of(const std::vector<Dwell>& dwells, const estimator::Settings& settings,
-                    const SpectrumRequest& request, const std::string& file) {
-    DwellKinds kinds(settings.frequency_hz, request.spectra);
-    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, file);
+DwellKinds kinds_of(const std::vector<Dwell>& dwells, const std::vector<std::string>& profiles,
+                    const configuration::Configuration& rig, const SpectrumRequest& request,
+                    const std::string& file) {
+    DwellKinds kinds(rig, request.spectra);
+    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, profiles, file);
+    if (!kinds.kinds().empty() && !kinds.reference() && !request.held_out)
+        throw std::runtime_error(file +
+                                 ": found random vibration alone, expected dwells at one sine "
+                                 "frequency at least, which the 30 coefficients are of");
     return kinds;
 }
 
@@ -214,6 +220,7 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
     if (!(period_s > 0)) return;
     namespace spectrum = estimator::spectrum;
     for (const spectrum::Kind& kind : kinds.kinds()) {
+        if (!kind.profile.empty()) continue;
         const double hz = kind.hz(), window_s = settings.level_window_s;
         if (!spectrum::forbidden(hz, 1 / period_s, window_s)) continue;
         std::array<char, 240> text{};
@@ -227,10 +234,12 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
 
 /// A recording that says with which frequency each dwell shook: kept whole, since the frequency
 /// that the filter takes is known at its end.
-Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settings,
-               const SpectrumRequest& request, const std::string& file) {
+Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::string>& profiles,
+               const configuration::Configuration& rig, const SpectrumRequest& request,
+               const std::string& file) {
+    estimator::Settings settings = rig.estimator;
     const std::vector<Dwell> dwells = dwells_of(rows);
-    const DwellKinds kinds = kinds_of(dwells, settings, request, file);
+    const DwellKinds kinds = kinds_of(dwells, profiles, rig, request, file);
     const auto reference = kinds.reference();
     if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
     refuse_forbidden(kinds, rows, settings, file);
@@ -248,7 +257,9 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
         const std::size_t before = identification.rows().size();
         estimator::DwellInfo info{dwell.run, dwell.position};
         if (common_clock) info.begin_s = 0;
-        if (kind) info.frequency_hz = kinds.kinds()[*kind].hz();
+        info.random = kinds.random(d);
+        const bool random = info.random.mean_square_g2 > 0;
+        if (kind && !random) info.frequency_hz = kinds.kinds()[*kind].hz();
         identification.begin_dwell(info);
         doubts.begin_dwell();
         plan.begin_dwell(dwell.run);
@@ -271,7 +282,7 @@ Found identify(const std::vector<RecordingRow>& rows, estimator::Settings settin
                                          ": found a dwell at rest that vibrates by " +
                                          std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
                                          " g, expected its frequency");
-            found.spectral.push_back({row, shook ? kind : std::nullopt, 0});
+            found.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
         }
     }
     if (!request.held_out) plan.tell();
@@ -394,6 +405,14 @@ int run(const IdentifyOptions& options) {
     return exit_status(assessed.verdict.level, options.strict);
 }
 
+/// Of a recording whose dwells are to prove a result: all of them.
+std::vector<HeldOut> held_out_of(const Found& found) {
+    std::vector<HeldOut> list;
+    for (const auto& dwell : found.spectral)
+        list.push_back({dwell.row, dwell.kind ? found.kinds[*dwell.kind].profile : ""});
+    return list;
+}
+
 }  // namespace
 
 Identified identify_recording(const std::string& file, const std::string& config,
@@ -410,10 +429,14 @@ Identified identify_recording(const std::string& file, const std::string& config
         identified.simulated = loaded.configuration.simulated() || reader.simulated();
         std::error_code unknown;
         const auto size = std::filesystem::file_size(file, unknown);
-        found =
-            reader.has_frequency() || !request.spectra.empty()
-                ? identify(rows_of(reader), identified.settings, request, file)
-                : identify(reader, unknown ? 0 : size, identified.settings, file, request.held_out);
+        const auto& rig = loaded.configuration;
+        if (reader.has_frequency() || reader.has_profile() || !request.spectra.empty()) {
+            const std::vector<RecordingRow> rows = rows_of(reader);
+            found = identify(rows, reader.profiles(), rig, request, file);
+        } else {
+            found = identify(reader, unknown ? 0 : size, rig, file, request.held_out);
+        }
+        if (request.held_out) identified.held_out = held_out_of(found);
     }
     identified.result = std::move(found.result);
     identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
@@ -432,8 +455,9 @@ Identified identify_recording(const std::string& file, const std::string& config
         if (identified.spectrum)
             adopt(*identified.spectrum, identified.settings, identified.assessed);
     }
-    std::ranges::copy_if(found.rows, std::back_inserter(identified.held_out),
-                         &estimator::DwellRow::held_out);
+    for (const estimator::DwellRow& row : found.rows) {
+        if (row.held_out) identified.held_out.push_back({row, ""});
+    }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;
 }
@@ -469,13 +493,15 @@ void add_identify(CLI::App& app, int& exit_code) {
                         "correlation and the dwells' residuals, too");
     command->add_flag("--json", options->json, "print the result as JSON");
     command
-        ->add_option("--spectrum", options->spectrum,
-                     "quadratic coefficients over frequency, where a recording has several "
-                     "(column frequency_hz): flat, groups, resonance, or auto, which weighs them")
+        ->add_option(
+            "--spectrum", options->spectrum,
+            "quadratic coefficients over frequency, where a recording has several "
+            "(columns frequency_hz, profile): flat, groups, resonance, or auto, which weighs them")
         ->check(CLI::IsMember({"auto", "flat", "groups", "resonance"}));
-    command->add_option("--spectra", options->spectra,
-                        "JSON list of {run, position, lines: [[hz, g_peak], ..]}, for a recording "
-                        "without the column");
+    command->add_option(
+        "--spectra", options->spectra,
+        "JSON list of {run, position, lines: [[hz, g_peak], ..]}, or in place of lines "
+        "profile or psd, and level_db, for a recording without the columns");
     command->add_flag("--strict", options->strict, "a doubtful result is a no as well");
     command->add_flag("--monte-carlo", options->monte_carlo,
                       "draw the declared inputs (JCGM 101) to check the combined uncertainty");

@@ -65,56 +65,49 @@ struct Held {
     std::vector<std::array<double, 3>> deg;
 };
 
-/// Of a campaign's held-out dwells those that shook with the profile's sine.
-std::vector<estimator::DwellRow> under(const Profile& profile,
-                                       const std::vector<estimator::DwellRow>& held_out) {
+/// That shook as the profile has it: its sine, or at random by its name.
+bool under(const Profile& profile, const HeldOut& held) {
     constexpr double kSame = 0.02;
-    std::vector<estimator::DwellRow> rows;
-    for (const estimator::DwellRow& row : held_out) {
-        if (profile.sines.size() == 1 && row.vibration.kappa > 1 &&
-            std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame)
-            rows.push_back(row);
-    }
-    return rows;
+    const estimator::DwellRow& row = held.row;
+    if (!(row.vibration.kappa > 1)) return false;
+    if (!profile.psd.empty()) return row.random && held.profile == profile.name;
+    return !row.random && (profile.sines.size() > 1 ||
+                           std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame);
+}
+
+/// What happened, not what was asked for.
+Eigen::Matrix3d realised_moment(const estimator::VibrationMoment& vibration) {
+    const estimator::LevelTensor& g = vibration.gamma;
+    Eigen::Matrix3d moment;
+    moment << g[0], g[3], g[4], g[3], g[1], g[5], g[4], g[5], g[2];
+    return moment * (vibration.kappa - 1);
 }
 
 Held held_out(const std::string& recording, const std::string& config, const Profile& profile,
               const AtPlatform& vibration) {
-    if (!profile.psd.empty())
+    if (!profile.psd.empty() && !profile.sines.empty())
         throw std::runtime_error(
-            "--verify: found a random profile, expected one of sines alone: a "
-            "recording of random dwells is not read");
+            "--verify: found a profile of psd and sines, expected one of them");
     SpectrumRequest request;
     request.held_out = true;
-    const Identified found = identify_recording(recording, config, request);
-    const bool planned = !found.held_out.empty();
-    const auto& rows = planned ? under(profile, found.held_out)
-                       : found.result.rows.empty() || !found.spectrum
-                           ? std::vector<estimator::DwellRow>(found.result.rows)
-                           : std::vector<estimator::DwellRow>(found.spectrum->table.rows().begin(),
-                                                              found.spectrum->table.rows().end());
-    if (rows.empty())
+    Identified found = identify_recording(recording, config, request);
+    std::erase_if(found.held_out, [&](const HeldOut& one) { return !under(profile, one); });
+    if (found.held_out.empty())
         throw std::runtime_error(
             recording + ": found no dwell " +
-            (planned ? "of role \"verify\" at the profile's frequency" : "that can be used") +
-            ", expected one");
+            (profile.psd.empty() ? "at the profile's frequency"
+                                 : "under the profile '" + profile.name + "'") +
+            " that can be used, expected one (in a campaign of role \"verify\")");
     Held held;
-    held.rates.resize(static_cast<Index>(rows.size()), 3);
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-        const estimator::DwellRow& row = rows[k];
-        // What happened, not what was asked for.
-        const estimator::LevelTensor& g = row.vibration.gamma;
-        Eigen::Matrix3d moment;
-        moment << g[0], g[3], g[4], g[3], g[1], g[5], g[4], g[5], g[2];
-        moment *= row.vibration.kappa - 1;
-        if (!(row.vibration.kappa > 1))
-            throw std::runtime_error(recording + ": run " + std::to_string(row.run) +
-                                     ", position " + std::to_string(row.position) +
-                                     ": found a dwell at rest, expected dwells under the profile");
-        held.situations.push_back({row.angles, moment, vibration.bands, row.duration_s, true});
-        held.rates.row(static_cast<Index>(k)) = row.rate;
+    const auto count = static_cast<Index>(found.held_out.size());
+    held.rates.resize(count, 3);
+    for (Index k = 0; k < count; ++k) {
+        const estimator::DwellRow& row = found.held_out[static_cast<std::size_t>(k)].row;
+        held.situations.push_back(
+            {row.angles, realised_moment(row.vibration), vibration.bands, row.duration_s, true});
+        held.rates.row(k) = row.rate;
         held.variances.push_back(row.variance);
-        held.relative_errors.push_back(0);
+        held.relative_errors.push_back(row.relative_error);
         std::array<double, 3> deg{};
         for (std::size_t i = 0; i < 3; ++i)
             deg[i] = row.angles[static_cast<Index>(i)] * 180 / std::numbers::pi;
@@ -318,7 +311,7 @@ void add_predict(CLI::App& app, int& exit_code) {
                      "mean over so long: what a random vibration's realisation varies is added")
         ->check(proto::finite(proto::kAboveZero, 1e7));
     command->add_option("--verify", options->recording,
-                        "recording of dwells under the profile (sines) that were not in the fit");
+                        "recording of dwells under the profile that were not in the fit");
     command
         ->add_option("--tolerance", options->tolerance,
                      "deg/h that two standard deviations stay below in a tight test "

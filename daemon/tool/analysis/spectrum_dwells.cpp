@@ -6,6 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "daemon/tool/analysis/profile_options.hpp"
+#include "estimator/spectrum/profile.hpp"
+
 namespace vibrig::tool {
 
 namespace {
@@ -13,6 +16,8 @@ namespace {
 using estimator::spectrum::Band;
 using SpectraJson = nlohmann::json;
 
+/// Of the mean square that a controller plays about its profile, 1 sigma.
+constexpr double kControllerGain = 0.01;
 constexpr double kSameFrequency = 0.02;  ///< relative: the rules of the reference frequency
 
 int count_of(const SpectraJson& entry, const char* key, const std::string& place) {
@@ -24,27 +29,84 @@ int count_of(const SpectraJson& entry, const char* key, const std::string& place
     return found->get<int>();
 }
 
-std::vector<std::pair<double, double>> lines_of(const SpectraJson& entry,
-                                                const std::string& place) {
-    const auto found = entry.find("lines");
-    if (found == entry.end() || !found->is_array())
-        throw std::runtime_error(place + "lines: found " +
-                                 (found == entry.end() ? "nothing" : found->dump()) +
-                                 ", expected [[hz, g_peak], ..], empty at rest");
-    std::vector<std::pair<double, double>> lines;
-    for (const SpectraJson& line : *found) {
-        const bool good = line.is_array() && line.size() == 2 && line[0].is_number() &&
-                          line[1].is_number() && line[0].get<double>() > 0 &&
-                          line[1].get<double>() > 0;
+using Pairs = std::vector<std::pair<double, double>>;
+
+Pairs pairs_of(const SpectraJson& list, const std::string& key, const std::string& form) {
+    if (!list.is_array())
+        throw std::runtime_error(key + ": found " + list.dump() + ", expected [" + form + ", ..]");
+    Pairs pairs;
+    for (const SpectraJson& one : list) {
+        const bool good = one.is_array() && one.size() == 2 && one[0].is_number() &&
+                          one[1].is_number() && one[0].get<double>() > 0 &&
+                          one[1].get<double>() > 0;
         if (!good)
-            throw std::runtime_error(place + "lines[" + std::to_string(lines.size()) + "]: found " +
-                                     line.dump() + ", expected [hz, g_peak], both above 0");
-        lines.emplace_back(line[0].get<double>(), line[1].get<double>());
+            throw std::runtime_error(key + "[" + std::to_string(pairs.size()) + "]: found " +
+                                     one.dump() + ", expected " + form + ", both above 0");
+        pairs.emplace_back(one[0].get<double>(), one[1].get<double>());
     }
-    return lines;
+    return pairs;
 }
 
-std::vector<Band> bands_of_lines(const std::vector<std::pair<double, double>>& lines) {
+/// lines, profile or psd: one of them.
+StatedSpectrum stated_of(const SpectraJson& entry, const std::string& place) {
+    StatedSpectrum of;
+    int count = 0;
+    if (const auto found = entry.find("lines"); found != entry.end()) {
+        of.lines = pairs_of(*found, place + "lines", "[hz, g_peak]");
+        ++count;
+    }
+    if (const auto found = entry.find("psd"); found != entry.end()) {
+        of.psd = pairs_of(*found, place + "psd", "[hz, g2_hz]");
+        of.profile = found->dump();
+        ++count;
+    }
+    if (const auto found = entry.find("profile"); found != entry.end()) {
+        of.profile = found->is_string()            ? found->get<std::string>()
+                     : found->is_number_unsigned() ? found->dump()
+                                                   : "";
+        if (of.profile.empty() || of.profile == "0")
+            throw std::runtime_error(place + "profile: found " + found->dump() +
+                                     ", expected a profile's name or number");
+        ++count;
+    }
+    if (count != 1)
+        throw std::runtime_error(place + "lines: found " +
+                                 (count == 0 ? "nothing" : "more beside it") +
+                                 ", expected [[hz, g_peak], ..], empty at rest; or profile or psd");
+    if (const auto found = entry.find("level_db"); found != entry.end()) {
+        if (!found->is_number() || of.profile.empty())
+            throw std::runtime_error(place + "level_db: found " + found->dump() +
+                                     ", expected the level of a profile, dB");
+        of.level_db = found->get<double>();
+    }
+    return of;
+}
+
+/// By its name, or by its number in the controller.
+plan::StatedProfile profile_of(const StatedSpectrum& of, const configuration::Configuration& rig,
+                               const std::string& place) {
+    if (!of.psd.empty()) {
+        plan::StatedProfile stated{{"psd", of.psd, {}, {0, 1, 0}, 0}, "platform"};
+        estimator::spectrum::check(stated.profile, place);
+        return stated;
+    }
+    for (const auto& one : rig.profiles) {
+        if (one.profile.name == of.profile ||
+            (one.number > 0 && std::to_string(one.number) == of.profile))
+            return {one.profile, one.at_table ? "table" : "platform"};
+    }
+    for (const auto& one : estimator::spectrum::built_in_profiles()) {
+        if (one.name == of.profile) return {one, "platform"};
+    }
+    std::string known;
+    for (const auto& one : rig.profiles) known += one.profile.name + ", ";
+    throw std::runtime_error(place + "profile: found '" + of.profile +
+                             "', expected the name or number of a [[profile]] of the "
+                             "configuration: one of " +
+                             known + "minimum-integrity, truck");
+}
+
+std::vector<Band> bands_of_lines(const Pairs& lines) {
     double all = 0;
     for (const auto& [hz, peak] : lines) all += peak * peak;
     std::vector<Band> bands;
@@ -67,15 +129,17 @@ Spectra read_spectra(const std::string& path) {
     if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
     const SpectraJson root = SpectraJson::parse(file, nullptr, false);
     if (!root.is_array())
-        throw std::runtime_error(path + ": expected a JSON list of {run, position, lines}");
+        throw std::runtime_error(
+            path + ": expected a JSON list of {run, position, lines | profile | psd}");
     Spectra spectra;
     for (std::size_t i = 0; i < root.size(); ++i) {
         const std::string place = path + ": [" + std::to_string(i) + "].";
         if (!root[i].is_object())
             throw std::runtime_error(path + ": [" + std::to_string(i) + "]: found " +
-                                     root[i].dump() + ", expected {run, position, lines}");
+                                     root[i].dump() +
+                                     ", expected {run, position, lines | profile | psd}");
         const std::pair key{count_of(root[i], "run", place), count_of(root[i], "position", place)};
-        if (!spectra.emplace(key, lines_of(root[i], place)).second)
+        if (!spectra.emplace(key, stated_of(root[i], place)).second)
             throw std::runtime_error(place + "run: found run " + std::to_string(key.first) +
                                      ", position " + std::to_string(key.second) +
                                      " twice, expected once");
@@ -83,37 +147,77 @@ Spectra read_spectra(const std::string& path) {
     return spectra;
 }
 
-void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows, const std::string& file) {
+void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows,
+                     const std::vector<std::string>& profiles, const std::string& file) {
     const proto::RecordingRow& first = *rows.front();
+    const auto line = [&](const proto::RecordingRow& row) {
+        return file + ":" + std::to_string(row.line) + ": ";
+    };
     for (const auto* row : rows) {
         if (row->frequency_hz != first.frequency_hz)
-            throw std::runtime_error(
-                file + ":" + std::to_string(row->line) + ": column frequency_hz: found " +
-                std::to_string(row->frequency_hz) + " after " + std::to_string(first.frequency_hz) +
-                ", expected one frequency in a dwell");
+            throw std::runtime_error(line(*row) + "column frequency_hz: found " +
+                                     std::to_string(row->frequency_hz) + " after " +
+                                     std::to_string(first.frequency_hz) +
+                                     ", expected one frequency in a dwell: a sweep is not read");
+        if (row->profile != first.profile || row->level_db != first.level_db)
+            throw std::runtime_error(line(*row) +
+                                     "column profile: found another profile or level than in the "
+                                     "row before, expected one in a dwell");
     }
     const auto found = spectra_.find({first.run, first.position});
     std::vector<Band> bands;
     if (found != spectra_.end()) {
-        bands = bands_of_lines(found->second);
+        if (!found->second.profile.empty()) return add_random(found->second, line(first));
+        bands = bands_of_lines(found->second.lines);
+    } else if (first.profile > 0) {
+        if (first.frequency_hz > 0)
+            throw std::runtime_error(line(first) + "column frequency_hz: found " +
+                                     std::to_string(first.frequency_hz) + " with profile '" +
+                                     profiles.at(first.profile - 1U) +
+                                     "', expected 0 under random vibration");
+        return add_random({{}, profiles.at(first.profile - 1U), {}, first.level_db},
+                          line(first) + "column ");
     } else if (!spectra_.empty() && first.frequency_hz < 0) {
-        throw std::runtime_error(file + ":" + std::to_string(first.line) + ": run " +
-                                 std::to_string(first.run) + ", position " +
+        throw std::runtime_error(line(first) + "run " + std::to_string(first.run) + ", position " +
                                  std::to_string(first.position) +
                                  ": found no spectrum in --spectra, expected one for every dwell");
     } else if (const double hz = first.frequency_hz < 0 ? configured_hz_ : first.frequency_hz;
                hz > 0) {
         bands = {{hz, 1, 0}};
     }
+    random_.emplace_back();
     if (bands.empty())
         of_dwell_.emplace_back();
     else
         of_dwell_.emplace_back(kind_of(std::move(bands)));
 }
 
+/// A profile is a kind by its name, whatever the levels at which it is played.
+void DwellKinds::add_random(const StatedSpectrum& of, const std::string& place) {
+    const plan::StatedProfile stated = profile_of(of, rig_, place);
+    const estimator::spectrum::Profile& profile = stated.profile;
+    if (std::abs(std::abs(profile.direction[1]) - 1) > 1e-6)
+        throw std::runtime_error(place + "profile: found '" + profile.name +
+                                 "', which is not along the vertical, expected what a shaker "
+                                 "under the platform plays");
+    if (!profile.sines.empty())
+        throw std::runtime_error(place + "profile: found '" + profile.name +
+                                 "' with sines, expected a psd alone");
+    AtPlatform there = at_platform(profile, stated.at, rig_);
+    random_.push_back({there.moment(1, 1) * std::pow(10, of.level_db / 10),
+                       estimator::spectrum::bandwidth_hz(there.bands), kControllerGain,
+                       profile.psd.back().first});
+    const std::string name = of.psd.empty() ? profile.name : of.profile;
+    for (std::size_t k = 0; k < kinds_.size(); ++k) {
+        if (kinds_[k].profile == name) return of_dwell_.push_back(k);
+    }
+    kinds_.push_back({name, std::move(there.bands)});
+    of_dwell_.emplace_back(kinds_.size() - 1);
+}
+
 std::size_t DwellKinds::kind_of(std::vector<Band> bands) {
     for (std::size_t k = 0; k < kinds_.size(); ++k) {
-        if (alike(kinds_[k].bands, bands)) return k;
+        if (kinds_[k].profile.empty() && alike(kinds_[k].bands, bands)) return k;
     }
     kinds_.push_back({"", std::move(bands)});
     return kinds_.size() - 1;
@@ -123,6 +227,7 @@ std::optional<std::size_t> DwellKinds::reference() const {
     std::optional<std::size_t> most;
     long largest = 0;
     for (std::size_t k = 0; k < kinds_.size(); ++k) {
+        if (!kinds_[k].profile.empty()) continue;
         if (std::abs(kinds_[k].hz() / configured_hz_ - 1) < kSameFrequency) return k;
         const auto count = std::count(of_dwell_.begin(), of_dwell_.end(), std::optional(k));
         if (count <= largest) continue;

@@ -6,40 +6,60 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/configuration/configuration.hpp"
+#include "estimator/filter/measurement.hpp"
 #include "estimator/spectrum/table.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
 
-/// Lines of a vibration for runs and positions: Hz and g peak.
-using Spectra = std::map<std::pair<int, int>, std::vector<std::pair<double, double>>>;
-/// Reads `--spectra`: a JSON list of {"run", "position", "lines": [[hz, g_peak], ..]}; no lines:
-/// rest. Throws with place, value and what was expected.
+/// What a dwell shook with, as a file says it: lines (none: rest), or a profile.
+struct StatedSpectrum {
+    std::vector<std::pair<double, double>> lines;  ///< Hz and g peak
+    std::string profile;                           ///< a name or a number; empty: lines
+    std::vector<std::pair<double, double>> psd;    ///< of the profile, where it is stated here
+    double level_db = 0;                           ///< about the profile
+};
+/// For runs and positions.
+using Spectra = std::map<std::pair<int, int>, StatedSpectrum>;
+/// Reads `--spectra`: a JSON list of {"run", "position"} and "lines": [[hz, g_peak], ..] (none:
+/// rest), or "profile": NAME|NUMBER or "psd": [[hz, g2_hz], ..] at the platform, with "level_db".
+/// Throws with place, value and what was expected.
 [[nodiscard]] Spectra read_spectra(const std::string& path);
 
 /// What the dwells of a recording shook with, dwell by dwell.
 class DwellKinds {
   public:
-    DwellKinds(double configured_hz, const Spectra& spectra)
-        : configured_hz_(configured_hz), spectra_(spectra) {}
+    /// `rig`: its profiles and what stands between table and platform; it has to outlive this.
+    DwellKinds(const configuration::Configuration& rig, const Spectra& spectra)
+        : configured_hz_(rig.estimator.frequency_hz), rig_(rig), spectra_(spectra) {}
 
-    /// The next dwell, its rows not empty. Throws where the frequency changes within it.
-    void add(const std::vector<const proto::RecordingRow*>& rows, const std::string& file);
+    /// The next dwell, its rows not empty; `profiles`: those that the rows name. Throws where the
+    /// frequency or the profile changes within it, and where a profile is not known.
+    void add(const std::vector<const proto::RecordingRow*>& rows,
+             const std::vector<std::string>& profiles, const std::string& file);
     [[nodiscard]] const std::vector<estimator::spectrum::Kind>& kinds() const { return kinds_; }
     /// None: at rest, by what the recording says.
     [[nodiscard]] const std::optional<std::size_t>& of(std::size_t dwell) const {
         return of_dwell_[dwell];
     }
-    /// The kind at the configured frequency, or else the most frequent one; none: nothing shakes.
+    /// Of a dwell under random vibration its profile at the platform.
+    [[nodiscard]] const estimator::RandomVibration& random(std::size_t dwell) const {
+        return random_[dwell];
+    }
+    /// The sine at the configured frequency, or else the most frequent one; none: there is no sine.
     [[nodiscard]] std::optional<std::size_t> reference() const;
 
   private:
     [[nodiscard]] std::size_t kind_of(std::vector<estimator::spectrum::Band> bands);
+    void add_random(const StatedSpectrum& of, const std::string& place);
 
     double configured_hz_;
+    const configuration::Configuration& rig_;
     const Spectra& spectra_;
     std::vector<estimator::spectrum::Kind> kinds_;
     std::vector<std::optional<std::size_t>> of_dwell_;
+    std::vector<estimator::RandomVibration> random_;
 };
 
 }  // namespace vibrig::tool

@@ -11,6 +11,12 @@
 
 namespace vibrig::tool {
 
+/// A dwell that a result is tried on, and the name of the profile that shook it; none: a sine.
+struct HeldOut {
+    estimator::DwellRow row;
+    std::string profile;
+};
+
 /// What a recording gives: coefficients, and what can be believed of them.
 struct Identified {
     estimator::Settings settings;
@@ -19,7 +25,8 @@ struct Identified {
     bool simulated = false;                  ///< the rig was a program
     std::optional<dwells::Live> live;        ///< of a campaign that was identified anew at its end
     std::optional<SpectrumResult> spectrum;  ///< of rows enough, and of a campaign frequencies
-    std::vector<estimator::DwellRow> held_out;  ///< of a campaign: planned for verification
+    /// Of a campaign planned for verification; all of a recording that is held out as a whole.
+    std::vector<HeldOut> held_out;
 };
 
 /// How a recording's frequencies are to be taken.

@@ -59,6 +59,34 @@ class Recording : public testing::Test {
     std::filesystem::path folder_;
 };
 
+TEST_F(Recording, ProfilesOfRandomDwellsByNameOrNumber) {
+    std::string header = kHeader;
+    header.back() = ',';
+    header += "profile,level_db\n";
+    const std::string text = header +
+                             "0,1,1,0,0,0,0,1,0,road,-3.5\n"
+                             "0,1,2,0,0,0,0,1,0,0,\n"
+                             "0,1,3,0,0,0,0,1,0,,\n"
+                             "0,1,4,0,0,0,0,1,0,7,0\n"
+                             "0,1,5,0,0,0,0,1,0,\"road\",0\n";
+    RecordingReader reader(write(text));
+    EXPECT_TRUE(reader.has_profile());
+    EXPECT_FALSE(reader.has_frequency());
+    std::vector<RecordingRow> rows;
+    for (RecordingRow row; reader.next(row);) rows.push_back(row);
+    ASSERT_EQ(rows.size(), 5U);
+    EXPECT_EQ(reader.profiles(), (std::vector<std::string>{"road", "7"}));
+    std::vector<int> places;
+    for (const auto& row : rows) places.push_back(row.profile);
+    EXPECT_EQ(places, (std::vector{1, 0, 0, 2, 1}));
+    EXPECT_EQ(rows[0].level_db, -3.5);
+    EXPECT_EQ(rows[1].level_db, 0);
+    EXPECT_FALSE(
+        RecordingReader(write(std::string(kHeader) + "0,1,1,0,0,0,0,1,0\n")).has_profile());
+    EXPECT_EQ(error(header + "0,1,1,0,0,0,0,1,0,road,loud\n"),
+              ":2: column level_db: found 'loud', expected a finite number");
+}
+
 TEST_F(Recording, GivesRowsInOrderWithTheirLines) {
     const auto rows =
         read(std::string(kHeader) + "0.025,1,2,10,20,30,0.1,-1,2e-3\n\n0.05,1,2,1,2,3,4,5,6");

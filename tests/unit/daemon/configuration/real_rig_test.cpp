@@ -24,7 +24,7 @@ watchdog_timeout = { address = 107, type = "u16", scale = 1e-3 }
 state = { address = 100, type = "u16", table = "input" }
 fault = { address = 101, type = "u16", table = "input" }
 emergency_stop = { address = 102, type = "bits", table = "input", mask = 1 }
-measured_amplitude = { address = 103, type = "f32", word_order = "little", table = "input" }
+measured_amplitude = { address = 103, type = "f32", word_order = "little", table = "input", scale = 1 }
 )";
 
 /// As complaint(), on the real clock.
@@ -68,6 +68,9 @@ TEST(RealRig, NoRegisterHasADefault) {
                   "shaker.registers.ramp_time.scale"},
              Case{"word_order = \"big\", scale = 1e-4", "scale = 1e-4",
                   "shaker.registers.amplitude.word_order"},
+             // A float in g that is taken for 1e-4 g would be at rest at 5 g.
+             Case{"\"input\", scale = 1 ", "\"input\" ",
+                  "shaker.registers.measured_amplitude.scale"},
              Case{", mask = 1", "", "shaker.registers.emergency_stop.mask"},
              Case{"word_order = \"little\", ", "", "shaker.registers.measured_amplitude.word_or"},
              Case{"101, type = \"u16\", table = \"input\"", "101, type = \"u16\"",

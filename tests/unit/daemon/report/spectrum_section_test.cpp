@@ -1,0 +1,89 @@
+#include "daemon/report/spectrum_section.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace vibrig::report {
+namespace {
+
+using ::testing::HasSubstr;
+using SectionJson = nlohmann::json;
+
+/// A result of two frequencies in which each number is its place: 18 by gyro and term of a
+/// frequency, 16 of a hypothesis.
+SectionJson result() {
+    SectionJson coefficients, sigma, x, p;
+    for (int i = 0; i < 18; ++i) {
+        coefficients.push_back(0.001 * i);
+        sigma.push_back(0.0001);
+    }
+    for (int i = 0; i < 16; ++i) {
+        x.push_back(0.01 * i);
+        p.push_back(SectionJson::array());
+        for (int k = 0; k < 16; ++k) p.back().push_back(i == k ? 1e-6 : 0);
+    }
+    const SectionJson hypothesis{{"w", 1}, {"hz", 60}, {"damping", 0.05}, {"x", x}, {"p", p}};
+    const SectionJson told{{"hz", 60},
+                           {"hz_interval", {59, 61}},
+                           {"damping", 0.05},
+                           {"damping_interval", {0.04, 0.06}}};
+    SectionJson frequencies;
+    for (const int hz : {15, 85})
+        frequencies.push_back(
+            {{"hz", hz}, {"dwells", 7}, {"coefficients", coefficients}, {"sigma", sigma}});
+    SectionJson mixture = SectionJson::array();
+    for (int j = 0; j < 3; ++j) mixture.push_back(SectionJson::array({hypothesis}));
+    return {{"spectrum",
+             {{"model", "resonance"},
+              {"frequencies", frequencies},
+              {"flat", {{"chi_square", 100}, {"dof", 18}, {"p", 0.0}}},
+              {"log_odds", {5, 5, 5}},
+              {"resonance", {told, told, told}},
+              {"mixture", mixture},
+              {"highest_hz", 85},
+              {"not_told", {"the first thing", "the second thing"}}}}};
+}
+
+std::string page_of(const SectionJson& root) {
+    record::Campaign campaign;
+    campaign.result_json = root.dump();
+    Page page;
+    add_spectrum(page, campaign);
+    return page.html("test");
+}
+
+TEST(SpectrumSection, EachCoefficientHasItsOwnNumbers) {
+    const std::string html = page_of(result());
+    // The filter's order: II SS OO IS IO OS.
+    for (const auto& [name, value] : {std::pair{"D_IIx", "0.00000"},
+                                      {"D_SSx", "0.00100"},
+                                      {"D_OOx", "0.00200"},
+                                      {"D_ISx", "0.00300"},
+                                      {"D_IOx", "0.00400"},
+                                      {"D_OSy", "0.01100"}}) {
+        const auto row = html.find(std::string(">") + name + "<");
+        ASSERT_NE(row, std::string::npos) << name;
+        const auto cell = html.find(" ± ", row);
+        EXPECT_EQ(html.substr(cell - 7, 7), value) << name;
+    }
+}
+
+TEST(SpectrumSection, ChartsOfEachCoefficientAndWhatIsNotTold) {
+    const std::string html = page_of(result());
+    std::size_t charts = 0;
+    for (auto at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1))
+        ++charts;
+    EXPECT_EQ(charts, 18U);
+    EXPECT_THAT(html, HasSubstr("D_OOz over frequency"));
+    EXPECT_THAT(html, HasSubstr("the first thing. the second thing."));
+    SectionJson groups = result();
+    groups["spectrum"]["model"] = "groups";
+    EXPECT_EQ(page_of(groups).find("<svg"), std::string::npos) << "between them nothing is known";
+}
+
+}  // namespace
+}  // namespace vibrig::report
