@@ -71,7 +71,7 @@ void add_gains(Reproduction& table) {
 
 void add_settling(Reproduction& table) {
     const double x = settling_product(0.005, kDamping);
-    table.rows.push_back({"sigma t for 10 min", "525 (decimal point lost)",
+    table.rows.push_back({"sigma t for 10 min (in print its decimal point is lost)", "525",
                           text("%.2f, sigma %.5f", x, x / 600), text("%.0f", 100 * x) == "525"});
     const double fall = 100 * (1 - std::abs(initial_response(5.25, kDamping)));
     table.rows.push_back(

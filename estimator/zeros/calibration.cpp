@@ -20,12 +20,8 @@ constexpr double kSlowest_deg_s = 0.1;  // below it the read-out's noise hides t
 constexpr double kLargestZero_mg = 10;
 constexpr std::size_t kBlock = 60;
 constexpr double kLargestGain = 0.02;  // of a gyro; beyond it is another fault
-/// Inside, axes are in the order level, level, upright: that of the platform, begun after the
-/// upright axis.
-std::size_t platform_axis(int upright, std::size_t place) {
-    return (static_cast<std::size_t>(upright) + 1 + place) % 3;
-}
 
+/// Inside, axes are in the order level, level, upright.
 Triple in_order(int upright, const Triple& platform) {
     Triple turned{};
     for (std::size_t i = 0; i < 3; ++i) turned[i] = platform[platform_axis(upright, i)];
@@ -418,6 +414,30 @@ struct Calibration::Impl {
                  v.mean_nis, v.low, v.high, v.outside, v.blocks, row.c_str()));
     }
 
+    /// What the filter knows, before what cannot be told apart is added.
+    [[nodiscard]] Joint joint() const {
+        Eigen::Matrix<double, Joint::kSize, 1> unit;
+        std::array<Eigen::Index, Joint::kSize> state{};
+        Joint r;
+        for (std::size_t k = 0; k < Joint::kSize; ++k) {
+            const auto i = static_cast<Eigen::Index>(k);
+            const bool zero = k < 3;
+            state[k] = zero ? kAccelerometer + i : kCross + i - 3;
+            unit[i] = zero ? to_mg() : 1e3;  // inside m/s^2, and 1 of 1 g
+            r.prior[k] = zero ? settings.initial.zero_mg
+                              : 1e3 * cross_prior(settings, (k - 3) / 2, (k - 3) % 2);
+            r.value[k] =
+                unit[i] * (zero ? filter->zero()[i] : filter->cross()((i - 3) / 2, (i - 3) % 2));
+        }
+        for (std::size_t i = 0; i < Joint::kSize; ++i) {
+            for (std::size_t j = 0; j < Joint::kSize; ++j)
+                r.covariance[i][j] = filter->covariance()(state[i], state[j]) *
+                                     unit[static_cast<Eigen::Index>(i)] *
+                                     unit[static_cast<Eigen::Index>(j)];
+        }
+        return r;
+    }
+
     [[nodiscard]] CalibrationResult result() const {
         CalibrationResult r;
         r.innovation = innovation;
@@ -430,23 +450,19 @@ struct Calibration::Impl {
         const Triple share_mg{1e3 * noise.misalignment, 1e3 * noise.misalignment,
                               1e3 * noise.scale_factor};
         if (filter) {
+            r.joint = joint();
             for (std::size_t i = 0; i < 3; ++i) {
                 const auto k = static_cast<Eigen::Index>(i);
-                for (std::size_t j = 0; j < 3; ++j) {
-                    r.covariance_mg2[i][j] =
-                        filter->covariance()(kAccelerometer + k,
-                                             kAccelerometer + static_cast<Eigen::Index>(j)) *
-                        to_mg() * to_mg();
-                }
                 AxisResult& axis = r.axis[i];
-                axis.zero_mg = filter->zero()[k] * to_mg();
-                axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                axis.zero_mg = r.joint.value[i];
                 if (!told_apart[i]) {
                     // Not told from tilt: as unsure as before, and by what the filter makes of it.
-                    r.covariance_mg2[i][i] = settings.initial.zero_mg * settings.initial.zero_mg +
-                                             axis.zero_mg * axis.zero_mg;
-                    axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
+                    r.joint.covariance[i][i] = settings.initial.zero_mg * settings.initial.zero_mg +
+                                               axis.zero_mg * axis.zero_mg;
                 }
+                for (std::size_t j = 0; j < 3; ++j)
+                    r.covariance_mg2[i][j] = r.joint.covariance[i][j];
+                axis.filter_sigma_mg = std::sqrt(r.covariance_mg2[i][i]);
                 r.filter_covariance_mg2[i] = r.covariance_mg2[i];
                 // Each accelerometer shows what it sees of 1 g along the axis of the slews too.
                 r.covariance_mg2[i][i] += share_mg[i] * share_mg[i];

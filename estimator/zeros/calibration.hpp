@@ -26,8 +26,8 @@ struct Noise {
     double gyro_drift = 0;               ///< of the biases, deg/h per sqrt(h)
     double accelerometer_drift = 0;      ///< of the zeros, mg per sqrt(h)
     double scale_factor = 100 * kMicro;  ///< of the vertical accelerometer, not known better
-    /// Of the horizontal accelerometers towards the axis of the slews as the gyros see it, rad, not
-    /// known better: 1 g of it is in x and y as long as z has been up only.
+    /// Of an accelerometer towards another axis as the gyros see it, rad, not known better: 1 g of
+    /// it is in x and y as long as z has been up only, and a unit off level has its share of it.
     double misalignment = kDeclaredCross;
 };
 
@@ -36,7 +36,7 @@ struct Initial {
     double tilt_deg = 1, azimuth_deg = 1;
     double velocity_mps = 0.1, position_m = 1;
     double gyro_bias_deg_h = 0.2, zero_mg = 5;
-    double cross = 1e-3;  ///< of what an accelerometer shows of x and y, its gain included, 1
+    double gain = 1e-3;  ///< of the level accelerometers, 1
 };
 
 struct CalibrationSettings {
@@ -79,6 +79,21 @@ struct InnovationStatistic {
     Triple velocity_ratio{}, position_ratio{};  ///< of squares to expected squares, last block
 };
 
+/// What the filter knows at its end, in the order level, level, upright of `platform_axis`, all in
+/// mg: three zeros, then of each accelerometer what it shows of 1 g along either level axis.
+struct Joint {
+    static constexpr std::size_t kSize = 9;
+    std::array<double, kSize> value{};
+    std::array<std::array<double, kSize>, kSize> covariance{};
+    std::array<double, kSize> prior{};  ///< 1 sigma before the run
+};
+
+/// Platform axis at a place of the order level, level, upright: that of the platform, begun after
+/// the upright axis.
+[[nodiscard]] constexpr std::size_t platform_axis(int upright, std::size_t place) {
+    return (static_cast<std::size_t>(upright) + 1 + place) % 3;
+}
+
 struct CalibrationResult {
     int upright = 2;        ///< as in the settings
     bool inverted = false;  ///< as in the settings
@@ -87,6 +102,7 @@ struct CalibrationResult {
     Triple gyro_sigma_deg_h{};
     std::array<Triple, 3> covariance_mg2{};         ///< of the zeros, with what is not told apart
     std::array<Triple, 3> filter_covariance_mg2{};  ///< without
+    Joint joint;
     /// Of the vertical gyro against the azimuth read-out, 1; none without a read-out.
     std::optional<double> gyro_gain;
     InnovationStatistic innovation;

@@ -18,7 +18,9 @@ struct ZerosApart {
 
 /// Least squares over the runs: with axis k up accelerometer i shows b_i + m_ik g, with it down
 /// b_i - m_ik g. An axis taken both ways needs nothing else; of one taken one way only, m_ik is
-/// known as declared (Noise::misalignment, scale_factor).
+/// known as declared (Noise::misalignment, scale_factor). What is shown of the level axes, which a
+/// unit off level has in its zeros, is one unknown in all runs, known as declared, or, where the
+/// misalignments that are found are larger than declared, as large as those.
 [[nodiscard]] ZerosApart together(const std::vector<CalibrationResult>& runs);
 
 }  // namespace vibrig::estimator::zeros

@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace vibrig::estimator::zeros {
@@ -11,6 +12,7 @@ namespace {
 /// The attitude of the error model may turn by so little (0.5 deg at 5 deg/s) before its matrix is
 /// taken anew.
 constexpr double kPart_s = 0.1;
+constexpr double kExact = 1e-9;  ///< of a misalignment that is declared to be none, rad
 
 Eigen::Matrix3d level_attitude(double azimuth, bool inverted) {
     Eigen::Matrix3d c;
@@ -23,6 +25,10 @@ Eigen::Matrix3d level_attitude(double azimuth, bool inverted) {
 }
 
 }  // namespace
+
+double cross_prior(const CalibrationSettings& settings, std::size_t of, std::size_t axis) noexcept {
+    return of == axis ? settings.initial.gain : std::max(settings.noise.misalignment, kExact);
+}
 
 ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
     : settings_(settings),
@@ -38,7 +44,9 @@ ZeroFilter::ZeroFilter(const CalibrationSettings& settings, double azimuth_rad)
         Eigen::Vector3d::Constant(start.velocity_mps), metre, metre / std::cos(site.latitude_rad),
         start.position_m, Eigen::Vector3d::Constant(start.gyro_bias_deg_h * kDegPerHour),
         Eigen::Vector3d::Constant(start.zero_mg * 1e-3 * site.gravity_mps2),
-        Eigen::Vector4d::Constant(start.cross), Eigen::Vector2d::Constant(kCrossOfZ);
+        Eigen::Matrix<double, 6, 1>::Zero();
+    for (std::size_t k = 0; k < 6; ++k)
+        sigma[kCross + static_cast<Eigen::Index>(k)] = cross_prior(settings, k / 2, k % 2);
     p_ = sigma.cwiseAbs2().asDiagonal();
 }
 

@@ -5,11 +5,13 @@
 
 namespace vibrig::estimator::zeros {
 
-/// Besides the 15 states: what each accelerometer shows of x and y besides its own axis, gains
-/// included. A unit that is not level has some of them in its zeros.
+/// Besides the 15 states: what each accelerometer shows of the two level axes besides itself. A
+/// unit that is not level has some of it in its zeros.
 inline constexpr int kCross = kStates, kFilterStates = kStates + 6;
-/// 1 sigma of what z shows of x and y: there is no gain in it as in theirs (Initial::cross).
-inline constexpr double kCrossOfZ = 5e-4;
+/// 1 sigma of what accelerometer `of` shows of level axis `axis`: its gain or a misalignment. None
+/// that is declared is taken for next to none, so that the covariance has an inverse.
+[[nodiscard]] double cross_prior(const CalibrationSettings& settings, std::size_t of,
+                                 std::size_t axis) noexcept;
 using FilterMatrix = Eigen::Matrix<double, kFilterStates, kFilterStates>;
 using FilterVector = Eigen::Matrix<double, kFilterStates, 1>;
 
@@ -34,6 +36,7 @@ class ZeroFilter {
 
     [[nodiscard]] const Eigen::Vector3d& gyro_bias() const noexcept { return gyro_bias_; }
     [[nodiscard]] const Eigen::Vector3d& zero() const noexcept { return zero_; }
+    [[nodiscard]] const Eigen::Matrix<double, 3, 2>& cross() const noexcept { return cross_; }
     [[nodiscard]] const FilterMatrix& covariance() const noexcept { return p_; }
 
   private:

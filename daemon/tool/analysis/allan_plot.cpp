@@ -95,7 +95,7 @@ plot::Chart deviation_chart(const AllanAnalysis& analysis) {
     const std::string name = upper(allan::name_of(analysis.request.statistic));
     plot::Chart chart;
     chart.title = name + " of " + std::filesystem::path(analysis.request.file).filename().string() +
-                  (analysis.column == "1" ? "" : ", " + analysis.column);
+                  (analysis.column.empty() || analysis.column == "1" ? "" : ", " + analysis.column);
     chart.x = plot::Axis("averaging time tau [s]", true);
     chart.y = plot::Axis(name + " [" + unit_of(analysis) + "]", true);
     plot::Curve measured{name, {}, {}, {}, {}, plot::Look::dots};
