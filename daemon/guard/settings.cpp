@@ -41,7 +41,8 @@ void insist_on_registers(Keys& keys, bool rig_time) {
     for (const char* key :
          {"shaker.registers.run.address", "shaker.registers.run.type",
           "shaker.registers.measured_amplitude.address", "shaker.registers.measured_amplitude.type",
-          "shaker.registers.ramp_time.address", "shaker.registers.ramp_time.type"})
+          "shaker.registers.measured_amplitude.scale", "shaker.registers.ramp_time.address",
+          "shaker.registers.ramp_time.type", "shaker.registers.ramp_time.scale"})
         if (!keys.stated(key))
             keys.refuse(key, "nothing",
                         "it stated: Vibrig's own map is for the simulated rig only");
@@ -87,7 +88,7 @@ void read_witness(Keys& keys, WitnessSettings& w) {
     };
     w.dbc = keys.text("can.dbc", w.dbc);
     keep_place("can.dbc");
-    w.sample_rate_hz = keys.number("can.sample_rate_hz", w.sample_rate_hz, 1, 1000);
+    w.sample_rate_hz = keys.number("can.sample_rate_hz", w.sample_rate_hz, 1, 10'000);
     constexpr std::array<const char*, 3> kAxes{"accel_x", "accel_y", "accel_z"};
     for (std::size_t i = 0; i < 3; ++i) {
         const std::string key = std::string("can.signals.") + kAxes[i];

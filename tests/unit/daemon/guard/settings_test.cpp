@@ -131,9 +131,20 @@ TEST(GuardSettings, NeverWritesItsOwnMapToAForeignController) {
         << said;
     const std::string half = "[shaker.registers]\nrun = { address = 30, type = \"u16\" }\n";
     EXPECT_NE(refusal(real + half).find("measured_amplitude.address"), std::string::npos);
-    const std::string more = half + "measured_amplitude = { address = 40, type = \"u16\" }\n";
+    const std::string unscaled = half + "measured_amplitude = { address = 40, type = \"f32\" }\n";
+    EXPECT_NE(refusal(real + unscaled).find("measured_amplitude.scale"), std::string::npos);
+    const std::string more =
+        half + "measured_amplitude = { address = 40, type = \"u16\", scale = 1e-4 }\n";
     EXPECT_NE(refusal(real + more).find("ramp_time.address"), std::string::npos);
-    EXPECT_EQ(refusal(real + more + "ramp_time = { address = 31, type = \"u16\" }\n"), "taken");
+    const std::string ramp = more + "ramp_time = { address = 31, type = \"u16\"";
+    EXPECT_NE(refusal(real + ramp + " }\n").find("ramp_time.scale"), std::string::npos);
+    EXPECT_EQ(refusal(real + ramp + ", scale = 0.001 }\n"), "taken");
+}
+
+TEST(GuardSettings, TakesEachRateThatVibrigdTakes) {
+    EXPECT_EQ(refusal(kGuard + "[can]\nsample_rate_hz = 10000\n"), "taken");
+    EXPECT_NE(refusal(kGuard + "[can]\nsample_rate_hz = 10001\n").find("can.sample_rate_hz"),
+              std::string::npos);
 }
 
 TEST(GuardSettings, ASerialLineIsRefusedWithTheReason) {
@@ -163,7 +174,7 @@ modbus = { horn_coil = 1, lamp_coil = 1 }
     for (const char* part :
          {"rig.toml:4:8: can.port: found \"ethernet\" (a string), expected \"socketcan\" or "
           "\"seqpacket\"",
-          "rig.toml:5:18: can.sample_rate_hz: found nan, expected a number from 1 to 1000",
+          "rig.toml:5:18: can.sample_rate_hz: found nan, expected a number from 1 to 10000",
           "rig.toml:7:8: shaker.port: found 70000, expected a whole number from 1 to 65535",
           "rig.toml:8:8: shaker.host: found 5, expected a string",
           "rig.toml:10:9: shaker.registers.run.table: found \"input\", expected \"holding\"",
