@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/plot/chart.hpp"
+#include "estimator/zeros/observability.hpp"
+#include "estimator/zeros/simulation.hpp"
+#include "estimator/zeros/together.hpp"
+
+namespace vibrig::tool::zero_command {
+
+namespace zeros = estimator::zeros;
+using Json = nlohmann::ordered_json;
+
+inline constexpr double kDegree = 3.14159265358979323846 / 180;
+inline constexpr double kArcsec = kDegree / 3600;
+inline constexpr std::array kAxisLetters{"x", "y", "z"};
+
+[[nodiscard]] plot::Chart chart_of(const std::vector<zeros::CalibrationTrace>& trace);
+[[nodiscard]] Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& seen);
+[[nodiscard]] std::string result_table(const zeros::CalibrationResult& r,
+                                       const zeros::Observability& seen);
+/// Zeros and misalignments told apart by several calibrations together.
+[[nodiscard]] Json apart_json(const zeros::ZerosApart& apart);
+[[nodiscard]] std::string apart_table(const zeros::ZerosApart& apart);
+
+}  // namespace vibrig::tool::zero_command
