@@ -26,11 +26,16 @@ bool LineReader::fill() {
 }
 
 std::string_view LineReader::take(std::size_t length) {
+    const std::string_view whole(buffer_.data() + begin_, length);
+    const std::size_t carriage = whole.find('\r');
+    if (carriage != std::string_view::npos && carriage + 1 < length)
+        throw std::runtime_error(
+            "found lines that end in a carriage return only, expected LF or CR LF");
     if (length > kMaximumLine) {
         throw std::runtime_error("found a line of more than " + std::to_string(kMaximumLine) +
                                  " bytes, expected a shorter one");
     }
-    std::string_view text(buffer_.data() + begin_, length);
+    std::string_view text = whole;
     if (text.find('\0') != std::string_view::npos) {
         throw std::runtime_error("found a NUL byte, expected text in UTF-8");
     }

@@ -11,6 +11,7 @@
 #include <future>
 
 #include "daemon/app/campaign_forecast.hpp"
+#include "daemon/configuration/warnings.hpp"
 #include "daemon/record/journal_anchors.hpp"
 
 namespace vibrig {
@@ -193,6 +194,8 @@ void Daemon::start_threads() {
         const std::lock_guard lock(parts_.setups_mutex);
         setup = std::move(done);
     };
+    for (const auto& line : configuration::warnings(parts_.loaded))
+        parts_.events.log(Severity::warning, "configuration", line);
     if (parts_.in_real_time() && configuration.lock_memory && !parts_.memory_lock.locked)
         parts_.events.log(Severity::warning, "memory", "not locked: " + parts_.memory_lock.cause);
     control_thread_ = std::thread([this] {

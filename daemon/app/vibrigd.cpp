@@ -13,10 +13,11 @@
 
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/daemon.hpp"
-#include "daemon/app/rig_lock.hpp"
 #include "daemon/app/start_checks.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/configuration/forms.hpp"
+#include "daemon/configuration/warnings.hpp"
+#include "daemon/lock/rig_lock.hpp"
 #include "daemon/log/log_sink.hpp"
 #include "daemon/rt/real_time.hpp"
 #include "daemon/serve/openapi.hpp"
@@ -269,6 +270,9 @@ int main(int argc, char** argv) {
             std::istringstream words(forecast.words);
             for (std::string line; std::getline(words, line);) {
                 std::cout << "# " << line << '\n';
+            }
+            for (const std::string& line : vibrig::configuration::warnings(loaded)) {
+                std::cerr << "warning: " << line << '\n';
             }
             for (const std::string& line : vibrig::check_plan(loaded.configuration)) {
                 std::cerr << "warning: campaign: " << line << '\n';

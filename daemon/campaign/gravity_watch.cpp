@@ -83,38 +83,37 @@ double GravityWatch::worst_deg(const estimator::Settings& rig) const {
     return worst;
 }
 
-std::string GravityWatch::suspects() const {
-    // What turns or swaps axes leaves the size as it is.
-    if (newest_.size_told)
-        return "suspects, by the size of gravity: accelerometer.zero_g; accelerometer.matrix";
-    std::vector<std::pair<double, std::string>> found;
-    const auto consider = [&](double worst, std::string words) {
-        if (worst <= limits_.told_deg) found.emplace_back(worst, std::move(words));
-    };
-    for (std::size_t i = 0; i < 3; ++i) {
-        auto rig = rig_;
-        rig.encoder_sign[i] = -rig.encoder_sign[i];
-        consider(worst_deg(rig),
-                 fmt::format("platform.encoder_sign of the {} gimbal", kGimbals[i]));
-        // Another zero: the best by whole degrees, then finer.
-        rig = rig_;
-        double best = 1e9, zero = 0;
-        for (const double step : {1.0, 0.05}) {
-            const double middle = zero;
-            const int count = step == 1.0 ? 180 : 20;
-            for (int n = -count; n <= count; ++n) {
-                rig.encoder_zero_deg[i] = rig_.encoder_zero_deg[i] + middle + n * step;
-                const double worst = worst_deg(rig);
-                if (worst >= best) continue;
-                best = worst;
-                zero = middle + n * step;
-            }
+void GravityWatch::consider(Suspects& found, double worst, std::string words) const {
+    if (worst <= limits_.told_deg) found.emplace_back(worst, std::move(words));
+}
+
+void GravityWatch::consider_encoder(Suspects& found, std::size_t gimbal) const {
+    auto rig = rig_;
+    rig.encoder_sign[gimbal] = -rig.encoder_sign[gimbal];
+    consider(found, worst_deg(rig),
+             fmt::format("platform.encoder_sign of the {} gimbal", kGimbals[gimbal]));
+    // Another zero: the best by whole degrees, then finer.
+    rig = rig_;
+    double best = 1e9, zero = 0;
+    for (const double step : {1.0, 0.05}) {
+        const double middle = zero;
+        const int count = step == 1.0 ? 180 : 20;
+        for (int n = -count; n <= count; ++n) {
+            rig.encoder_zero_deg[gimbal] = rig_.encoder_zero_deg[gimbal] + middle + n * step;
+            const double worst = worst_deg(rig);
+            if (worst >= best) continue;
+            best = worst;
+            zero = middle + n * step;
         }
-        consider(best, fmt::format(
-                           "platform.encoder_zero_deg of the {} gimbal, {:.2f} instead of {:g}",
-                           kGimbals[i], rig_.encoder_zero_deg[i] + zero, rig_.encoder_zero_deg[i]));
     }
-    // Accelerometers swapped or wired the wrong way round; what the vertical shows of it.
+    const double configured = rig_.encoder_zero_deg[gimbal];
+    consider(found, best,
+             fmt::format("platform.encoder_zero_deg of the {} gimbal, {:.2f} instead of {:g}",
+                         kGimbals[gimbal], configured + zero, configured));
+}
+
+/// Accelerometers swapped or wired the wrong way round; what the vertical shows of it.
+void GravityWatch::consider_accelerometers(Suspects& found) const {
     std::array<std::size_t, 3> order{0, 1, 2};
     do {
         for (int signs = 0; signs < 8; ++signs) {
@@ -130,19 +129,32 @@ std::string GravityWatch::suspects() const {
             for (std::size_t i = 0; i < 3; ++i)
                 words += fmt::format("{} {}{}", i == 0 ? "" : ",",
                                      (signs >> i) % 2 == 0 ? '+' : '-', "xyz"[order[i]]);
-            consider(worst, words);
+            consider(found, worst, words);
         }
     } while (std::ranges::next_permutation(order).found);
+}
+
+void GravityWatch::consider_up(Suspects& found) const {
     for (const int axis : {0, 1, 2}) {
         for (const int sign : {1, -1}) {
             if (axis == rig_.up.axis && sign == rig_.up.sign) continue;
             auto rig = rig_;
             rig.up = {axis, sign};
-            consider(worst_deg(rig),
+            consider(found, worst_deg(rig),
                      fmt::format("platform.up, {}{} instead of {}{}", sign > 0 ? '+' : '-',
                                  "xyz"[axis], rig_.up.sign > 0 ? '+' : '-', "xyz"[rig_.up.axis]));
         }
     }
+}
+
+std::string GravityWatch::suspects() const {
+    // What turns or swaps axes leaves the size as it is.
+    if (newest_.size_told)
+        return "suspects, by the size of gravity: accelerometer.zero_g; accelerometer.matrix";
+    Suspects found;
+    for (std::size_t gimbal = 0; gimbal < 3; ++gimbal) consider_encoder(found, gimbal);
+    consider_accelerometers(found);
+    consider_up(found);
     std::ranges::stable_sort(found, {}, [](const auto& f) { return std::round(f.first * 20); });
     std::string text;
     for (std::size_t n = 0; n < std::min(found.size(), kMostSuspects); ++n)

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/campaign/rig_frame.hpp"
@@ -51,7 +52,14 @@ class GravityWatch {
     struct Look {
         Vector encoder_rad{}, force{};  ///< platform axes
     };
+    /// How far each explanation leaves the worst position from its limits, deg, and its words.
+    using Suspects = std::vector<std::pair<double, std::string>>;
     [[nodiscard]] double worst_deg(const estimator::Settings& rig) const;
+    /// Takes it where it explains all positions.
+    void consider(Suspects& found, double worst, std::string words) const;
+    void consider_encoder(Suspects& found, std::size_t gimbal) const;
+    void consider_accelerometers(Suspects& found) const;
+    void consider_up(Suspects& found) const;
 
     estimator::Settings rig_;
     GravityLimits limits_;

@@ -22,6 +22,20 @@ std::string ranges_of(const std::vector<int>& bytes) {
     return text.empty() ? "-" : text;
 }
 
+double share(std::uint64_t part, std::uint64_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// ", turned 2 (4 %) 3 (98 %)", of bytes that rest otherwise.
+std::string turned_bytes(const BusList::Message& m) {
+    std::string text;
+    for (const auto& flips : m.flips)
+        if (flips.at_rest == 0)
+            text += fmt::format("{} {} ({:.0f} %)", text.empty() ? ", turned" : "", flips.byte,
+                                100 * flips.turned);
+    return text;
+}
+
 std::string name_of(const BusList::Message& m) {
     return m.extended ? fmt::format("{:08x}", m.id) : fmt::format("{:03x}", m.id);
 }
@@ -46,10 +60,10 @@ void BusList::add(std::uint32_t id, bool extended, std::span<const std::uint8_t>
         const double off = step - seen.mean_s;
         seen.mean_s += off / n;
         seen.squares += off * (step - seen.mean_s);
+        ++(turned_ ? seen.turned : seen.rested);
+        auto& changes = turned_ ? seen.turn : seen.rest;
         for (std::size_t i = 0; i < std::min(size, m.shortest); ++i) {
-            const bool changed = data[i] != seen.before[i];
-            auto& changes = turned_ ? seen.turn : seen.rest;
-            changes[i] = changes[i] || changed;
+            if (data[i] != seen.before[i]) ++changes[i];
             if (!turned_)
                 seen.counts[i] =
                     seen.counts[i] && data[i] == static_cast<std::uint8_t>(seen.before[i] + 1);
@@ -72,10 +86,13 @@ std::vector<BusList::Message> BusList::messages() const {
         if (m.frames > 2) m.jitter_ms = 1e3 * std::sqrt(seen.squares / (intervals - 1));
         for (std::size_t i = 0; i < m.shortest; ++i) {
             const int byte = static_cast<int>(i);
-            if (seen.rest[i]) m.at_rest.push_back(byte);
-            if (seen.turn[i] && !seen.rest[i]) m.turned_only.push_back(byte);
+            if (seen.rest[i] > 0) m.at_rest.push_back(byte);
+            if (seen.turn[i] > 0 && seen.rest[i] == 0) m.turned_only.push_back(byte);
+            if (seen.rest[i] > 0 || seen.turn[i] > 0)
+                m.flips.push_back(
+                    {byte, share(seen.rest[i], seen.rested), share(seen.turn[i], seen.turned)});
             // A few frames may count by chance.
-            if (seen.rest[i] && seen.counts[i] && m.frames > 8) m.counters.push_back(byte);
+            if (seen.rest[i] > 0 && seen.counts[i] && m.frames > 8) m.counters.push_back(byte);
         }
         all.push_back(std::move(m));
     }
@@ -88,7 +105,7 @@ std::string table_of(const BusList& bus) {
     for (const auto& m : bus.messages()) {
         std::string bytes = "at rest " + ranges_of(m.at_rest);
         if (!m.counters.empty()) bytes += ", counts " + ranges_of(m.counters);
-        if (!m.turned_only.empty()) bytes += ", turned " + ranges_of(m.turned_only);
+        bytes += turned_bytes(m);
         const std::string size = m.shortest == m.longest
                                      ? fmt::format("{}", m.longest)
                                      : fmt::format("{}-{}", m.shortest, m.longest);
@@ -100,7 +117,10 @@ std::string table_of(const BusList& bus) {
 
 nlohmann::ordered_json json_of(const BusList& bus) {
     nlohmann::ordered_json all = nlohmann::ordered_json::array();
-    for (const auto& m : bus.messages())
+    for (const auto& m : bus.messages()) {
+        nlohmann::ordered_json flips = nlohmann::ordered_json::array();
+        for (const auto& f : m.flips)
+            flips.push_back({{"byte", f.byte}, {"at_rest", f.at_rest}, {"turned", f.turned}});
         all.push_back({{"id", m.id},
                        {"extended", m.extended},
                        {"frames", m.frames},
@@ -109,7 +129,9 @@ nlohmann::ordered_json json_of(const BusList& bus) {
                        {"bytes", {m.shortest, m.longest}},
                        {"at_rest", m.at_rest},
                        {"turned", m.turned_only},
-                       {"counters", m.counters}});
+                       {"counters", m.counters},
+                       {"flips", flips}});
+    }
     return {{"frames", bus.frames()}, {"messages", all}};
 }
 

@@ -36,7 +36,7 @@ bool keeps(const Register& place, const Shown& shown, const std::vector<Register
 
 }  // namespace
 
-std::optional<Shown> shown_value(const std::string& text) {
+std::optional<Shown> shown_number(const std::string& text) {
     double value = 0;
     std::size_t used = 0;
     try {
@@ -44,12 +44,17 @@ std::optional<Shown> shown_value(const std::string& text) {
     } catch (const std::exception&) {
         return std::nullopt;
     }
-    if (used != text.size() || !(value > 0) || !std::isfinite(value) ||
+    if (used != text.size() || !std::isfinite(value) ||
         text.find_first_not_of("0123456789.") != std::string::npos)
         return std::nullopt;
     const auto point = text.find('.');
     const auto digits = point == std::string::npos ? 0 : text.size() - point - 1;
     return Shown{value, 0.5 * std::pow(10.0, -static_cast<double>(digits))};
+}
+
+std::optional<Shown> shown_value(const std::string& text) {
+    const auto shown = shown_number(text);
+    return shown && shown->value > 0 ? shown : std::nullopt;
 }
 
 std::vector<Register> places_of(const Shown& shown, const std::vector<RegisterBlock>& blocks) {

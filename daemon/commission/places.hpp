@@ -20,6 +20,8 @@ struct Shown {
     double value = 0;
     double half_digit = 0;  ///< what the display leaves open
 };
+/// Nothing: no number of digits and a point.
+[[nodiscard]] std::optional<Shown> shown_number(const std::string& text);
 /// Nothing: no positive number.
 [[nodiscard]] std::optional<Shown> shown_value(const std::string& text);
 

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <vector>
 
 #include "daemon/configuration/cross_checks.hpp"
 #include "daemon/configuration/value.hpp"
+#include "daemon/configuration/warnings.hpp"
 #include "estimator/filter/settings_check.hpp"
 
 namespace vibrig::configuration {
@@ -65,11 +67,22 @@ void CrossCheck::registers_stated() {
         for (const auto& [part, needed] : {std::pair{"address", true},
                                            {"type", true},
                                            {"word_order", words},
-                                           {"scale", role.quantity && type != RegisterType::f32},
+                                           {"scale", role.quantity},
                                            {"mask", type == RegisterType::bits},
                                            {"table", !own_table}})
             if (needed && !stated(part)) miss(key + "." + part);
     }
+}
+
+std::vector<std::string> warnings(const Loaded& loaded) {
+    std::vector<std::string> all;
+    for (const auto& doubt : estimator::doubtful_axes(loaded.configuration.estimator)) {
+        const auto key = doubt.key.substr(0, doubt.key.find('['));
+        const auto stated = std::ranges::find(loaded.effective, key, &EffectiveValue::key);
+        all.push_back((stated == loaded.effective.end() ? "" : stated->origin + ": ") + doubt.key +
+                      ": found " + doubt.found + ", expected " + doubt.expected);
+    }
+    return all;
 }
 
 }  // namespace vibrig::configuration

@@ -60,13 +60,13 @@ Database::Database(const std::string& path, Mode mode) : path_(path) {
     database_.reset(opened);
     if (result != SQLITE_OK) fail("open");
     sqlite3_busy_timeout(opened, kBusyTimeout_ms);
+    // What is written is seldom read again, what is read is read once: of 2 MB, the usual, a daemon
+    // would fill each byte in its first night, and each look at the whole journal would take them.
+    execute("PRAGMA cache_size = -256");
     if (mode == Mode::read) return;
     execute("PRAGMA journal_mode = WAL");
     execute("PRAGMA synchronous = FULL");
     execute("PRAGMA foreign_keys = ON");
-    // What is written is seldom read again: of 2 MB, the usual, a daemon would fill each byte in
-    // its first night.
-    execute("PRAGMA cache_size = -256");
 }
 
 Database::~Database() = default;

@@ -91,6 +91,9 @@ void close_part(const std::string& path, const std::string& next);
 [[nodiscard]] std::string identification_sections(const std::string& configuration);
 /// The raw log's files in order, compressed or not.
 [[nodiscard]] std::vector<std::string> raw_files(const std::string& folder);
+/// Names of those in the folder that are not among `logs`, by their numbers.
+[[nodiscard]] std::vector<std::string> left_out(const std::string& folder,
+                                                const std::vector<std::string>& logs);
 /// Of raw-0003.log, compressed or not: 3; 0 for other names.
 [[nodiscard]] int raw_number(const std::string& path);
 /// Logs in the order in which they are read: segments of one folder by their numbers, each once

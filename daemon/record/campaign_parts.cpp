@@ -343,4 +343,13 @@ std::vector<std::string> raw_files(const std::string& folder) {
     return in_order(std::move(files));
 }
 
+std::vector<std::string> left_out(const std::string& folder, const std::vector<std::string>& logs) {
+    std::vector<std::string> names;
+    for (const auto& path : raw_files(folder)) {
+        if (std::ranges::find(logs, raw_number(path), raw_number) == logs.end())
+            names.push_back(fs::path(path).filename().string());
+    }
+    return names;
+}
+
 }  // namespace vibrig::record

@@ -353,13 +353,11 @@ void compare_with_index(const std::string& campaign_folder, const Index::Tell& t
                              path.string(), fs::file_size(path, error), file.bytes));
         }
     }
-    for (const auto& words : missing_raw(campaign_folder, raw_files(campaign_folder), tell))
+    for (const auto& words : missing_raw(campaign_folder, tell))
         tell(campaign_folder + ": missing " + words);
 }
 
-std::vector<std::string> missing_raw(const std::string& campaign_folder,
-                                     const std::vector<std::string>& logs,
-                                     const Index::Tell& tell) {
+std::vector<std::string> missing_raw(const std::string& campaign_folder, const Index::Tell& tell) {
     std::map<int, std::string> expected;
     const auto there = raw_files(campaign_folder);
     for (int n = there.empty() ? 0 : raw_number(there.back()); n > 0; --n)
@@ -369,7 +367,7 @@ std::vector<std::string> missing_raw(const std::string& campaign_folder,
             expected[n] = fmt::format("{}, which the index has with {} frames, SHA-256 {}",
                                       file.name, file.rows, file.sha256);
     }
-    for (const auto& path : logs) expected.erase(raw_number(path));
+    for (const auto& path : there) expected.erase(raw_number(path));
     std::vector<std::string> words;
     for (auto& [number, text] : expected) words.push_back(std::move(text));
     return words;

@@ -85,10 +85,9 @@ class Index {
 /// What the index beside a campaign's folder says of its files: throws if one is not there, tells
 /// if one is not as it was closed. Silent without an index.
 void compare_with_index(const std::string& campaign_folder, const Index::Tell& tell);
-/// In words, the segments of a campaign's raw log that are not among `logs`: by the numbers of
-/// those that are in its folder, and by the index beside it. Empty: all are.
+/// In words, the segments of a campaign's raw log that are not in its folder: by the numbers of
+/// those that are, and by the index beside it. Empty: all are there.
 [[nodiscard]] std::vector<std::string> missing_raw(const std::string& campaign_folder,
-                                                   const std::vector<std::string>& logs,
                                                    const Index::Tell& tell);
 
 }  // namespace vibrig::record

@@ -174,7 +174,7 @@ Recovery recover_folder(const std::string& folder, const Index::Tell& tell) {
         throw std::runtime_error(with_raw_log(error.what(), path));
     }
     recovery.path = path;
-    recovery.missing_raw = missing_raw(folder_of(path), raw_files(folder_of(path)), tell);
+    recovery.missing_raw = missing_raw(folder_of(path), tell);
     return recovery;
 }
 

@@ -115,8 +115,7 @@ void add_files(Page& page, const Campaign& campaign) {
         add(part.path, part.state, fmt::to_string(part.samples));
     for (const auto& path : record::raw_files(campaign.folder)) add(path, "frames", "-");
     page.table(rows, "words hashes");
-    for (const auto& words : record::missing_raw(
-             campaign.folder, record::raw_files(campaign.folder), [](const auto&) {}))
+    for (const auto& words : record::missing_raw(campaign.folder, [](const auto&) {}))
         page.paragraph("Missing: " + words + ".");
 }
 

@@ -1,16 +1,13 @@
 #pragma once
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "estimator/uncertainty/monte_carlo.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::tool {
 
-/// null for what is no number.
-[[nodiscard]] inline nlohmann::ordered_json number_or_null(double value) {
-    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
+using proto::number_or_null;
 
 /// What stands beside a coefficient's value: uncertainties and budget.
 [[nodiscard]] nlohmann::ordered_json coefficient_json(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cstddef>
@@ -45,10 +46,15 @@ class Ring {
         }
         const auto room = static_cast<std::size_t>(capacity - (head - cached_tail_));
         const std::size_t n = records.size() < room ? records.size() : room;
-        for (std::size_t i = 0; i < n; ++i) slots_[(head + i) & mask_] = records[i];
+        // In two runs, to the last slot and from the first: an index masked for each record costs a
+        // batch a quarter of its time.
+        const auto at = static_cast<std::size_t>(head & mask_);
+        const std::size_t first = std::min(n, mask_ + 1 - at);
+        copy(records.data(), first, &slots_[at]);
+        copy(records.data() + first, n - first, slots_.get());
         if (n > 0) {
             if (unreported_ > 0) {
-                slots_[head & mask_].dropped_before += unreported_;
+                slots_[at].dropped_before += unreported_;
                 unreported_ = 0;
             }
             head_.store(head + n, std::memory_order_release);
@@ -83,17 +89,21 @@ class Ring {
     }
 
   private:
+    static void copy(const T* from, std::size_t n, T* to) noexcept {
+        for (std::size_t i = 0; i < n; ++i) to[i] = from[i];
+    }
+
     // Indices grow for ever and are masked on use, so "full" and "empty" differ without a spare
     // slot. Each side has one line, which the other side looks at: besides its index, a copy of the
     // other's index, so that the other's line is read only when the copy says full or empty. A push
-    // that finds room writes nothing there but the index: each write takes the line away from the
-    // side that looks.
+    // writes nothing there but the index, since each write takes the line away from the side that
+    // looks: what counts the lost, at each try while the ring is full, is on a line of its own.
     alignas(64) std::atomic<std::uint64_t> head_{0};
     std::uint64_t cached_tail_ = 0;
-    std::uint32_t unreported_ = 0;
-    std::atomic<std::uint64_t> dropped_{0};
     alignas(64) std::atomic<std::uint64_t> tail_{0};
     std::uint64_t cached_head_ = 0;
+    alignas(64) std::uint32_t unreported_ = 0;
+    std::atomic<std::uint64_t> dropped_{0};
     alignas(64) std::size_t mask_;
     std::unique_ptr<T[]> slots_;
 };

@@ -16,7 +16,8 @@ using Json = nlohmann::json;
 
 namespace {
 
-constexpr auto kYoung = std::chrono::milliseconds(20);  // clients due together share a status
+constexpr auto kYoung = std::chrono::milliseconds(20);    // the same status, whoever asks
+constexpr auto kShared = std::chrono::milliseconds(200);  // among those due together
 constexpr std::size_t kMadeKept = 64;
 constexpr double kDefaultRate_hz = 1;
 
@@ -52,11 +53,16 @@ struct Frame {
     }
 };
 
-const std::string& StreamFeed::newest_text() { return newest()->text; }
-
-std::shared_ptr<const Frame> StreamFeed::newest() {
+const std::string& StreamFeed::newest_text() {
     const auto now = Clock::now();
-    if (newest_ && now - newest_->made < kYoung) return newest_;
+    return newest(now, now)->text;
+}
+
+std::shared_ptr<const Frame> StreamFeed::newest(Clock::time_point now, Clock::time_point since) {
+    if (newest_) {
+        const auto age = now - newest_->made;
+        if (age < kYoung || (newest_->made >= since && age < kShared)) return newest_;
+    }
     auto frame = std::make_shared<Frame>();
     frame->number = ++number_;
     frame->made = now;
@@ -126,10 +132,11 @@ std::shared_ptr<const std::string> StreamClient::next(Clock::time_point now) {
     }
     // On a grid: clients of one rate are due together and share what is made for them. No burst
     // afterwards to make up for what was slow.
-    due_ = Clock::time_point((now.time_since_epoch() / period_ + 1) * period_);
+    const Clock::time_point began(now.time_since_epoch() / period_ * period_);
+    due_ = began + period_;
     events_looked_at_ = false;
     if (!with_status_) return {};
-    const auto frame = feed_.newest();
+    const auto frame = feed_.newest(now, began);
     auto text = feed_.change(sent_, frame);
     sent_ = frame;
     return text;

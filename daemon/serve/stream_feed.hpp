@@ -21,9 +21,12 @@ struct Frame;
 class StreamFeed {
   public:
     explicit StreamFeed(StatusSource& source) : source_(source) {}
-    /// The status now, or of a moment ago.
-    [[nodiscard]] std::shared_ptr<const Frame> newest();
-    /// Its text; one who commands sees what came of it after forget().
+    /// The status at `now`, or of a moment ago, or one made since `since` (the begin of the
+    /// client's period) at most a fifth of a second ago: however many are due together, and however
+    /// long it takes to serve them, one is made for all.
+    [[nodiscard]] std::shared_ptr<const Frame> newest(std::chrono::steady_clock::time_point now,
+                                                      std::chrono::steady_clock::time_point since);
+    /// The text of the status now; one who commands sees what came of it after forget().
     [[nodiscard]] const std::string& newest_text();
     void forget() noexcept { newest_.reset(); }
     [[nodiscard]] StatusSource& source() noexcept { return source_; }

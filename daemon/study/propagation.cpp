@@ -9,10 +9,10 @@
 #include <optional>
 
 #include "daemon/study/campaign_record.hpp"
-#include "daemon/study/json_number.hpp"
 #include "daemon/study/recordings.hpp"
 #include "daemon/study/statistics.hpp"
 #include "estimator/uncertainty/monte_carlo.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::study {
 
@@ -125,25 +125,27 @@ Json PropagationSums::json() const {
         Json one{{"name", estimator::parameter_names()[i]}, {"unit", estimator::parameter_unit(i)}};
         const BlockNumbers& budget = s.first[i];
         if (budget.u > 0) {
-            const auto end = [&](std::size_t k) { return number(budget.value + s.mean(i, k)); };
+            const auto end = [&](std::size_t k) {
+                return proto::number_or_null(budget.value + s.mean(i, k));
+            };
             const double delta = s.delta(i);
             // JCGM 101, 8.1.3
             const double off = std::max(std::abs(-budget.expanded - s.mean(i, 2)),
                                         std::abs(budget.expanded - s.mean(i, 3)));
-            one["value"] = number(budget.value);
+            one["value"] = proto::number_or_null(budget.value);
             one["mean"] = end(0);
-            one["u"] = number(s.mean(i, 1));
+            one["u"] = proto::number_or_null(s.mean(i, 1));
             one["symmetric"] = {end(2), end(3)};
             one["shortest"] = {end(4), end(5)};
-            one["gum"] = {{"u", number(budget.u)},
-                          {"low", number(budget.value - budget.expanded)},
-                          {"high", number(budget.value + budget.expanded)}};
-            one["standard_error"] = {{"mean", number(s.standard_error(i, 0))},
-                                     {"u", number(s.standard_error(i, 1))},
-                                     {"low", number(s.standard_error(i, 2))},
-                                     {"high", number(s.standard_error(i, 3))}};
-            one["tolerance"] = number(delta);
-            one["difference"] = number(off);
+            one["gum"] = {{"u", proto::number_or_null(budget.u)},
+                          {"low", proto::number_or_null(budget.value - budget.expanded)},
+                          {"high", proto::number_or_null(budget.value + budget.expanded)}};
+            one["standard_error"] = {{"mean", proto::number_or_null(s.standard_error(i, 0))},
+                                     {"u", proto::number_or_null(s.standard_error(i, 1))},
+                                     {"low", proto::number_or_null(s.standard_error(i, 2))},
+                                     {"high", proto::number_or_null(s.standard_error(i, 3))}};
+            one["tolerance"] = proto::number_or_null(delta);
+            one["difference"] = proto::number_or_null(off);
             one["validated"] = off <= delta;
             validated = validated && off <= delta;
         }

@@ -15,9 +15,9 @@
 #include "daemon/record/replay.hpp"
 #include "daemon/study/campaign_record.hpp"
 #include "daemon/study/campaigns.hpp"
-#include "daemon/study/json_number.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::study {
 
@@ -73,9 +73,9 @@ Json new_result(const estimator::Result& result, const uncertainty::Assessment& 
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
         const auto& c = assessed.coefficients[i];
         const bool known = assessed.done && result.observable[i];
-        lists.value.push_back(known ? number(c.value) : Json());
-        lists.u.push_back(known ? number(c.u) : Json());
-        lists.expanded.push_back(known ? number(c.expanded) : Json());
+        lists.value.push_back(known ? proto::number_or_null(c.value) : Json());
+        lists.u.push_back(known ? proto::number_or_null(c.u) : Json());
+        lists.expanded.push_back(known ? proto::number_or_null(c.expanded) : Json());
     }
     return lists.json(uncertainty::word_of(assessed.verdict.level));
 }
@@ -253,8 +253,8 @@ void RecordingSums::add(const Recording& recording, const std::string& bytes) {
         };
         const double difference = entry(now, "value") - entry(before, "value");
         const double e = difference / std::hypot(entry(now, "expanded"), entry(before, "expanded"));
-        in_sigma.push_back(number(difference / entry(before, "u")));
-        e_n.push_back(number(e));
+        in_sigma.push_back(proto::number_or_null(difference / entry(before, "u")));
+        e_n.push_back(proto::number_or_null(e));
         if (std::isfinite(e) && (worst == estimator::kParameters || std::abs(e) > one.rank)) {
             one.rank = std::abs(e);
             worst = i;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/study/json_number.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::study {
 
@@ -20,9 +20,9 @@ constexpr double kDegrees = estimator::kParameters;
 constexpr std::size_t kMostReasons = 100;
 
 Json json_of(const Interval& interval) {
-    return {{"value", number(interval.value)},
-            {"low", number(interval.low)},
-            {"high", number(interval.high)}};
+    return {{"value", proto::number_or_null(interval.value)},
+            {"low", proto::number_or_null(interval.low)},
+            {"high", proto::number_or_null(interval.high)}};
 }
 
 void count(std::map<std::string, std::uint64_t>& counts, const std::string& what) {
@@ -86,7 +86,7 @@ Json CampaignSums::json(const Claim& claim, std::uint64_t runs) {
     Json coverage;
     for (std::size_t k = 0; k < kCoverages.size(); ++k)
         coverage[std::to_string(kCoverages[k])] = json_of(share_interval(claim.within[k], runs));
-    return {{"sigma", number(std::sqrt(claim.sigma_squares.value() / n))},
+    return {{"sigma", proto::number_or_null(std::sqrt(claim.sigma_squares.value() / n))},
             {"rms_z", json_of(rms_interval(claim.z_squares.value(), runs))},
             {"coverage", coverage}};
 }
@@ -104,7 +104,8 @@ Json CampaignSums::json() const {
         {"valid", verdicts_[0]}, {"doubtful", verdicts_[1]}, {"not_valid", verdicts_[2]}};
     out["reasons"] = reasons_;
     const std::uint64_t good = runs_ - failed_;
-    out["campaign_h"] = good > 0 ? number(hours_.value() / static_cast<double>(good)) : Json();
+    out["campaign_h"] =
+        good > 0 ? proto::number_or_null(hours_.value() / static_cast<double>(good)) : Json();
     out["nees"] = {{"noise", json(nees_noise_)}, {"all", json(nees_all_)}};
     Json list = Json::array();
     for (std::size_t i = 0; i < estimator::kParameters; ++i) {
@@ -114,8 +115,8 @@ Json CampaignSums::json() const {
                  {"n", c.count}};
         if (c.count > 0) {
             const auto n = static_cast<double>(c.count);
-            one["mean_error"] = number(c.error.value() / n);
-            one["rms_error"] = number(std::sqrt(c.error_squares.value() / n));
+            one["mean_error"] = proto::number_or_null(c.error.value() / n);
+            one["rms_error"] = proto::number_or_null(std::sqrt(c.error_squares.value() / n));
             one["noise"] = json(c.noise, c.count);
             one["all"] = json(c.all, c.count);
         }

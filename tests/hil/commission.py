@@ -27,6 +27,16 @@ CAMPAIGN = {"name": "commissioned", "identify": "what-it-can", "positions_deg": 
 ANSWERS = {"power": "yes", "permit.hold": "yes", "permit.outer": "yes", "permit.inner": "yes", "permit.azimuth": "yes"}
 
 
+# Of a controller that is not ours: another scale than 1e-4 g, words the other way round.
+FOREIGN = {"frequency": {"address": 100, "type": "f32", "word_order": "little", "scale": 1},
+           "amplitude": {"address": 60, "type": "u32", "word_order": "little", "scale": 1e-6},
+           "ramp_time": {"address": 70, "type": "u16", "scale": 0.1}, "run": {"address": 71, "type": "u16"},
+           "watchdog": {"address": 80, "type": "u16"}, "watchdog_timeout": {"address": 90, "type": "u16", "scale": 1e-3},
+           "state": {"address": 20, "type": "u16", "table": "input"}, "fault": {"address": 21, "type": "u16", "table": "input"},
+           "emergency_stop": {"address": 22, "type": "bits", "table": "input", "mask": 8},
+           "measured_amplitude": {"address": 30, "type": "f32", "word_order": "big", "table": "input", "scale": 1}}
+
+
 def remainder(degrees):
     return math.remainder(degrees, 360)
 
@@ -57,9 +67,14 @@ def after_slews(rig):
 class Unknown:
     """A rig with a truth of its own, of which the configuration says nothing."""
 
-    def __init__(self, checks, programs, folder, truth, speed="max"):
+    def __init__(self, checks, programs, folder, truth, speed="max", foreign=None):
         self.checks, self.truth = checks, truth
+        self.registers = {"shaker.registers." + role: keys for role, keys in (foreign or {}).items()}
         self.rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1)
+        if foreign:
+            truth.setdefault("shaker", {})["map"] = "map.toml"   # beside the truth file
+            with open(os.path.join(folder, "map.toml"), "w", encoding="utf-8") as file:
+                file.write(r.toml(self.registers))
         self.record = os.path.join(folder, "commission", "record.json")
         self.rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45", "--speed", speed,
                              "--truth", self.rig.truth_file(truth))
@@ -67,7 +82,7 @@ class Unknown:
         self.start()
 
     def configure(self, **tables):
-        self.rig.configure(CAMPAIGN, commission={"enforce": True, "folder": os.path.dirname(self.record)}, **tables)
+        self.rig.configure(CAMPAIGN, commission={"enforce": True, "folder": os.path.dirname(self.record)}, **self.registers, **tables)
 
     def start(self):
         self.rig.start_daemon()
@@ -122,8 +137,8 @@ def drawn(seed):
 
 
 def whole(checks, programs, folder, seed):
-    """From nothing known to armed, but for the proof of the safe state."""
-    u = Unknown(checks, programs, folder, drawn(seed))
+    """From nothing known to armed, with a shaker's controller that is not ours."""
+    u = Unknown(checks, programs, folder, drawn(seed), foreign=FOREIGN)
     try:
         tool = u.rig.tool
         checks.equal(tool("commission", "status").returncode, 1, "nothing is proven")
@@ -513,6 +528,12 @@ def dialogue(checks, programs, folder):
                                capture_output=True, text=True, check=False)
         checks.check(other.returncode == 1 and "the platform's parts first: bus: no record" in other.stderr, "nothing shakes before the platform is known",
                      other.stderr)
+        u.configure(platform={"gyro_y_axes": ["+x", "+y", "+z"], "gyro_z_axes": ["+z", "+y", "+x"]})
+        check = subprocess.run([u.rig.program("vibrigd"), "--check", "--config", u.rig.configuration], capture_output=True, text=True, check=False)
+        u.restart()
+        told = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', "platform.gyro_z_axes: found +z +y +x, left-handed")
+        checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and each in u.rig.daemon.text() for each in told),
+                     "gyro axes that are hardly meant are told by --check and at the start", check.stderr + u.rig.logs())
     finally:
         u.rig.stop()
 

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """A controller that is not ours, played by pymodbus with a map of its own, exceptions beyond it and a count of what is written to it:
-what Vibrig does before anybody has stated its registers is read it, over TCP and over a serial line.
+what Vibrig does before anybody has stated its registers is read it, over TCP and over a serial line. Once they are stated each is tried, with the
+stop chain open.
 
 usage: foreign_registers.py PROGRAMS
 """
@@ -8,6 +9,9 @@ import asyncio
 import json
 import logging
 import os
+import re
+import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -23,15 +27,25 @@ import pymodbus_shaker  # noqa: E402
 import rig as r  # noqa: E402
 
 FREQUENCY, ACTUAL, AMPLITUDE, HOLDING = 100, 140, 60, 160
+RAMP, RUN, FEED, TIMEOUT = 70, 72, 80, 90
+STATE, FAULT, CHAIN, MEASURED = 0, 1, 2, 3   # input
+IDLE, FAULTY = 0, 4
+MOST_G = 13   # that it takes
 
 
 class Counted(ModbusSequentialDataBlock):
     """Counts what comes over the wire; the panel does not."""
     written = 0
 
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.places, self.then = set(), lambda: None
+
     def setValues(self, address, values):
         self.written += 1
+        self.places.update(range(address, address + (len(values) if isinstance(values, list) else 1)))
         super().setValues(address, values)
+        self.then()
 
     def panel(self, address, words):
         self.values[address:address + len(words)] = words
@@ -75,6 +89,34 @@ class Controller:
     def amplitude(self, g):
         count = round(g * 1e6)
         self.holding.panel(AMPLITUDE, [count >> 16, count & 0xffff])
+
+    def rest(self):
+        """As a rig that its registers were stated of: at rest, the chain closed."""
+        self.frequency(15.0, 3.0)
+        self.amplitude(0)
+        for at, value in ((RAMP, 20), (RUN, 0), (FEED, 0), (TIMEOUT, 1500)):
+            self.holding.panel(at, [value])
+        self.inputs.panel(0, [0] * 8)
+        self.holding.then = self.takes_no_more
+
+    def takes_no_more(self):
+        """A set-point beyond what it does is cut to that."""
+        if self.holding.values[AMPLITUDE] << 16 | self.holding.values[AMPLITUDE + 1] > round(MOST_G * 1e6):
+            self.amplitude(MOST_G)
+
+    def chain(self, is_open):
+        self.inputs.panel(CHAIN, [8 if is_open else 0])
+        if is_open:
+            self.inputs.panel(STATE, [FAULTY])
+
+    def shown(self, role):
+        """On its display."""
+        if role == "frequency":
+            high, low = self.holding.values[FREQUENCY + 1], self.holding.values[FREQUENCY]
+            return f"{struct.unpack('>f', struct.pack('>HH', high, low))[0]:.2f}"
+        if role == "amplitude":
+            return f"{(self.holding.values[AMPLITUDE] << 16 | self.holding.values[AMPLITUDE + 1]) * 1e-6:.3f}"
+        return f"{self.holding.values[RAMP] * 0.1:.1f}" if role == "ramp_time" else "-"
 
     def written(self):
         return self.holding.written + self.inputs.written + self.coils.written
@@ -133,6 +175,134 @@ def found_by_reading(checks, programs, line):
     checks.equal(controller.written(), 0, f"{name}: nothing was written")
 
 
+STATED = {
+    "frequency": {"address": FREQUENCY, "type": "f32", "word_order": "little", "scale": 1},
+    "amplitude": {"address": AMPLITUDE, "type": "u32", "word_order": "big", "scale": 1e-6},
+    "ramp_time": {"address": RAMP, "type": "u16", "scale": 0.1}, "run": {"address": RUN, "type": "u16"},
+    "watchdog": {"address": FEED, "type": "u16"}, "watchdog_timeout": {"address": TIMEOUT, "type": "u16", "scale": 1e-3},
+    "state": {"address": STATE, "type": "u16", "table": "input"}, "fault": {"address": FAULT, "type": "u16", "table": "input"},
+    "emergency_stop": {"address": CHAIN, "type": "bits", "table": "input", "mask": 8},
+    "measured_amplitude": {"address": MEASURED, "type": "u32", "word_order": "big", "table": "input", "scale": 1e-6}}
+WRITTEN = {FREQUENCY, FREQUENCY + 1, AMPLITUDE, AMPLITUDE + 1, RAMP, RUN, FEED, TIMEOUT}
+
+
+class Tried:
+    """A person who does and types what is asked for, over the controller and its registers as they are stated."""
+
+    def __init__(self, programs, folder, controller, line, buttons, **other):
+        rig = r.Rig(programs, "seqpacket", "real", folder)
+        rig.modbus_port = 502 if line else int(controller.where.rpartition(":")[2])
+        link = {"transport": "rtu", "device": controller.where, "baud": 115200} if line else {}
+        stated = {**STATED, **other}
+        rig.configure({"name": "foreign"}, shaker=link, commission={"simulated": False, "folder": os.path.join(folder, "commission"), "buttons": buttons},
+                      **{"shaker.registers." + role: keys for role, keys in stated.items()})
+        self.controller, self.text, self.instead = controller, "", {}
+        self.command = [os.path.join(programs, "vibrig"), "commission", "registers", "--by", "Ada", "--plate", "a plate", "--json", "--write",
+                        "--config", rig.configuration]
+        self.tool = subprocess.Popen(self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                     preexec_fn=r.die_with_parent)
+
+    def question(self):
+        asked = ""
+        while not asked.endswith("\n> "):
+            one = self.tool.stderr.read(1)
+            asked += one
+            self.text += one
+            if not one:
+                return ""
+        return " ".join(asked.split())
+
+    def answer(self, question):
+        for words, what in self.instead.items():
+            if words in question:
+                return what() if callable(what) else what
+        if "power stage off? [yes" in question:
+            return "yes"
+        for words, is_open in (("? Close the", False), ("Release ", False), ("Press the button", True), ("? Open the", True)):
+            if words in question:
+                self.controller.chain(is_open)
+                return ""
+        name = re.search(r"\? May (\w+) ", question)
+        if name:
+            return name[1]
+        return self.controller.shown(re.search(r"\? (\w+) is ", question)[1])
+
+    def all(self):
+        while True:
+            question = self.question()
+            if not question:
+                break
+            text = self.answer(question)
+            if text is None:
+                break
+            self.tool.stdin.write(text + "\n")
+            self.tool.stdin.flush()
+        out, rest = self.tool.communicate(timeout=60)
+        return self.tool.returncode, json.loads(out) if out else {}, self.text + rest
+
+
+def tried(checks, programs, line):
+    """Each register that is stated is written, read back and put back; nothing else is."""
+    name = "RTU" if line else "TCP"
+    controller = Controller(line)
+    controller.rest()
+    before = list(controller.holding.values)
+    with tempfile.TemporaryDirectory() as folder:
+        code, found, text = Tried(programs, folder, controller, line, ["rack"]).all()
+    rows = {row["name"]: row for row in found.get("rows", [])}
+    checks.check(code == 0 and found["outcome"] == "decided" and not found["simulated"] and
+                 list(rows)[:8] == ["stop chain, rack", "closing after rack", "frequency", "amplitude", "ramp_time", "watchdog_timeout", "watchdog", "run"],
+                 f"{name}: each of its registers passes", text)
+    checks.equal(controller.holding.places, WRITTEN, f"{name}: only the stated registers were written")
+    checks.equal(controller.holding.values, before, f"{name}: and all is as it was")
+    limits = [rows.get(f"limit, {each}", {}).get("found", "") for each in ("acceleration_g", "velocity_mps", "displacement_mm")]
+    checks.check("does not limit, Vibrig alone does" in limits[0] and limits[1].endswith(f"g is held to {MOST_G}"),
+                 f"{name}: what the controller does not limit is told, and what it does", limits)
+
+
+def not_as_stated(checks, programs):
+    """What contradicts the map ends it, with what was written taken back."""
+    for what, other, word in (("a scale that is not the display's", {"ramp_time": {"address": RAMP, "type": "u16", "scale": 0.01}}, "on the display"),
+                              ("another place", {"watchdog_timeout": {"address": HOLDING + 5, "type": "u16", "scale": 1e-3}}, "cannot be read"),
+                              ("swapped words", {"frequency": {"address": FREQUENCY, "type": "f32", "word_order": "big", "scale": 1}}, "shaker.registers.frequency")):
+        controller = Controller(False)
+        controller.rest()
+        before = list(controller.holding.values)
+        with tempfile.TemporaryDirectory() as folder:
+            code, found, text = Tried(programs, folder, controller, False, ["rack"], **other).all()
+        checks.check(code == 1 and found.get("outcome") == "refused" and word in found["why"], f"{what} is refused: {found.get('why')}", text)
+        checks.check(controller.holding.values == before and controller.holding.places <= WRITTEN, f"{what}: all is as it was", controller.holding.places)
+
+
+def disturbed(checks, programs):
+    """Another master, a person who goes, a daemon that has the rig."""
+    controller = Controller(False)
+    controller.rest()
+    with tempfile.TemporaryDirectory() as folder:
+        one = Tried(programs, folder, controller, False, ["rack"])
+        one.instead["? May amplitude "] = lambda: controller.frequency(40.0, 3.0) or "amplitude"
+        code, found, text = one.all()
+    checks.check(code == 1 and "shaker.registers.frequency (holding 100) was 15, is 40" in found.get("why", "") and "another master" in found["why"],
+                 "another master is named by its register", text)
+    checks.check(not controller.holding.places & {AMPLITUDE, RAMP}, "and nothing more is written", controller.holding.places)
+    for how in ("ended by a signal", "nobody answers"):
+        controller.rest()
+        controller.holding.places.clear()
+        before = list(controller.holding.values)
+        with tempfile.TemporaryDirectory() as folder:
+            one = Tried(programs, folder, controller, False, ["rack"])
+            one.instead["? frequency is 16 now"] = lambda one=one, how=how: one.tool.send_signal(signal.SIGINT) if "signal" in how else None
+            code, found, text = one.all()
+        checks.check(code == 2 and FREQUENCY in controller.holding.places and controller.holding.values == before,
+                     f"{how}: what was written is taken back", text)
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as daemon:
+        daemon.bind("\0vibrig-rig/modbus:" + controller.where)
+        daemon.listen()
+        written = controller.written()
+        code, found, text = Tried(programs, folder, controller, False, ["rack"]).all()
+        checks.check(code == 2 and f"pid {os.getpid()}" in text and controller.written() == written, "a rig that a daemon has is left alone", text)
+
+
 def not_stated(checks, programs):
     """Without its registers a real rig's daemon does not start, and writes nothing."""
     controller = Controller(False)
@@ -152,6 +322,10 @@ def main():
     for line in (False, True):
         found_by_reading(checks, programs, line)
     not_stated(checks, programs)
+    for line in (False, True):
+        tried(checks, programs, line)
+    not_as_stated(checks, programs)
+    disturbed(checks, programs)
     nobody = subprocess.run([os.path.join(programs, "vibrig"), "commission", "registers", "--by", "Ada", "--tcp", "127.0.0.1:1"], capture_output=True,
                             text=True, check=False, timeout=30)
     checks.check(nobody.returncode == 2 and "127.0.0.1:1" in nobody.stderr, "where nothing answers: exit code 2 and the address", nobody.stderr)

@@ -181,6 +181,10 @@ def missing_segment(checks, rig, folder):
     os.rename(aside, path)
     whole = offline(rig, "export", folder, "--to", "candump", "-o", "whole.log")
     checks.check(whole.returncode == 0 and "missing" not in whole.stderr, "with it nothing is missing", whole.stderr)
+    logs = r.raw_logs(folder)
+    run = offline(rig, "replay", logs[1])
+    checks.check(run.returncode == 1 and f"not read: {os.path.basename(logs[0])}" in run.stderr and "missing" not in run.stderr,
+                 "replay of one segment: the others lie there, and none is missing", f"status {run.returncode} {run.stderr}")
 
 
 def played(checks, rig, folder):

@@ -8,10 +8,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <span>
 #include <vector>
 
 namespace vibrig::plant {
@@ -35,7 +37,7 @@ struct Write {
 };
 
 Write parse_write(const std::uint8_t* pdu, std::size_t length,
-                  const std::array<std::uint16_t, ShakerController::kHolding>& holding) {
+                  std::span<const std::uint16_t> holding) {
     Write write;
     const auto list = [&](std::size_t address_at, std::size_t count_at, std::size_t data_at) {
         if (length < data_at) return;
@@ -74,8 +76,13 @@ Write parse_write(const std::uint8_t* pdu, std::size_t length,
 }  // namespace
 
 struct ModbusServer::Link {
-    explicit Link(modbus_t* c) : context(c) {
-        mapping = modbus_mapping_new(0, 0, ShakerController::kHolding, ShakerController::kInput);
+    Link(modbus_t* c, const ForeignMap* foreign) : context(c) {
+        using proto::RegisterTable;
+        const auto size = [&](RegisterTable table, std::size_t own) {
+            return static_cast<int>(foreign == nullptr ? own : foreign->size(table));
+        };
+        mapping = modbus_mapping_new(0, 0, size(RegisterTable::holding, ShakerController::kHolding),
+                                     size(RegisterTable::input, ShakerController::kInput));
     }
     ~Link() {
         modbus_mapping_free(mapping);
@@ -93,6 +100,8 @@ ModbusServer::ModbusServer(const std::string& address, SharedRig& rig)
     const auto fail = [&](const std::string& what) {
         throw PlantError("--modbus " + address + ": " + what);
     };
+    if (const auto& map = rig.rig.truth().map; !map.empty())
+        foreign_ = std::make_unique<ForeignMap>(read_map(map));
     const bool tcp = address.starts_with("tcp:");
     if (tcp) {
         const auto colon = address.rfind(':');
@@ -105,7 +114,7 @@ ModbusServer::ModbusServer(const std::string& address, SharedRig& rig)
             end != port.data() + port.size() || number < 0 || number > 65535) {
             fail("expected tcp:ADDRESS:PORT with a numeric address, such as tcp:127.0.0.1:1502");
         }
-        link_ = std::make_unique<Link>(modbus_new_tcp(host.c_str(), number));
+        link_ = std::make_unique<Link>(modbus_new_tcp(host.c_str(), number), foreign_.get());
         listener_ = modbus_tcp_listen(link_->context, kConnections);
         if (listener_ < 0) fail(std::string("cannot listen: ") + modbus_strerror(errno));
         sockaddr_in bound{};
@@ -116,7 +125,7 @@ ModbusServer::ModbusServer(const std::string& address, SharedRig& rig)
     } else if (address.starts_with("rtu:") && address.size() > 4) {
         modbus_t* context = modbus_new_rtu(address.c_str() + 4, 19200, 'E', 8, 1);
         if (context == nullptr) fail(modbus_strerror(errno));
-        link_ = std::make_unique<Link>(context);
+        link_ = std::make_unique<Link>(context, foreign_.get());
         modbus_set_slave(context, 1);
         if (modbus_connect(context) != 0)
             fail(std::string("cannot open: ") + modbus_strerror(errno));
@@ -177,6 +186,40 @@ void ModbusServer::serve_rtu() {
     }
 }
 
+struct ModbusServer::Outcome {
+    Answer answer = Answer::accepted;
+    bool failure = false, silent = false;
+};
+
+/// What a request does to the controller, and what its registers read after it.
+ModbusServer::Outcome ModbusServer::apply(const std::uint8_t* pdu, std::size_t length) {
+    const std::scoped_lock lock(rig_.mutex);
+    const double now = rig_.now_s();
+    Outcome outcome;
+    outcome.silent = rig_.faults.active(FaultKind::modbus_silent, now) != nullptr;
+    if (outcome.silent) return outcome;
+    ShakerController& shaker = rig_.rig.shaker();
+    const Fault* wrong = rig_.faults.active(FaultKind::modbus_wrong, now);
+    const bool wrong_value = wrong != nullptr && wrong->value != 0;
+    outcome.failure = wrong != nullptr && !wrong_value;
+    const auto holding = [&]() -> std::span<const std::uint16_t> {
+        return foreign_ ? foreign_->holding(shaker) : shaker.holding();
+    };
+    const Write write = parse_write(pdu, length, holding());
+    if (write.any && wrong == nullptr)
+        outcome.answer = foreign_ ? foreign_->write(shaker, write.address, write.values)
+                                  : shaker.write(write.address, write.values);
+    const auto as_wrong = [wrong_value](std::uint16_t word) {
+        return static_cast<std::uint16_t>(word ^ (wrong_value ? 0x5555 : 0));
+    };
+    const auto own_input = shaker.input();
+    std::ranges::transform(holding(), link_->mapping->tab_registers, as_wrong);
+    std::ranges::transform(
+        foreign_ ? foreign_->input(shaker) : std::span<const std::uint16_t>(own_input),
+        link_->mapping->tab_input_registers, as_wrong);
+    return outcome;
+}
+
 bool ModbusServer::answer() {
     Query query{};
     const int received = modbus_receive(link_->context, query.data());
@@ -187,38 +230,20 @@ bool ModbusServer::answer() {
     if (length <= header) return true;
     const std::uint8_t* pdu = query.data() + header;
 
-    Answer outcome = Answer::accepted;
-    bool failure = false;
-    {
-        const std::scoped_lock lock(rig_.mutex);
-        const double now = rig_.now_s();
-        if (rig_.faults.active(FaultKind::modbus_silent, now) != nullptr) return true;
-        ShakerController& shaker = rig_.rig.shaker();
-        const Fault* wrong = rig_.faults.active(FaultKind::modbus_wrong, now);
-        const bool wrong_value = wrong != nullptr && wrong->value != 0;
-        failure = wrong != nullptr && !wrong_value;
-        const Write write = parse_write(pdu, length - header, shaker.holding());
-        if (write.any && wrong == nullptr) outcome = shaker.write(write.address, write.values);
-        const auto input = shaker.input();
-        for (std::size_t i = 0; i < shaker.holding().size(); ++i) {
-            link_->mapping->tab_registers[i] =
-                static_cast<std::uint16_t>(shaker.holding()[i] ^ (wrong_value ? 0x5555 : 0));
-        }
-        for (std::size_t i = 0; i < input.size(); ++i) {
-            link_->mapping->tab_input_registers[i] =
-                static_cast<std::uint16_t>(input[i] ^ (wrong_value ? 0x5555 : 0));
-        }
-    }
+    const Outcome outcome = apply(pdu, length - header);
+    if (outcome.silent) return true;
     int sent = 0;
-    if (failure) {
+    if (outcome.failure) {
         sent = modbus_reply_exception(link_->context, query.data(),
                                       MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE);
-    } else if (outcome == Answer::illegal_value) {
+    } else if (outcome.answer == Answer::illegal_address) {
+        sent = modbus_reply_exception(link_->context, query.data(),
+                                      MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS);
+    } else if (outcome.answer == Answer::illegal_value) {
         sent = modbus_reply_exception(link_->context, query.data(),
                                       MODBUS_EXCEPTION_ILLEGAL_DATA_VALUE);
     } else {
-        sent = modbus_reply(link_->context, query.data(), received,
-                            link_->mapping);  // an illegal address is its own
+        sent = modbus_reply(link_->context, query.data(), received, link_->mapping);
     }
     return sent >= 0;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <thread>
 
+#include "tests/plant/foreign_map.hpp"
 #include "tests/plant/shared_rig.hpp"
 
 namespace vibrig::plant {
@@ -12,8 +13,8 @@ namespace vibrig::plant {
 /// serial device.
 class ModbusServer {
   public:
-    /// "tcp:HOST:PORT" (port 0: any free one) or "rtu:DEVICE" (19200 baud, 8E1, unit 1). Throws
-    /// PlantError.
+    /// "tcp:HOST:PORT" (port 0: any free one) or "rtu:DEVICE" (19200 baud, 8E1, unit 1). The rig's
+    /// truth may have a foreign map. Throws PlantError.
     ModbusServer(const std::string& address, SharedRig& rig);
     ~ModbusServer();
     ModbusServer(const ModbusServer&) = delete;
@@ -24,6 +25,8 @@ class ModbusServer {
 
   private:
     struct Link;
+    struct Outcome;
+    [[nodiscard]] Outcome apply(const std::uint8_t* pdu, std::size_t length);
     void serve_tcp();
     void serve_rtu();
     /// One request of the current socket; false when the connection is over.
@@ -31,6 +34,7 @@ class ModbusServer {
 
     std::string address_;
     SharedRig& rig_;
+    std::unique_ptr<ForeignMap> foreign_;  ///< none: Vibrig's own
     std::unique_ptr<Link> link_;
     int listener_ = -1;
     int stop_event_ = -1;

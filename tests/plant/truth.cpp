@@ -1,6 +1,7 @@
 #include "tests/plant/truth.hpp"
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -61,6 +62,11 @@ struct Reader {
     void value(const std::string& key, const Json& json, bool& out, int, int) const {
         if (!json.is_boolean()) fail(key, "found " + text_of(json) + ", expected true or false");
         out = json.get<bool>();
+    }
+    void value(const std::string& key, const Json& json, std::string& out, int, int) const {
+        if (!json.is_string())
+            fail(key, "found " + text_of(json) + ", expected the name of a file, or \"\"");
+        out = json.get<std::string>();
     }
     void value(const std::string& key, const Json& json, Axis& out, int, int) const {
         const std::string text = json.is_string() ? json.get<std::string>() : std::string();
@@ -135,6 +141,7 @@ struct Writer {
     static Json json(int v) { return v; }
     static Json json(bool v) { return v; }
     static Json json(std::uint16_t v) { return v; }
+    static Json json(const std::string& v) { return v; }
     static Json json(AmplitudeUnit v) { return kAmplitudeUnits[static_cast<std::size_t>(v)]; }
     static Json json(AngleUnit v) { return kAngleUnits[static_cast<std::size_t>(v)]; }
     static Json json(GimbalAxis v) { return kGimbalNames[static_cast<std::size_t>(v)]; }
@@ -294,6 +301,8 @@ Truth parse_truth(std::string_view text, const std::string& file) {
     Reader reader{root, file};
     for_each_field(truth, reader);
     read_profiles(root, reader, truth);
+    if (!truth.map.empty())
+        truth.map = (std::filesystem::path(file).parent_path() / truth.map).string();
     ShakerLies& lies = truth.shaker_lies;
     lies.timeout_ignored = lies.timeout_ignored || !truth.watchdog_works;
     lies.unit_rms = lies.unit_rms || truth.amplitude_unit == AmplitudeUnit::g_rms;

@@ -157,6 +157,7 @@ struct Truth {
     std::array<double, 2> tilt_deg{};     ///< of the vibration from the vertical: to north, east
     double amplitude_drift_per_h = 0;     ///< relative, since the table was last started
     double frequency_drift_hz_per_h = 0;  ///< likewise
+    std::string map{};                    ///< file of a foreign register map; empty: Vibrig's own
     double limit_g = 20;                  ///< largest set-point accepted
     double limit_mm = 25;                 ///< peak displacement that trips the limit switch
     ShakerLies shaker_lies;
@@ -170,7 +171,8 @@ struct Truth {
 };
 
 /// Missing coefficients, unknown keys and impossible values throw PlantError naming file and key.
-/// Other sections and keys may be missing: the default holds.
+/// Other sections and keys may be missing: the default holds. A relative `map` is relative to the
+/// folder of `file_name`.
 [[nodiscard]] Truth parse_truth(std::string_view json, const std::string& file_name);
 [[nodiscard]] Truth read_truth(const std::string& path);
 [[nodiscard]] std::string to_json(const Truth& truth);

@@ -85,6 +85,7 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "tilt_deg", t.tilt_deg, -45.0, 45.0);
     field("shaker", "amplitude_drift_per_h", t.amplitude_drift_per_h, -100.0, 100.0);
     field("shaker", "frequency_drift_hz_per_h", t.frequency_drift_hz_per_h, -1e3, 1e3);
+    field("shaker", "map", t.map, 0, 0);
     field("shaker", "limit_g", t.limit_g, 0.1, 100.0);
     field("shaker", "limit_mm", t.limit_mm, 0.1, 1000.0);
     field("shaker", "watchdog_works", t.watchdog_works, 0, 0);

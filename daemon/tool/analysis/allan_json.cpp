@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/tool/analysis/allan_analysis.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::tool {
 
@@ -9,17 +10,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json fit_json(const allan::Fit& fit) {
     Json terms = Json::object();
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
         const allan::FittedTerm& term = fit.terms[j];
-        Json entry = {{"value", term.detected ? number(term.value) : Json(nullptr)},
-                      {"sigma", term.detected ? number(term.sigma) : Json(nullptr)},
+        Json entry = {{"value", term.detected ? proto::number_or_null(term.value) : Json(nullptr)},
+                      {"sigma", term.detected ? proto::number_or_null(term.sigma) : Json(nullptr)},
                       {"unit", allan::kTermUnits[j]}};
         if (!term.detected) {
-            entry["below"] = number(term.below);
+            entry["below"] = proto::number_or_null(term.below);
         }
         terms[allan::kTermNames[j]] = std::move(entry);
     }
@@ -40,7 +39,7 @@ Json slow_json(const allan::Fit& fit) {
     return {{"found", fit.slow.found},
             {"kind_determined", fit.slow.determined},
             {"tau", where ? Json(fit.slow.tau) : Json(nullptr)},
-            {"ratio", where ? number(fit.slow.ratio) : Json(nullptr)},
+            {"ratio", where ? proto::number_or_null(fit.slow.ratio) : Json(nullptr)},
             {"verdict", fit.verdict()},
             {"models", std::move(models)}};
 }
@@ -53,8 +52,8 @@ Json class_sums_json(const allan::ClassicalFit& fit, const std::vector<double>& 
     Json fast = Json::array();
     for (const double tau : taus) {
         const allan::ClassSums sums = allan::class_sums(a, tau);
-        slow.push_back(number(sums.slow));
-        fast.push_back(number(sums.fast));
+        slow.push_back(proto::number_or_null(sums.slow));
+        fast.push_back(proto::number_or_null(sums.fast));
     }
     return {{"a0_known", fit.a0_known}, {"slow", std::move(slow)}, {"fast", std::move(fast)}};
 }
@@ -62,11 +61,12 @@ Json class_sums_json(const allan::ClassicalFit& fit, const std::vector<double>& 
 Json classical_json(const allan::ClassicalFit& fit, const std::vector<double>& taus) {
     Json a = Json::object();
     for (std::size_t k = 0; k < fit.a.size(); ++k) {
-        a["a" + std::to_string(k)] = k == 0 && !fit.a0_known ? Json(nullptr) : number(fit.a[k]);
+        a["a" + std::to_string(k)] =
+            k == 0 && !fit.a0_known ? Json(nullptr) : proto::number_or_null(fit.a[k]);
     }
     Json terms = Json::object();
     for (std::size_t j = 0; j < allan::kTerms; ++j) {
-        terms[allan::kTermNames[j]] = number(fit.terms[j]);
+        terms[allan::kTermNames[j]] = proto::number_or_null(fit.terms[j]);
     }
     return {{"a", std::move(a)},
             {"terms", std::move(terms)},
@@ -78,8 +78,8 @@ Json alarms_json(const std::vector<allan::Alarm>& alarms) {
     Json list = Json::array();
     for (const allan::Alarm& alarm : alarms) {
         list.push_back({{"tau", alarm.tau},
-                        {"ratio", number(alarm.ratio)},
-                        {"limit", number(alarm.limit)},
+                        {"ratio", proto::number_or_null(alarm.ratio)},
+                        {"limit", proto::number_or_null(alarm.limit)},
                         {"since", alarm.since_s},
                         {"reading", allan::words_of(alarm.reading)}});
     }
@@ -88,7 +88,8 @@ Json alarms_json(const std::vector<allan::Alarm>& alarms) {
 
 Json deviations(const std::vector<double>& variances, double to_deg_h) {
     Json list = Json::array();
-    for (const double variance : variances) list.push_back(number(std::sqrt(variance) / to_deg_h));
+    for (const double variance : variances)
+        list.push_back(proto::number_or_null(std::sqrt(variance) / to_deg_h));
     return list;
 }
 
@@ -96,7 +97,7 @@ Json deviations(const std::vector<double>& variances, double to_deg_h) {
 /// the input.
 Json window_json(const allan::WindowRow& row, double to_deg_h) {
     return {{"t", row.centre_s},
-            {"mean", number(row.mean)},
+            {"mean", proto::number_or_null(row.mean)},
             {"missing", row.missing},
             {"refused", row.refused},
             {"dev", deviations(row.allan, to_deg_h)}};
@@ -127,8 +128,9 @@ Json dynamic_json(const AllanAnalysis& analysis) {
     }
     return {{"window", analysis.request.window_s},
             {"overlap", analysis.request.overlap},
-            {"smallest_change",
-             analysis.smallest_change > 0 ? number(analysis.smallest_change) : Json(nullptr)},
+            {"smallest_change", analysis.smallest_change > 0
+                                    ? proto::number_or_null(analysis.smallest_change)
+                                    : Json(nullptr)},
             {"taus", taus},
             {"rows", std::move(rows)},
             {"summary", std::move(summary)}};
@@ -147,10 +149,10 @@ std::string allan_json(const AllanAnalysis& analysis) {
     for (const allan::Point& p : analysis.points) {
         points.push_back({{"m", p.m},
                           {"tau", p.tau},
-                          {"dev", number(p.dev)},
-                          {"lo", number(p.lo)},
-                          {"hi", number(p.hi)},
-                          {"edf", number(p.edf)},
+                          {"dev", proto::number_or_null(p.dev)},
+                          {"lo", proto::number_or_null(p.lo)},
+                          {"hi", proto::number_or_null(p.hi)},
+                          {"edf", proto::number_or_null(p.edf)},
                           {"n", p.n}});
     }
     root["points"] = std::move(points);

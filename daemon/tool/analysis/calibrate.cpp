@@ -21,6 +21,7 @@
 #include "daemon/tool/design/plan_terms.hpp"
 #include "estimator/allan/edf.hpp"
 #include "estimator/plan/calibration.hpp"
+#include "proto/json_number.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::calibration {
@@ -114,17 +115,15 @@ void warn_of_outliers(Study& study) {
     }
 }
 
-Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json test_json(const Study& study) {
     if (!study.result.test) return nullptr;
     const planning::ResidualTest& test = *study.result.test;
     const bool stated = test.error_degrees == 0;
     return {{"kind", stated ? "chi-square" : "lack of fit, F"},
-            {"statistic", finite(test.statistic)},
+            {"statistic", proto::number_or_null(test.statistic)},
             {"degrees", test.degrees},
             {"error_degrees", stated ? Json(nullptr) : Json(test.error_degrees)},
-            {"probability", finite(test.probability)},
+            {"probability", proto::number_or_null(test.probability)},
             {"level", study.level},
             {"passed", study.passed()}};
 }
@@ -135,10 +134,11 @@ std::string json_text(const Study& study) {
     for (std::size_t k = 0; k < planning::kTerms; ++k) {
         if (!study.terms[k]) continue;
         const bool determined = std::isfinite(r.plan.sigma[k]);
-        coefficients.push_back({{"name", planning::kTermNames[k]},
-                                {"value", determined ? finite(r.value[k]) : Json(nullptr)},
-                                {"sigma", determined ? finite(r.sigma[k]) : Json(nullptr)},
-                                {"determined", determined}});
+        coefficients.push_back(
+            {{"name", planning::kTermNames[k]},
+             {"value", determined ? proto::number_or_null(r.value[k]) : Json(nullptr)},
+             {"sigma", determined ? proto::number_or_null(r.sigma[k]) : Json(nullptr)},
+             {"determined", determined}});
     }
     for (const planning::Row& row : r.plan.null_vectors) {
         Json weights = Json::object();
@@ -150,23 +150,23 @@ std::string json_text(const Study& study) {
     for (std::size_t i = 0; i < study.readings.size(); ++i) {
         residuals.push_back({{"line", study.lines[i]},
                              {"residual", r.residual[i]},
-                             {"standardised", finite(r.standardised[i])}});
+                             {"standardised", proto::number_or_null(r.standardised[i])}});
     }
     Json covariance = Json::array();
     for (Eigen::Index i = 0; i < r.covariance.rows(); ++i) {
         Json row = Json::array();
         for (Eigen::Index j = 0; j < r.covariance.cols(); ++j)
-            row.push_back(finite(r.covariance(i, j)));
+            row.push_back(proto::number_or_null(r.covariance(i, j)));
         covariance.push_back(std::move(row));
     }
     return Json{{"coefficients", std::move(coefficients)},
                 {"covariance", std::move(covariance)},
                 {"rank", r.plan.rank},
-                {"condition", finite(r.plan.condition)},
+                {"condition", proto::number_or_null(r.plan.condition)},
                 {"null_vectors", std::move(null)},
                 {"readings", study.readings.size()},
                 {"degrees_of_freedom", r.degrees},
-                {"noise", finite(r.noise)},
+                {"noise", proto::number_or_null(r.noise)},
                 {"test", test_json(study)},
                 {"residuals", std::move(residuals)},
                 {"warnings", study.warnings}}

@@ -22,6 +22,7 @@
 
 #include "daemon/plot/chart.hpp"
 #include "daemon/tool/commands.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::tool {
 
@@ -161,7 +162,7 @@ Json json(const Reproduction& reproduction) {
     for (const ReproducedRow& row : reproduction.rows) {
         Json values = Json::object();
         for (const auto& [key, value] : row.values) {
-            values[key] = std::isfinite(value) ? Json(value) : Json(nullptr);
+            values[key] = proto::number_or_null(value);
         }
         if (row.values.empty()) {
             add_numbers("published", row.published, values);

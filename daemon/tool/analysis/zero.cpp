@@ -24,6 +24,7 @@
 #include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
+#include "proto/json_number.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::zero_command {
@@ -60,8 +61,6 @@ struct Options {
     bool both_ways = false, second_axis = false;
     std::string write;
 };
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 zeros::CalibrationSettings settings_of(const Options& options) {
     zeros::CalibrationSettings s = options.calibration;
@@ -107,11 +106,11 @@ Json result_json(const zeros::CalibrationResult& r, const zeros::Observability& 
             {{"axis", kAxisLetters[i]},
              {"what", kWhat[i]},
              {"observable", false},
-             {"zero_mg", number(axis.zero_mg)},
-             {"sigma_mg", number(axis.sigma_mg)},
-             {"filter_sigma_mg", number(axis.filter_sigma_mg)},
-             {"level_arcmin", number(axis.zero_mg * 1e-3 / kDegree * 60)},
-             {"movement_mg", number(axis.movement_mg)},
+             {"zero_mg", proto::number_or_null(axis.zero_mg)},
+             {"sigma_mg", proto::number_or_null(axis.sigma_mg)},
+             {"filter_sigma_mg", proto::number_or_null(axis.filter_sigma_mg)},
+             {"level_arcmin", proto::number_or_null(axis.zero_mg * 1e-3 / kDegree * 60)},
+             {"movement_mg", proto::number_or_null(axis.movement_mg)},
              {"converged_s", axis.converged_s ? Json(*axis.converged_s) : Json(nullptr)}});
     }
     Json degrees = Json::object();

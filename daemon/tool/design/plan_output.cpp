@@ -4,14 +4,13 @@
 
 #include "daemon/tool/analysis/uncertainty_text.hpp"
 #include "daemon/tool/design/plan_study.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::tool::planner {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 std::size_t count_of(const PlanStudy& study) {
     std::size_t sum = 0;
@@ -38,14 +37,15 @@ Json survey_json(const Survey& of) {
                          {"limited", line.limited},
                          {"dwells", of.dwells[k]}});
     }
-    for (const auto& [hz, share] : of.smallest_seen) seen[format("%g", hz)] = finite(share);
+    for (const auto& [hz, share] : of.smallest_seen)
+        seen[format("%g", hz)] = proto::number_or_null(share);
     return {{"mount", of.hard ? "hard" : "isolated"},
             {"frequencies", std::move(lines)},
             {"highest_hz", of.highest_hz},
             {"smallest_share_seen", std::move(seen)},
             {"profile", of.profile.empty() ? Json(nullptr) : Json(of.profile)},
             {"predicted_u_deg_h",
-             of.predicted_u_deg_h ? finite(*of.predicted_u_deg_h) : Json(nullptr)}};
+             of.predicted_u_deg_h ? proto::number_or_null(*of.predicted_u_deg_h) : Json(nullptr)}};
 }
 
 std::string survey_text(const Survey& of) {
@@ -84,12 +84,13 @@ std::string plan_json(const PlanStudy& study) {
     }
     Json errors = Json::object();
     for (std::size_t i = 0; i < estimator::kParameters; ++i)
-        errors[estimator::parameter_names()[i]] = finite(study.forecast.sigma[i]);
+        errors[estimator::parameter_names()[i]] = proto::number_or_null(study.forecast.sigma[i]);
     const planning::Evaluation& e = study.evaluation;
     Json unit = Json::object();
     for (std::size_t i = 0; i < planning::kTerms; ++i) {
         unit[planning::kTermNames[i]] =
-            e.sigma[i] > 0 ? finite(e.sigma[i] * std::sqrt(e.effort)) : Json(nullptr);
+            e.sigma[i] > 0 ? proto::number_or_null(e.sigma[i] * std::sqrt(e.effort))
+                           : Json(nullptr);
     }
     Json shares = Json::array();
     for (const auto& [level, share] : study.optimal_shares)
@@ -109,7 +110,7 @@ std::string plan_json(const PlanStudy& study) {
               {"run_count", count_of(study)},
               {"a_efficiency", study.a_efficiency},
               {"e_efficiency_at_least", study.e_efficiency},
-              {"condition", finite(e.condition)},
+              {"condition", proto::number_or_null(e.condition)},
               {"unit_standard_errors", std::move(unit)},
               {"strongest_correlation", correlation(e)},
               {"drift_imbalance", study.drift_imbalance},
@@ -119,15 +120,15 @@ std::string plan_json(const PlanStudy& study) {
     if (study.survey) json["survey"] = survey_json(*study.survey);
     if (study.uncertainty) {
         const auto& merit = study.uncertainty->merit;
-        json["order_inflation"] = {{"bias", finite(merit.bias)},
-                                   {"largest", finite(merit.largest)},
-                                   {"median", finite(merit.median)},
-                                   {"step", finite(merit.step)}};
+        json["order_inflation"] = {{"bias", proto::number_or_null(merit.bias)},
+                                   {"largest", proto::number_or_null(merit.largest)},
+                                   {"median", proto::number_or_null(merit.median)},
+                                   {"step", proto::number_or_null(merit.step)}};
         Json combined = Json::object(), expanded = Json::object();
         for (std::size_t i = 0; i < estimator::kParameters; ++i) {
             const auto& c = study.uncertainty->assessed.coefficients[i];
-            combined[estimator::parameter_names()[i]] = finite(c.u);
-            expanded[estimator::parameter_names()[i]] = finite(c.expanded);
+            combined[estimator::parameter_names()[i]] = proto::number_or_null(c.u);
+            expanded[estimator::parameter_names()[i]] = proto::number_or_null(c.expanded);
         }
         json["combined_uncertainty"] = std::move(combined);
         json["expanded_uncertainty"] = std::move(expanded);

@@ -10,6 +10,7 @@
 #include "daemon/tool/design/plan_terms.hpp"
 #include "estimator/plan/exact.hpp"
 #include "estimator/plan/optimum.hpp"
+#include "proto/json_number.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -151,8 +152,7 @@ std::string turntable_json(const TurntablePlan& plan) {
         runs.push_back({{"input", run.input}, {"radius", run.radius}, {"count", run.count}});
     for (std::size_t k = 0; k < planning::kTerms; ++k) {
         const double sigma = plan.evaluation.sigma[k];
-        if (sigma != 0)
-            errors[planning::kTermNames[k]] = std::isfinite(sigma) ? Json(sigma) : Json(nullptr);
+        if (sigma != 0) errors[planning::kTermNames[k]] = proto::number_or_null(sigma);
     }
     for (const Growth& g : plan.growth) growth.push_back({{"r", g.r}, {"log10_det", g.log10_det}});
     for (const auto& [sphere, share] : plan.optimal_shares)

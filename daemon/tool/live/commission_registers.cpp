@@ -1,5 +1,5 @@
 // Where a foreign controller keeps what its display shows. Reads only: what is below has no
-// function that writes.
+// function that writes. What writes is commission_trial.cpp.
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -19,6 +19,7 @@
 
 #include "daemon/commission/places.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/live/commission_registers.hpp"
 #include "drivers/shaker/modbus_link.hpp"
 
 namespace vibrig::tool {
@@ -26,12 +27,6 @@ namespace vibrig::tool {
 namespace {
 
 using RegisterJson = nlohmann::ordered_json;
-
-struct RegisterOptions {
-    std::string by, tcp, device, plate;
-    int baud = 19200, unit = 1, holding = 128, input = 32;
-    bool json = false;
-};
 
 constexpr std::size_t kWordsAtOnce = 16;
 constexpr auto kBetweenRequests = std::chrono::milliseconds(200);
@@ -110,14 +105,6 @@ class ReadingLink {
     drivers::ModbusLink link_;
 };
 
-std::string typed_line(std::ostream& out) {
-    out << "> " << std::flush;
-    std::string line;
-    if (!std::getline(std::cin, line)) throw std::runtime_error("nobody answers");
-    const auto first = line.find_first_not_of(" \t\r"), last = line.find_last_not_of(" \t\r");
-    return first == std::string::npos ? "" : line.substr(first, last - first + 1);
-}
-
 /// Three values of one quantity, as a person sets them on the panel.
 std::optional<std::vector<proto::Register>> places_by_values(ReadingLink& link,
                                                              const RegisterOptions& options,
@@ -192,11 +179,20 @@ int find_registers(const RegisterOptions& options) {
 
 }  // namespace
 
+std::string typed_line(std::ostream& out) {
+    out << "> " << std::flush;
+    std::string line;
+    if (!std::getline(std::cin, line)) throw std::runtime_error("nobody answers");
+    const auto first = line.find_first_not_of(" \t\r"), last = line.find_last_not_of(" \t\r");
+    return first == std::string::npos ? "" : line.substr(first, last - first + 1);
+}
+
 void add_commission_registers(CLI::App& commissioning, int& exit_code) {
     CLI::App& command = *commissioning.add_subcommand(
         "registers",
         "Find where a shaker's controller keeps frequency and amplitude, from what its display "
-        "shows. Reads only, needs no daemon");
+        "shows: reads only. With --write, try the registers that a configuration states, one by "
+        "one, while nothing can move. Needs no daemon");
     auto options = std::make_shared<RegisterOptions>();
     command.add_option("--by", options->by, "Who stands at the panel")->required();
     command.add_option("--tcp", options->tcp, "Modbus TCP, HOST or HOST:PORT (502)");
@@ -214,13 +210,26 @@ void add_commission_registers(CLI::App& commissioning, int& exit_code) {
     command.add_option("--input", options->input, "How many input registers, from 0 on")
         ->capture_default_str()
         ->check(CLI::Range(0, 1024));
+    auto* const write = command.add_flag(
+        "--write", options->write,
+        "Try the registers that --config states: the stop chain by hand, then with the chain open "
+        "and the power stage off each one whose name is typed; the vibrigd of this rig is stopped");
+    auto* const file = command.add_option("--config", options->configuration,
+                                          "The daemon's configuration file, for --write");
+    write->needs(file);
+    file->needs(write);
+    for (const char* reading : {"--tcp", "--device", "--baud", "--unit", "--holding", "--input"})
+        write->excludes(command.get_option(reading));
     command.add_flag("--json", options->json, "As JSON; the dialogue goes to standard error");
     command.footer(
         "Example: vibrig commission registers --by 'Ada Lovelace' --tcp 192.0.2.7\n"
-        "Exit code 0: one place each; 1: several or none.");
+        "  vibrig commission registers --by 'Ada Lovelace' --write --config "
+        "/etc/vibrig/vibrigd.toml\n"
+        "Exit code 0: one place each, or all was tried and passed; 1: several, none, or not.");
     command.callback([&exit_code, options] {
-        exit_code =
-            guarded([&] { return find_registers(*options); }, "vibrig commission registers: ");
+        exit_code = guarded(
+            [&] { return options->write ? try_registers(*options) : find_registers(*options); },
+            "vibrig commission registers: ");
     });
 }
 

@@ -45,10 +45,21 @@ void keep_recordings(const std::string& output) {
                                  ": found a file of a recording, expected another to write");
 }
 
-bool tell_missing_raw(const std::string& folder, const std::vector<std::string>& logs) {
-    const auto missing = record::missing_raw(folder, logs, tell_on_error);
+bool tell_missing_raw(const std::string& folder) {
+    const auto missing = record::missing_raw(folder, tell_on_error);
     for (const auto& words : missing) std::cerr << folder << ": missing " << words << '\n';
     return missing.empty();
+}
+
+bool tell_left_out(const std::string& folder, const std::vector<std::string>& logs) {
+    const auto names = record::left_out(folder, logs);
+    if (names.empty()) return true;
+    std::cerr << folder << ": not read: " << names.front();
+    if (names.size() > 1) std::cerr << " to " << names.back();
+    std::cerr << ", " << names.size() << " of its " << record::raw_files(folder).size()
+              << " segments: this is part of the campaign; expected " << folder
+              << ", or all of them\n";
+    return false;
 }
 
 }  // namespace vibrig::tool

@@ -16,10 +16,10 @@ inline constexpr const char* kCampaignHelp =
 /// one is missing.
 [[nodiscard]] record::Campaign read_named_campaign(const std::string& argument);
 
-/// Says on standard error which segments of the raw log in `folder` are not among `logs`; true:
-/// none.
-[[nodiscard]] bool tell_missing_raw(const std::string& folder,
-                                    const std::vector<std::string>& logs);
+/// Says on standard error which segments of the raw log are not in `folder`; true: none.
+[[nodiscard]] bool tell_missing_raw(const std::string& folder);
+/// Likewise which are there and not among `logs`.
+[[nodiscard]] bool tell_left_out(const std::string& folder, const std::vector<std::string>& logs);
 /// Refuses an output that is a file of a recording: an HDF5 file, or what lies beside one or beside
 /// the folders of campaigns. Throws std::runtime_error.
 void keep_recordings(const std::string& output);

@@ -175,7 +175,7 @@ bool export_candump(const record::Campaign& campaign, const std::string& path, b
     if (!good) throw std::runtime_error(path + ": cannot be written");
     if (to != stdout)
         std::cerr << path << ": " << bytes << " bytes of " << files.size() << " segments\n";
-    return tell_missing_raw(campaign.folder, files);
+    return tell_missing_raw(campaign.folder);
 }
 
 int export_campaign(const std::string& argument, const std::string& format, std::string path) {

@@ -139,8 +139,12 @@ int replay(const ReplayArguments& arguments) {
     }
     // Logs of other names are anybody's.
     const auto& files = arguments.files;
-    const bool whole = !std::ranges::all_of(files, record::raw_number) ||
-                       tell_missing_raw(record::folder_of(files.front()), files);
+    bool whole = true;
+    if (std::ranges::all_of(files, record::raw_number)) {
+        const std::string folder = record::folder_of(files.front());
+        whole = tell_missing_raw(folder);
+        whole = tell_left_out(folder, files) && whole;
+    }
     if (!arguments.config.empty()) replayed.different = replayed.compared = 0;
     const bool same_build = campaign.head.version == VIBRIG_VERSION &&
                             campaign.head.compiler == estimator::compiler() &&
@@ -211,7 +215,8 @@ void add_replay(CLI::App& app, int& exit_code) {
         "(142 000\n"
         "samples) take about a second.\n"
         "Exit codes: 0 the result is valid or doubtful, 1 it is not valid (with --strict: or "
-        "doubtful), a segment of the raw log is\nmissing, or the recording's build and instruction "
+        "doubtful), a segment of the raw log is\nmissing or was not given, or the recording's "
+        "build and instruction "
         "set give other estimates (then "
         "\"replay\" in\nthe JSON), 2 bad usage or input.");
     command->callback(

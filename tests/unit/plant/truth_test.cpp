@@ -37,10 +37,14 @@ TEST(Truth, SurvivesWritingAndReading) {
     truth.cross_axis = {0.05, -0.1};
     truth.cubic_deg_h_g3[2] = {1e-3, 2e-3, 3e-3};
     truth.shaker_lies.timeout_register = 0;
+    truth.map = "/etc/a map.toml";
     const std::string json = to_json(truth);
     EXPECT_EQ(to_json(parse_truth(json, "truth.json")), json);
     EXPECT_EQ(parse_truth(json, "truth.json").coefficients, truth.coefficients);
     EXPECT_EQ(parse_truth(json, "truth.json").shaker_lies.timeout_register, 0);
+    EXPECT_EQ(parse_truth(json, "truth.json").map, "/etc/a map.toml");
+    truth.map = "map.toml";
+    EXPECT_EQ(parse_truth(to_json(truth), "/here/truth.json").map, "/here/map.toml");
     EXPECT_FALSE(
         parse_truth(to_json(Truth{}), "truth.json").shaker_lies.timeout_register.has_value());
 }

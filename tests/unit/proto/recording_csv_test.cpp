@@ -258,10 +258,14 @@ TEST_F(Recording, NamesDecimalCommasAmongCommasAndLinesThatEndInACarriageReturn)
     EXPECT_EQ(row_error("0,5,1,2,10,25,0,0,-3,0,0,0,1,0,0,0"),
               ":3: found 16 fields, expected 9 as in the header (decimal commas want ';' or a tab "
               "between the fields)");
-    std::string text = std::string(kHeader) + "0,1,1,0,0,0,0,0,0\n";
-    std::replace(text.begin(), text.end(), '\n', '\r');
-    EXPECT_EQ(error(text),
-              ":1: found lines that end in a carriage return only, expected LF or CR LF");
+    const std::string row = "0,1,1,0,0,0,0,0,0\n";
+    std::string many = std::string(kHeader);
+    while (many.size() < std::size_t{3} << 20) many += row;
+    for (std::string text : {kHeader + row, std::string("# a comment\n") + kHeader + row, many}) {
+        std::replace(text.begin(), text.end(), '\n', '\r');
+        EXPECT_EQ(error(text),
+                  ":1: found lines that end in a carriage return only, expected LF or CR LF");
+    }
 }
 
 TEST_F(Recording, RefusesWhatIsNoText) {

@@ -39,7 +39,14 @@ TEST(BusList, SaysHowOftenAMessageComesAndWhichOfItsBytesChange) {
     EXPECT_EQ(all[1].period_ms, 0);
     EXPECT_THAT(all[1].at_rest, IsEmpty());
     EXPECT_THAT(table_of(bus), HasSubstr("123          300      25.00       1.00      4  at rest "
-                                         "0-1, counts 0, turned 3\n"));
+                                         "0-1, counts 0, turned 3 (99 %)\n"));
+    // AND how often: the counter always, the noise in two of three frames
+    ASSERT_EQ(all[0].flips.size(), 3U);
+    EXPECT_EQ(all[0].flips[0].at_rest, 1);
+    EXPECT_NEAR(all[0].flips[1].at_rest, 2.0 / 3, 0.01);
+    EXPECT_EQ(all[0].flips[2].at_rest, 0);
+    EXPECT_NEAR(all[0].flips[2].turned, 0.99, 1e-9);
+    EXPECT_EQ(json_of(bus)["messages"][0]["flips"][2]["byte"], 3);
     EXPECT_THAT(table_of(bus), HasSubstr("00000123"));
     EXPECT_EQ(json_of(bus)["messages"][0]["turned"], (std::vector<int>{3}));
 }

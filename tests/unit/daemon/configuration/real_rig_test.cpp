@@ -1,13 +1,16 @@
 // What is demanded of a rig that can hurt somebody, on the real clock.
 #include <string>
 
+#include "daemon/configuration/warnings.hpp"
 #include "tests/unit/daemon/configuration/support.hpp"
 
 namespace vibrig::configuration {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 const std::string kMap = R"(
@@ -21,7 +24,7 @@ watchdog_timeout = { address = 107, type = "u16", scale = 1e-3 }
 state = { address = 100, type = "u16", table = "input" }
 fault = { address = 101, type = "u16", table = "input" }
 emergency_stop = { address = 102, type = "bits", table = "input", mask = 1 }
-measured_amplitude = { address = 103, type = "f32", word_order = "little", table = "input" }
+measured_amplitude = { address = 103, type = "f32", word_order = "little", table = "input", scale = 1 }
 )";
 
 /// As complaint(), on the real clock.
@@ -65,6 +68,9 @@ TEST(RealRig, NoRegisterHasADefault) {
                   "shaker.registers.ramp_time.scale"},
              Case{"word_order = \"big\", scale = 1e-4", "scale = 1e-4",
                   "shaker.registers.amplitude.word_order"},
+             // A float in g that is taken for 1e-4 g would be at rest at 5 g.
+             Case{"\"input\", scale = 1 ", "\"input\" ",
+                  "shaker.registers.measured_amplitude.scale"},
              Case{", mask = 1", "", "shaker.registers.emergency_stop.mask"},
              Case{"word_order = \"little\", ", "", "shaker.registers.measured_amplitude.word_or"},
              Case{"101, type = \"u16\", table = \"input\"", "101, type = \"u16\"",
@@ -81,8 +87,12 @@ TEST(RealRig, TwoGyrosOnOneInputAxisAreRefused) {
     EXPECT_THAT(real_complaint(axes + kMap),
                 HasSubstr("platform.gyro_y_axes[0]: found \"+x\", the input axis of gyro x too, "
                           "expected \"+y\" or \"-y\": gyro y drifts about platform y"));
-    EXPECT_EQ(complaint(axes, true), "") << "a simulated rig";
     EXPECT_EQ(complaint(axes, false), "") << "a recording: identify warns";
+    // BUT of a simulated rig it is a warning, with its place
+    EXPECT_THAT(
+        warnings(parse(as_simulated(axes, true), "rig.toml", true)),
+        ElementsAre("rig.toml:1: platform.gyro_y_axes[0]: found \"+x\", the input axis of "
+                    "gyro x too, expected \"+y\" or \"-y\": gyro y drifts about platform y"));
     // the letter of another gyro, though no two are alike
     const std::string swapped =
         "platform.gyro_x_axes = [\"+y\", \"+z\", \"+x\"]\n"
@@ -96,6 +106,10 @@ TEST(RealRig, ALeftHandedTriadIsRefused) {
     EXPECT_THAT(real_complaint(axes + kMap),
                 AllOf(HasSubstr("platform.gyro_z_axes: found +z +y +x, left-handed"),
                       HasSubstr("right-handed")));
+    EXPECT_THAT(warnings(parse(as_simulated(axes, true), "rig.toml", true)),
+                ElementsAre(AllOf(HasSubstr("rig.toml:1: platform.gyro_z_axes: found +z +y +x, "),
+                                  HasSubstr("left-handed"))));
+    EXPECT_THAT(warnings(parse(as_simulated("", true), "rig.toml", true)), IsEmpty());
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"+z\", \"-y\", \"+x\"]\n" + kMap), "");
     EXPECT_EQ(real_complaint("platform.gyro_z_axes = [\"-z\", \"+y\", \"+x\"]\n" + kMap), "");
 }

@@ -37,16 +37,98 @@ TEST(StreamClientTest, GetsTheStatusOnceAndThenWhatChanged) {
     StatusData status = source.status();
     status.time += drivers::kSecond;
     source.set(status);
-    std::this_thread::sleep_for(25ms);  // older than what clients share
-    const auto patch = client.next(client.due());
+    now = client.due() + 20ms;  // older than what all share
+    const auto patch = client.next(now);
     ASSERT_NE(patch, nullptr);
     EXPECT_TRUE(holds(*patch, R"({"type":"delta","patch":{"time_s":)")) << *patch;
     EXPECT_LT(patch->size(), 200u) << *patch;
     // WHEN a value is no longer there THEN the patch says null
     status.shaker.valid = false;
     source.set(status);
-    std::this_thread::sleep_for(25ms);
-    EXPECT_TRUE(holds(*client.next(client.due()), R"("measured_g":null)"));
+    EXPECT_TRUE(holds(*client.next(client.due() + 20ms), R"("measured_g":null)"));
+}
+
+/// Streams of one rate as the server's one thread serves them, one after the other.
+class Streams {
+  public:
+    Streams(StreamFeed& feed, int count, double rate_hz)
+        : clients_(static_cast<std::size_t>(count),
+                   StreamClient(feed, "1", Role::viewer, rate_hz, 0)) {
+        for (auto& client : clients_) (void)client.next(now);  // the greeting
+    }
+    /// All that is due; each takes `cost`. How many got a text.
+    int serve(Clock::duration cost) {
+        int texts = 0;
+        for (auto& client : clients_) {
+            if (client.next(now) != nullptr) ++texts;
+            now += cost;
+        }
+        return texts;
+    }
+    [[nodiscard]] Clock::time_point due() const { return clients_.front().due(); }
+
+    Clock::time_point now{std::chrono::hours(1)};
+
+  private:
+    std::vector<StreamClient> clients_;
+};
+
+TEST(StreamClientTest, OfOnePeriodShareAStatusHoweverLongServingThemTakes) {
+    constexpr int kPeriods = 10;
+    for (const int count : {1, 100, 1000}) {
+        FakeSource source;
+        StreamFeed feed(source);
+        Streams streams(feed, count, 5);
+        (void)streams.serve(0ms);  // the first of each
+        StatusData status = source.status();
+        // WHEN serving all of them takes most of a period of 200 ms
+        for (int k = 0; k < kPeriods; ++k) {
+            status.time += drivers::kSecond;
+            source.set(status);
+            const int before = source.asked;
+            streams.now = streams.due();
+            // THEN each has its text in each period, of one status made once
+            EXPECT_EQ(streams.serve(150ms / count), count) << count << " in period " << k;
+            EXPECT_EQ(source.asked - before, 1) << count << " in period " << k;
+        }
+    }
+}
+
+TEST(StreamClientTest, GetsNoStatusOlderThanItsPeriodNorThanAFifthOfASecond) {
+    FakeSource source;
+    StreamFeed feed(source);
+    const auto text_of = [&](StreamClient& client, Clock::time_point now) {
+        const auto text = client.next(now);
+        return text ? *text : std::string();
+    };
+    // GIVEN a client of one rate, served at the begin of a period
+    StreamClient first(feed, "1", Role::viewer, 0.1, 0), late = first, fast = first;
+    fast.take(R"({"rate_hz": 20})");
+    Clock::time_point now{std::chrono::hours(1)};
+    for (auto* client : {&first, &late, &fast}) (void)client->next(now);
+    for (auto* client : {&first, &late, &fast}) EXPECT_NE(text_of(*client, now), "");
+    StatusData status = source.status();
+    const auto changed = [&] {
+        status.time += drivers::kSecond;
+        source.set(status);
+    };
+    changed();
+    now = first.due();
+    EXPECT_NE(text_of(first, now), "");
+    // WHEN one that is slow, of the same long period, takes up again much later
+    changed();
+    int before = source.asked;
+    EXPECT_NE(text_of(late, now + 250ms), "");
+    EXPECT_EQ(source.asked - before, 1) << "of data the latest";
+    before = source.asked;
+    // THEN a fast one gets what is new in each of its own periods
+    now += 300ms;
+    for (int k = 0; k < 4; ++k) {
+        changed();
+        EXPECT_NE(text_of(fast, now), "");
+        now = fast.due();
+    }
+    EXPECT_EQ(source.asked - before, 4);
 }
 
 TEST(StreamClientTest, GetsEveryEventInOrderOrIsTooSlow) {

@@ -1,4 +1,4 @@
-#include "daemon/app/rig_lock.hpp"
+#include "daemon/lock/rig_lock.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

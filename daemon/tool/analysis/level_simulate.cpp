@@ -1,0 +1,230 @@
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "daemon/plot/chart.hpp"
+#include "daemon/results/exit_status.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/tool/analysis/level_options.hpp"
+#include "daemon/tool/commands.hpp"
+#include "estimator/levelling/simulation.hpp"
+#include "proto/json_number.hpp"
+#include "proto/option_value.hpp"
+
+namespace vibrig::tool::level_command {
+
+namespace {
+
+levelling::Scenario scenario_of(const Options& options) {
+    levelling::Scenario start;
+    start.loop = settings_of(options);
+    start.network = options.network == "fast"           ? levelling::Network::fast
+                    : options.network == "conventional" ? levelling::Network::conventional
+                                                        : levelling::Network::undamped;
+    start.tilt = pair(options.tilt, kArcmin);
+    start.drift = pair(options.drift, kDegPerHour);
+    start.zero = pair(options.zero_mg, 1e-3 * options.gravity);
+    start.reference_error = pair(options.reference_error, 1);
+    start.step = {options.step * kArcmin, options.step * kArcmin};
+    start.step_s = options.step_s;
+    start.duration_s =
+        options.duration_s > 0 ? options.duration_s : 3.1 * options.specification.settling_s;
+    check_samples("--duration", start.duration_s, options.period_s);
+    if (options.step != 0 && options.step_s < 0 && options.runs == 1) {
+        throw std::invalid_argument(text(
+            "--step: found %g without --step-at, expected the time of the step", options.step));
+    }
+    start.seed = options.seed;
+    return start;
+}
+
+void plot_run(const std::string& path, const levelling::SimulatedStart& run) {
+    plot::Chart tilt;
+    tilt.title = "Tilt while levelling";
+    tilt.x = plot::Axis("time [s]");
+    tilt.y = plot::Axis("tilt [arcmin]");
+    plot::Chart rate;
+    rate.title = "Commanded rate while levelling";
+    rate.x = plot::Axis("time [s]");
+    rate.y = plot::Axis("rate [deg/h]");
+    const std::size_t every = std::max<std::size_t>(1, run.trace.size() / 2000);
+    for (std::size_t i = 0; i < 2; ++i) {
+        const char* name = i == 0 ? "first channel" : "second channel";
+        plot::Curve of_tilt{name, {}, {}, {}, {}, plot::Look::line};
+        plot::Curve of_rate{name, {}, {}, {}, {}, plot::Look::line};
+        for (std::size_t k = 0; k < run.trace.size(); k += every) {
+            of_tilt.x.push_back(run.trace[k].time_s);
+            of_tilt.y.push_back(run.trace[k].tilt[i] / kArcmin);
+            of_rate.y.push_back(run.trace[k].rate[i] / kDegPerHour);
+        }
+        of_rate.x = of_tilt.x;
+        tilt.curves.push_back(std::move(of_tilt));
+        rate.curves.push_back(std::move(of_rate));
+    }
+    const std::filesystem::path where(path);
+    if (where.extension() == ".svg") {
+        plot::write_file(path, tilt.svg());
+        return;
+    }
+    plot::make_folder(path);
+    plot::write_file((where / "tilt.svg").string(), tilt.svg());
+    plot::write_file((where / "rate.svg").string(), rate.svg());
+}
+
+/// What became of many starts.
+struct ManyStarts {
+    std::vector<double> times;  ///< of those that settled, ascending, s
+    double bound = 0;           ///< s, after the start or the step
+    double worst_tilt = 0;      ///< when declared, rad
+    std::size_t late = 0, never = 0, falsely = 0;
+
+    [[nodiscard]] double time_within(double part) const {
+        return times.empty()
+                   ? std::nan("")
+                   : times[static_cast<std::size_t>(part * static_cast<double>(times.size() - 1))];
+    }
+};
+
+/// A start with tilts and drifts up to those given and a step at any time before settling.
+levelling::Scenario random_start(const Options& options, double settling_s, std::size_t number) {
+    levelling::Scenario start = scenario_of(options);
+    start.seed = options.seed + number;
+    start.until_settled = true;
+    std::mt19937_64 generator(start.seed ^ 0x5eedU);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (std::size_t i = 0; i < 2; ++i) {
+        start.tilt[i] *= uniform(generator);
+        start.drift[i] *= uniform(generator);
+        start.step[i] = std::copysign(start.step[i], uniform(generator));
+    }
+    start.step_s = options.step != 0 ? settling_s * (1 + uniform(generator)) : -1;
+    return start;
+}
+
+ManyStarts simulate_many(const Options& options, const levelling::LevellerSettings& loop,
+                         double tolerance) {
+    Progress progress("levelling");
+    ManyStarts many;
+    const auto declared = declared_within(options, loop);
+    many.bound = declared ? 1.05 * *declared : levelling::kPatience * loop.settling_s;
+    for (std::size_t n = 0; n < options.runs; ++n) {
+        progress.show(n, options.runs);
+        const levelling::Scenario start = random_start(options, loop.settling_s, n);
+        const levelling::SimulatedStart run = levelling::simulate(start);
+        if (run.verdict != levelling::Verdict::settled) {
+            ++many.never;
+            continue;
+        }
+        const bool stepped = start.step_s >= 0 && start.step_s < run.settled_s;
+        many.late += run.settled_s - (stepped ? start.step_s : 0) > many.bound ? 1 : 0;
+        double tilt = 0;
+        for (std::size_t i = 0; i < 2; ++i) {
+            tilt = std::max(tilt,
+                            std::abs(run.tilt_when_settled[i] + start.zero[i] / options.gravity));
+        }
+        many.falsely += tilt > 2 * tolerance ? 1U : 0U;
+        many.worst_tilt = std::max(many.worst_tilt, tilt);
+        many.times.push_back(run.settled_s);
+    }
+    std::sort(many.times.begin(), many.times.end());
+    return many;
+}
+
+int run_many(const Options& options) {
+    const levelling::LevellerSettings loop = settings_of(options);
+    const double tolerance = levelling::Leveller(loop).tolerance();
+    const ManyStarts many = simulate_many(options, loop, tolerance);
+    if (options.json) {
+        std::cout << Json{{"runs", options.runs},
+                          {"settled", many.times.size()},
+                          {"late", many.late},
+                          {"false", many.falsely},
+                          {"bound_s", many.bound},
+                          {"median_s", proto::number_or_null(many.time_within(0.5))},
+                          {"p95_s", proto::number_or_null(many.time_within(0.95))},
+                          {"longest_s", proto::number_or_null(many.time_within(1))},
+                          {"worst_tilt_arcmin", many.worst_tilt / kArcmin},
+                          {"tolerance_arcmin", tolerance / kArcmin}}
+                         .dump()
+                  << '\n';
+    } else {
+        std::cout << text(
+                         "%zu of %zu settled, %zu later than %.5g s after the start or the step, "
+                         "%zu declared falsely\n",
+                         many.times.size(), options.runs, many.late, many.bound, many.falsely)
+                  << text(
+                         "time: median %.5g s, 95 %% within %.5g s, longest %.5g s; largest tilt "
+                         "when declared %.3g' (tolerance %.3g')\n",
+                         many.time_within(0.5), many.time_within(0.95), many.time_within(1),
+                         many.worst_tilt / kArcmin, tolerance / kArcmin);
+    }
+    return many.never == 0 && 20 * many.late <= options.runs && many.falsely == 0 ? 0 : kNo;
+}
+
+}  // namespace
+
+int run_simulate(const Options& options) {
+    if (options.runs > 1) {
+        return run_many(options);
+    }
+    const levelling::Scenario start = scenario_of(options);
+    const levelling::SimulatedStart run = levelling::simulate(start);
+    const levelling::Leveller leveller(start.loop);
+    const Pair end = run.trace.back().tilt;
+    if (!options.plot.empty()) {
+        plot_run(options.plot, run);
+    }
+    const bool fast = start.network == levelling::Network::fast;
+    if (options.json) {
+        const auto both = [](const Pair& p, double unit) {
+            return Json::array(
+                {proto::number_or_null(p[0] / unit), proto::number_or_null(p[1] / unit)});
+        };
+        Json result = {{"network", options.network},
+                       {"gains", gains_json(start.loop.fast)},
+                       {"seed", options.seed},
+                       {"tilt_arcmin", both(end, kArcmin)},
+                       {"tilt_deviation_arcmin", run.tilt_deviation() / kArcmin}};
+        if (fast) {
+            result["verdict"] = levelling::name_of(run.verdict);
+            result["settled_s"] = run.settled_s >= 0 ? Json(run.settled_s) : Json(nullptr);
+            result["force_arcmin"] = both(run.observables.force_rad, kArcmin);
+            result["drift_deg_h"] = both(run.drift, kDegPerHour);
+            result["tolerance_arcmin"] = leveller.tolerance() / kArcmin;
+            result["noise"] = budget_json(leveller);
+            result["message"] = run.message;
+        }
+        std::cout << result.dump() << '\n';
+    } else {
+        std::cout << text("tilt after %.6g s: %.4g' and %.4g'\n", start.duration_s,
+                          end[0] / kArcmin, end[1] / kArcmin);
+        if (fast) {
+            std::cout << (run.settled_s >= 0 ? text("settled after %.5g s", run.settled_s)
+                                             : std::string(levelling::name_of(run.verdict)))
+                      << text("; tolerance %.3g'\n", leveller.tolerance() / kArcmin)
+                      << text("drift found: %.5g and %.5g deg/h\n", run.drift[0] / kDegPerHour,
+                              run.drift[1] / kDegPerHour)
+                      << budget_table(leveller);
+            if (!run.message.empty()) {
+                std::cout << "note: " << run.message << '\n';
+            }
+        }
+    }
+    return fast && run.settled_s < 0 ? kNo : 0;
+}
+
+}  // namespace vibrig::tool::level_command

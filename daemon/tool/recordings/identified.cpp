@@ -1,0 +1,420 @@
+#include "daemon/tool/recordings/identified.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <iterator>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/configuration/configuration.hpp"
+#include "daemon/record/in_order.hpp"
+#include "daemon/record/replay.hpp"
+#include "daemon/results/progress.hpp"
+#include "daemon/results/spectrum_result.hpp"
+#include "daemon/rt/dwell_order.hpp"
+#include "daemon/tool/analysis/rig_doubts.hpp"
+#include "daemon/tool/analysis/seen_plan.hpp"
+#include "daemon/tool/analysis/spectrum_dwells.hpp"
+#include "daemon/tool/recordings/campaign_argument.hpp"
+#include "estimator/identification/identification.hpp"
+#include "estimator/level/vibration_level.hpp"
+#include "estimator/spectrum/sampling.hpp"
+#include "proto/recording_csv.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+using proto::RecordingRow;
+
+estimator::Measurement measurement_of(const RecordingRow& row) {
+    estimator::Measurement measurement;
+    measurement.time_s = row.time_s;
+    for (std::size_t i = 0; i < 3; ++i) {
+        measurement.angle_rad[i] = row.angle_deg[i] * (std::numbers::pi / 180);
+        measurement.force_g[i] = row.force_g[i];
+    }
+    return measurement;
+}
+
+/// A result, and what of the recording contradicts the configuration.
+struct Found {
+    estimator::Result result;
+    std::string contradiction;  ///< the first; empty: none
+    std::vector<estimator::spectrum::SpectralDwell> spectral;
+    std::vector<estimator::spectrum::Kind> kinds;
+    std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
+};
+
+/// `rows`: of all dwells.
+Found with_doubts(estimator::Result result, const std::vector<estimator::DwellRow>& rows,
+                  const RigDoubts& doubts) {
+    Found found{std::move(result), {}, {}, {}, {}};
+    found.contradiction = doubts.tell(found.result, rows);
+    return found;
+}
+
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
+class RowsIdentified {
+  public:
+    explicit RowsIdentified(const estimator::Settings& settings)
+        : identification_(settings, room_), doubts_(settings), plan_(settings) {}
+
+    void add(const RecordingRow& row) {
+        if (dwells_ == 0 || row.run != run_ || row.position != position_) begin_dwell(row);
+        last_s_ = row.time_s;
+        const auto measurement = measurement_of(row);
+        plan_.add(measurement);
+        static_cast<void>(identification_.add(measurement));
+        doubts_.add(measurement);
+    }
+    /// `held_out`: a few dwells that a result is tried on determine nothing by themselves.
+    Found found(bool held_out) {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        if (!held_out) plan_.tell();
+        auto result = identification_.result();
+        for (auto& row : result.rows) row.common_clock = common_clock_;
+        return with_doubts(std::move(result), identification_.rows(), doubts_);
+    }
+
+  private:
+    void begin_dwell(const RecordingRow& row) {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        // The times of the file may go on from dwell to dwell; that they do is known at its end.
+        if (dwells_ > 0 && !(row.time_s > last_s_)) common_clock_ = false;
+        if (++dwells_ > room_) identification_.reserve(room_ *= 2);
+        run_ = row.run;
+        position_ = row.position;
+        estimator::DwellInfo info{run_, position_};
+        info.begin_s = 0;
+        identification_.begin_dwell(info);
+        doubts_.begin_dwell();
+        plan_.begin_dwell(run_);
+    }
+
+    std::size_t room_ = 1024, dwells_ = 0;
+    estimator::Identification identification_;
+    RigDoubts doubts_;
+    SeenPlan plan_;
+    bool common_clock_ = true;
+    int run_ = 0, position_ = 0;
+    double last_s_ = 0;
+};
+
+/// A file of any length, in memory that does not grow with it: another thread reads ahead.
+Found identify(proto::RecordingReader& file, std::uint64_t size,
+               const configuration::Configuration& rig, const std::string& path, bool held_out) {
+    const estimator::Settings& settings = rig.estimator;
+    struct Block {
+        std::vector<RecordingRow> rows;
+        std::uint64_t bytes = 0;  ///< of the file, up to its end
+    };
+    constexpr std::size_t kBlock = 4096;
+    record::InOrder<Block> blocks(
+        [&file]() -> std::optional<Block> {
+            Block block;
+            block.rows.resize(kBlock);
+            std::size_t count = 0;
+            while (count < kBlock && file.next(block.rows[count])) ++count;
+            block.rows.resize(count);
+            block.bytes = file.bytes();
+            return count > 0 ? std::optional(std::move(block)) : std::nullopt;
+        },
+        std::identity(), 1);
+    RowsIdentified identified(settings);
+    Progress progress("identifying");
+    while (const auto block = blocks.next()) {
+        for (const RecordingRow& row : block->rows) identified.add(row);
+        progress.show(block->bytes, std::max(size, block->bytes));
+    }
+    Found found = identified.found(held_out);
+    // All that shook did so at the frequency of the configuration.
+    const Spectra none;
+    DwellKinds kinds(rig, none);
+    const RecordingRow any;
+    kinds.add({&any}, {}, path);
+    found.kinds = kinds.kinds();
+    for (const estimator::DwellRow& row : found.result.rows)
+        found.spectral.push_back({row, row.vibration.kappa > 1 ? kinds.of(0) : std::nullopt, 0});
+    return found;
+}
+
+std::vector<RecordingRow> rows_of(proto::RecordingReader& file) {
+    std::vector<RecordingRow> rows(1);
+    while (file.next(rows.back())) rows.emplace_back();
+    rows.pop_back();
+    return rows;
+}
+
+struct Dwell {
+    int run = 0;
+    int position = 0;
+    std::vector<const RecordingRow*> rows;
+};
+
+/// One dwell for each stretch of rows with the same run and position: a pair that comes back
+/// begins another.
+std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
+    std::vector<Dwell> dwells;
+    for (const RecordingRow& row : rows) {
+        if (dwells.empty() || dwells.back().run != row.run ||
+            dwells.back().position != row.position)
+            dwells.push_back({row.run, row.position, {}});
+        dwells.back().rows.push_back(&row);
+    }
+    return dwells;
+}
+
+/// The times of the file go on from dwell to dwell.
+bool has_common_clock(const std::vector<Dwell>& dwells) {
+    for (std::size_t d = 1; d < dwells.size(); ++d) {
+        if (!(dwells[d].rows.front()->time_s > dwells[d - 1].rows.back()->time_s)) return false;
+    }
+    return true;
+}
+
+DwellKinds kinds_of(const std::vector<Dwell>& dwells, const std::vector<std::string>& profiles,
+                    const configuration::Configuration& rig, const SpectrumRequest& request,
+                    const std::string& file) {
+    DwellKinds kinds(rig, request.spectra);
+    for (const Dwell& dwell : dwells) kinds.add(dwell.rows, profiles, file);
+    if (!kinds.kinds().empty() && !kinds.reference() && !request.held_out)
+        throw std::runtime_error(file +
+                                 ": found random vibration alone, expected dwells at one sine "
+                                 "frequency at least, which the 30 coefficients are of");
+    return kinds;
+}
+
+/// A frequency of which a harmonic falls on a multiple of the sampling rate, where the recording
+/// itself names its frequencies: the level, and with it the row, would be wrong.
+void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& rows,
+                      const estimator::Settings& settings, const std::string& file) {
+    if (rows.front().frequency_hz < 0) return;
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < std::min<std::size_t>(rows.size(), 1001); ++i)
+        times_s.push_back(rows[i].time_s);
+    const double period_s = estimator::median_interval(times_s);
+    if (!(period_s > 0)) return;
+    namespace spectrum = estimator::spectrum;
+    for (const spectrum::Kind& kind : kinds.kinds()) {
+        if (!kind.profile.empty()) continue;
+        const double hz = kind.hz(), window_s = settings.level_window_s;
+        if (!spectrum::forbidden(hz, 1 / period_s, window_s)) continue;
+        std::array<char, 240> text{};
+        std::snprintf(text.data(), text.size(),
+                      ": column frequency_hz: found %g Hz at %g samples/s, of which a harmonic "
+                      "falls on a multiple of the rate, expected another: the nearest is %g Hz",
+                      hz, 1 / period_s, spectrum::nearest_free(hz, 1 / period_s, window_s));
+        throw std::runtime_error(file + text.data());
+    }
+}
+
+/// A recording that says with which frequency each dwell shook: kept whole, since the frequency
+/// that the filter takes is known at its end.
+Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::string>& profiles,
+               const configuration::Configuration& rig, const SpectrumRequest& request,
+               const std::string& file) {
+    estimator::Settings settings = rig.estimator;
+    const std::vector<Dwell> dwells = dwells_of(rows);
+    const DwellKinds kinds = kinds_of(dwells, profiles, rig, request, file);
+    const auto reference = kinds.reference();
+    if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
+    refuse_forbidden(kinds, rows, settings, file);
+    const bool common_clock = has_common_clock(dwells);
+    estimator::Identification identification(settings, dwells.size());
+    RigDoubts doubts(settings);
+    SeenPlan plan(settings);
+    Progress progress("identifying");
+    std::size_t done = 0;
+    Found found;
+    found.kinds = kinds.kinds();
+    for (std::size_t d = 0; d < dwells.size(); ++d) {
+        const Dwell& dwell = dwells[d];
+        const auto kind = kinds.of(d);
+        const std::size_t before = identification.rows().size();
+        estimator::DwellInfo info{dwell.run, dwell.position};
+        if (common_clock) info.begin_s = 0;
+        info.random = kinds.random(d);
+        const bool random = info.random.mean_square_g2 > 0;
+        if (kind && !random) info.frequency_hz = kinds.kinds()[*kind].hz();
+        identification.begin_dwell(info);
+        doubts.begin_dwell();
+        plan.begin_dwell(dwell.run);
+        for (const RecordingRow* row : dwell.rows) {
+            const auto measurement = measurement_of(*row);
+            static_cast<void>(identification.add(measurement));
+            doubts.add(measurement);
+            plan.add(measurement);
+            // Asking a clock costs more than a filter step.
+            if (++done % 1024 == 0) {
+                progress.show(done, rows.size());
+            }
+        }
+        static_cast<void>(identification.end_dwell());
+        if (identification.rows().size() > before) {
+            const estimator::DwellRow& row = identification.rows().back();
+            const bool shook = row.vibration.kappa > 1;
+            if (shook && !kind)
+                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
+                                         ": found a dwell at rest that vibrates by " +
+                                         std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
+                                         " g, expected its frequency");
+            found.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
+        }
+    }
+    if (!request.held_out) plan.tell();
+    Found whole = with_doubts(identification.result(), identification.rows(), doubts);
+    found.result = std::move(whole.result);
+    found.contradiction = std::move(whole.contradiction);
+    return found;
+}
+
+/// Of a campaign's HDF5 file the dwells as they were fed, with the levels commanded.
+Found identify(const record::Campaign& campaign, const estimator::Settings& settings) {
+    const auto dwells = record::recorded_dwells(campaign);
+    SeenPlan plan(settings);
+    for (const auto& dwell : dwells) {
+        plan.begin_dwell(dwell.order->run);
+        for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
+            plan.add(
+                rt::measurement_of(campaign.samples[i], dwell.order->from, dwell.order->zero_g));
+    }
+    plan.tell();
+    std::optional<dwells::Anew> anew;
+    if (campaign.found) anew.emplace(settings, *campaign.found, dwells.size());
+    estimator::Identification as_recorded(settings, dwells.size());
+    auto& identification = anew ? anew->identification() : as_recorded;
+    RigDoubts doubts(settings);
+    Progress progress("identifying");
+    std::size_t done = 0;
+    for (const auto& dwell : dwells) {
+        doubts.begin_dwell();
+        record::feed(identification, campaign, dwell,
+                     [&](std::size_t sample, const estimator::StepResult&) {
+                         doubts.add(rt::measurement_of(campaign.samples[sample], dwell.order->from,
+                                                       dwell.order->zero_g));
+                         if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
+                     });
+    }
+    Found found =
+        with_doubts(anew ? anew->result() : identification.result(), identification.rows(), doubts);
+    found.rows = identification.rows();
+    return found;
+}
+
+Found identify_campaign(const std::string& path, const std::string& config,
+                        estimator::Settings& settings, bool& simulated,
+                        std::optional<dwells::Live>& live) {
+    record::Campaign campaign = read_named_campaign(path);
+    if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
+    if (!config.empty()) record::forget_noise(campaign);
+    const auto loaded =
+        config.empty()
+            ? configuration::parse(record::identification_sections(campaign.head.configuration),
+                                   "configuration in " + campaign.path, false)
+            : configuration::load(config, false);
+    settings = loaded.configuration.estimator;
+    simulated = campaign.head.simulated;
+    if (campaign.found) {
+        live = {*campaign.found, record::live_result(campaign, settings), {}};
+        live->assessed = estimator::uncertainty::assess(settings, live->result);
+    }
+    settings = dwells::Anew::settings_of(settings, campaign.found);
+    return identify(campaign, settings);
+}
+
+/// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
+void contradict(estimator::uncertainty::Verdict& verdict, const std::string& contradiction) {
+    if (contradiction.empty()) return;
+    using estimator::uncertainty::Level;
+    const std::string text = "the configuration does not fit the recording: " + contradiction;
+    verdict.level = Level::not_valid;
+    verdict.reasons.insert(verdict.reasons.begin(), {"configuration", text, Level::not_valid});
+    verdict.sentence = "not valid, because " + text;
+}
+
+/// A folder, an HDF5 file, or the name of a campaign: then there is no such file.
+bool is_campaign(const std::string& argument) {
+    std::error_code error;
+    return !std::filesystem::is_regular_file(argument, error)
+               ? std::filesystem::is_directory(argument, error) ||
+                     argument.find_first_of("/.") == std::string::npos
+               : record::is_hdf5(argument);
+}
+
+/// Of a recording whose dwells are to prove a result: all of them.
+std::vector<HeldOut> held_out_of(const Found& found) {
+    std::vector<HeldOut> list;
+    for (const auto& dwell : found.spectral)
+        list.push_back({dwell.row, dwell.kind ? found.kinds[*dwell.kind].profile : ""});
+    return list;
+}
+
+}  // namespace
+
+Identified identify_recording(const std::string& file, const std::string& config,
+                              const SpectrumRequest& request) {
+    Identified identified;
+    Found found;
+    if (is_campaign(file)) {
+        found = identify_campaign(file, config, identified.settings, identified.simulated,
+                                  identified.live);
+    } else {
+        const auto loaded = configuration::load(config, false);
+        identified.settings = loaded.configuration.estimator;
+        proto::RecordingReader reader(file);
+        identified.simulated = loaded.configuration.simulated() || reader.simulated();
+        std::error_code unknown;
+        const auto size = std::filesystem::file_size(file, unknown);
+        const auto& rig = loaded.configuration;
+        if (reader.has_frequency() || reader.has_profile() || !request.spectra.empty()) {
+            const std::vector<RecordingRow> rows = rows_of(reader);
+            found = identify(rows, reader.profiles(), rig, request, file);
+        } else {
+            found = identify(reader, unknown ? 0 : size, rig, file, request.held_out);
+        }
+        if (request.held_out) identified.held_out = held_out_of(found);
+    }
+    identified.result = std::move(found.result);
+    identified.assessed = estimator::uncertainty::assess(identified.settings, identified.result);
+    if (found.spectral.size() > kMostSpectralDwells && found.kinds.size() > 1) {
+        identified.result.warnings.push_back(
+            "found " + std::to_string(found.spectral.size()) + " dwells, expected at most " +
+            std::to_string(kMostSpectralDwells) +
+            " for coefficients over frequency: those at the reference frequency stand");
+    } else if (identified.assessed.done && found.spectral.size() >= 2 &&
+               found.spectral.size() <= kMostSpectralDwells) {
+        identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
+                                          std::move(found.kinds), request.form);
+        adopt(*identified.spectrum, identified.settings, identified.assessed);
+    } else if (identified.assessed.done) {
+        identified.spectrum = spectrum_of(identified.settings, found.rows, request.form);
+        if (identified.spectrum)
+            adopt(*identified.spectrum, identified.settings, identified.assessed);
+    }
+    for (const estimator::DwellRow& row : found.rows) {
+        if (row.held_out) identified.held_out.push_back({row, ""});
+    }
+    contradict(identified.assessed.verdict, found.contradiction);
+    return identified;
+}
+
+estimator::uncertainty::MonteCarlo draw(const Identified& of) {
+    Progress progress("drawing");
+    const estimator::uncertainty::MonteCarloSettings how;
+    return estimator::uncertainty::propagate_distributions(
+        of.settings, of.result, of.assessed, how,
+        [&](int blocks) { progress.show(static_cast<std::size_t>(blocks), 100); });
+}
+
+}  // namespace vibrig::tool

@@ -1,0 +1,46 @@
+#include "daemon/journal/database.hpp"
+
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+namespace vibrig::journal {
+namespace {
+
+/// A file of 8 MB in pages of 4 kB.
+class DatabaseTest : public testing::Test {
+  protected:
+    DatabaseTest() {
+        Database database(path.string());
+        database.execute("CREATE TABLE event (text TEXT)");
+        database.execute(
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 2000) "
+            "INSERT INTO event SELECT printf('%04000d', i) FROM n");
+    }
+    ~DatabaseTest() override {
+        for (const char* end : {"", "-wal", "-shm"}) std::filesystem::remove(path.string() + end);
+    }
+    const std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("vibrig-database-" + std::to_string(::getpid()));
+};
+
+TEST_F(DatabaseTest, HoldsLittleOfAFileHoweverMuchIsReadOfIt) {
+    for (const auto mode : {Database::Mode::read, Database::Mode::write}) {
+        const auto before = ::sqlite3_memory_used();
+        ::sqlite3_memory_highwater(1);
+        Database database(path.string(), mode);
+        // Each page once: a sum over the texts themselves.
+        EXPECT_EQ(
+            database.ask("SELECT count(*) FROM event WHERE text LIKE '%1'").at(0).numbers.at(0),
+            200);
+        // 256 kB of pages, and 5 % of each besides; with what a connection has, half of a
+        // megabyte. SQLite itself would take 2 MB.
+        EXPECT_LT(::sqlite3_memory_highwater(0) - before, 1 << 19) << "of 8 MB";
+    }
+}
+
+}  // namespace
+}  // namespace vibrig::journal
