@@ -9,10 +9,6 @@
 namespace vibrig::drivers {
 namespace {
 
-// A register resolves 1 mHz.
-constexpr double kSameFrequency_hz = 0.01;
-constexpr double kSameLevel_db = 0.05;
-
 // The first time on a new link that is the stop's alone. A device that was cut off for long has
 // tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
 // left shaking is to see it told one thing. 100 ms, and as much again for the way there.
@@ -87,15 +83,6 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops)
     if (orders_.put(set_point, ticket)) ++counts_.set_points_discarded;
     wake();
     return true;
-}
-
-bool ModbusShaker::same_kind(const ShakerSetPoint& set_point,
-                             const ShakerReading& now) const noexcept {
-    if (set_point.random || (now.random && now.random->random))
-        return set_point.random && now.random && now.random->random &&
-               now.random->profile == set_point.random->profile &&
-               std::abs(now.random->level_db - set_point.random->level_db) < kSameLevel_db;
-    return std::abs(set_point.frequency_hz - now.frequency_hz) <= kSameFrequency_hz;
 }
 
 void ModbusShaker::stop_now() noexcept {
@@ -437,37 +424,6 @@ bool ModbusShaker::write_each(std::span<const Step> steps) {
         if (write_and_verify(step.role, step.reg, step.value) != Written::as_told) return false;
     }
     return true;
-}
-
-bool ModbusShaker::choose(const std::optional<RandomSetPoint>& random) {
-    const proto::RandomRegisters& map = *settings_.registers.random;
-    const proto::Register& amplitude = settings_.registers.amplitude;
-    if (!random && !nonzero(image_.words_of(map.mode))) return true;
-    // As the frequency: at zero amplitude, where the register may still hold the last one.
-    if (nonzero(image_.words_of(amplitude)) &&
-        !write_each(std::array{Step{"amplitude", amplitude, 0}}))
-        return false;
-    if (!random) return write_each(std::array{Step{"mode", map.mode, 0}});
-    // A controller refuses the mode without a profile that it knows.
-    const double number = random->profile;
-    if (!write_each(std::array{Step{"profile number", map.profile_number, number},
-                               Step{"profile level", map.profile_level_db, random->level_db},
-                               Step{"mode", map.mode, 1}}))
-        return false;
-    Words words{};
-    const auto raw = std::span(words).first(map.profile_checksum.words());
-    const Reply reply = read(map.profile_checksum, raw);
-    if (reply.ok() && proto::decode(map.profile_checksum, raw) == random->checksum) return true;
-    if (!reply.ok() && reply.kind != ReplyKind::exception) return false;
-    write_failed_ = true;
-    if (reply.ok()) ++counts_.read_back_mismatches;
-    settle(reply.ok() ? "profile checksum reads back as " +
-                            std::to_string(static_cast<std::uint32_t>(
-                                proto::decode(map.profile_checksum, raw))) +
-                            ", expected " + std::to_string(random->checksum) + " of profile " +
-                            std::to_string(random->profile)
-                      : "profile checksum cannot be read back: " + reply.text());
-    return false;
 }
 
 bool ModbusShaker::watchdog_due(Time now) const noexcept {
