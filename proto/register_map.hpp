@@ -25,6 +25,26 @@ struct Register {
     [[nodiscard]] std::size_t words() const noexcept;
 };
 
+/// Of a controller that plays random vibration by profiles of its own.
+struct RandomRegisters {
+    Register mode{8, RegisterType::u16, WordOrder::big, RegisterTable::holding, Access::read_write,
+                  1};  ///< 0 sine, 1 random
+    Register profile_number{
+        9, RegisterType::u16, WordOrder::big, RegisterTable::holding, Access::read_write, 1};
+    Register profile_level_db{
+        10, RegisterType::i16, WordOrder::big, RegisterTable::holding, Access::read_write,
+        0.1};  ///< about the profile
+    /// CRC-32 of the profile in force: of hz and g^2/Hz of each breakpoint, big-endian floats.
+    Register profile_checksum{
+        5, RegisterType::u32, WordOrder::big, RegisterTable::input, Access::read, 1};
+    Register measured_g_rms{
+        7, RegisterType::u32, WordOrder::big, RegisterTable::input, Access::read, 1e-4};
+    /// Low four bits: 0 idle, 1 levelling, 2 at level, 3 aborted; then 1: its abort bands are
+    /// armed; the high byte: why it aborted.
+    Register control_state{9, RegisterType::u16, WordOrder::big, RegisterTable::input, Access::read,
+                           1};
+};
+
 /// The roles Vibrig knows. The configuration's [shaker.registers] table gives each its Register.
 struct ShakerRegisters {
     Register frequency{
@@ -50,7 +70,8 @@ struct ShakerRegisters {
         0x0001};  ///< 1: chain open
     Register measured_amplitude{
         3,   RegisterType::u32, WordOrder::big, RegisterTable::input, Access::read,
-        1e-4};  ///< g peak at the table
+        1e-4};                              ///< g peak at the table
+    std::optional<RandomRegisters> random;  ///< none: sines alone
 };
 
 [[nodiscard]] double decode(const Register& reg, std::span<const std::uint16_t> words) noexcept;

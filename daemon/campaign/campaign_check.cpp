@@ -26,6 +26,7 @@ void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
     proof_.take_over(std::move(history));
     stop_.pads(proof_.pads());
     // The witnesses go on with what was measured; a key that has changed since asks for a new one.
+    for (const auto& [hz, ratio] : proof_.transmissions()) excitation_.measured(hz, ratio);
     const auto transmission = proof_.transmission();
     if (!transmission) return;
     ports_.rig.transmission(*transmission);

@@ -14,7 +14,8 @@ using drivers::Time;
 
 void Excitation::from_rest(const Stop& stop, Time now) {
     frequency_hz_ = stop.frequency_hz > 0 ? stop.frequency_hz : settings_.frequency_hz;
-    transmission_ = stop.transmission;
+    const auto measured = measured_.find(stop.frequency_hz);
+    transmission_ = measured != measured_.end() ? measured->second : stop.transmission;
     asked_g_ = 0;
     tell_ramp(0, now);
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <string>
 
 #include "daemon/campaign/ports.hpp"
@@ -28,6 +29,10 @@ class Excitation {
     /// From rest, where the gimbals are (deg): what the table was told last is over, and no witness
     /// may hold it to that.
     void from_rest(const Stop& stop, drivers::Time now);
+    /// Platform over table at a frequency of the plan, as the loop check has measured it.
+    void measured(double frequency_hz, double transmission) {
+        measured_[frequency_hz] = transmission;
+    }
     /// Where the gimbals are while the table moves, deg as the encoders count.
     void place(const std::array<double, 3>& position_deg) { position_deg_ = position_deg; }
     [[nodiscard]] const std::array<double, 3>& position_deg() const { return position_deg_; }
@@ -79,7 +84,8 @@ class Excitation {
     StopMonitor& stop_;
     std::array<double, 3> position_deg_{};
     double frequency_hz_;
-    double transmission_ = 0;  ///< see Stop
+    double transmission_ = 0;            ///< see Stop
+    std::map<double, double> measured_;  ///< transmissions by frequency
     double highest_g_ = 0;
     bool campaign_ = true;
     drivers::Time since_ = 0;

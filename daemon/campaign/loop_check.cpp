@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "daemon/interlock/amplitude_witness.hpp"
 
@@ -21,22 +22,41 @@ constexpr double kMostBad = 0.1;  // of the samples
 LoopCheck::LoopCheck(const LoopCheckSettings& settings, const estimator::Settings& rig)
     : settings_(settings), rig_(rig), frame_(rig) {}
 
+std::vector<Stop> LoopCheck::further_frequencies(const Settings& settings) {
+    std::vector<Stop> list;
+    for (const Stop& stop : settings.stops) {
+        const double hz = stop.frequency_hz;
+        if (!(hz > 0 && stop.table_g > 0) || estimator::at_reference(settings.rig, hz) ||
+            std::ranges::count(list, hz, &Stop::frequency_hz) > 0)
+            continue;
+        list.push_back(stop);
+    }
+    std::ranges::sort(list, {}, &Stop::frequency_hz);
+    return list;
+}
+
 std::string LoopCheck::beyond_limits(const Settings& settings) {
-    const double omega = 2 * std::numbers::pi * settings.frequency_hz;
-    const double mps2 = settings.loop.table_g * settings.rig.gravity_mps2;
-    const std::string what =
-        fmt::format("{:g} g at {:g} Hz: ", settings.loop.table_g, settings.frequency_hz);
-    if (settings.loop.table_g > settings.max_acceleration_g)
-        return what + fmt::format("{:g} g at most", settings.max_acceleration_g);
-    if (mps2 / omega > settings.max_velocity_mps)
-        return what + fmt::format("{:g} m/s at most", settings.max_velocity_mps);
-    if (mps2 / (omega * omega) * 1e3 > settings.max_displacement_mm)
-        return what + fmt::format("{:g} mm at most", settings.max_displacement_mm);
-    return {};
+    const auto at = [&](double hz) -> std::string {
+        const double omega = 2 * std::numbers::pi * hz;
+        const double mps2 = settings.loop.table_g * settings.rig.gravity_mps2;
+        const std::string what = fmt::format("{:g} g at {:g} Hz: ", settings.loop.table_g, hz);
+        if (settings.loop.table_g > settings.max_acceleration_g)
+            return what + fmt::format("{:g} g at most", settings.max_acceleration_g);
+        if (mps2 / omega > settings.max_velocity_mps)
+            return what + fmt::format("{:g} m/s at most", settings.max_velocity_mps);
+        if (mps2 / (omega * omega) * 1e3 > settings.max_displacement_mm)
+            return what + fmt::format("{:g} mm at most", settings.max_displacement_mm);
+        return {};
+    };
+    std::string why = at(settings.frequency_hz);
+    for (const Stop& stop : further_frequencies(settings))
+        if (why.empty()) why = at(stop.frequency_hz);
+    return why;
 }
 
 void LoopCheck::begin(const std::string& by) {
     readings_.clear();
+    found_wrong_.clear();
     bad_ = 0;
     status_ = {};
     status_.by = by;
@@ -189,13 +209,39 @@ double LoopCheck::over_command(drivers::Time asked, double ramp_s) const {
     return slope * ramp_s / settings_.table_g;
 }
 
-void LoopCheck::row(const char* name, const char* unit, double value, double low, double high) {
+LoopCheckStatus::Row LoopCheck::judged(const char* name, const char* unit, double value, double low,
+                                       double high, const std::string& at) {
     const bool passed = value >= low && value <= high;
-    status_.rows.push_back({name, unit, value, low, high, passed});
-    if (passed) return;
-    out_of_band_ +=
-        fmt::format("{}{} {:.4g}{}{}, expected {:.4g} to {:.4g}", out_of_band_.empty() ? "" : "; ",
-                    name, value, *unit == '\0' ? "" : " ", unit, low, high);
+    if (!passed)
+        found_wrong_ += fmt::format("{}{}{} {:.4g}{}{}, expected {:.4g} to {:.4g}",
+                                    found_wrong_.empty() ? "" : "; ", at, name, value,
+                                    *unit == '\0' ? "" : " ", unit, low, high);
+    return {name, unit, value, low, high, passed};
+}
+
+void LoopCheck::row(const char* name, const char* unit, double value, double low, double high) {
+    status_.rows.push_back(judged(name, unit, value, low, high, ""));
+}
+
+LoopCheck::AtFrequency LoopCheck::finish_at(double hz, double transmission) {
+    const auto found = estimator::loop_response(readings_, hz);
+    const double table_g = found.table_known ? found.table_g : settings_.table_g;
+    const double tolerance = settings_.transmission_tolerance;
+    const std::string at = fmt::format("at {:g} Hz ", hz);
+    AtFrequency out{hz, table_g > 0 ? found.platform_g / table_g : 0, {}};
+    const auto row = [&](const char* name, const char* unit, double value, double low,
+                         double high) {
+        out.rows.push_back(judged(name, unit, value, low, high, at));
+    };
+    row("transmission", "", out.transmission, transmission * (1 - tolerance),
+        transmission * (1 + tolerance));
+    if (found.table_known)
+        row("table over command", "", found.table_g / settings_.table_g, 1 / kDecibel, kDecibel);
+    row("frequency", "Hz", found.frequency_hz, hz - settings_.frequency_tolerance_hz,
+        hz + settings_.frequency_tolerance_hz);
+    row("distortion", "", found.distortion, 0, settings_.distortion);
+    row("cross-axis share", "", found.cross_share, 0, settings_.cross_share);
+    return out;
 }
 
 void LoopCheck::finish(double shaker_g) {
@@ -203,7 +249,6 @@ void LoopCheck::finish(double shaker_g) {
     const double commanded_g = settings_.table_g;
     const double table_g = found.table_known ? found.table_g : commanded_g;
     const double tolerance = settings_.transmission_tolerance;
-    out_of_band_.clear();
     transmission_ = table_g > 0 ? found.platform_g / table_g : 0;
     row("transmission", "", transmission_, rig_.transmission * (1 - tolerance),
         rig_.transmission * (1 + tolerance));
@@ -224,8 +269,9 @@ void LoopCheck::finish(double shaker_g) {
             settings_.phase_deg + settings_.phase_tolerance_deg);
     }
     if (const auto unit = unit_of_ratio(found.platform_g / (rig_.transmission * commanded_g));
-        !unit.empty() && !out_of_band_.empty())
-        out_of_band_ += "; " + unit;
+        !unit.empty() && !found_wrong_.empty())
+        found_wrong_ += "; " + unit;
+    out_of_band_ = std::exchange(found_wrong_, {});
     passed_ = out_of_band_.empty();
 }
 

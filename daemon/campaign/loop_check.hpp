@@ -50,6 +50,13 @@ class LoopCheck {
     /// Judges it, `shaker_g` being what the controller says of the table: that is held against the
     /// command as the accelerometers are, and is no witness of them.
     void finish(double shaker_g);
+    /// The same at another frequency of the plan, where the platform is to do `transmission` times
+    /// what the table does; before finish(), whose verdict it is part of.
+    struct AtFrequency {
+        double hz = 0, transmission = 0;  ///< of the vibration as it was asked for; as measured
+        std::vector<LoopCheckStatus::Row> rows;
+    };
+    [[nodiscard]] AtFrequency finish_at(double hz, double transmission);
     void conclude();  ///< the table is at rest again: it is over
     void not_completed(const std::string& why);
 
@@ -62,13 +69,18 @@ class LoopCheck {
     [[nodiscard]] const LoopCheckStatus& status() const { return status_; }
     /// Platform over table as measured; over the command where the table has no accelerometer.
     [[nodiscard]] double transmission() const { return transmission_; }
-    /// The shaker's limit that the level exceeds; empty: none.
+    /// Frequencies of a plan's dwells apart from the reference one, each once, as stops.
+    [[nodiscard]] static std::vector<Stop> further_frequencies(const Settings& settings);
+    /// The shaker's limit that the level exceeds at any frequency; empty: none.
     [[nodiscard]] static std::string beyond_limits(const Settings& settings);
 
   private:
     /// What moves: of the table where it is known throughout, else of the platform; less its mean.
     [[nodiscard]] std::vector<double> motion() const;
     void row(const char* name, const char* unit, double value, double low, double high);
+    /// Judges a row; `at` stands before its name where it is out of band.
+    LoopCheckStatus::Row judged(const char* name, const char* unit, double value, double low,
+                                double high, const std::string& at);
 
     LoopCheckSettings settings_;
     estimator::Settings rig_;
@@ -80,6 +92,7 @@ class LoopCheck {
     bool passed_ = false;
     double transmission_ = 0;
     std::string out_of_band_;  ///< of the newest that was completed
+    std::string found_wrong_;  ///< of the one under way
     LoopCheckStatus status_;
 };
 

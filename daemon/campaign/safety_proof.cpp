@@ -124,6 +124,7 @@ std::string to_json(const ProofRecord& r) {
                   {"frequency_hz", r.pads_hz},
                   {"damping", r.pads_damping}}},
                 {"transmission", r.transmission},
+                {"transmissions", r.transmissions},
                 {"keys", r.keys},
                 {"keys_sha256", r.keys_sha256}}
         .dump();
@@ -148,6 +149,8 @@ std::optional<ProofRecord> proof_from_json(const std::string& text) {
         r.pads_hz = pads.at("frequency_hz");
         r.pads_damping = pads.at("damping");
         r.transmission = json.value("transmission", 0.0);  // earlier records have none
+        if (const auto further = json.find("transmissions"); further != json.end())
+            r.transmissions = further->get<decltype(r.transmissions)>();
         r.keys = json.at("keys");
         r.keys_sha256 = json.at("keys_sha256");
         return r;
@@ -314,11 +317,20 @@ void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
     status.trend = trend();
 }
 
+const ProofRecord* SafetyProof::newest_of_these_keys() const {
+    return history_.empty() || history_.back().keys_sha256 != keys_sha256_ ? nullptr
+                                                                           : &history_.back();
+}
+
 std::optional<double> SafetyProof::transmission() const {
-    if (history_.empty()) return std::nullopt;
-    const ProofRecord& newest = history_.back();
-    if (!(newest.transmission > 0) || newest.keys_sha256 != keys_sha256_) return std::nullopt;
-    return newest.transmission;
+    const ProofRecord* newest = newest_of_these_keys();
+    if (newest == nullptr || !(newest->transmission > 0)) return std::nullopt;
+    return newest->transmission;
+}
+
+std::vector<std::pair<double, double>> SafetyProof::transmissions() const {
+    const ProofRecord* newest = newest_of_these_keys();
+    return newest == nullptr ? std::vector<std::pair<double, double>>{} : newest->transmissions;
 }
 
 PadRingDown SafetyProof::pads() const {

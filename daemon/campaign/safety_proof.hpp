@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/campaign/stop_monitor.hpp"
@@ -42,6 +43,8 @@ struct ProofRecord {
     PadRingDown pads;
     double pads_hz = 0, pads_damping = 0;
     double transmission = 0;  ///< platform over table, of a loop check in band; 0: not measured
+    /// The same at further frequencies of the plan, Hz first.
+    std::vector<std::pair<double, double>> transmissions;
     std::string keys, keys_sha256;  ///< as in ProofSettings
 };
 
@@ -109,11 +112,15 @@ class SafetyProof {
     /// As the newest loop check in band has measured it with the configuration as it is; nothing
     /// otherwise: then the configuration's holds.
     [[nodiscard]] std::optional<double> transmission() const;
+    /// Likewise at the plan's further frequencies.
+    [[nodiscard]] std::vector<std::pair<double, double>> transmissions() const;
     /// Of the newest that passed; a documented allowance without one.
     [[nodiscard]] PadRingDown pads() const;
 
   private:
     [[nodiscard]] const ProofRecord* newest_passed() const;
+    /// If it is of the configuration as it is.
+    [[nodiscard]] const ProofRecord* newest_of_these_keys() const;
 
     ProofSettings settings_;
     std::string keys_sha256_;

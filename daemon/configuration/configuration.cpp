@@ -9,6 +9,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <set>
 #include <string_view>
 
 #include "daemon/configuration/cross_checks.hpp"
@@ -177,12 +178,27 @@ void take_plan(Configuration& c) {
     }
 }
 
+/// The loop check that a proof begins with looks at each of them.
+void cover_frequencies(Configuration& c) {
+    std::set<double> all;
+    for (const auto& stop : c.campaign.stops) {
+        if (stop.frequency_hz > 0 && stop.table_g > 0 &&
+            !estimator::at_reference(c.estimator, stop.frequency_hz))
+            all.insert(stop.frequency_hz);
+    }
+    std::string text;
+    for (const double hz : all) text += (text.empty() ? "" : ", ") + plain(hz);
+    if (!text.empty()) c.campaign.proof.keys += "frequencies of campaign.plan=" + text + " Hz\n";
+}
+
 /// What stands between table and platform, from what is stated of it.
 void take_mount(Configuration& c, const std::map<std::string, Place>& places) {
     auto& s = c.spectrum;
     s.mount_stated = places.contains("spectrum.mount") || places.contains("spectrum.transmission");
     if (s.hard && !places.contains("vibration.transmission")) c.estimator.transmission = 1;
     if (s.hard) c.campaign.resonance_hz = 0;
+    // Nothing between them lets the platform lag.
+    if (s.hard && !places.contains("selftest.phase_deg")) c.campaign.loop.phase_deg = 0;
     s.mount = {s.hard || (!s.mount_stated && c.estimator.transmission >= 1), {}, s.transmission};
     if (!s.mount.hard)
         s.mount.pads = estimator::spectrum::pads_with(
@@ -347,6 +363,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     if (!c.campaign.plan.empty()) {
         try {
             take_plan(c);
+            cover_frequencies(c);
         } catch (const plan::PlanFileError& error) {
             const auto& places = reader.places();
             problems.add(places.at("campaign.plan"), "campaign.plan", error.what(),

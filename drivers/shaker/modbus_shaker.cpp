@@ -9,9 +9,6 @@
 namespace vibrig::drivers {
 namespace {
 
-// A register resolves 1 mHz.
-constexpr double kSameFrequency_hz = 0.01;
-
 // The first time on a new link that is the stop's alone. A device that was cut off for long has
 // tripped already, nothing is gained by feeding it at once; and who comes back to a table that he
 // left shaking is to see it told one thing. 100 ms, and as much again for the way there.
@@ -29,6 +26,18 @@ constexpr Time kTimeoutLook = 500 * kMillisecond;
     std::array<std::uint16_t, 2> words{};
     return std::isfinite(value) && value >= 0 &&
            proto::encode(reg, value, std::span(words).first(reg.words()));
+}
+
+/// A set-point of random vibration that the registers can hold; none: any.
+[[nodiscard]] bool playable(const proto::ShakerRegisters& map,
+                            const std::optional<RandomSetPoint>& random) noexcept {
+    if (!random) return true;
+    std::array<std::uint16_t, 2> words{};
+    return map.random && random->profile > 0 &&
+           encodable(map.random->profile_number, random->profile) &&
+           std::isfinite(random->level_db) &&
+           proto::encode(map.random->profile_level_db, random->level_db,
+                         std::span(words).first(map.random->profile_level_db.words()));
 }
 
 [[nodiscard]] bool nonzero(std::span<const std::uint16_t> words) noexcept {
@@ -60,13 +69,13 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops)
     const proto::ShakerRegisters& map = settings_.registers;
     if (!encodable(map.frequency, set_point.frequency_hz) ||
         !encodable(map.amplitude, set_point.amplitude_g) ||
-        !encodable(map.ramp_time, set_point.ramp_s)) {
+        !encodable(map.ramp_time, set_point.ramp_s) || !playable(map, set_point.random)) {
         return false;
     }
     // Whatever the caller thinks: the frequency changes at rest only, or it passes the resonance.
     const auto now = reading();
     if (set_point.amplitude_g > 0 && now.valid && (now.running || !now.still()) &&
-        std::abs(set_point.frequency_hz - now.frequency_hz) > kSameFrequency_hz)
+        !same_kind(set_point, now))
         return false;
     const auto ticket = orders_.ticket();
     if (ticket.stop_pending() || ticket.stops() != stops || state() != LinkState::running)
@@ -375,11 +384,6 @@ void ModbusShaker::write_set_point() {
 }
 
 bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
-    struct Step {
-        const char* role;
-        const proto::Register& reg;
-        double value;
-    };
     const proto::ShakerRegisters& map = settings_.registers;
     Words words{};
     const auto encoded = [&](const proto::Register& reg, double value) {
@@ -393,8 +397,9 @@ bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
     std::vector<Step> steps;
     // On the way to zero the frequency does not matter: nothing may keep the shaker from coming
     // down.
+    if (excite && !running && map.random && !choose(set_point.random)) return false;
     const auto frequency = encoded(map.frequency, set_point.frequency_hz);
-    if ((excite || (!running && nonzero(frequency))) &&
+    if (!set_point.random && (excite || (!running && nonzero(frequency))) &&
         !same_raw(map.frequency, frequency, image_.words_of(map.frequency))) {
         // Frequency changes only at zero amplitude; at rest the register may still hold the last
         // one.
@@ -407,12 +412,17 @@ bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
     // A device that is thought to run and does not has tripped: it is told nothing, and the
     // read-back differs.
     if (!excite || !running) steps.push_back({"run", map.run, excite ? 1.0 : 0.0});
+    if (!write_each(steps)) return false;
+    if (excite && running) return verify("run", map.run, encoded(map.run, 1)) == Written::as_told;
+    return true;
+}
+
+bool ModbusShaker::write_each(std::span<const Step> steps) {
     for (const Step& step : steps) {
         if (watchdog_due(clock_.now())) serve_watchdog(clock_.now());
         if (!link_.connected()) return false;
         if (write_and_verify(step.role, step.reg, step.value) != Written::as_told) return false;
     }
-    if (excite && running) return verify("run", map.run, encoded(map.run, 1)) == Written::as_told;
     return true;
 }
 
@@ -505,24 +515,36 @@ void ModbusShaker::poll(Time now) {
     if (on_reading_) on_reading_();
 }
 
+std::string ModbusShaker::differs(const char* role, const proto::Register& reg, double told) {
+    Words words = present(reg);
+    const auto ours = std::span(words).first(reg.words());
+    static_cast<void>(proto::encode(reg, told, ours));
+    const auto read = image_.words_of(reg);
+    return same_raw(reg, ours, read)
+               ? std::string()
+               : std::string(role) + " was changed by another: reads back as " +
+                     std::to_string(proto::decode(reg, read)) + ", was told " +
+                     std::to_string(proto::decode(reg, ours));
+}
+
 std::string ModbusShaker::changed_by_others(const ShakerReading& reading) {
     // A device that has stopped by itself and says so has a trip of its own.
     if (!told_ || stop_pending() || reading.fault != 0 || reading.state == kShakerFault ||
         reading.emergency_stop_open)
         return {};
     const proto::ShakerRegisters& map = settings_.registers;
-    const auto differs = [&](const char* role, const proto::Register& reg, double told) {
-        Words words = present(reg);
-        const auto ours = std::span(words).first(reg.words());
-        static_cast<void>(proto::encode(reg, told, ours));
-        const auto read = image_.words_of(reg);
-        return same_raw(reg, ours, read)
-                   ? std::string()
-                   : std::string(role) + " was changed by another: reads back as " +
-                         std::to_string(proto::decode(reg, read)) + ", was told " +
-                         std::to_string(proto::decode(reg, ours));
-    };
-    std::string found = differs("frequency", map.frequency, told_->frequency_hz);
+    std::string found;
+    if (map.random) found = differs("mode", map.random->mode, told_->random ? 1 : 0);
+    if (const auto& random = told_->random) {
+        if (found.empty())
+            found = differs("profile number", map.random->profile_number, random->profile);
+        if (found.empty())
+            found = differs("profile level", map.random->profile_level_db, random->level_db);
+        if (found.empty())
+            found = differs("profile checksum", map.random->profile_checksum, random->checksum);
+    } else if (found.empty()) {
+        found = differs("frequency", map.frequency, told_->frequency_hz);
+    }
     if (found.empty()) found = differs("amplitude", map.amplitude, told_->amplitude_g);
     if (found.empty()) found = differs("ramp time", map.ramp_time, told_->ramp_s);
     if (found.empty()) found = differs("run", map.run, 1);

@@ -78,7 +78,18 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] Reply order_stop(std::span<const std::uint16_t> run);
     [[nodiscard]] Reply try_ramp(std::span<const std::uint16_t> ramp);
     void write_set_point();
+    struct Step {
+        const char* role;
+        const proto::Register& reg;
+        double value;
+    };
     [[nodiscard]] bool write_steps(const ShakerSetPoint& set_point);
+    [[nodiscard]] bool write_each(std::span<const Step> steps);
+    /// What chooses the kind of vibration, at rest; of random vibration the checksum is looked at.
+    [[nodiscard]] bool choose(const std::optional<RandomSetPoint>& random);
+    [[nodiscard]] bool same_kind(const ShakerSetPoint& set_point,
+                                 const ShakerReading& now) const noexcept;
+    [[nodiscard]] std::string differs(const char* role, const proto::Register& reg, double told);
     void drop_void_set_point() noexcept;
     [[nodiscard]] bool watchdog_due(Time now) const noexcept;
     void serve_watchdog(Time now);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -41,12 +42,23 @@ inline constexpr Time kLongestWatchdogPeriod = kLongestWatchdogTimeout / 3;
 /// An emergency-stop chain that opens is to be seen within half a second.
 inline constexpr Time kLongestPollPeriod = 500 * kMillisecond;
 
+/// A profile that the controller knows, and how it is to be played.
+struct RandomSetPoint {
+    std::uint16_t profile = 0;   ///< its number
+    double level_db = 0;         ///< about it
+    std::uint32_t checksum = 0;  ///< of its breakpoints; what the controller shows has to be this
+
+    [[nodiscard]] bool operator==(const RandomSetPoint&) const = default;
+};
+
 /// What is asked of the shaker. Frequency may only change while the amplitude is zero (checked by
 /// the campaign).
 struct ShakerSetPoint {
     double frequency_hz = 0;
-    double amplitude_g = 0;  ///< peak, at the table
+    double amplitude_g = 0;  ///< peak, at the table; of random vibration its rms
     double ramp_s = 0;       ///< from the present amplitude to this one
+    /// In place of a sine; the frequency is left alone then. Like it chosen at rest only.
+    std::optional<RandomSetPoint> random{};
 };
 
 /// Values of the state register.
@@ -58,6 +70,19 @@ enum class WatchdogTimeout : std::uint8_t {
     unread,   ///< not looked at since the link was made
     kept,     ///< what was written; of a register that is only read: short enough
     changed,  ///< another value, or none to be had
+};
+
+/// Of a controller with registers for random vibration, as read back.
+struct RandomReading {
+    enum class State : std::uint8_t { idle, levelling, at_level, aborted };
+    bool random = false;  ///< the mode
+    std::uint16_t profile = 0;
+    double level_db = 0;
+    std::uint32_t checksum = 0;
+    double measured_g_rms = 0;
+    State state = State::idle;
+    bool bands_armed = false;  ///< it stops by itself where the level is not right
+    std::uint8_t abort_reason = 0;
 };
 
 /// The newest read-back. Nothing of it is valid while `valid` is false.
@@ -73,7 +98,8 @@ struct ShakerReading {
     bool running = false;  ///< the run register read back
     bool emergency_stop_open = false;
     WatchdogTimeout watchdog = WatchdogTimeout::unread;
-    double watchdog_timeout_s = 0;  ///< as read
+    double watchdog_timeout_s = 0;          ///< as read
+    std::optional<RandomReading> random{};  ///< none: no registers for it
     [[nodiscard]] bool still() const { return valid && measured_g < 0.05; }
     [[nodiscard]] bool at_rest() const { return still() && !running && state == 0; }
 };

@@ -5,11 +5,13 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace vibrig::drivers {
 namespace {
 
-constexpr std::size_t kMaxReadWords = 125;  ///< Modbus application protocol 1.1b3, 6.3
+constexpr std::uint16_t kBandsArmed = 0x10;  ///< of control_state
+constexpr std::size_t kMaxReadWords = 125;   ///< Modbus application protocol 1.1b3, 6.3
 
 [[nodiscard]] std::uint16_t to_u16(double value) noexcept {
     return value >= 0 && value <= 65535 ? static_cast<std::uint16_t>(std::lround(value))
@@ -40,10 +42,14 @@ void check_role(const char* role, const proto::Register& reg, bool read, bool wr
 }  // namespace
 
 ShakerImage::ShakerImage(const proto::ShakerRegisters& registers) : registers_(registers) {
-    std::array roles{registers.frequency,      registers.amplitude,
-                     registers.ramp_time,      registers.run,
-                     registers.state,          registers.fault,
-                     registers.emergency_stop, registers.measured_amplitude};
+    std::vector roles{registers.frequency,      registers.amplitude,
+                      registers.ramp_time,      registers.run,
+                      registers.state,          registers.fault,
+                      registers.emergency_stop, registers.measured_amplitude};
+    if (const auto& random = registers.random)
+        roles.insert(roles.end(),
+                     {random->mode, random->profile_number, random->profile_level_db,
+                      random->profile_checksum, random->measured_g_rms, random->control_state});
     std::sort(roles.begin(), roles.end(), [](const auto& a, const auto& b) {
         return std::pair(a.table, a.address) < std::pair(b.table, b.address);
     });
@@ -90,6 +96,24 @@ ShakerReading ShakerImage::reading(Time time) noexcept {
     reading.emergency_stop_open = value_of(registers_.emergency_stop) != 0;
     reading.valid = std::isfinite(reading.frequency_hz) && std::isfinite(reading.amplitude_g) &&
                     std::isfinite(reading.measured_g);
+    if (registers_.random) reading.random = random_reading(*registers_.random);
+    return reading;
+}
+
+RandomReading ShakerImage::random_reading(const proto::RandomRegisters& map) noexcept {
+    RandomReading reading;
+    const std::uint16_t control = to_u16(value_of(map.control_state));
+    const double checksum = value_of(map.profile_checksum);
+    reading.random = value_of(map.mode) != 0;
+    reading.profile = to_u16(value_of(map.profile_number));
+    reading.level_db = value_of(map.profile_level_db);
+    if (checksum >= 0 && checksum <= 0xffffffff)
+        reading.checksum = static_cast<std::uint32_t>(checksum);
+    reading.measured_g_rms = value_of(map.measured_g_rms);
+    // What is not a state it knows is none that it may be in.
+    reading.state = static_cast<RandomReading::State>(std::min(control & 0xf, 3));
+    reading.bands_armed = (control & kBandsArmed) != 0;
+    reading.abort_reason = static_cast<std::uint8_t>(control >> 8);
     return reading;
 }
 
@@ -124,6 +148,14 @@ void check_registers(const ShakerSettings& settings) {
     check_role("fault", map.fault, true, false);
     check_role("emergency_stop", map.emergency_stop, true, false);
     check_role("measured_amplitude", map.measured_amplitude, true, false);
+    if (const auto& random = map.random) {
+        check_role("mode", random->mode, true, true);
+        check_role("profile_number", random->profile_number, true, true);
+        check_role("profile_level_db", random->profile_level_db, true, true);
+        check_role("profile_checksum", random->profile_checksum, true, false);
+        check_role("measured_g_rms", random->measured_g_rms, true, false);
+        check_role("control_state", random->control_state, true, false);
+    }
     std::array<std::uint16_t, 2> words{};
     const double timeout_s = 3 * to_seconds(settings.watchdog_period);
     if (map.watchdog_timeout.access != proto::Access::read &&

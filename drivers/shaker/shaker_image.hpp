@@ -30,6 +30,8 @@ class ShakerImage {
     [[nodiscard]] ShakerReading reading(Time time) noexcept;
 
   private:
+    [[nodiscard]] RandomReading random_reading(const proto::RandomRegisters& map) noexcept;
+
     proto::ShakerRegisters registers_;
     std::vector<RegisterRange> ranges_;
 };

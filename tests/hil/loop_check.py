@@ -32,7 +32,7 @@ def over(status):
     return status["campaign"]["state"] != "checking"
 
 
-def make(checks, programs, folder, speed, change=None, **selftest):
+def make(checks, programs, folder, speed, change=None, campaign=None, tables=None, plant=(), **selftest):
     """A rig, its truth changed as told, and a daemon that measures."""
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     truth = os.path.join(folder, "truth.json")
@@ -45,8 +45,8 @@ def make(checks, programs, folder, speed, change=None, **selftest):
         values.setdefault(section, {}).update(keys)
     with open(truth, "w", encoding="utf-8") as file:
         json.dump(values, file)
-    rig.start_plant("--seed", "6", "--truth", truth, "--speed", str(speed))
-    rig.configure(CAMPAIGN, selftest=selftest)
+    rig.start_plant("--seed", "6", "--truth", truth, "--speed", str(speed), *plant)
+    rig.configure(campaign or CAMPAIGN, selftest=selftest, **(tables or {}))
     rig.start_daemon()
     status = rig.wait_for(ready, 60)
     checks.check(status is not None and ready(status), "the rig is ready", rig.logs())
@@ -132,6 +132,36 @@ def out_of_band(checks, programs, folder, what, change, says):
         rig.stop()
 
 
+def each_frequency(checks, programs, folder, what, says=None, change=None, plant=()):
+    """Of a survey: every frequency of its plan is looked at, from rest."""
+    plan = os.path.join(folder, "plan.json")
+    with open(plan, "w", encoding="utf-8") as file:
+        json.dump({"runs": [{"position": [0, 0, 0], "level_g": 3, "table_g": 3, "count": 1, "frequency_hz": hz}
+                            for hz in (15.0, 65.1, 25.1, 65.1)]}, file)
+    rig = make(checks, programs, folder, 40, {"isolator": {"hard": True, **(change or {})}},
+               {"name": "survey", "plan": plan, "identify": "what-it-can", "dwell_s": 10.0},
+               {"spectrum": {"mount": "hard"}}, plant)
+    try:
+        tested = rig.tool("selftest", "--by", "Ada", timeout=120)
+        status = rig.status()
+        rows = {row["name"]: row["value"] for row in status["proof"].get("rows", [])}
+        refused = rig.tool("arm", "--by", "Ada")
+        if says is None:
+            checks.check(tested.returncode == 0, f"{what}: in band", tested.stdout + tested.stderr)
+            # 5 s of samples with 1e-4 g of noise, 1e-3 g at the table: a per cent of 0.5 g is far beyond doubt.
+            checks.check(all(abs(rows.get(f"{hz} Hz, transmission", 0) - 1) < 0.01 and
+                             abs(rows.get(f"{hz} Hz, frequency", 0) - hz) < 0.01 for hz in (25.1, 65.1)),
+                         f"{what}: transmission and frequency as the rig has them, at each frequency of the plan", rows)
+            checks.check(status["shaker"].get("state") == 0, f"{what}: it ends at rest", r.state_of(status))
+            checks.equal(refused.returncode, 0, f"{what}: the campaign can be armed")
+            return
+        checks.check(tested.returncode == 1, f"{what}: it is found", tested.stdout + tested.stderr)
+        checks.check(refused.returncode == 1 and says in refused.stderr + tested.stdout + rig.daemon.text(),
+                     f"{what}: nothing is armed, and the frequency is named", tested.stdout + refused.stderr + rig.logs())
+    finally:
+        rig.stop()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
@@ -141,6 +171,10 @@ def main():
                                ("soft isolators", {"isolator": {"transmission": 0.5}}, "transmission")):
         with tempfile.TemporaryDirectory() as folder:
             out_of_band(checks, programs, folder, what, change, says)
+    for what, says, plant in (("frequencies of a plan", None, ()),
+                              ("frequency_ignored", "at 25.1 Hz frequency", ("--fault", "frequency-ignored"))):
+        with tempfile.TemporaryDirectory() as folder:
+            each_frequency(checks, programs, folder, what, says, plant=plant)
     return checks.end()
 
 

@@ -33,6 +33,8 @@ void LoopChecking::begin(Time now) {
     level_.loop.begin(by_);
     level_.proof.begin(by_, level_.settings.loop.table_g);
     rung_ = 0;
+    further_ = LoopCheck::further_frequencies(level_.settings);
+    further_at_ = 0;
     level_.begin(now);
     part_ = Part::look;
 }
@@ -44,7 +46,7 @@ void LoopChecking::go_on_to(Part part, Time now) {
 }
 
 double LoopChecking::table_g() const {
-    if (part_ == Part::none || part_ == Part::look) return 0;
+    if (part_ == Part::none || part_ == Part::look || part_ == Part::rest) return 0;
     return part_ == Part::climb || part_ == Part::rung ? rungs_[rung_]
                                                        : level_.settings.loop.table_g;
 }
@@ -65,15 +67,21 @@ StageStep LoopChecking::step(Time now) {
             return ramp(Part::rung, now);
         case Part::rung:
             return stand_on_rung(now);
+        case Part::rest:
+            return come_to_rest(now);
         case Part::ramp:
             return ramp(Part::settle, now);
         case Part::settle:
             if (since < from_seconds(level_.settings.settle_s)) break;
             level_.loop.measure();
             go_on_to(Part::measure, now);
-            return StageStep::asks();
+            if (!at_further()) return StageStep::asks();
+            break;
         case Part::measure:
-            if (since >= from_seconds(level_.settings.loop.measure_s)) return measured();
+            if (since < from_seconds(level_.settings.loop.measure_s)) break;
+            if (!at_further()) return measured();
+            measured_further();
+            go_on_to(Part::rest, now);
             break;
     }
     return StageStep::going_on(now + kStagePoll);
@@ -87,7 +95,13 @@ StageStep LoopChecking::look(Time now) {
     if (!level_.stop.rest(now).measured())
         return StageStep::failed("not at rest: " + level_.stop.what_moves(now));
     if (!quiet()) return StageStep::failed("the noise at rest is too near to shaker.rest_g");
-    go_on_to(rungs_.empty() ? Part::ramp : Part::climb, now);
+    if (!rungs_.empty()) {
+        go_on_to(Part::climb, now);
+    } else if (at_further()) {
+        next_frequency(now);
+    } else {
+        go_on_to(Part::ramp, now);
+    }
     return StageStep::going_on(now + kStagePoll);
 }
 
@@ -141,8 +155,43 @@ StageStep LoopChecking::stand_on_rung(Time now) {
             unit.empty() ? "" : ": ", unit));
     }
     ++rung_;
-    go_on_to(rung_ < rungs_.size() ? Part::climb : Part::ramp, now);
+    go_on_to(rung_ < rungs_.size() ? Part::climb : at_further() ? Part::rest : Part::ramp, now);
     return StageStep::going_on(now + kStagePoll);
+}
+
+StageStep LoopChecking::come_to_rest(Time now) {
+    switch (level_.excitation.come_to_rest(now)) {
+        case Excitation::Rests::not_yet:
+            break;
+        case Excitation::Rests::at_rest:
+            next_frequency(now);
+            break;
+        case Excitation::Rests::overdue:
+            return StageStep::failed("no rest between two frequencies: " +
+                                     level_.stop.what_moves(now));
+    }
+    return StageStep::going_on(now + kStagePoll);
+}
+
+void LoopChecking::next_frequency(Time now) {
+    level_.excitation.from_rest(at_further() ? further_[further_at_] : Stop{}, now);
+    go_on_to(Part::ramp, now);
+}
+
+void LoopChecking::measured_further() {
+    const Stop& stop = further_[further_at_++];
+    const double expected =
+        stop.transmission > 0 ? stop.transmission : level_.settings.rig.transmission;
+    const auto found = level_.loop.finish_at(stop.frequency_hz, expected);
+    bool passed = true;
+    for (const auto& row : found.rows) {
+        level_.proof.row(fmt::format("{:g} Hz, {}", found.hz, row.name), row.unit, row.value,
+                         row.low, row.high);
+        passed = passed && row.passed;
+    }
+    if (!passed) return;
+    level_.excitation.measured(found.hz, found.transmission);
+    level_.proof.record().transmissions.emplace_back(found.hz, found.transmission);
 }
 
 StageStep LoopChecking::measured() {

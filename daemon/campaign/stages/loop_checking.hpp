@@ -9,7 +9,8 @@
 namespace vibrig::campaign {
 
 /// The loop check on the rig: a look at rest, up to a small level, by a ladder where that is asked
-/// for, and what table and platform make of it. Leaves the table vibrating: the proof stops it.
+/// for, and what table and platform make of it; before that, from rest each, at every further
+/// frequency of the plan. Leaves the table vibrating: the proof stops it.
 /// Asks once, at the level, for the orders that have to be refused while the table moves.
 class LoopChecking : public Stage {
   public:
@@ -31,6 +32,7 @@ class LoopChecking : public Stage {
         look,
         climb,  ///< to the next rung of the ladder
         rung,   ///< there
+        rest,   ///< to it, before another frequency
         ramp,
         settle,
         measure
@@ -40,6 +42,11 @@ class LoopChecking : public Stage {
     [[nodiscard]] StageStep ramp(Part then, drivers::Time now);
     [[nodiscard]] StageStep stand_on_rung(drivers::Time now);
     [[nodiscard]] StageStep measured();
+    [[nodiscard]] StageStep come_to_rest(drivers::Time now);
+    /// At rest: up to the level, at the next frequency.
+    void next_frequency(drivers::Time now);
+    void measured_further();
+    [[nodiscard]] bool at_further() const { return further_at_ < further_.size(); }
     [[nodiscard]] bool quiet();
 
     SmallLevel& level_;
@@ -48,6 +55,8 @@ class LoopChecking : public Stage {
     std::vector<double> rungs_;  ///< g at the table
     std::size_t rung_ = 0;
     bool rung_counts_ = false;
+    std::vector<Stop> further_;  ///< frequencies, each once
+    std::size_t further_at_ = 0;
 };
 
 }  // namespace vibrig::campaign

@@ -73,9 +73,15 @@ TEST(SafetyProof, SaysWhatHasChangedSince) {
 
 TEST(SafetyProof, ARecordSurvivesTheJournal) {
     SafetyProof proof(demanded());
-    const ProofRecord record = proved(proof, kNow);
+    ProofRecord record = proved(proof, kNow);
+    record.transmissions = {{25.1, 0.3}, {65.1, 0.06}};
     const auto read = proof_from_json(to_json(record));
     ASSERT_TRUE(read);
+    SafetyProof after(demanded()), other(demanded("can.sample_rate_hz=41\n"));
+    after.take_over({*read});
+    other.take_over({*read});
+    EXPECT_EQ(after.transmissions(), record.transmissions);
+    EXPECT_TRUE(other.transmissions().empty());
     EXPECT_EQ(to_json(*read), to_json(record));
     EXPECT_EQ(read->keys_sha256, sha256(kKeys));
     // AND what is no record is none

@@ -1,5 +1,7 @@
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "tests/unit/daemon/configuration/support.hpp"
 #include "tests/unit/plant/temporary_folder.hpp"
@@ -9,6 +11,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 std::string profile_with(const std::string& lines) { return "[[profile]]\nname = \"p\"\n" + lines; }
@@ -77,6 +80,11 @@ TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemo
 
 TEST(SpectrumKeys, AHardMountHasATransmissionOfOne) {
     EXPECT_EQ(accepted("spectrum.mount = \"hard\"\n").estimator.transmission, 1);
+    // Nor does the platform lag; what is stated stands.
+    EXPECT_EQ(accepted("spectrum.mount = \"hard\"\n").campaign.loop.phase_deg, 0);
+    EXPECT_EQ(
+        accepted("spectrum.mount = \"hard\"\nselftest.phase_deg = 90\n").campaign.loop.phase_deg,
+        90);
     EXPECT_THAT(complaint("vibration.transmission = 0.6667\nspectrum.mount = \"hard\"\n", false),
                 HasSubstr("found 0.6667 with a hard mount, expected 1"));
     const auto c = accepted("spectrum.transmission = [[10, 0.9], [40, 0.15]]\n");
@@ -88,6 +96,24 @@ TEST(SpectrumKeys, AHardMountHasATransmissionOfOne) {
     EXPECT_NE(
         accepted("vibration.transmission = 1\n").campaign.proof.keys,
         accepted("vibration.transmission = 1\nspectrum.mount = \"hard\"\n").campaign.proof.keys);
+}
+
+TEST(SpectrumKeys, AProofCoversTheFrequenciesOfThePlan) {
+    const plant::TemporaryFolder folder;
+    const auto keys_with = [&](const std::vector<double>& hz) {
+        const std::string path = folder.file("plan.json");
+        std::string runs;
+        for (const double one : hz)
+            runs += (runs.empty() ? "" : ",") +
+                    (R"({"position":[0,0,0],"table_g":3,"frequency_hz":)" + std::to_string(one)) +
+                    "}";
+        std::ofstream(path) << R"({"runs":[)" << runs << "]}";
+        return accepted("spectrum.mount = \"hard\"\ncampaign.plan = \"" + path + "\"\n")
+            .campaign.proof.keys;
+    };
+    EXPECT_THAT(keys_with({15, 65.1, 25.1, 65.1}),
+                HasSubstr("frequencies of campaign.plan=25.1, 65.1 Hz\n"));
+    EXPECT_THAT(keys_with({15, 15}), Not(HasSubstr("frequencies of")));
 }
 
 TEST(SpectrumKeys, FrequenciesThatSamplingForbidsAreRefusedWithTheNearestFreeOne) {

@@ -1,0 +1,57 @@
+// Which kind of vibration the controller plays: chosen at rest only.
+#include <array>
+#include <cmath>
+#include <span>
+#include <string>
+
+#include "drivers/shaker/modbus_shaker.hpp"
+
+namespace vibrig::drivers {
+namespace {
+
+// A register resolves 1 mHz.
+constexpr double kSameFrequency_hz = 0.01;
+constexpr double kSameLevel_db = 0.05;
+
+}  // namespace
+
+bool ModbusShaker::same_kind(const ShakerSetPoint& set_point,
+                             const ShakerReading& now) const noexcept {
+    if (set_point.random || (now.random && now.random->random))
+        return set_point.random && now.random && now.random->random &&
+               now.random->profile == set_point.random->profile &&
+               std::abs(now.random->level_db - set_point.random->level_db) < kSameLevel_db;
+    return std::abs(set_point.frequency_hz - now.frequency_hz) <= kSameFrequency_hz;
+}
+
+bool ModbusShaker::choose(const std::optional<RandomSetPoint>& random) {
+    const proto::RandomRegisters& map = *settings_.registers.random;
+    const proto::Register& amplitude = settings_.registers.amplitude;
+    if (!random && !image_.value_of(map.mode) != 0) return true;
+    // As the frequency: at zero amplitude, where the register may still hold the last one.
+    if (image_.value_of(amplitude) != 0 && !write_each(std::array{Step{"amplitude", amplitude, 0}}))
+        return false;
+    if (!random) return write_each(std::array{Step{"mode", map.mode, 0}});
+    // A controller refuses the mode without a profile that it knows.
+    const double number = random->profile;
+    if (!write_each(std::array{Step{"profile number", map.profile_number, number},
+                               Step{"profile level", map.profile_level_db, random->level_db},
+                               Step{"mode", map.mode, 1}}))
+        return false;
+    Words words{};
+    const auto raw = std::span(words).first(map.profile_checksum.words());
+    const Reply reply = read(map.profile_checksum, raw);
+    if (reply.ok() && proto::decode(map.profile_checksum, raw) == random->checksum) return true;
+    if (!reply.ok() && reply.kind != ReplyKind::exception) return false;
+    write_failed_ = true;
+    if (reply.ok()) ++counts_.read_back_mismatches;
+    settle(reply.ok() ? "profile checksum reads back as " +
+                            std::to_string(static_cast<std::uint32_t>(
+                                proto::decode(map.profile_checksum, raw))) +
+                            ", expected " + std::to_string(random->checksum) + " of profile " +
+                            std::to_string(random->profile)
+                      : "profile checksum cannot be read back: " + reply.text());
+    return false;
+}
+
+}  // namespace vibrig::drivers

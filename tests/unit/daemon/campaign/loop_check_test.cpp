@@ -1,0 +1,94 @@
+#include "daemon/campaign/loop_check.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace vibrig::campaign {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// Five seconds of a table and of the platform over it at 40/s, upright.
+void shake(LoopCheck& loop, double hz, double table_g, double platform_g) {
+    loop.measure();
+    for (int i = 0; i < 200; ++i) {
+        const double t = i / 40.0, wave = std::sin(2 * std::numbers::pi * hz * t);
+        rt::Motion motion;
+        motion.time = drivers::from_seconds(100 + t);
+        motion.force = {0, 1 + platform_g * wave, 0};
+        motion.table = table_g * wave;
+        motion.table_good = motion.good = true;
+        loop.add(motion);
+    }
+}
+
+Settings survey() {
+    Settings settings;
+    settings.frequency_hz = settings.rig.frequency_hz = 15;
+    settings.rig.transmission = 1;
+    for (const double hz : {15.0, 65.1, 0.0, 25.1, 65.1}) {
+        Stop stop{{}, hz > 0 ? 6.0 : 0.0, hz};
+        stop.transmission = hz > 20 ? 1 : 0;
+        settings.stops.push_back(stop);
+    }
+    return settings;
+}
+
+TEST(LoopCheck, FurtherFrequenciesOfAPlanAreLookedAtOnceEach) {
+    std::vector<double> hz;
+    for (const Stop& stop : LoopCheck::further_frequencies(survey()))
+        hz.push_back(stop.frequency_hz);
+    EXPECT_THAT(hz, ElementsAre(25.1, 65.1));
+    EXPECT_TRUE(LoopCheck::further_frequencies(Settings{}).empty());
+}
+
+TEST(LoopCheck, LimitsHoldAtEveryFrequency) {
+    Settings settings = survey();
+    EXPECT_EQ(LoopCheck::beyond_limits(settings), "");
+    settings.stops.front().frequency_hz = 2;
+    // 0.5 g at 2 Hz: 31 mm.
+    EXPECT_THAT(LoopCheck::beyond_limits(settings), HasSubstr("at 2 Hz: 12 mm at most"));
+}
+
+TEST(LoopCheck, AFrequencyThatIsNotShownIsOutOfBand) {
+    const Settings settings = survey();
+    const double g = settings.loop.table_g;
+    for (const bool ignored : {false, true}) {
+        LoopCheck loop(settings.loop, settings.rig);
+        loop.begin("Ada");
+        shake(loop, ignored ? 15 : 25.1, g, g);
+        const auto found = loop.finish_at(25.1, 1);
+        EXPECT_NEAR(found.transmission, 1, 1e-3);
+        shake(loop, 15, g, g);
+        loop.finish(g);
+        if (ignored) {
+            EXPECT_THAT(loop.out_of_band(), HasSubstr("at 25.1 Hz frequency"));
+            EXPECT_THAT(loop.refusal(), HasSubstr("out of band"));
+        } else {
+            EXPECT_THAT(loop.out_of_band(), ::testing::Not(HasSubstr("25.1 Hz")));
+        }
+    }
+}
+
+TEST(LoopCheck, ATransmissionThatIsNotTheConfiguredOneIsOutOfBand) {
+    const Settings settings = survey();
+    LoopCheck loop(settings.loop, settings.rig);
+    loop.begin("Ada");
+    shake(loop, 65.1, 0.5, 0.4);
+    EXPECT_NEAR(loop.finish_at(65.1, 1).transmission, 0.8, 1e-3);
+    shake(loop, 15, 0.5, 0.5);
+    loop.finish(0.5);
+    EXPECT_THAT(loop.out_of_band(), HasSubstr("at 65.1 Hz transmission 0.8"));
+    // Another check begins anew.
+    loop.begin("Ada");
+    shake(loop, 15, 0.5, 0.5);
+    loop.finish(0.5);
+    EXPECT_THAT(loop.out_of_band(), ::testing::Not(HasSubstr("65.1 Hz")));
+}
+
+}  // namespace
+}  // namespace vibrig::campaign
