@@ -27,7 +27,7 @@ bool ModbusShaker::same_kind(const ShakerSetPoint& set_point,
 bool ModbusShaker::choose(const std::optional<RandomSetPoint>& random) {
     const proto::RandomRegisters& map = *settings_.registers.random;
     const proto::Register& amplitude = settings_.registers.amplitude;
-    if (!random && !image_.value_of(map.mode) != 0) return true;
+    if (!random && image_.value_of(map.mode) == 0) return true;
     // As the frequency: at zero amplitude, where the register may still hold the last one.
     if (image_.value_of(amplitude) != 0 && !write_each(std::array{Step{"amplitude", amplitude, 0}}))
         return false;
