@@ -1,17 +1,7 @@
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
-#include <CLI/Validators.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <iostream>
-#include <memory>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -20,10 +10,7 @@
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
 #include "daemon/tool/analysis/level_options.hpp"
-#include "daemon/tool/commands.hpp"
-#include "estimator/levelling/simulation.hpp"
 #include "proto/json_number.hpp"
-#include "proto/option_value.hpp"
 
 namespace vibrig::tool::level_command {
 

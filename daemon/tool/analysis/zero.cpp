@@ -4,13 +4,10 @@
 #include <CLI/Validators.hpp>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <vector>
@@ -22,10 +19,8 @@
 #include "daemon/tool/analysis/column_file.hpp"
 #include "daemon/tool/analysis/zero_output.hpp"
 #include "daemon/tool/commands.hpp"
-#include "estimator/zeros/observability.hpp"
 #include "estimator/zeros/simulation.hpp"
 #include "estimator/zeros/together.hpp"
-#include "proto/json_number.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool::zero_command {

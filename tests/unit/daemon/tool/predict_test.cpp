@@ -90,6 +90,15 @@ class Predict : public ::testing::Test {
         std::ofstream(folder() / name, std::ios::binary) << text;
     }
     static PredictJson result() { return PredictJson::parse(content("result.json")); }
+    static void write_without_elastic_part(const std::string& name) {
+        PredictJson broken = result();
+        for (auto& gyro : broken["spectrum"]["mixture"]) {
+            for (auto& one : gyro) {
+                for (std::size_t i = 10; i < one["x"].size(); ++i) one["x"][i] = 0.0;
+            }
+        }
+        write(name, broken.dump());
+    }
 };
 
 TEST_F(Predict, SurveyNamesTheResonanceAndTellsStaticCoefficients) {
@@ -144,13 +153,7 @@ TEST_F(Predict, HeldOutDwellsConfirm) {
 }
 
 TEST_F(Predict, HeldOutDwellsContradictAResultWithoutItsElasticPart) {
-    PredictJson broken = result();
-    for (auto& gyro : broken["spectrum"]["mixture"]) {
-        for (auto& one : gyro) {
-            for (std::size_t i = 10; i < one["x"].size(); ++i) one["x"][i] = 0.0;
-        }
-    }
-    write("broken.json", broken.dump());
+    write_without_elastic_part("broken.json");
     const Ended ended =
         run("predict broken.json --profile sine.json --verify held_out.csv --config held.toml");
     EXPECT_EQ(ended.exit_code, 1) << ended.error;
@@ -227,13 +230,7 @@ TEST_F(PredictRandom, HeldOutRandomDwellsConfirm) {
 }
 
 TEST_F(PredictRandom, HeldOutRandomDwellsContradictAResultWithoutItsElasticPart) {
-    PredictJson broken = result();
-    for (auto& gyro : broken["spectrum"]["mixture"]) {
-        for (auto& one : gyro) {
-            for (std::size_t i = 10; i < one["x"].size(); ++i) one["x"][i] = 0.0;
-        }
-    }
-    write("broken.json", broken.dump());
+    write_without_elastic_part("broken.json");
     const Ended ended =
         run("predict broken.json --profile 'band 4' --verify random_held.csv --config random.toml");
     EXPECT_EQ(ended.exit_code, 1) << ended.error;
