@@ -202,7 +202,7 @@ def whole(checks, programs, folder, seed):
         tool("start", "--by", "Ada")
         last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
         checks.equal(r.state_of(last), "finished", "and gravity is where the encoders say")
-        checks.check("opening check: the rig is what its configuration says" in u.rig.daemon.text(), "free drift and gravity agree with it", u.rig.logs())
+        checks.check(u.rig.daemon.says("opening check: the rig is what its configuration says"), "free drift and gravity agree with it", u.rig.logs())
         with open(u.rig.configuration, encoding="utf-8") as file:
             text = file.read()
         checks.check("# SIMULATED: ln LR" in text, "the configuration's comments say so, too", text)
@@ -450,7 +450,7 @@ def against_its_certificate(checks, programs, folder):
         rig.daemon.end()
         warnings = json.loads(rig.result()[1] or "{}").get("warnings", [])
         marked = [w for w in warnings if w.startswith("campaign marked: D_Fz is ") and "-1.2 by the certificate: sign of platform.drift_sign" in w]
-        checks.check(len(marked) == 1 and "D_Fx" not in marked[0] and marked[0] in rig.daemon.text(), "whose sign is against the certificate is marked",
+        checks.check(len(marked) == 1 and "D_Fx" not in marked[0] and rig.daemon.says(marked[0]), "whose sign is against the certificate is marked",
                      warnings + [rig.logs()])
     finally:
         rig.stop()
@@ -532,7 +532,7 @@ def dialogue(checks, programs, folder):
         check = subprocess.run([u.rig.program("vibrigd"), "--check", "--config", u.rig.configuration], capture_output=True, text=True, check=False)
         u.restart()
         told = ('platform.gyro_y_axes[0]: found "+x", the input axis of gyro x too', "platform.gyro_z_axes: found +z +y +x, left-handed")
-        checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and each in u.rig.daemon.text() for each in told),
+        checks.check(check.returncode == 0 and all(f": {each}" in check.stderr and u.rig.daemon.says(each) for each in told),
                      "gyro axes that are hardly meant are told by --check and at the start", check.stderr + u.rig.logs())
     finally:
         u.rig.stop()

@@ -263,7 +263,7 @@ def continued(checks, rig, what, _):
     checks.check(wait_until(lambda: rig.tool("ack", "trip", "--by", "Ada").returncode == 0), f"{what}: it can be acknowledged",
                  rig.logs())
     status = rig.wait_for(lambda s: s["guard"].get("cause") == "none", SOON)
-    checks.check(status is not None and status["guard"]["cause"] == "none" and "acknowledged, watching" in rig.guard.text(),
+    checks.check(status is not None and status["guard"]["cause"] == "none" and rig.guard.says("acknowledged, watching"),
                  f"{what}: the guard takes the acknowledgement", rig.logs())
     checks.check(wait_until(lambda: not rig.coils.on(1)), f"{what}: the lamp goes out", rig.coils.writes)
     checks.check(wait_until(lambda: rig.tool("arm", "--by", "Ada").returncode == 0), f"{what}: it can be armed again", rig.logs())

@@ -156,7 +156,7 @@ def each_frequency(checks, programs, folder, what, says=None, change=None, plant
             checks.equal(refused.returncode, 0, f"{what}: the campaign can be armed")
             return
         checks.check(tested.returncode == 1, f"{what}: it is found", tested.stdout + tested.stderr)
-        checks.check(refused.returncode == 1 and says in refused.stderr + tested.stdout + rig.daemon.text(),
+        checks.check(refused.returncode == 1 and (says in refused.stderr + tested.stdout or rig.daemon.says(says)),
                      f"{what}: nothing is armed, and the frequency is named", tested.stdout + refused.stderr + rig.logs())
     finally:
         rig.stop()

@@ -102,7 +102,7 @@ def restarted(checks, programs, folder):
         rig.tool("ack", "trip", "--by", "tester")
         commands = [rig.tool(command, "--by", "tester") for command in ("arm", "resume")]
         last = rig.wait_for_state(("finished", "aborted", "tripped"), 150)
-        checks.check(last and last["campaign"]["state"] == "finished" and "time limit has come" in rig.daemon.text(),
+        checks.check(last and last["campaign"]["state"] == "finished" and rig.daemon.says("time limit has come"),
                      "resumed, it ends when its time limit comes", f"{r.state_of(last)} {commands}\n{rig.daemon.text()[-3000:]}")
         dwells = last["campaign"]["dwells"]
         # 40 s of dwell, 7 s of ramps and settling, slews: 21 dwells in 1000 s at most, and not the whole limit anew.

@@ -131,6 +131,15 @@ class Child:
         with open(self.log, encoding="utf-8", errors="replace") as log:
             return log.read()
 
+    def says(self, words, timeout_s=10):
+        """Whether it has said so, or does within `timeout_s`: the log is written by a thread of its own, behind what is logged."""
+        end = time.monotonic() + timeout_s
+        while words not in self.text():
+            if time.monotonic() > end:
+                return False
+            time.sleep(0.05)
+        return True
+
 
 def die_with_parent(number=signal.SIGKILL):
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, number)

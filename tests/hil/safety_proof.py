@@ -150,7 +150,7 @@ def honest(checks, programs, folder):
         p.rig.start_daemon()
         p.rig.wait_for(ready, 60)
         checks.equal(p.rig.tool("arm", "--by", "Ada").returncode, 0, "a proof outlives the daemon")
-        checks.check("as the loop check of the newest proof measured it" in p.rig.daemon.text(), "with the transmission that it measured",
+        checks.check(p.rig.daemon.says("as the loop check of the newest proof measured it"), "with the transmission that it measured",
                      p.rig.logs())
         p.rig.tool("abort", "--by", "Ada")
         p.rig.daemon.end()

@@ -46,7 +46,7 @@ def end_without_rig(checks, programs, folder):
         rig.plant.process.kill()
         checks.equal(rig.daemon.end(signal.SIGTERM, timeout=60), 1,
                      "SIGTERM ends vibrigd by itself with status 1 when the rig is dead: the stop was not read back")
-        checks.check("its watchdog stops it" in rig.daemon.text(), "and it says so", rig.logs())
+        checks.check(rig.daemon.says("its watchdog stops it"), "and it says so", rig.logs())
         checks.check(not r.SANITIZER.search(rig.daemon.text()), "the sanitizer has nothing on that end",
                      rig.daemon.text()[-4000:])
     finally:

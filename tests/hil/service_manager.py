@@ -138,7 +138,7 @@ def talks(checks, rig, manager):
     rig.daemon.process.send_signal(signal.SIGHUP)
     heard = manager.listen(10, "READY=1")
     checks.check("RELOADING=1" in heard and "READY=1" in heard, "a reload is announced and ended", str(heard))
-    checks.check("takes effect with the next start" in rig.daemon.text(), "a reload checks the configuration")
+    checks.check(rig.daemon.says("takes effect with the next start"), "a reload checks the configuration", rig.logs())
     rig.daemon.process.send_signal(signal.SIGTERM)
     checks.check("STOPPING=1" in manager.listen(10, "STOPPING=1"), "it says STOPPING")
     checks.equal(rig.daemon.end(timeout=30), 0, "and ends with status 0")

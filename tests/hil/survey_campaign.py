@@ -132,7 +132,7 @@ def ignored(checks, programs, folder):
                      "the accelerometers do not show the vibration" in last["campaign"]["reason"],
                      "frequency_ignored: the daemon trips by wrong_vibration", f"{r.state_of(last)}\n{rig.daemon.text()[-3000:]}")
         checks.equal(rows, [], "frequency_ignored: not a sample is taken at the wrong frequency")
-        checks.check("Hz were asked for and read back" in rig.daemon.text(), "frequency_ignored: both frequencies are told",
+        checks.check(rig.daemon.says("Hz were asked for and read back"), "frequency_ignored: both frequencies are told",
                      rig.daemon.text()[-2000:])
     finally:
         rig.stop()
