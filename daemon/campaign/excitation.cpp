@@ -35,9 +35,11 @@ std::string Excitation::climb(double table_g, Time now, bool& reached) {
     if (!asked_) return ask(table_g, now, table_g == 0) ? "" : "the shaker takes no set-point";
     reached = !rig_.shaker.busy() && as_commanded(table_g);
     if (reached || now - since_ <= from_seconds(settings_.ramp_s) + kRampGrace) return {};
-    return fmt::format("shaker: measured {:.3f} g, expected {:g} g within {:g} %",
-                       rig_.shaker.reading().measured_g, table_g,
-                       100 * settings_.amplitude_tolerance);
+    const bool degraded = rig_.shaker.state() == drivers::LinkState::degraded;
+    return fmt::format(
+        "shaker: measured {:.3f} g, expected {:g} g within {:g} %{}",
+        rig_.shaker.reading().measured_g, table_g, 100 * settings_.amplitude_tolerance,
+        degraded ? "; a register was refused, or reads back otherwise: vibrig events" : "");
 }
 
 void Excitation::tell_ramp(double table_g, Time now) {

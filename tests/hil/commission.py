@@ -268,6 +268,28 @@ def ended(child):
         time.sleep(0.1)
 
 
+def with_swapped_words(checks, u):
+    """The configuration has the words of the amplitude's register the other way round: it is read back as written, and is anything."""
+    rig = u.rig
+    with open(rig.configuration, encoding="utf-8") as file:
+        right = file.read()
+    table = right.index("[shaker.registers.amplitude]")
+    wrong = right[:table] + right[table:].replace('"little"', '"big"', 1)
+    try:
+        with open(rig.configuration, "w", encoding="utf-8") as file:
+            file.write(wrong)
+        u.restart()
+        refused = rig.tool("commission", "units", "--by", "Ada", "--yes", timeout=120)
+        checks.check(wrong != right and refused.returncode == 1 and "REFUSED" in refused.stdout and "ladder" not in refused.stdout and
+                     "a register was refused" in unwrapped(refused.stdout) and rig.daemon.says("amplitude refused: exception 3") and highest_g(rig) == 0, "words the wrong way round: refused before the first rung, and nothing has moved",
+                     refused.stdout + refused.stderr + rig.logs())
+    finally:
+        with open(rig.configuration, "w", encoding="utf-8") as file:
+            file.write(right)
+    at_rest_again(rig)
+    u.restart()
+
+
 def shaker_is_proven(checks, u):
     """By proofs of the safe state, one for each button of the emergency stop, which somebody presses and acknowledges."""
     tool, rig = u.rig.tool, u.rig
@@ -276,6 +298,7 @@ def shaker_is_proven(checks, u):
                  "the shaker's parts are asked for", lacks.stderr)
     unknown = tool("commission", "watchdog", "earth", "--by", "Ada")
     checks.equal(unknown.returncode, 2, "parts of platform and shaker are not proven at once")
+    with_swapped_words(checks, u)
     early = tool("selftest", "--by", "Ada", timeout=120)
     checks.check("has not run at 0 g yet" in early.stderr, "nothing shakes before it has run at 0 g", early.stdout + early.stderr)
     for lie, word in AT_ZERO:
@@ -291,6 +314,12 @@ def shaker_is_proven(checks, u):
         checks.check(refused.returncode == 1 and "REFUSED: not completed: ladder: at 0.03 g" in refused.stdout.replace("\n   ", " ") and
                      word in refused.stdout.replace("\n   ", " "), f"the ladder ends at its first rung: {lie}", refused.stdout + refused.stderr + rig.logs())
         rig.order("clear")
+    rig.order("fault frequency-ignored")
+    refused = tool("commission", "units", "--by", "Ada", "--yes", timeout=120)
+    checks.check(refused.returncode == 1 and "ladder, 0.3 g, table over command" in refused.stdout and
+                 "REFUSED: not completed: an accelerometer disagrees" in unwrapped(refused.stdout),
+                 "a frequency that is not taken is found 1 Hz above", refused.stdout + refused.stderr + rig.logs())
+    at_rest_again(rig)
     plain = tool("commission", "watchdog", "units", "excitation", "--by", "Ada", "--json", "--yes", timeout=120)
     found = json.loads(plain.stdout or "{}")
     ladder = {name: value for name, value in found["parts"]["registers"].get("evidence", {}).items() if name.startswith("ladder")}
