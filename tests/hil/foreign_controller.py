@@ -172,12 +172,30 @@ def at_the_stop(checks, rig, name, which=None):
         rig.comes_to_rest(checks, what + ", starved of feeds")
 
 
+def at_zero(checks, rig, name):
+    """Before anything moves: its watchdog stops it while it is read, and with the link closed; of one that does not it is said."""
+    for lie, word in ((None, ""), ("timeout_ignored", "the watchdog was not fed, and did not stop the controller")):
+        rig.rest()
+        if lie:
+            rig.lie(lie)
+        said = rig.tool("selftest", "--by", "Ada", "--at-zero", timeout=180)
+        proof = (rig.status() or {}).get("proof", {})
+        rows = {row["name"]: row["value"] for row in proof.get("rows", [])}
+        if lie:
+            checks.check(not proof.get("passed") and word in proof.get("message", ""), f"{name}: at 0 g {lie} is found", said.stdout + said.stderr)
+        else:
+            checks.check(proof.get("passed") and 0.75 <= rows["watchdog at 0 g, not fed"] <= 2 and rows["watchdog at 0 g, link closed"] <= 2,
+                         f"{name}: at 0 g its watchdog stops it, with the link closed, too", said.stdout + said.stderr + rig.logs())
+    checks.equal(rig.table_g(), 0, f"{name}: and nothing has moved")
+
+
 def over_tcp(part):
     return lambda checks, programs, folder: played(checks, programs, folder, False, part)
 
 
 def over_a_line(checks, programs, folder):
     def part(checks, rig, _):
+        at_zero(checks, rig, "RTU")
         while_shaking(checks, rig, "RTU", WHILE_SHAKING[::3])
         at_the_stop(checks, rig, "RTU", AT_THE_STOP[:1])
     played(checks, programs, folder, True, part)
@@ -194,7 +212,7 @@ def played(checks, programs, folder, line, part):
         rig.stop()
 
 
-PARTS = [over_tcp(while_shaking), over_tcp(lambda c, rig, n: (from_the_start(c, rig, n), at_the_stop(c, rig, n))), over_a_line]
+PARTS = [over_tcp(while_shaking), over_tcp(lambda c, rig, n: (at_zero(c, rig, n), from_the_start(c, rig, n), at_the_stop(c, rig, n))), over_a_line]
 
 
 def main():

@@ -93,7 +93,7 @@ class Shaker:
         ends = self.told_to_run and not self.word(RUN) and not lies.get("ack_without_stop")
         self.told_to_run = bool(self.word(RUN)) or (self.told_to_run and not ends)
         timeout = self.word(TIMEOUT) * 1e-3 * lies.get("timeout_scaled", 1.0)
-        if self.level > 0 and 0 < timeout < now - self.fed_at and not lies.get("timeout_ignored"):
+        if (self.level > 0 or self.told_to_run) and 0 < timeout < now - self.fed_at and not lies.get("timeout_ignored"):
             ends, self.told_to_run, self.fault = True, False, self.fault | 1
             self.holding.values[RUN] = 0
         if ends and lies.get("stuck_contactor"):

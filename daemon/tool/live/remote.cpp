@@ -42,7 +42,7 @@ struct CommandOptions {
 struct TestOptions {
     serve::Address at;
     std::string by;
-    bool json = false, emergency_stop = false;
+    bool json = false, emergency_stop = false, at_zero = false;
 };
 
 std::string json_of(const v1::Command& command) {
@@ -169,7 +169,9 @@ int self_test(const TestOptions& options) {
         v1::Command command;
         command.set_kind(v1::Command::selftest);
         command.set_by(options.by);
-        if (options.emergency_stop) command.set_argument("emergency_stop");
+        command.set_argument(std::string(options.at_zero ? "at_zero" : "") +
+                             (options.at_zero && options.emergency_stop ? " " : "") +
+                             (options.emergency_stop ? "emergency_stop" : ""));
         wait_for_rest(client);
         const auto before = ask_status(client);
         const serve::Reply begun = client.post("/api/v1/commands", json_of(command));
@@ -336,6 +338,12 @@ void add_remote(CLI::App& app, int& exit_code) {
     testing
         .add_flag("--emergency-stop", test_options->emergency_stop,
                   "Ask for the emergency stop at the end, too; it trips as ever")
+        ->needs("--by");
+    testing
+        .add_flag(
+            "--at-zero", test_options->at_zero,
+            "Instead: the controller runs at 0 g, and its watchdog stops it twice, the second "
+            "time with the link closed; half a minute, and nothing moves")
         ->needs("--by");
     add_socket(testing, test_options->at);
     testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
