@@ -57,6 +57,7 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
             text.is_string() ? text.get<std::string>() : value.value;
     }
     names.command = configuration_.gimbal.message;
+    names.torque = configuration_.campaign.level.torquer.message;
     commission::Ports ports;
     ports.sample = [this] {
         const auto sample = acquisition_.view().sample;
@@ -76,6 +77,14 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     };
     ports.release = [this](Time now) { gimbal_.release(now); };
     ports.gimbal = [this] { return gimbal_.state(); };
+    if (parts_.torquer)
+        ports.torque = [this](const commission::Vec3& deg_per_h) {
+            // As the commands are sent: the sign of the rate over them is what is looked for.
+            commission::Vec3 rate{};
+            for (std::size_t i = 0; i < 3; ++i)
+                rate[i] = configuration_.campaign.level.torquer.sign[i] * deg_per_h[i];
+            return parts_.torquer->command(rate);
+        };
     ports.event = [this](Severity severity, const std::string& text) {
         log(severity, "commissioning", text);
     };
@@ -92,9 +101,12 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     };
     return std::make_unique<commission::Procedure>(
         std::move(names),
-        commission::Stated{configuration_.estimator.latitude_deg,
-                           configuration_.commission.linear_sigma,
-                           configuration_.simulated() && !real_wire(configuration_.can)},
+        commission::Stated{
+            configuration_.estimator.latitude_deg, configuration_.commission.linear_sigma,
+            configuration_.simulated() && !real_wire(configuration_.can),
+            parts_.torquer ? std::min(parts_.torquer->limit(),
+                                      configuration_.campaign.level.torquer_limit_deg_h)
+                           : 0},
         std::move(ports));
 }
 
@@ -320,6 +332,9 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
         if (const auto why = commission::not_as_running({Part::gyros}, {}, book_, file);
             !why.empty())
             return {false, why + ": restart vibrigd first"};
+        const Json torquers = book_.evidence(Part::gimbals).value("torquers", Json());
+        if (const auto why = commission::not_as_torqued(torquers, file); !why.empty())
+            return {false, why};
         // Of a simulated rig a script may leave it out.
         const Json said = what.value("statements", Json::array());
         if (!said.empty() || !configuration_.simulated())
@@ -329,6 +344,7 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
                 return {false, why};
         return record_parts(request, second, {Part::gyros},
                             {{"stated", "by two persons, from the drawing; nothing measures it"},
+                             {"torquers", torquers},
                              {"drift_sign", said}},
                             file);
     } catch (const std::exception& error) {

@@ -321,6 +321,12 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
     return all;
 }
 
+Json Book::evidence(Part part) const {
+    if (!record_ || !record_->parts.contains(part)) return Json::object();
+    const Json& all = record_->parts.at(part).evidence;
+    return all.is_object() ? all : Json::object();
+}
+
 std::string Book::refusal(std::int64_t utc_ns, bool the_shaker) const {
     if (!loaded_.configuration.record_demanded()) return {};
     if (!trouble_.empty()) return "not commissioned: " + trouble_ + ": vibrig commission";

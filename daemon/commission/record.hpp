@@ -102,6 +102,8 @@ class Book {
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
     /// What the daemon runs with, as it was when it started.
     [[nodiscard]] const Keys& keys(Part part) const { return keys_.at(part); }
+    /// Of a part as it was proven; empty: it was not.
+    [[nodiscard]] Json evidence(Part part) const;
     /// Takes a part in and writes the file. Throws std::runtime_error that names the file.
     void prove(const std::vector<Part>& parts, const PartRecord& what,
                const configuration::Loaded& as);

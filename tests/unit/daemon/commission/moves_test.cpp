@@ -197,5 +197,48 @@ TEST_F(Moved, AStopInAFreeDriftBeginsTheDriftAnew) {
     EXPECT_EQ(result["outcome"], "decided") << result.dump(1);
 }
 
+TEST_F(Commissioned, ASoftStopEndsItWithItsGimbalAndATravelWithinItIsScaledInto) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        // Says that it is in position where its stop is.
+        rig_of(seed);
+        based = false;
+        travel = {};
+        drifting_since = 0;
+        const std::size_t short_one = seed % 3;
+        rig->travel_deg = {140, 35, 178};
+        rig->travel_deg[short_one] = short_one == 1 ? 18 : 60;
+        answers["travel"] = "-130 130 -30 30 -175 175";
+        const Json stopped = run()["result"];
+        EXPECT_EQ(stopped["outcome"], "undecided");
+        constexpr std::array<const char*, 3> kLoud{"OUTER", "INNER", "AZIMUTH"};
+        EXPECT_THAT(
+            stopped["why"].get<std::string>(),
+            ::testing::AllOf(HasSubstr(std::string("the ") + kLoud[short_one] + " gimbal stands"),
+                             HasSubstr("a soft stop?")));
+        EXPECT_TRUE(stopped["found"].empty());
+    }
+    // The travel that it has is stated: sweeps and positions are scaled into it.
+    int decided = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        rig_of(seed);
+        based = false;
+        travel = most_travel = {};
+        drifting_since = 0;
+        rig->travel_deg = {60, 20, 70};
+        answers["travel"] = "-60 60 -20 20 -70 70";
+        const Json result = run()["result"];
+        for (std::size_t k = 0; k < 3; ++k) EXPECT_LE(most_travel[k], rig->travel_deg[k] + 1e-9);
+        EXPECT_NE(result["outcome"], "refused") << result["why"];
+        if (result["outcome"] == "decided") ++decided;
+        if (result["outcome"] == "undecided") {
+            EXPECT_FALSE(result["why"].get<std::string>().empty());
+            EXPECT_TRUE(result["found"].empty());
+        }
+    }
+    EXPECT_GE(decided, 10);
+}
+
 }  // namespace
 }  // namespace vibrig::commission
