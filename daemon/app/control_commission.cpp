@@ -180,6 +180,7 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const Json reply{{"record", record},
                      {"simulated", configuration_.simulated()},
                      {"configuration", loaded_.path},
+                     {"progress", procedure_ && procedure_->active() ? procedure_->progress() : ""},
                      {"procedure", procedure_ ? procedure_->state(after) : Json()}};
     waiting.reply.set_value({true, reply.dump(-1, ' ', false, Json::error_handler_t::replace)});
 }
@@ -192,13 +193,15 @@ CommandReply ControlLoop::do_commission(const CommandRequest& request, const Jso
     const std::string word = text("do");
     const bool active = procedure_ && procedure_->active();
     if (word == "accept" || word == "state") return enter_in_record(request, what, now);
+    if (word == "sign") return sign_record(request, what);
     if (word == "begin") {
         if (active) return {false, "the rig is being commissioned by " + procedure_->by()};
         return begin_commissioning(request, what, now);
     }
     if (word != "answer" && word != "answers" && word != "stop" && word != "end")
         return {false, "commission: do: found \"" + word +
-                           "\", expected begin, read, answer, answers, stop, end, accept or state"};
+                           "\", expected begin, read, answer, answers, stop, end, accept, state or "
+                           "sign"};
     if (!active) return {false, "the rig is not being commissioned"};
     procedure_->attend(request.by, rt::wall_clock());
     if (word == "answer") {
@@ -350,6 +353,29 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
     } catch (const std::exception& error) {
         return {false, std::string("nothing is recorded: ") + error.what()};
     }
+}
+
+CommandReply ControlLoop::sign_record(const CommandRequest& request, const Json& what) {
+    std::vector<Part> parts;
+    for (const Json& name : what.value("parts", Json::array()))
+        if (const auto part =
+                name.is_string() ? commission::part_named(name.get<std::string>()) : std::nullopt)
+            parts.push_back(*part);
+    const std::string by = commission::name_of_person(request.by);
+    try {
+        book_.sign(parts, by, what.value("cms", std::string()));
+    } catch (const std::exception& error) {
+        return {false, std::string("not signed: ") + error.what()};
+    }
+    std::string names;
+    for (const Part part : parts) names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    const auto text =
+        fmt::format("{} signed with the certificate of {}, record {}", names, by, book_.sha256());
+    log(Severity::info, "commissioning", text);
+    for (const Part part : parts)
+        keep_commissioned({name_of(part), "", request.by, "", "sign",
+                           Json{{"record_sha256", book_.sha256()}, {"cms", what["cms"]}}.dump()});
+    return {true, text};
 }
 
 CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
