@@ -359,7 +359,7 @@ std::string Book::path() const {
 std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
     std::vector<Standing> all;
     for (const Part part : kParts) {
-        Standing s{part, false, "no record", {}, std::nullopt};
+        Standing s{part, false, "no record", {}, {}, std::nullopt};
         if (record_ && record_->parts.contains(part)) {
             const PartRecord& r = record_->parts.at(part);
             s.record = r;

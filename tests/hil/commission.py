@@ -83,6 +83,9 @@ class Unknown:
         self.start()
 
     def configure(self, **tables):
+        authority = os.path.join(self.rig.folder, "pki", "authority.crt")
+        if os.path.exists(authority):
+            tables.setdefault("server", {"clients_ca": authority})
         self.rig.configure(CAMPAIGN, commission={"enforce": True, "folder": os.path.dirname(self.record)}, **self.registers, **tables)
 
     def start(self):
@@ -140,6 +143,9 @@ def drawn(seed):
 
 def whole(checks, programs, folder, seed):
     """From nothing known to armed, with a shaker's controller that is not ours."""
+    pki = os.path.join(folder, "pki")
+    subprocess.run([os.path.join(programs, "vibrig"), "pki", "init", "--folder", pki, "--host", "127.0.0.1", "--operator", "ada", "--operator", "bo"],
+                   check=True, capture_output=True)
     u = Unknown(checks, programs, folder, drawn(seed), foreign=FOREIGN)
     try:
         tool = u.rig.tool
@@ -195,11 +201,17 @@ def whole(checks, programs, folder, seed):
         u.restart()
         gyros = tool("arm", "--by", "Ada")
         checks.check("no record of gyros, registers, watchdog, stop, units, excitation: vibrig commission gyros" in gyros.stderr, "what nothing measures is asked for", gyros.stderr)
+        another = tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes", "--identity", os.path.join(pki, "bo"))
+        checks.check(another.returncode == 1 and "not signed: it is that of bo" in another.stderr, "another person's certificate signs nothing", another.stderr)
+        nobodys = tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes", "--identity", os.path.join(pki, "cy"))
+        checks.check(nobodys.returncode == 2 and "cy.crt: " in nobodys.stderr, "nor does one that is not there", nobodys.stderr)
         for typed, code, word in (("1\ndrawing 7\n2\ncertificate\nyes\n", 1, "they differ"), ("2\nd\n2\nd\nyes\n", 1, "expected 1 as both say"),
                                   ("7\n1\n\ndrawing 7\n1\ncertificate\nyes\n", 0, "gyros recorded by Ada")):
-            said = subprocess.run([u.rig.program("vibrig"), "commission", "gyros", "--by", "Ada", "--second", "Bo", "--socket", u.rig.socket],
-                                  input=typed, capture_output=True, text=True, check=False)
+            said = subprocess.run([u.rig.program("vibrig"), "commission", "gyros", "--by", "Ada", "--second", "Bo", "--socket", u.rig.socket,
+                                   "--identity", os.path.join(pki, "ada")], input=typed, capture_output=True, text=True, check=False)
             checks.check(said.returncode == code and word in said.stdout + said.stderr, f"drift_sign is stated by two apart: {word}", said.stdout + said.stderr)
+        signed = tool("commission", "status").stdout.replace("\n   ", " ")
+        checks.check(re.search("^gyros .*Bo, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
         shaker_is_proven(checks, u)
         proven = tool("commission", "status")
         checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
@@ -227,7 +239,7 @@ def journal_has_it(checks, u):
         rows = database.execute("SELECT part, step, by, identity, what, data_json FROM commissioning ORDER BY id").fetchall()
     whats = {row[4] for row in rows}
     checks.equal(sorted(whats - {"answer"}), ["accept", "begin", "hypothesis", "move", "permission", "question", "reading", "refused arm",
-                                              "torque", "verdict", "void"], "the journal has each kind of step")
+                                              "sign", "torque", "verdict", "void"], "the journal has each kind of step")
     checks.check(all(row[2] == "Ada" for row in rows if row[4] != "void") and
                  any(row[3].startswith("uid ") for row in rows if row[4] == "permission") and all(json.loads(row[5]) for row in rows),
                  "with the person and who the socket says it was", rows[:3])
@@ -316,6 +328,15 @@ def each_key_is_caught_twice(checks, u, text):
             with open(u.record, "w", encoding="utf-8") as file:
                 file.write(recorded)
             u.restart()
+        if key == WRONG[0][0]:
+            forge(u, key, with_persons=True)
+            u.restart()
+            forged = u.rig.tool("arm", "--by", "Ada")
+            checks.check(forged.returncode == 1 and "the signature of Ada is not that of what the record says" in forged.stderr,
+                         "nor is one that the daemon's key has signed, against a person's signature", forged.stderr)
+            with open(u.record, "w", encoding="utf-8") as file:
+                file.write(recorded)
+            u.restart()
         forge(u, key)
         u.restart()
         if u.rig.tool("arm", "--by", "Ada").returncode:
@@ -329,9 +350,9 @@ def each_key_is_caught_twice(checks, u, text):
                      not last["campaign"].get("dwells"), f"and {key} is caught before the table moves", reason)
 
 
-def forge(unknown, key, with_its_key=True):
+def forge(unknown, key, with_its_key=True, with_persons=False):
     """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit, and the signature, too, where the
-    forger is root and reads the daemon's key."""
+    forger is root and reads the daemon's key; persons' signatures, which nobody can make anew, are taken out."""
     proven = unknown.rig.tool("commission", "status", "--json")
     now = [re.search(re.escape(key) + " is (.*), was proven as ", part["why"]) for part in json.loads(proven.stdout)["parts"].values()]
     value = next(found[1] for found in now if found)
@@ -343,6 +364,8 @@ def forge(unknown, key, with_its_key=True):
             part["sha256"] = hashlib.sha256("".join(f"{k}={v}\n" for k, v in sorted(part["keys"].items())).encode()).hexdigest()
     signature = record.pop("signature")
     record.pop("sha256")
+    if not with_persons:
+        record.pop("persons", None)
     whole_text = json.dumps(record, separators=(",", ":"), ensure_ascii=False)
     record["sha256"] = hashlib.sha256(whole_text.encode()).hexdigest()
     record["signature"] = signature
