@@ -303,15 +303,27 @@ std::string Procedure::stopped_short() const {
         if (std::abs(read[k] - asked[k]) <= kHolds_deg + kSlewShare * std::abs(asked[k])) continue;
         return fmt::format(
             "the {} gimbal stands at a travel of {:+.1f} deg, {:+.1f} commanded: a "
-            "soft stop? State the travel that it has",
+            "soft stop?",
             kLoudNames[k], read[k], asked[k]);
     }
     return {};
 }
 
+/// What is in position short of where it was sent has a stop there, and is sent no further.
+void Procedure::keep_within(const std::string& why) {
+    const Vec3 asked = legs_.front();
+    travel_ = read_travel(asked);
+    for (std::size_t k = 0; k < 3; ++k) {
+        auto& [least, most] = limits_deg_[k];
+        if (asked[k] > 0 && travel_[k] < asked[k] - kHolds_deg) most = std::max(travel_[k], 0.0);
+        if (asked[k] < 0 && travel_[k] > asked[k] + kHolds_deg) least = std::min(travel_[k], 0.0);
+    }
+    tell("   " + why);
+}
+
 void Procedure::arrive(Time now) {
-    if (const auto why = stopped_short(); !why.empty()) return conclude(Verdict::undecided, why);
     travel_ = legs_.front();
+    if (const auto why = stopped_short(); !why.empty()) keep_within(why);
     legs_.erase(legs_.begin());
     if (!legs_.empty()) return next_leg();
     since_ = now;

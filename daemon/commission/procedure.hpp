@@ -122,6 +122,7 @@ class Procedure {
     void watch_move(drivers::Time now);
     void arrive(drivers::Time now);
     [[nodiscard]] std::string stopped_short() const;
+    void keep_within(const std::string& why);
     void take_second(drivers::Time now);
     void stand();
     void release();

@@ -138,7 +138,8 @@ void Procedure::decide_torques() {
     }
     if (as_is.verdict != Verdict::decided)
         return conclude(Verdict::refused, as_is.why + " (no torque: answer no)");
-    if (as_is.named() || !renamed.named()) return take_torques(as_is);
+    if (!renamed.named()) return take_torques(as_is);
+    if (as_is.named()) return take_torques(renamed);
     const auto text =
         fmt::format("Torques X Y Z turn platform axes {}, if {}, {}, {} are x, y, z.",
                     axes_of(as_is), names_.force[0], names_.force[1], names_.force[2]);

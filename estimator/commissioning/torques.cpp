@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "estimator/commissioning/words.hpp"
 
@@ -165,17 +166,22 @@ TorqueFinding named_by_torquers(const Description& description, const EarthRate&
                                 const std::vector<Torqued>& drifts,
                                 const TorqueSettings& settings) {
     TorqueFinding best = find_by_torque(description, rate, drifts, settings);
-    if (best.verdict != Verdict::decided || best.named()) return best;
+    if (best.verdict != Verdict::decided) return best;
+    // Which end of an axis is positive is a convention: that of the accelerometers' names, then
+    // that of as many torquers as may be. Noise decides nothing.
     const auto family = family_of(description);
-    double names = -HUGE_VAL;
+    const auto kept = [](const TorqueFinding& f) {
+        return std::pair(std::lround(f.description.wiring().trace()),
+                         f.sign[0] + f.sign[1] + f.sign[2]);
+    };
+    bool any = false;
     for (std::size_t i = 0; i < family.size() / 2; ++i) {
-        const Description& d = family[i];
-        if (d.sign[0] != description.sign[0] || d.accelerometers.trace() <= names) continue;
-        if (auto one = find_by_torque(d, rate, drifts, settings);
-            one.verdict == Verdict::decided && one.named()) {
-            names = d.accelerometers.trace();
-            best = std::move(one);
-        }
+        if (family[i].sign[0] != description.sign[0]) continue;
+        auto one = find_by_torque(family[i], rate, drifts, settings);
+        if (one.verdict != Verdict::decided || !one.named()) continue;
+        if (any && kept(one) <= kept(best)) continue;
+        any = true;
+        best = std::move(one);
     }
     return best;
 }
