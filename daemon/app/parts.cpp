@@ -103,9 +103,11 @@ rt::Acquisition::Wiring wiring(Parts& parts) {
 
 std::unique_ptr<drivers::Torquer> make_torquer(Parts& parts) {
     const auto& campaign = parts.configuration.campaign;
-    return campaign.levelling ? std::make_unique<drivers::Torquer>(
-                                    parts.dbc, campaign.level.torquer, parts.sending_port())
-                              : nullptr;
+    // Commissioning wants it of every rig that has torquers.
+    if (!campaign.levelling && !drivers::Torquer::known(parts.dbc, campaign.level.torquer))
+        return nullptr;
+    return std::make_unique<drivers::Torquer>(parts.dbc, campaign.level.torquer,
+                                              parts.sending_port());
 }
 
 /// Levelling and zeroing, where they are asked for, act by way of these.
