@@ -96,9 +96,10 @@ void CrossCheck::profiles() {
 }
 
 void CrossCheck::mode() {
-    if (sound({"spectrum.mode"}) && c_.spectrum.mixed)
+    if (!sound({"spectrum.mode", "shaker.registers"})) return;
+    if (c_.spectrum.mixed && !c_.shaker.registers.random)
         refuse({"spectrum.mode"}, "\"mixed\" without registers of mode and profile",
-               "\"sine\": vibrigd runs sines");
+               "shaker.registers.mode and its five companions, or \"sine\"");
 }
 
 void CrossCheck::frequencies_of_plan() {

@@ -135,5 +135,59 @@ TEST(SpectrumKeys, FrequenciesThatSamplingForbidsAreRefusedWithTheNearestFreeOne
                 HasSubstr("found \"mixed\" without registers of mode and profile"));
 }
 
+const std::string kRandomRegisters = R"([shaker.registers]
+mode = { address = 8 }
+profile_number = { address = 9 }
+profile_level_db = { address = 10 }
+profile_checksum = { address = 5 }
+measured_g_rms = { address = 7 }
+control_state = { address = 9 }
+)";
+
+TEST(RandomRegisters, AreNoneUnlessStatedAndThenAsStated) {
+    EXPECT_FALSE(accepted("", true).shaker.registers.random);
+    const auto map = accepted("spectrum.mode = \"mixed\"\n" + kRandomRegisters, true)
+                         .shaker.registers.random.value();
+    EXPECT_EQ(map.profile_level_db.type, proto::RegisterType::i16);
+    EXPECT_EQ(map.profile_level_db.scale, 0.1);
+    EXPECT_EQ(map.control_state.table, proto::RegisterTable::input);
+    const auto shown = [](const std::string& text) {
+        return format_effective(parse(as_simulated(text, true), "rig.toml", true));
+    };
+    EXPECT_THAT(shown(kRandomRegisters), HasSubstr("shaker.registers.profile_checksum.address"));
+    EXPECT_THAT(shown(""), Not(HasSubstr("profile_checksum")));
+}
+
+TEST(RandomRegisters, EachMissingOrUnfitRoleIsNamed) {
+    const auto without = [](const std::string& role) {
+        std::string text = kRandomRegisters;
+        const auto at = text.find(role);
+        return complaint(text.erase(at, text.find('\n', at) + 1 - at), true);
+    };
+    for (const char* role : {"mode", "profile_number", "profile_level_db", "profile_checksum",
+                             "measured_g_rms", "control_state"})
+        EXPECT_THAT(without(role), AllOf(HasSubstr(std::string("shaker.registers.") + role +
+                                                   ".address: found nothing, expected an address"),
+                                         HasSubstr("random vibration needs mode, profile_number")))
+            << role;
+    const auto with = [](const std::string& line) {
+        std::string text = kRandomRegisters;
+        const auto at = text.find(line.substr(0, line.find(' ')));
+        text.replace(at, text.find("\n", at) - at, line);
+        return complaint(text, true);
+    };
+    EXPECT_THAT(with("profile_level_db = { address = 10, type = \"u16\" }"),
+                AllOf(StartsWith("rig.toml:4:"), HasSubstr("profile_level_db.type"),
+                      HasSubstr("found u16, expected i16, i32 or f32")));
+    EXPECT_THAT(with("profile_checksum = { address = 5, type = \"f32\" }"),
+                HasSubstr("profile_checksum.type: found f32, expected u32"));
+    EXPECT_THAT(with("mode = { address = 8, table = \"input\" }"),
+                HasSubstr("mode.table: found \"input\", expected \"holding\""));
+    EXPECT_THAT(with("mode = { address = 5 }"),
+                HasSubstr("expected written registers that do not"));
+    EXPECT_THAT(with("control_state = { address = 9, type = \"bits\" }"),
+                HasSubstr("control_state.type: found bits"));
+}
+
 }  // namespace
 }  // namespace vibrig::configuration
