@@ -60,7 +60,8 @@ struct Found {
 /// `rows`: of all dwells.
 Found with_doubts(estimator::Result result, const std::vector<estimator::DwellRow>& rows,
                   const RigDoubts& doubts) {
-    Found found{std::move(result), {}, {}, {}, {}};
+    Found found;
+    found.result = std::move(result);
     found.contradiction = doubts.tell(found.result, rows);
     return found;
 }
