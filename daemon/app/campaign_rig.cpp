@@ -15,8 +15,9 @@ void CampaignRig::disobeyed(bool now_so) {
 }
 
 void CampaignRig::proving(campaign::Proving what) {
-    starving_.store(what == campaign::Proving::watchdog);
-    interlock_.proving(what != campaign::Proving::nothing);
+    const bool unlinked = what == campaign::Proving::unlinked;
+    starving_.store(unlinked || what == campaign::Proving::watchdog);
+    interlock_.proving(what != campaign::Proving::nothing, unlinked);
 }
 
 }  // namespace vibrig

@@ -161,6 +161,7 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
                            : 0;
     Json record = book_.status(utc_now());
     record["buttons_left"] = campaign_.proof().buttons_left();
+    record["ran_at_zero"] = campaign_.proof().ran_at_zero();
     record["lacking"] = Json::object();
     if (what.contains("shaker"))  // why parts are not given: no business of a poll
         for (const auto& [part, why] : shaker_parts({}).lacking)

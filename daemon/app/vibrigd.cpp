@@ -36,7 +36,8 @@ vibrig::serve::ServerSettings settings_of(const vibrig::configuration::Configura
         c.socket,      c.server.operator_group, c.server.status_socket,
         c.server.page, c.server.remote,         c.server.certificate,
         c.server.key,  c.server.clients_ca,     c.server.revoked};
-    // Of each of four doors: together they leave descriptors for everything else.
+    // Of each of four doors: together they leave descriptors for everything else below 1024, and
+    // no key lifts it, since libmodbus waits with select(), which takes none above that.
     settings.limits.connections = 224;
     return settings;
 }

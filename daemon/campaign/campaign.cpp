@@ -10,6 +10,7 @@
 #include "daemon/campaign/stages/opening.hpp"
 #include "daemon/campaign/stages/stop_proof.hpp"
 #include "daemon/campaign/stages/waiting.hpp"
+#include "daemon/campaign/stages/zero_run.hpp"
 #include "daemon/campaign/stages/zeroing.hpp"
 
 namespace vibrig::campaign {
@@ -138,7 +139,7 @@ Time Campaign::step_once(Time now) {
     if (proving_->pressed()) proving_->look(state_ == State::tripped, reason_, now);
     // A link that was lost ends the arming: excitation never recovers alone.
     if ((active() || state_ == State::armed || state_ == State::checking) && !shutting_down_ &&
-        !ports_.rig.shaker.reading().valid) {
+        !zero_run_->hung_up() && !ports_.rig.shaker.reading().valid) {
         abort("no valid read-back from the shaker", now);
     }
     insist_on_zero_torque(now);
@@ -239,7 +240,8 @@ void Campaign::end(State state, const std::string& why, Time now) {
     if (state == State::tripped) {
         ports_.log.event(Severity::trip, "stop of the shaker ordered: " + why);
     } else {
-        ports_.log.event(Severity::alarm, (checking        ? "loop check aborted: "
+        ports_.log.event(Severity::alarm, (checking ? checks_at_zero() ? "run at 0 g aborted: "
+                                                                       : "loop check aborted: "
                                            : commissioning ? "commissioning aborted: "
                                                            : "campaign aborted: ") +
                                               why);

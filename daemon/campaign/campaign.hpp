@@ -38,6 +38,7 @@ class StopProof;
 class Waiting;
 class ZeroCalibration;
 class Zeroing;
+class ZeroRun;
 
 /// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
 [[nodiscard]] std::string check_stages(const Settings& settings, const proto::Dbc& dbc,
@@ -151,6 +152,7 @@ class Campaign {
     CommandReply begin_check(const CommandRequest& request, drivers::Time now);
     drivers::Time check(drivers::Time now);
     void prove_refusals(drivers::Time now);
+    [[nodiscard]] bool checks_at_zero() const;
     void end_check(CampaignState state, const std::string& why, drivers::Time now);
     void conclude_check(drivers::Time now);
     [[nodiscard]] std::int64_t utc_ns() const { return ports_.log.utc_ns(); }
@@ -273,6 +275,7 @@ class Campaign {
     std::shared_ptr<Dwelling> dwelling_;
     std::shared_ptr<LoopCheck> loop_;
     std::shared_ptr<SmallLevel> small_level_;
+    std::shared_ptr<ZeroRun> zero_run_;
     std::shared_ptr<LoopChecking> checking_;
     std::shared_ptr<StopProof> proving_;
     std::shared_ptr<GravityWatch> gravity_;

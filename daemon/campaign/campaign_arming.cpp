@@ -110,6 +110,8 @@ std::string Campaign::refusal(const CommandRequest& request, Time now) const {
 
 std::string Campaign::arming_text(const CommandRequest& request) const {
     const std::string unit = settings_.unit.empty() ? "a unit that is not stated" : settings_.unit;
+    if (request.kind == CommandRequest::Kind::selftest && request.argument.starts_with("at_zero"))
+        return unit + ", a run at 0 g";
     if (request.kind == CommandRequest::Kind::selftest)
         return fmt::format("{}, loop check, {:g} g at the table", unit, settings_.loop.table_g);
     const std::string plan =

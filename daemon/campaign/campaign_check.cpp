@@ -11,12 +11,18 @@
 #include "daemon/campaign/stages/loop_checking.hpp"
 #include "daemon/campaign/stages/opening.hpp"
 #include "daemon/campaign/stages/stop_proof.hpp"
+#include "daemon/campaign/stages/zero_run.hpp"
 
 namespace vibrig::campaign {
 
 using drivers::Time;
 using State = CampaignState;
 using Came = StageStep::Kind;
+
+namespace {
+/// Of a self-test's argument: the run at 0 g.
+constexpr std::string_view kAtZero = "at_zero";
+}  // namespace
 
 void Campaign::take_over_loop_check(const std::string& out_of_band) {
     loop_->take_over(out_of_band);
@@ -51,29 +57,40 @@ std::string Campaign::not_fit_to_check(Time now) const {
 
 CommandReply Campaign::begin_check(const CommandRequest& request, Time now) {
     constexpr std::string_view kPress = "emergency_stop";
-    const bool press = request.argument.starts_with(kPress);
-    std::string button;
-    if (press && request.argument.size() > kPress.size() + 1)
-        button = request.argument.substr(kPress.size() + 1);
+    std::string_view asked = request.argument;
+    const bool at_zero = asked.starts_with(kAtZero);
+    if (at_zero) asked.remove_prefix(std::min(asked.size(), kAtZero.size() + 1));
+    const bool press = asked.starts_with(kPress);
+    const std::string button(press ? asked.substr(std::min(asked.size(), kPress.size() + 1))
+                                   : std::string_view());
     const auto& buttons = settings_.proof.buttons;
-    if (!press && !request.argument.empty())
-        return {false,
-                "selftest: found \"" + request.argument + "\", expected nothing or emergency_stop"};
+    if (!press && !asked.empty())
+        return {false, "selftest: found \"" + request.argument +
+                           "\", expected nothing, emergency_stop, at_zero or both"};
     if (!button.empty() && std::ranges::find(buttons, button) == buttons.end())
         return {false, "selftest: found the button \"" + button +
                            "\", expected one of commission.buttons"};
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
+    if (climbs_ && !at_zero && !proof_.ran_at_zero())
+        return {false,
+                "the controller has not run at 0 g yet: vibrig commission watchdog stop units "
+                "excitation"};
     armed_by_ = request.by;
     armed_for_ = arming_text(request);
     excitation_.armed();
     reason_.clear();
     checking_->aim(request.by, climbs_);
+    zero_run_->aim(request.by, press);
     proving_->with_press(press);
-    begin(*checking_, State::checking, now);
+    if (at_zero)
+        begin(*zero_run_, State::checking, now);
+    else
+        begin(*checking_, State::checking, now);
     // There is but one.
     proof_.record().button = press && button.empty() && buttons.size() == 1 ? buttons[0] : button;
     const std::string text =
-        fmt::format("loop check and safe-state proof at {:g} g", settings_.loop.table_g);
+        at_zero ? fmt::format("run at 0 g{}", press ? ", and the emergency stop" : "")
+                : fmt::format("loop check and safe-state proof at {:g} g", settings_.loop.table_g);
     ports_.log.event(Severity::info, fmt::format("{} by {}", text, request.by));
     return {true, text};
 }
@@ -90,10 +107,12 @@ Time Campaign::check(Time now) {
             abort(step.why, now);
             break;
         case Came::done:
-            if (stage_ == proving_.get()) {
+            if (stage_ == proving_.get() || (checks_at_zero() && !proving_->wants_press())) {
                 conclude_check(now);
+            } else if (std::exchange(stage_, proving_.get()) == zero_run_.get()) {
+                zero_run_->leave();
+                proving_->begin_at_zero(now);
             } else {
-                stage_ = proving_.get();
                 stage_->begin(now);
             }
     }
@@ -109,23 +128,28 @@ void Campaign::prove_refusals(Time now) {
                excitation_.refuses_frequency(settings_.frequency_hz + 1, settings_.loop.table_g));
 }
 
+bool Campaign::checks_at_zero() const { return small_level_->level_g == 0; }
+
 /// It ends before it is done, in this state.
 void Campaign::end_check(State state, const std::string& why, Time now) {
-    loop_->not_completed(why);
+    if (!checks_at_zero()) loop_->not_completed(why);
     if (proving_->waits_for_press() &&
         (state == State::tripped || ports_.rig.shaker.reading().emergency_stop_open)) {
         proving_->begin_pressed(now);
     } else {
-        proving_->conclude("not completed: " + why + checking_->suspect_unit());
+        proving_->conclude("not completed: " + why + checking_->suspect_unit() +
+                           zero_run_->where());
     }
 }
 
 void Campaign::conclude_check(Time now) {
     leave_stage();
-    loop_->conclude();
+    const bool at_zero = checks_at_zero();
+    if (!at_zero) loop_->conclude();
     proving_->conclude({});
     armed_by_.clear();
     enter(State::idle, now);
+    if (at_zero) return;
     const auto& found = loop_->status();
     for (const auto& row : found.rows) {
         ports_.log.event(

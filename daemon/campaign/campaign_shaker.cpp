@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "daemon/campaign/campaign.hpp"
+#include "daemon/campaign/stages/small_level.hpp"
 
 namespace vibrig::campaign {
 
@@ -11,7 +12,7 @@ using drivers::Time;
 using State = CampaignState;
 
 double Campaign::highest_level() const {
-    if (state_ == State::checking) return settings_.loop.table_g;
+    if (state_ == State::checking) return std::max(small_level_->level_g, Excitation::kAtZero_g);
     if (settings_.stops.empty()) return *std::ranges::max_element(settings_.table_g);
     // Of random vibration the peaks that it hardly goes beyond: three sigma.
     double highest_g = 0;

@@ -9,6 +9,7 @@
 #include "daemon/campaign/stages/opening.hpp"
 #include "daemon/campaign/stages/stop_proof.hpp"
 #include "daemon/campaign/stages/waiting.hpp"
+#include "daemon/campaign/stages/zero_run.hpp"
 #include "daemon/campaign/stages/zeroing.hpp"
 
 namespace vibrig::campaign {
@@ -25,6 +26,7 @@ void Campaign::make_stages() {
     loop_ = std::make_shared<LoopCheck>(settings_.loop, settings_.rig);
     small_level_ =
         std::make_shared<SmallLevel>(settings_, ports_, excitation_, stop_, *loop_, proof_);
+    zero_run_ = std::make_shared<ZeroRun>(*small_level_);
     checking_ = std::make_shared<LoopChecking>(*small_level_);
     proving_ = std::make_shared<StopProof>(*small_level_);
     dwelling_ = std::make_shared<Dwelling>(settings_, ports_, excitation_, stop_);

@@ -21,15 +21,16 @@ void Excitation::from_rest(const Stop& stop, Time now) {
     tell_ramp(0, now);
 }
 
-drivers::ShakerSetPoint Excitation::set_point(double table_g) const {
-    drivers::ShakerSetPoint point{frequency_hz_, table_g, settings_.ramp_s};
+drivers::ShakerSetPoint Excitation::set_point(double table_g, bool run_at_zero) const {
+    drivers::ShakerSetPoint point{
+        frequency_hz_, table_g, settings_.ramp_s, {}, run_at_zero && !random_};
     if (random_) point.random = random_->set_point;
     return point;
 }
 
-bool Excitation::ask(double table_g, Time now) {
+bool Excitation::ask(double table_g, Time now, bool run_at_zero) {
     stop_.excited(table_g);
-    if (!rig_.shaker.request(set_point(table_g), armed_under_)) return false;
+    if (!rig_.shaker.request(set_point(table_g, run_at_zero), armed_under_)) return false;
     asked_ = true;
     tell_ramp(table_g, now);
     return true;
@@ -37,7 +38,7 @@ bool Excitation::ask(double table_g, Time now) {
 
 std::string Excitation::climb(double table_g, Time now, bool& reached) {
     reached = false;
-    if (!asked_) return ask(table_g, now) ? "" : "the shaker takes no set-point";
+    if (!asked_) return ask(table_g, now, table_g == 0) ? "" : "the shaker takes no set-point";
     reached = !rig_.shaker.busy() && as_commanded(table_g);
     if (reached || now - since_ <= from_seconds(settings_.ramp_s) + kRampGrace) return {};
     if (random_) return off_command(table_g, now);
@@ -117,12 +118,16 @@ bool Excitation::chosen() const {
 bool Excitation::as_commanded(double table_g) const {
     constexpr double kFrequencyToleranceHz = 0.01;  // read back; a register resolves 1 mHz
     const auto reading = rig_.shaker.reading();
-    const bool runs = reading.valid && reading.running && reading.state == drivers::kShakerRunning;
-    if (random_) return runs && reading.random && plays_as_commanded(reading);
+    const bool running =
+        reading.valid && reading.running && reading.state == drivers::kShakerRunning;
+    if (random_) return running && reading.random && plays_as_commanded(reading);
     if (reading.random && reading.random->random) return false;
-    return reading.valid && reading.running && reading.state == drivers::kShakerRunning &&
+    const bool there = reading.state == drivers::kShakerRunning ||
+                       (table_g == 0 && reading.state == drivers::kShakerRamping);
+    const double tolerance_g = table_g > 0 ? settings_.amplitude_tolerance * table_g : kAtZero_g;
+    return reading.valid && reading.running && there &&
            std::abs(reading.frequency_hz - frequency_hz_) <= kFrequencyToleranceHz &&
-           std::abs(reading.measured_g - table_g) <= settings_.amplitude_tolerance * table_g;
+           std::abs(reading.measured_g - table_g) <= tolerance_g;
 }
 
 std::string Excitation::off_command(double table_g, Time now) {

@@ -51,12 +51,13 @@ class Excitation {
     [[nodiscard]] drivers::Time since() const { return since_; }
     /// Within this part the set-point was accepted.
     [[nodiscard]] bool asked() const { return asked_; }
-    /// Asks for a level; false: the shaker takes no set-point.
-    [[nodiscard]] bool ask(double table_g, drivers::Time now);
+    /// Asks for a level, 0 being the way down; `run_at_zero`: it runs there. False: the shaker
+    /// takes no set-point.
+    [[nodiscard]] bool ask(double table_g, drivers::Time now, bool run_at_zero = false);
     /// When a level was asked for last.
     [[nodiscard]] drivers::Time asked_at() const { return asked_at_; }
-    /// Asks for it once, and waits for it. Why it does not come, else empty; `reached` once it is
-    /// there.
+    /// Asks for it once, and waits for it; 0: for the controller to run there. Why it does not
+    /// come, else empty; `reached` once it is there.
     [[nodiscard]] std::string climb(double table_g, drivers::Time now, bool& reached);
 
     enum class Rests : std::uint8_t { not_yet, at_rest, overdue };
@@ -78,12 +79,14 @@ class Excitation {
     /// Another frequency is refused while the table moves: true if this one is.
     [[nodiscard]] bool refuses_frequency(double frequency_hz, double table_g);
 
+    /// What the table may seem to do where the controller runs at 0 g.
+    static constexpr double kAtZero_g = 0.01;
     /// How much later than the ramp itself the controller may report the level as reached.
     static constexpr drivers::Time kRampGrace = 10 * drivers::kSecond;
 
   private:
     void tell_ramp(double table_g, drivers::Time now);
-    [[nodiscard]] drivers::ShakerSetPoint set_point(double table_g) const;
+    [[nodiscard]] drivers::ShakerSetPoint set_point(double table_g, bool run_at_zero) const;
     [[nodiscard]] bool plays_as_commanded(const drivers::ShakerReading& reading) const;
 
     const Settings& settings_;

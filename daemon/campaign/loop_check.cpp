@@ -138,6 +138,12 @@ LoopCheck::Noise LoopCheck::noise() const {
     return {rms(platform), rms(table)};
 }
 
+double LoopCheck::mean_force_g() const {
+    double sum = 0;
+    for (const auto& reading : readings_) sum += norm(reading);
+    return sum / static_cast<double>(std::max<std::size_t>(readings_.size(), 1));
+}
+
 LoopCheck::Noise LoopCheck::peak() const {
     const auto of = [](double value, double noise) {
         return std::sqrt(2 * std::max(0.0, value * value - noise * noise));
@@ -183,6 +189,25 @@ std::string unit_of_ratio(double ratio) {
     return {};
 }
 
+std::array<double, 2> isolator_ratio(double transmission, double from_hz, double to_hz) {
+    if (!(transmission < 1)) return {1, 1};
+    constexpr double kMostDamping = 0.5;
+    constexpr int kSteps = 10;
+    const double square = transmission * transmission;
+    std::array<double, 2> found{1e9, 0};
+    for (int i = 0; i <= kSteps; ++i) {
+        const double z = std::pow(2 * kMostDamping * i / kSteps, 2);
+        const double b = square * (z - 2) - z;
+        const double x = (-b + std::sqrt(b * b + 4 * square * (1 - square))) / (2 * square);
+        const double there = x * (to_hz / from_hz) * (to_hz / from_hz);
+        const double at_there =
+            std::sqrt((1 + z * there) / ((1 - there) * (1 - there) + z * there));
+        found = {std::min(found[0], at_there / transmission),
+                 std::max(found[1], at_there / transmission)};
+    }
+    return found;
+}
+
 double LoopCheck::over_command(drivers::Time asked, double ramp_s) const {
     // The slope of the amplitude, from the energy of two halves of what came: neither the phase nor
     // when the controller began need be known.
@@ -223,18 +248,15 @@ void LoopCheck::row(const char* name, const char* unit, double value, double low
     status_.rows.push_back(judged(name, unit, value, low, high, ""));
 }
 
-LoopCheck::AtFrequency LoopCheck::finish_at(double hz, double transmission) {
+LoopCheck::AtFrequency LoopCheck::finish_at(double hz, double low, double high) {
     const auto found = estimator::loop_response(readings_, hz);
     const double table_g = found.table_known ? found.table_g : settings_.table_g;
-    const double tolerance = settings_.transmission_tolerance;
     const std::string at = fmt::format("at {:g} Hz ", hz);
     AtFrequency out{hz, table_g > 0 ? found.platform_g / table_g : 0, {}};
-    const auto row = [&](const char* name, const char* unit, double value, double low,
-                         double high) {
-        out.rows.push_back(judged(name, unit, value, low, high, at));
+    const auto row = [&](const char* name, const char* unit, double value, double from, double to) {
+        out.rows.push_back(judged(name, unit, value, from, to, at));
     };
-    row("transmission", "", out.transmission, transmission * (1 - tolerance),
-        transmission * (1 + tolerance));
+    row("transmission", "", out.transmission, low, high);
     if (found.table_known)
         row("table over command", "", found.table_g / settings_.table_g, 1 / kDecibel, kDecibel);
     row("frequency", "Hz", found.frequency_hz, hz - settings_.frequency_tolerance_hz,

@@ -16,6 +16,13 @@ namespace vibrig::campaign {
 /// Which unit the controller may have been given for another, by table over command; empty: none.
 [[nodiscard]] std::string unit_of_ratio(double ratio);
 
+/// Lowest and highest of what the transmission does from one frequency to another above the
+/// resonance, over what it was: of a mass on a spring with any damping up to half of the critical,
+/// |T|^2 = (1 + z x) / ((1 - x)^2 + z x), x = (f/fn)^2, z = (2 damping)^2 (Tang et al. 2009, eq.
+/// 3). 1 and 1 of a rigid mount, `transmission` 1.
+[[nodiscard]] std::array<double, 2> isolator_ratio(double transmission, double from_hz,
+                                                   double to_hz);
+
 /// The newest loop check: collects samples at rest and at the small level, and says what is out of
 /// band. Control thread only.
 class LoopCheck {
@@ -35,13 +42,18 @@ class LoopCheck {
     [[nodiscard]] Noise noise() const;
     /// What counts is of a rig at rest: how much of later vibration is noise.
     void rests() { at_rest_ = noise(); }
+    /// Mean of the norm of the specific force over what counts, g.
+    [[nodiscard]] double mean_force_g() const;
     /// Amplitudes of a vibration, peak, less what was noise at rest.
     [[nodiscard]] Noise peak() const;
     /// The last moment at which the table (or the platform, where the table has no accelerometer)
     /// was beyond half of its highest; 0: nothing counts.
     [[nodiscard]] drivers::Time last_at_half() const;
     /// From now on what counts.
-    void measure() { readings_.clear(); }
+    void measure() {
+        readings_.clear();
+        bad_ = 0;
+    }
     /// While the level is still coming up, linearly over `ramp_s` from when it was asked for: table
     /// (platform over the transmission, where it has no accelerometer) over command; 0: unknown.
     [[nodiscard]] double over_command(drivers::Time asked, double ramp_s) const;
@@ -50,13 +62,18 @@ class LoopCheck {
     /// Judges it, `shaker_g` being what the controller says of the table: that is held against the
     /// command as the accelerometers are, and is no witness of them.
     void finish(double shaker_g);
-    /// The same at another frequency of the plan, where the platform is to do `transmission` times
-    /// what the table does; before finish(), whose verdict it is part of.
+    /// The same at another frequency, where the platform is to do from `low` to `high` times what
+    /// the table does; before finish(), whose verdict it is part of.
     struct AtFrequency {
         double hz = 0, transmission = 0;  ///< of the vibration as it was asked for; as measured
         std::vector<LoopCheckStatus::Row> rows;
     };
-    [[nodiscard]] AtFrequency finish_at(double hz, double transmission);
+    [[nodiscard]] AtFrequency finish_at(double hz, double low, double high);
+    /// Likewise, to `transmission` within the configured tolerance.
+    [[nodiscard]] AtFrequency finish_at(double hz, double transmission) {
+        const double tolerance = settings_.transmission_tolerance;
+        return finish_at(hz, transmission * (1 - tolerance), transmission * (1 + tolerance));
+    }
     void conclude();  ///< the table is at rest again: it is over
     void not_completed(const std::string& why);
 

@@ -28,8 +28,8 @@ struct Next {
 };
 
 /// A stop that is made to happen, by order or by not feeding the watchdog: the amplitude may fall
-/// as it likes, and the controller may say fault.
-enum class Proving : std::uint8_t { nothing, stop, watchdog };
+/// as it likes, and the controller may say fault; unlinked: and nobody talks to it.
+enum class Proving : std::uint8_t { nothing, stop, watchdog, unlinked };
 
 /// What the campaign moves, what it measures of it, and who watches meanwhile. Like the other two
 /// ports it is called by the control thread only; a call that has a body may be left out.

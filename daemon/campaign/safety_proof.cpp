@@ -207,17 +207,33 @@ std::vector<std::string> SafetyProof::buttons_left() const {
 }
 
 const ProofRecord* SafetyProof::newest_passed() const {
-    const auto found =
-        std::find_if(history_.rbegin(), history_.rend(), [](const auto& r) { return r.passed; });
+    const auto found = std::find_if(history_.rbegin(), history_.rend(),
+                                    [](const auto& r) { return r.passed && r.table_g > 0; });
     return found == history_.rend() ? nullptr : &*found;
+}
+
+const ProofRecord* SafetyProof::newest_shaken() const {
+    const auto found = std::find_if(history_.rbegin(), history_.rend(),
+                                    [](const auto& r) { return r.table_g > 0; });
+    return found == history_.rend() ? nullptr : &*found;
+}
+
+bool SafetyProof::ran_at_zero() const {
+    return std::ranges::any_of(history_, [this](const ProofRecord& one) {
+        return one.passed && one.table_g == 0 && !one.emergency_stop &&
+               one.keys_sha256 == keys_sha256_;
+    });
 }
 
 std::string SafetyProof::refusal(std::int64_t utc_ns) const {
     if (!settings_.demanded) return {};
     const std::string what = "the safe state is not proved: ";
-    if (history_.empty()) return what + "there is no proof" + kRemedy;
     // The last word counts: one that failed is not made good by an older one that passed.
-    const ProofRecord& newest = history_.back();
+    if (!history_.empty() && !history_.back().passed)
+        return what + "the newest proof failed: " + history_.back().message + kRemedy;
+    const ProofRecord* shaken = newest_shaken();
+    if (shaken == nullptr) return what + "there is no proof" + kRemedy;
+    const ProofRecord& newest = *shaken;
     if (!newest.passed) return what + "the newest proof failed: " + newest.message + kRemedy;
     const double age_h = static_cast<double>(utc_ns - newest.utc_ns) / kHour_ns;
     if (age_h < 0)
@@ -274,6 +290,7 @@ std::string SafetyProof::trend() const {
 
 std::string SafetyProof::recording_json() const {
     if (history_.empty()) return {};
+    const ProofRecord* shaken = newest_shaken();
     Json past = Json::array();
     for (const ProofRecord& record : history_) {
         Json times;
@@ -284,7 +301,7 @@ std::string SafetyProof::recording_json() const {
     }
     return Json{{"demanded", settings_.demanded},
                 {"trend", trend()},
-                {"newest", Json::parse(to_json(history_.back()))},
+                {"newest", Json::parse(to_json(shaken != nullptr ? *shaken : history_.back()))},
                 {"history", past}}
         .dump();
 }
@@ -318,8 +335,8 @@ void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
 }
 
 const ProofRecord* SafetyProof::newest_of_these_keys() const {
-    return history_.empty() || history_.back().keys_sha256 != keys_sha256_ ? nullptr
-                                                                           : &history_.back();
+    const ProofRecord* newest = newest_shaken();
+    return newest == nullptr || newest->keys_sha256 != keys_sha256_ ? nullptr : newest;
 }
 
 std::optional<double> SafetyProof::transmission() const {

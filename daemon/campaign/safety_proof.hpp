@@ -34,7 +34,7 @@ struct ProofRow {
 struct ProofRecord {
     std::string by;
     std::int64_t utc_ns = 0;
-    double table_g = 0;  ///< peak, at the table
+    double table_g = 0;  ///< peak, at the table; 0: a run at 0 g, which alone proves no safe state
     bool passed = false;
     bool emergency_stop = false;  ///< its button was pressed, and the rig obeyed
     std::string button;           ///< which one was; empty: nobody said
@@ -107,6 +107,8 @@ class SafetyProof {
     [[nodiscard]] const std::vector<ProofRecord>& history() const { return history_; }
     /// Of the keys as they are, oldest first.
     [[nodiscard]] std::vector<ProofRecord> with_these_keys() const;
+    /// With these keys the controller has run at 0 g, and its watchdog has stopped it there.
+    [[nodiscard]] bool ran_at_zero() const;
     /// Of the emergency stop's buttons: none of those proofs that passed had them pressed.
     [[nodiscard]] std::vector<std::string> buttons_left() const;
     /// As the newest loop check in band has measured it with the configuration as it is; nothing
@@ -119,6 +121,8 @@ class SafetyProof {
 
   private:
     [[nodiscard]] const ProofRecord* newest_passed() const;
+    /// Not of a run at 0 g.
+    [[nodiscard]] const ProofRecord* newest_shaken() const;
     /// If it is of the configuration as it is.
     [[nodiscard]] const ProofRecord* newest_of_these_keys() const;
 

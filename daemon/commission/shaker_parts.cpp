@@ -95,17 +95,43 @@ ShakerParts shaker_parts(const std::vector<Json>& proofs,
         for (const Part part : kShakerParts) parts.lacking[part] = why;
         return parts;
     }
-    const Json& newest = proofs.back();
+    const auto newest_of = [&proofs](auto&& is) -> const Json* {
+        const auto found = std::find_if(proofs.rbegin(), proofs.rend(), is);
+        return found == proofs.rend() ? nullptr : &*found;
+    };
+    const Json* shaken = newest_of([](const Json& one) { return one.at("table_g") > 0; });
+    const Json* at_zero = newest_of([](const Json& one) {
+        return one.at("table_g") == 0 && one.at("passed") == true && one["emergency_stop"] != true;
+    });
+    if (shaken == nullptr || shaken->at("passed") != true) {
+        for (const Part part : kShakerParts)
+            parts.lacking[part] = shaken == nullptr
+                                      ? "it has run at 0 g, and not shaken yet"
+                                      : "the newest proof that shook has not passed: " +
+                                            shaken->at("message").get<std::string>();
+        return parts;
+    }
+    const Json& newest = *shaken;
     Json pressed = Json::object();
     for (const Json& one : proofs) {
         const std::string button = one.value("button", "");
         if (one.at("passed") != true || one.at("emergency_stop") != true || button.empty())
             continue;
         pressed[button] = rows_of(one, {"emergency stop", "closing"});
+        pressed[button]["table_g"] = one.at("table_g");
     }
-    parts.proven[Part::registers] =
-        rows_of(newest, {"controller", "frequency", "stop, controller", "ladder"});
-    parts.proven[Part::watchdog] = rows_of(newest, {"watchdog"});
+    if (at_zero == nullptr) {
+        parts.lacking[Part::registers] = parts.lacking[Part::watchdog] = "it has not run at 0 g";
+    } else {
+        const auto also = [&](const char* beginning, Json rows) {
+            rows.update(rows_of(*at_zero, {beginning}));
+            return rows;
+        };
+        parts.proven[Part::registers] = also(
+            "at 0 g",
+            rows_of(newest, {"controller", "frequency", "stop, controller", "ladder", "f + 1 Hz"}));
+        parts.proven[Part::watchdog] = also("watchdog", rows_of(newest, {"watchdog"}));
+    }
     parts.proven[Part::excitation] =
         rows_of(newest, {"transmission", "frequency", "distortion", "cross-axis", "phase"});
     parts.proven[Part::excitation]["table_g"] = newest.at("table_g");

@@ -24,7 +24,8 @@ struct ShakerParts {
     std::map<Part, std::string> lacking;
 };
 
-/// `proofs`: made with the keys as they are, oldest first, as the journal keeps them
+/// What a run at 0 g shows (`table_g` 0) and what a proof that shakes shows belong together: both
+/// are asked for. `proofs`: made with the keys as they are, oldest first, as the journal keeps them
 /// (daemon/campaign/safety_proof.hpp). `buttons_left`: nobody has pressed them in any of them.
 [[nodiscard]] ShakerParts shaker_parts(const std::vector<Json>& proofs,
                                        const std::vector<std::string>& buttons_left,

@@ -284,7 +284,7 @@ void Interlock::check_ages(const drivers::SampleAssembler& assembler, Time now) 
     judge(By::sample, Trip::horn, horn_silent_.load(), now);
     if (guard < Guard::armed) return;
     judge(By::sample, Trip::guard_lost, guard_lost_.load(), now);
-    judge(By::sample, Trip::shaker_lost, !shaker_.reading().valid, now);
+    judge(By::sample, Trip::shaker_lost, !unlinked_.load() && !shaker_.reading().valid, now);
 }
 
 void Interlock::lost_bus() noexcept {

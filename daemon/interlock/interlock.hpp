@@ -92,7 +92,11 @@ class Interlock {
     }
     /// Control thread: a stop is proved by making it happen. The amplitude may fall as it likes
     /// then, and the controller may say fault once nobody feeds its watchdog; nothing may rise.
-    void proving(bool stop) noexcept { proving_.store(stop); }
+    /// `unlinked`: nobody reads it meanwhile.
+    void proving(bool stop, bool unlinked = false) noexcept {
+        proving_.store(stop);
+        unlinked_.store(unlinked);
+    }
     /// Control thread: platform over table, as the loop check has measured it.
     void transmission(double measured) noexcept { transmission_.store(measured); }
     /// Platform and table as the accelerometers show them, g peak at the table; negative: unknown.
@@ -206,7 +210,7 @@ class Interlock {
     std::atomic<Tripped> tripped_{Tripped{}};
     std::atomic<std::uint8_t> trips_{0};
     std::atomic<double> commanded_g_{0}, nis_{0}, disk_free_mb_{-1};
-    std::atomic<bool> proving_{false};
+    std::atomic<bool> proving_{false}, unlinked_{false};
     std::atomic<bool> recording_degraded_{false}, server_stuck_{false};
     std::atomic<bool> guard_lost_{false}, guard_stopped_{false}, horn_silent_{false};
     std::array<std::atomic<double>, 3> position_rad_{};

@@ -151,6 +151,60 @@ void add_charts(Page& page, const SpectrumJson& spectrum) {
     }
 }
 
+/// Measured over what the coefficients foretell, all gyros; what the fit has not seen apart.
+void add_predicted(Page& page, const SpectrumJson& root) {
+    tool::plot::Curve fitted, held, equal;
+    fitted.name = "dwells of the fit";
+    held.name = "held out";
+    equal.name = "as predicted";
+    fitted.look = held.look = tool::plot::Look::dots;
+    const auto add = [&](tool::plot::Curve& to, double predicted, double measured) {
+        to.x.push_back(predicted);
+        to.y.push_back(measured);
+        equal.x.push_back(predicted);
+    };
+    for (const SpectrumJson& row : root.at("dwell_rates")) {
+        for (std::size_t j = 0; j < 3; ++j) {
+            const double rate = row.at("rate").at(j).get<double>();
+            add(fitted, rate - row.at("residual").at(j).get<double>(), rate);
+        }
+    }
+    // Results of earlier versions do not have it.
+    const SpectrumJson none = SpectrumJson::array();
+    const auto found = root.at("spectrum").find("held_out");
+    const SpectrumJson& apart = found != root.at("spectrum").end() ? *found : none;
+    std::vector<std::vector<std::string>> rows{
+        {"run, position", "Hz", "measured x", "y", "z", "predicted x", "y", "z", "z x", "y", "z"}};
+    for (const SpectrumJson& row : apart) {
+        std::vector<std::string> cells{
+            fmt::format("{}, {}", row.at("run").get<int>(), row.at("position").get<int>()),
+            shown(row.at("hz"), "{:g}")};
+        for (const char* key : {"rate", "predicted"}) {
+            for (const SpectrumJson& value : row.at(key)) cells.push_back(shown(value, "{:.4f}"));
+        }
+        for (const SpectrumJson& value : row.at("z")) cells.push_back(shown(value, "{:.1f}"));
+        rows.push_back(std::move(cells));
+        for (std::size_t j = 0; j < 3; ++j)
+            add(held, row.at("predicted").at(j).get<double>(), row.at("rate").at(j).get<double>());
+    }
+    if (equal.x.empty()) return;
+    const auto [low, high] = std::ranges::minmax(equal.x);
+    equal.x = equal.y = {low, high};
+    tool::plot::Chart chart;
+    chart.title = "Drift predicted against measured";
+    chart.x = tool::plot::Axis("predicted, deg/h");
+    chart.y = tool::plot::Axis("measured, deg/h");
+    chart.curves = {equal, fitted};
+    if (!held.x.empty()) chart.curves.push_back(held);
+    page.figure(chart.svg(), "All three gyros, each dwell of each frequency.");
+    if (rows.size() < 2)
+        return page.paragraph("No dwell was held out (role \"verify\" of a plan).");
+    page.paragraph(
+        "Dwells held out from the fit, deg/h about the input axes; z: measured less predicted in "
+        "standard uncertainties of both.");
+    page.table(rows);
+}
+
 }  // namespace
 
 void add_spectrum(Page& page, const record::Campaign& campaign) {
@@ -171,10 +225,11 @@ void add_spectrum(Page& page, const record::Campaign& campaign) {
         page.paragraph("Quadratic coefficients, deg/h/g^2, from the dwells of each frequency:");
         add_groups(page, spectrum.at("frequencies"));
         if (spectrum.at("model") != "groups") add_charts(page, spectrum);
+        add_predicted(page, root);
         std::string limits = "What such a campaign does not tell:";
         for (const SpectrumJson& one : spectrum.value("not_told", SpectrumJson::array()))
-            limits += " " + one.get<std::string>() + ".";
-        if (!limits.ends_with(':')) page.paragraph(limits);
+            limits += (limits.ends_with(':') ? " " : "; ") + one.get<std::string>();
+        if (!limits.ends_with(':')) page.paragraph(limits + ".");
     } catch (const SpectrumJson::exception& error) {
         page.paragraph(std::string("The recorded result cannot be read: ") + error.what());
     }

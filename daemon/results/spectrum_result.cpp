@@ -11,6 +11,7 @@
 #include "daemon/results/assessment_json.hpp"
 #include "daemon/results/text_line.hpp"
 #include "estimator/filter/parameters.hpp"
+#include "estimator/spectrum/prediction.hpp"
 
 namespace vibrig::tool {
 
@@ -126,6 +127,39 @@ Json effects_json(const std::vector<Effect>& effects) {
         list.push_back({{"input", effect.input},
                         {"element", effect.element.empty() ? Json(nullptr) : Json(effect.element)},
                         {"change", std::move(change)}});
+    }
+    return list;
+}
+
+/// Rates of the dwells held out, those foretold for what happened in them, deg/h, and what is
+/// between the two in standard uncertainties of both.
+Json held_out_json(const SpectrumResult& of) {
+    Json list = Json::array();
+    std::vector<Situation> situations;
+    for (const estimator::DwellRow& row : of.held_out) {
+        const double hz = row.commanded_hz > 0 ? row.commanded_hz : row.frequency_hz;
+        situations.push_back(
+            {row.angles, level_moment(row.vibration), {{hz, 1, 0}}, row.duration_s, true});
+    }
+    if (situations.empty()) return list;
+    const Prediction foretold = predict(of.analysis.model, situations);
+    for (Index k = 0; k < foretold.drift.rows(); ++k) {
+        const estimator::DwellRow& row = of.held_out[static_cast<std::size_t>(k)];
+        VectorXd u(3), z(3);
+        for (Index j = 0; j < 3; ++j) {
+            u[j] = foretold.u(k, j);
+            z[j] =
+                (row.rate[j] - foretold.drift(k, j)) / std::sqrt(u[j] * u[j] + row.variance(j, j));
+        }
+        list.push_back(
+            {{"run", row.run},
+             {"position", row.position},
+             {"hz",
+              row.vibration.kappa > 1 ? situations[static_cast<std::size_t>(k)].bands[0].hz : 0.0},
+             {"rate", numbers_of(row.rate)},
+             {"predicted", numbers_of(foretold.drift.row(k))},
+             {"u", numbers_of(u)},
+             {"z", numbers_of(z)}});
     }
     return list;
 }
@@ -280,8 +314,12 @@ std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
                                           const NumberedKinds& profiles) {
     std::vector<SpectralDwell> dwells;
     std::vector<Kind> kinds;
+    std::vector<estimator::DwellRow> held_out;
     for (const estimator::DwellRow& row : rows) {
-        if (row.held_out) continue;
+        if (row.held_out) {
+            if (!row.random) held_out.push_back(row);
+            continue;
+        }
         const auto profile = std::ranges::find_if(
             profiles, [&row](const auto& one) { return one.first == row.profile; });
         if (row.random && profile == profiles.end()) continue;
@@ -301,7 +339,9 @@ std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
         if (known == kinds.end()) kinds.push_back({"", {{hz, 1, 0}}});
     }
     if (kinds.size() < 2 || dwells.size() > kMostSpectralDwells) return std::nullopt;
-    return spectrum_of(settings, std::move(dwells), std::move(kinds), form);
+    SpectrumResult found = spectrum_of(settings, std::move(dwells), std::move(kinds), form);
+    found.held_out = std::move(held_out);
+    return found;
 }
 
 void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
@@ -363,6 +403,7 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
         {"lack_of_fit", std::move(lack)},
         {"lowest_hz", a.model.lowest_hz},
         {"highest_hz", a.model.highest_hz},
+        {"held_out", held_out_json(of)},
         {"refusal", a.model.refusal.empty() ? Json(nullptr) : Json(a.model.refusal)},
         {"not_told", not_told()},
         {"effects", effects_json(a.model.effects)},

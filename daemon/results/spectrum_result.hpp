@@ -17,7 +17,8 @@ namespace vibrig::tool {
 struct SpectrumResult {
     estimator::spectrum::Analysis analysis;
     estimator::spectrum::SpectralTable table;
-    double reference_hz = 0;  ///< of the coefficients that are not static
+    double reference_hz = 0;                         ///< of the coefficients that are not static
+    std::vector<estimator::DwellRow> held_out = {};  ///< under a sine or at rest
 
     [[nodiscard]] bool several() const { return table.kinds().size() > 1; }
 };
@@ -49,7 +50,8 @@ using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::
 void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
            estimator::uncertainty::Assessment& assessed);
 
-/// Root `spectrum`, `at_hz` of the parameters and `lines` of the dwells' rates.
+/// Root `spectrum`, `at_hz` of the parameters and `lines` of the dwells' rates. Of the dwells that
+/// were held out it has what was measured beside what the others foretell.
 void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 /// For people; empty with one frequency.
 [[nodiscard]] std::string spectrum_text(const SpectrumResult& spectrum);

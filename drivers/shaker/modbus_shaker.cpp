@@ -93,6 +93,11 @@ void ModbusShaker::stop_now() noexcept {
     wake();
 }
 
+void ModbusShaker::hang_up_until(Time time) noexcept {
+    hung_up_until_ = time;
+    wake();
+}
+
 ShakerReading ModbusShaker::reading() const noexcept {
     ShakerReading reading = latest_.load();
     // One lost reply and the reconnect after it are lived through; the watchdog waits longer still.
@@ -148,6 +153,16 @@ void ModbusShaker::work(Time now) {
     drop_void_set_point();
     const bool stop = stop_pending();
     if (!stop) stop_tried_ = connect_tried_for_stop_ = ramp_tried_ = joint_in_vain_ = false;
+    if (stop) hung_up_until_ = 0;
+    const Time silent_until = hung_up_until_.load();
+    if (!stop && now < silent_until) {
+        if (link_.connected()) {
+            close_link();
+            set_state(LinkState::connecting, "closed by order");
+        }
+        next_attempt_ = silent_until;
+        return sleep_until(silent_until);
+    }
     if (!link_.connected()) {
         if (now >= next_attempt_ || (stop && !connect_tried_for_stop_)) return try_connect(now);
         return sleep_until(next_attempt_);
@@ -191,11 +206,16 @@ void ModbusShaker::try_connect(Time now) {
     next_feed_ = stop_alone_until_;
 }
 
-void ModbusShaker::lose_link(const std::string& why) {
+/// What waits was meant for the device as it was.
+void ModbusShaker::close_link() {
     link_.close();
     orders_.link_lost();
     drop_void_set_point();
     polled_ = false;
+}
+
+void ModbusShaker::lose_link(const std::string& why) {
+    close_link();
     next_attempt_ = clock_.now() + (stop_pending() ? settings_.backoff_min : backoff_);
     backoff_ = std::min(2 * backoff_, settings_.backoff_max);
     set_state(LinkState::connecting, why + "; connecting again");
@@ -376,7 +396,7 @@ void ModbusShaker::write_set_point() {
         if (outranked() || !link_.connected()) ++counts_.set_points_discarded;
     } else {
         ++counts_.set_points_written;
-        if (set_point->amplitude_g > 0) told_ = set_point;
+        if (set_point->amplitude_g > 0 || set_point->run_at_zero) told_ = set_point;
     }
     if (link_.connected() && !outranked())
         poll(clock_.now());  // a reading newer than the set-point, then not busy
@@ -393,7 +413,8 @@ bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
         return raw;
     };
     const bool running = image_.value_of(map.run) != 0;
-    const bool excite = nonzero(encoded(map.amplitude, set_point.amplitude_g));
+    const bool excite =
+        set_point.run_at_zero || nonzero(encoded(map.amplitude, set_point.amplitude_g));
     std::vector<Step> steps;
     // On the way to zero the frequency does not matter: nothing may keep the shaker from coming
     // down.

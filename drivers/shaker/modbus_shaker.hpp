@@ -28,6 +28,7 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] bool request(const ShakerSetPoint& set_point,
                                std::uint64_t stops) noexcept override;
     void stop_now() noexcept override;
+    void hang_up_until(Time time) noexcept override;
     [[nodiscard]] std::uint64_t stops() const noexcept override { return orders_.ticket().stops(); }
     [[nodiscard]] bool stop_pending() const noexcept override { return orders_.stop_pending(); }
     [[nodiscard]] bool busy() const noexcept override { return orders_.busy(); }
@@ -60,6 +61,7 @@ class ModbusShaker final : public Shaker {
 
     void try_connect(Time now);
     void lose_link(const std::string& why);
+    void close_link();
     [[nodiscard]] bool outranked() const noexcept;
     template <typename Request>
     [[nodiscard]] Reply transact(Request&& request);
@@ -123,6 +125,7 @@ class ModbusShaker final : public Shaker {
     std::atomic<int> wakers_{0};
     std::atomic<bool> quit_{false};
     std::atomic<bool> in_flight_{false};
+    std::atomic<Time> hung_up_until_{0};
     std::thread thread_;
 
     // The rest belongs to the shaker's thread.

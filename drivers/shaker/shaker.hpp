@@ -59,9 +59,13 @@ struct ShakerSetPoint {
     double ramp_s = 0;       ///< from the present amplitude to this one
     /// In place of a sine; the frequency is left alone then. Like it chosen at rest only.
     std::optional<RandomSetPoint> random{};
+    /// run = 1 although the amplitude is 0: the controller runs, the table stands. Else 0 g is
+    /// run = 0.
+    bool run_at_zero = false;
 };
 
 /// Values of the state register.
+inline constexpr std::uint16_t kShakerIdle = 0, kShakerRamping = 1;
 inline constexpr std::uint16_t kShakerRunning = 2;
 inline constexpr std::uint16_t kShakerFault = 4;
 
@@ -104,6 +108,11 @@ struct ShakerReading {
     [[nodiscard]] bool at_rest() const { return still() && !running && state == 0; }
 };
 
+/// By its state register: on the way to a level, or there.
+[[nodiscard]] inline bool is_excited(const ShakerReading& reading) {
+    return reading.state == kShakerRamping || reading.state == kShakerRunning;
+}
+
 enum class LinkState : std::uint8_t { absent, connecting, running, degraded, fault };
 [[nodiscard]] const char* name_of(LinkState state) noexcept;
 
@@ -138,6 +147,9 @@ class Shaker {
                                        std::uint64_t stops) noexcept = 0;
     /// Any thread; never blocks. Cuts off a request in flight.
     virtual void stop_now() noexcept = 0;
+    /// Nobody talks to the device until then; its watchdog is on its own. A stop ends that at once:
+    /// it connects again and is written first. Any thread; never blocks.
+    virtual void hang_up_until(Time /*time*/) noexcept {}
     /// How often stop_now() was called.
     [[nodiscard]] virtual std::uint64_t stops() const noexcept = 0;
     [[nodiscard]] virtual bool stop_pending() const noexcept = 0;

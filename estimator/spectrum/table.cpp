@@ -8,7 +8,6 @@
 #include "estimator/filter/kinematics.hpp"
 
 namespace vibrig::estimator::spectrum {
-namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -20,8 +19,6 @@ Eigen::Matrix3d level_moment(const VibrationMoment& vibration) {
     moment << g[0], g[3], g[4], g[3], g[1], g[5], g[4], g[5], g[2];
     return (vibration.kappa - 1) * moment;
 }
-
-}  // namespace
 
 double Kind::hz() const noexcept {
     double sum = 0;

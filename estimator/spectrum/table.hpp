@@ -61,6 +61,9 @@ class SpectralTable {
     std::array<Eigen::MatrixXd, 3> base_, vibration_;
 };
 
+/// Second moment of a vibration, level frame, g^2.
+[[nodiscard]] Eigen::Matrix3d level_moment(const VibrationMoment& vibration);
+
 /// The model's columns for an attitude: the base's under gravity and `moment` (level frame, g^2),
 /// and the six of `moment` alone; [gyro].
 struct Attitude {

@@ -232,6 +232,42 @@ def journal_has_it(checks, u):
     checks.equal(verified.returncode, 0, "and its chain holds: " + verified.stdout[-200:] + verified.stderr)
 
 
+# What a controller does wrong at 0 g, and what is said of it.
+AT_ZERO = (("timeout-ignored", "the watchdog was not fed, and did not stop the controller within 2 s: state 2"),
+           ("timeout-scaled=3", "the watchdog was not fed, and did not stop the controller"),
+           ("timeout-scaled=0.3", "shaker fault"),
+           ("timeout-if-unlinked", "the watchdog was not fed, and did not stop the controller"),
+           ("timeout-if-linked", "with its link closed the watchdog did not stop the controller within 2 s: state 2"),
+           ("ack-without-stop", "the controller is not idle after it ran"))
+BUTTON = (("estop-contact-only", "emergency stop, the controller says fault 0"),
+          ("estop-unseen", "REFUSED: not completed: shaker fault"),
+          ("estop-restarts", "closing the chain starts nothing 0"))
+
+
+def unwrapped(text):
+    return text.replace("\n   ", " ")
+
+
+def highest_g(rig):
+    """Of the table in truth, since there is a rig."""
+    return float(re.search(r"highest (\S+) g", rig.order("status")).group(1))
+
+
+def at_rest_again(rig):
+    rig.order("clear")
+    rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest" or s["campaign"]["state"] == "tripped", 60)
+    for what in ("trip", "stop_disobeyed"):
+        rig.tool("ack", what, "--by", "Ada")
+    rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest" and s["campaign"]["state"] != "tripped" and s["shaker"].get("state") == 0, 30)
+
+
+def ended(child):
+    for _ in range(600):
+        if not child.running():
+            break
+        time.sleep(0.1)
+
+
 def shaker_is_proven(checks, u):
     """By proofs of the safe state, one for each button of the emergency stop, which somebody presses and acknowledges."""
     tool, rig = u.rig.tool, u.rig
@@ -240,24 +276,48 @@ def shaker_is_proven(checks, u):
                  "the shaker's parts are asked for", lacks.stderr)
     unknown = tool("commission", "watchdog", "earth", "--by", "Ada")
     checks.equal(unknown.returncode, 2, "parts of platform and shaker are not proven at once")
+    early = tool("selftest", "--by", "Ada", timeout=120)
+    checks.check("has not run at 0 g yet" in early.stderr, "nothing shakes before it has run at 0 g", early.stdout + early.stderr)
+    for lie, word in AT_ZERO:
+        rig.order("fault " + lie)
+        refused = tool("commission", "watchdog", "--by", "Ada", "--yes", timeout=120)
+        checks.check(refused.returncode == 1 and "REFUSED: at 0 g: not completed: " + word in unwrapped(refused.stdout) and
+                     highest_g(rig) == 0, f"it ends at 0 g, and nothing has moved: {lie}", refused.stdout + refused.stderr + rig.logs())
+        at_rest_again(rig)
     for lie, word in (("unit-rms", "g rms for g peak?"), ("unit-mps2", "m/s2 for g?"), ("dead-table readback-echo", "the platform does")):
         for one in lie.split():
             rig.order("fault " + one)
-        refused = tool("commission", "units", "--by", "Ada", timeout=120)
+        refused = tool("commission", "units", "--by", "Ada", "--yes", timeout=120)
         checks.check(refused.returncode == 1 and "REFUSED: not completed: ladder: at 0.03 g" in refused.stdout.replace("\n   ", " ") and
                      word in refused.stdout.replace("\n   ", " "), f"the ladder ends at its first rung: {lie}", refused.stdout + refused.stderr + rig.logs())
         rig.order("clear")
-    plain = tool("commission", "watchdog", "units", "excitation", "--by", "Ada", "--json", timeout=120)
+    plain = tool("commission", "watchdog", "units", "excitation", "--by", "Ada", "--json", "--yes", timeout=120)
     found = json.loads(plain.stdout or "{}")
     ladder = {name: value for name, value in found["parts"]["registers"].get("evidence", {}).items() if name.startswith("ladder")}
     checks.check(sorted(ladder) == sorted(f"ladder, {g} g, {what}" for g in (0.03, 0.1, 0.3) for what in ("platform over expected", "table over command")) and
                  all(0.9 < value < 1.1 for value in ladder.values()), "the first proof goes up by 0.03, 0.1 and 0.3 g", ladder)
     checks.check(plain.returncode == 0 and found["outcome"] == "decided" and found["simulated"] and
                  found["parts"]["watchdog"]["evidence"]["watchdog, the controller says fault"] == 1 and
+                 0.75 <= found["parts"]["watchdog"]["evidence"]["watchdog at 0 g, not fed"] <= 2 and
+                 1.5 <= found["parts"]["watchdog"]["evidence"]["watchdog at 0 g, link closed"] <= 2 and
+                 found["parts"]["registers"]["evidence"]["at 0 g, state after"] == 0 and
+                 0.75 < found["parts"]["registers"]["evidence"]["f + 1 Hz over f, transmission"] < 0.97 and
                  found["parts"]["registers"]["proven"] and found["parts"]["units"]["evidence"]["hypotheses"][0]["unit"] == "g peak",
                  "a proof shows registers, watchdog, units and excitation", plain.stdout + plain.stderr + rig.logs())
     lacks = tool("arm", "--by", "Ada")
     checks.check("no record of stop: vibrig commission watchdog stop" in lacks.stderr, "but no button", lacks.stderr)
+    for lie, word in BUTTON:
+        rig.order("fault " + lie)
+        with_button = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
+        rig.wait_for(lambda s: "press" in s.get("proof", {}).get("asks", ""), 60)
+        rig.order("estop open")
+        rig.wait_for(lambda s: "press" not in s.get("proof", {}).get("asks", ""), 60)
+        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 2)
+        rig.order("estop close")
+        ended(with_button)
+        checks.check(with_button.process.poll() == 1 and word in unwrapped(with_button.text()),
+                     f"a button is found out at 0 g: {lie}", with_button.text() + rig.logs())
+        at_rest_again(rig)
     stop = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
     for button in ("rack", "door"):
         asked = rig.wait_for(lambda s, b=button: f'press the emergency stop "{b}" now' in s.get("proof", {}).get("asks", ""), 60)
@@ -265,10 +325,8 @@ def shaker_is_proven(checks, u):
         rig.order("estop open")
         rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
         rig.order("estop close")
-    for _ in range(600):
-        if not stop.running():
-            break
-        time.sleep(0.1)
+    ended(stop)
+    checks.check(0.49 < highest_g(rig) < 0.51, "the table has never done more than 0.5 g", highest_g(rig))
     checks.check(stop.process.poll() == 0 and "stop: proven" in stop.text(), "each was pressed and seen", stop.text() + rig.logs())
 
 

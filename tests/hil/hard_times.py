@@ -328,17 +328,18 @@ def write(path, text):
 
 # ---- the proof against a controller that lies
 
-# Truth, a word of the verdict (with ramps as short as these the unit itself is not told from them); whether nothing but the emergency stop ends it.
+# Truth, words of which the verdict has one (with ramps as short as these the unit itself is not told from them; of a slow ramp the shaker's own word
+# and the accelerometers' come within a sample of each other); whether nothing but the emergency stop ends it.
 PROVED = [
-    ("honest", [], None, False),
-    ("ack-without-stop", ["ack-without-stop"], "not obeyed", False),
-    ("timeout-ignored", ["timeout-ignored"], "watchdog", False),
-    ("timeout-scaled", ["timeout-scaled=10"], "watchdog", False),
-    ("amplitude-scaled", ["amplitude-scaled=1.8"], "amplitude", False),
-    ("readback-echo of a dead table", ["dead-table", "readback-echo"], "amplitude", False),
-    ("stuck-contactor", ["stuck-contactor"], "not obeyed", True),
-    ("slow-ramp", ["slow-ramp=10"], "shaker", False),
-    ("unit-rms", ["unit-rms"], "amplitude", False),
+    ("honest", [], (), False),
+    ("ack-without-stop", ["ack-without-stop"], ("not obeyed",), False),
+    ("timeout-ignored", ["timeout-ignored"], ("watchdog",), False),
+    ("timeout-scaled", ["timeout-scaled=10"], ("watchdog",), False),
+    ("amplitude-scaled", ["amplitude-scaled=1.8"], ("amplitude",), False),
+    ("readback-echo of a dead table", ["dead-table", "readback-echo"], ("amplitude",), False),
+    ("stuck-contactor", ["stuck-contactor"], ("not obeyed",), True),
+    ("slow-ramp", ["slow-ramp=10"], ("shaker", "amplitude"), False),
+    ("unit-rms", ["unit-rms"], ("amplitude",), False),
 ]
 
 
@@ -346,7 +347,7 @@ def seconds_of(proof, name):
     return next((row.get("value") for row in proof.get("rows", []) if row["name"] == name), None)
 
 
-def proved(checks, rig, name, faults, word, by_hand):
+def proved(checks, rig, name, faults, words, by_hand):
     text = f"proof: {name}"
     rig.rest()
     rig.wait_for(lambda s: s["platform"].get("ready"), 60)
@@ -363,7 +364,7 @@ def proved(checks, rig, name, faults, word, by_hand):
         time.sleep(0.2)
     proof = status["proof"]
     checks.check(proof.get("utc_ns", "0") != before, f"{text}: over within {PROOF_S} s", r.state_of(status) + rig.logs())
-    if word is None:
+    if not words:
         good = proof.get("passed") and 0 < seconds_of(proof, "stop, table") <= STOP_S and \
             0 < seconds_of(proof, "stop, platform") <= STOP_S + RING_DOWN_S and \
             TIMEOUT_S / 2 <= seconds_of(proof, "watchdog, rest") <= TIMEOUT_S + STOP_S
@@ -372,7 +373,7 @@ def proved(checks, rig, name, faults, word, by_hand):
         # Not in what earlier proofs have found.
         rows = proof.get("rows", []) + status["loop_check"].get("rows", [])
         found = " ".join([proof.get("message", ""), *(row["name"] for row in rows if not row["passed"])])
-        checks.check(not proof.get("passed") and word in found, f"{text}: does not pass, and says why", proof)
+        checks.check(not proof.get("passed") and any(word in found for word in words), f"{text}: does not pass, and says why", proof)
     checks.check(highest <= 1.0, f"{text}: never more than 1 g at the table", f"{highest} g")
     if by_hand:
         took = lies.seconds_until(lambda: lies.tripped_by(rig, ("stop_disobeyed",)), STOP_S + RING_DOWN_S + lies.SLACK_S)

@@ -101,6 +101,13 @@ def judge(checks, programs, rig, result, path, log, dwells, frequencies):
     checks.check(proof.returncode == 0 and verification.get("word", "").startswith("confirmed") and
                  len(verification.get("dwells", [])) == len(HELD_OUT),
                  "the prediction at 55 Hz is confirmed on the dwells held out", proof.stdout + proof.stderr)
+    shown = [(round(z, 6) for z in d["z"]) for d in spectrum.get("held_out", [])]
+    checks.equal([list(z) for z in shown], [[round(z, 6) for z in d["z"]] for d in verification.get("dwells", [])],
+                 "the result has them beside what was foretold")
+    page = os.path.join(rig.folder, "report.html")
+    made = vibrig(programs, "report", recorded, "-o", page)
+    checks.check(made.returncode == 0 and "Dwells held out from the fit" in open(page, encoding="utf-8").read(),
+                 "and so has the report", made.stderr)
     # The same coefficients without their elastic part are contradicted: the proof can fail.
     flat = vibrig(programs, "identify", recorded, "--spectrum", "flat", "--json")
     flat_path = os.path.join(rig.folder, "flat.json")

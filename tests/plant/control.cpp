@@ -82,10 +82,12 @@ std::string Control::execute(std::string_view line) {
         }
         if (word == "status") {
             std::array<char, 160> status{};
-            std::snprintf(status.data(), status.size(),
-                          "ok time %.3f s, shaker state %d, table %.4f g, faults %d", rig_.now_s(),
-                          static_cast<int>(rig_.rig.shaker().state()),
-                          rig_.rig.shaker().amplitude_g(), rig_.rig.shaker().faults());
+            std::snprintf(
+                status.data(), status.size(),
+                "ok time %.3f s, shaker state %d, table %.4f g, highest %.4f g, faults %d",
+                rig_.now_s(), static_cast<int>(rig_.rig.shaker().state()),
+                rig_.rig.shaker().amplitude_g(), rig_.rig.shaker().highest_g(),
+                rig_.rig.shaker().faults());
             return status.data();
         }
         if (word == "help") return std::string("ok ") + kHelp;

@@ -29,7 +29,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 32> kDescriptions{{
+constexpr std::array<Description, 37> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -67,6 +67,16 @@ constexpr std::array<Description, 32> kDescriptions{{
      "timeout-ignored       the watchdog never fires"},
     {FaultKind::timeout_scaled, "timeout-scaled", Value::factor, false,
      "timeout-scaled=FACTOR  the watchdog fires after FACTOR times its timeout"},
+    {FaultKind::timeout_if_linked, "timeout-if-linked", Value::none, false,
+     "timeout-if-linked     the watchdog's time passes only while somebody is connected"},
+    {FaultKind::timeout_if_unlinked, "timeout-if-unlinked", Value::none, false,
+     "timeout-if-unlinked   the watchdog's time passes only while nobody is connected"},
+    {FaultKind::estop_contact_only, "estop-contact-only", Value::none, false,
+     "estop-contact-only    the open emergency-stop chain is shown, and cuts nothing"},
+    {FaultKind::estop_unseen, "estop-unseen", Value::none, false,
+     "estop-unseen          the open chain cuts the power, its register shows it closed"},
+    {FaultKind::estop_restarts, "estop-restarts", Value::none, false,
+     "estop-restarts        once the chain is closed again the controller runs as before"},
     {FaultKind::amplitude_scaled, "amplitude-scaled", Value::factor, false,
      "amplitude-scaled=FACTOR  the table does FACTOR times the set-point, read back as ordered"},
     {FaultKind::readback_echo, "readback-echo", Value::none, false,

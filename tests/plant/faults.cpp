@@ -32,6 +32,11 @@ ShakerLies lies_at(double time_s, ShakerLies lies, const Faults& faults) noexcep
     yes(FaultKind::ack_without_stop, lies.ack_without_stop);
     yes(FaultKind::timeout_ignored, lies.timeout_ignored);
     value(FaultKind::timeout_scaled, lies.timeout_scaled);
+    yes(FaultKind::timeout_if_linked, lies.timeout_if_linked);
+    yes(FaultKind::timeout_if_unlinked, lies.timeout_if_unlinked);
+    yes(FaultKind::estop_contact_only, lies.estop_contact_only);
+    yes(FaultKind::estop_unseen, lies.estop_unseen);
+    yes(FaultKind::estop_restarts, lies.estop_restarts);
     value(FaultKind::amplitude_scaled, lies.amplitude_scaled);
     yes(FaultKind::readback_echo, lies.readback_echo);
     yes(FaultKind::stuck_contactor, lies.stuck_contactor);

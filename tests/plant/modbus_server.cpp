@@ -147,7 +147,13 @@ ModbusServer::~ModbusServer() {
     }
 }
 
+void ModbusServer::tell_linked(bool linked) {
+    const std::scoped_lock lock(rig_.mutex);
+    rig_.rig.shaker().linked(linked);
+}
+
 void ModbusServer::serve_tcp() {
+    tell_linked(false);
     std::vector<pollfd> descriptors{{stop_event_, POLLIN, 0}, {listener_, POLLIN, 0}};
     for (;;) {
         if (poll(descriptors.data(), descriptors.size(), -1) < 0) continue;
@@ -158,6 +164,7 @@ void ModbusServer::serve_tcp() {
                 if (!answer()) {
                     close(descriptors[i].fd);
                     descriptors.erase(descriptors.begin() + static_cast<std::ptrdiff_t>(i));
+                    tell_linked(descriptors.size() > 2);
                     continue;
                 }
             }
@@ -167,6 +174,7 @@ void ModbusServer::serve_tcp() {
             const int fd = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
             if (fd >= 0 && descriptors.size() < kConnections + 2) {
                 descriptors.push_back({fd, POLLIN, 0});
+                tell_linked(true);
             } else if (fd >= 0) {
                 close(fd);
             }

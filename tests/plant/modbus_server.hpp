@@ -28,6 +28,7 @@ class ModbusServer {
     struct Outcome;
     [[nodiscard]] Outcome apply(const std::uint8_t* pdu, std::size_t length);
     void serve_tcp();
+    void tell_linked(bool linked);
     void serve_rtu();
     /// One request of the current socket; false when the connection is over.
     bool answer();

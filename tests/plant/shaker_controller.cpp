@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "proto/register_map.hpp"
 
@@ -130,7 +131,7 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     std::array<std::uint16_t, kInput> words{};
     words[kMap.state.address] = static_cast<std::uint16_t>(state_);
     words[kMap.fault.address] = faults_;
-    words[kMap.emergency_stop.address] = emergency_stop_open_ ? 1 : 0;
+    words[kMap.emergency_stop.address] = emergency_stop_open_ && !lies_.estop_unseen ? 1 : 0;
     double measured = lies_.dead_table ? 0 : drive_g_;
     if (lies_.readback_echo) measured = holding_[kMap.run.address] != 0 ? set_point_g() : 0;
     split(words, kMap.measured_amplitude.address, measured / kMap.measured_amplitude.scale);
@@ -170,8 +171,15 @@ void ShakerController::watch_bands(double dt_s) noexcept {
 }
 
 void ShakerController::open_emergency_stop(bool open) noexcept {
-    if (open && !emergency_stop_open_) trip(kFaultEmergencyStop, kEmergencyStop);
-    emergency_stop_open_ = open;
+    const bool was_open = std::exchange(emergency_stop_open_, open);
+    if (open == was_open) return;
+    if (open && !lies_.estop_contact_only) trip(kFaultEmergencyStop, kEmergencyStop);
+    if (open || !lies_.estop_restarts) return;
+    faults_ = 0;
+    since_feed_s_ = 0;
+    holding_[kMap.run.address] = 1;
+    state_ = ShakerState::ramping;
+    ramp_to(commanded_g(), ramp_s());
 }
 
 void ShakerController::lie(const ShakerLies& lies) noexcept {
@@ -207,7 +215,8 @@ void ShakerController::stop(ShakerState state, double time_s) noexcept {
 void ShakerController::advance(double dt_s) noexcept {
     const bool excited = state_ == ShakerState::ramping || state_ == ShakerState::running;
     const double timeout = lies_.timeout_scaled * value(holding_, kMap.watchdog_timeout);
-    since_feed_s_ += dt_s;
+    const bool stands = linked_ ? lies_.timeout_if_unlinked : lies_.timeout_if_linked;
+    if (!stands) since_feed_s_ += dt_s;
     if (excited && timeout > 0 && !lies_.timeout_ignored && since_feed_s_ > timeout)
         trip(kFaultWatchdog, kWatchdogStop);
 
@@ -222,6 +231,7 @@ void ShakerController::advance(double dt_s) noexcept {
         if (state_ == ShakerState::ramping) state_ = ShakerState::running;
         if (state_ == ShakerState::stopping) state_ = ShakerState::idle;
     }
+    highest_g_ = std::max(highest_g_, amplitude_g());
     watch_bands(dt_s);
     const double omega = 2 * std::numbers::pi * table_hz_;
     const ShakerProfile* profile = played();

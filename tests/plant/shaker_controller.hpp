@@ -47,6 +47,8 @@ class ShakerController {
     [[nodiscard]] std::array<std::uint16_t, kInput> input() const noexcept;
 
     void open_emergency_stop(bool open) noexcept;
+    /// Whether somebody is connected to its registers; a serial line always is.
+    void linked(bool linked) noexcept { linked_ = linked; }
     /// The table does this, whatever the controller drives: another controller has it. None: its
     /// own again.
     void drive_from_outside(std::optional<double> table_g) noexcept { outside_g_ = table_g; }
@@ -63,6 +65,8 @@ class ShakerController {
     [[nodiscard]] std::uint16_t faults() const noexcept { return faults_; }
     /// Of the table now in truth: peak of a sine, rms of random vibration.
     [[nodiscard]] double amplitude_g() const noexcept;
+    /// The highest of it that there ever was.
+    [[nodiscard]] double highest_g() const noexcept { return highest_g_; }
     [[nodiscard]] double frequency_hz() const noexcept;                   ///< as its register says
     [[nodiscard]] double table_hz() const noexcept { return table_hz_; }  ///< in truth
     [[nodiscard]] double set_point_g() const noexcept;
@@ -88,9 +92,11 @@ class ShakerController {
     ShakerState state_ = ShakerState::idle;
     std::uint16_t faults_ = 0;
     bool emergency_stop_open_ = false;
+    bool linked_ = true;
     ShakerLies lies_;
     std::optional<double> outside_g_;
     double drive_g_ = 0;  ///< what the controller believes the table does
+    double highest_g_ = 0;
     double target_g_ = 0;
     double slope_g_per_s_ = 0;  ///< positive
     double held_g_ = 0;         ///< what a contactor that is stuck keeps up when the drive goes

@@ -6,13 +6,18 @@
 namespace vibrig::plant {
 
 /// What the shaker's controller does otherwise than its registers say. The emergency stop cuts the
-/// power whatever the controller does.
+/// power whatever the controller does, but with the lies of the chain itself.
 struct ShakerLies {
-    bool ack_without_stop = false;  ///< run = 0 is taken and read back, the table shakes on
-    bool timeout_ignored = false;   ///< the watchdog never fires
-    double timeout_scaled = 1;      ///< it fires after so many times its register
-    double amplitude_scaled = 1;    ///< the table does so many times what the registers say
-    bool readback_echo = false;     ///< the measured amplitude is the set-point, or 0 with run = 0
+    bool ack_without_stop = false;     ///< run = 0 is taken and read back, the table shakes on
+    bool timeout_ignored = false;      ///< the watchdog never fires
+    double timeout_scaled = 1;         ///< it fires after so many times its register
+    bool timeout_if_linked = false;    ///< its time passes only while somebody is connected
+    bool timeout_if_unlinked = false;  ///< only while nobody is
+    bool estop_contact_only = false;   ///< the open chain is shown, and cuts nothing
+    bool estop_unseen = false;         ///< it cuts, and its register shows it closed
+    bool estop_restarts = false;       ///< once the chain is closed again it runs as before
+    double amplitude_scaled = 1;       ///< the table does so many times what the registers say
+    bool readback_echo = false;  ///< the measured amplitude is the set-point, or 0 with run = 0
     /// A stop leaves the table as it is: the controller believes itself at rest and says so.
     bool stuck_contactor = false;
     double slow_ramp = 1;            ///< ramps take so many times their time, a stop's too

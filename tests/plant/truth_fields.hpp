@@ -93,6 +93,11 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "ack_without_stop", t.shaker_lies.ack_without_stop, 0, 0);
     field("shaker", "timeout_ignored", t.shaker_lies.timeout_ignored, 0, 0);
     field("shaker", "timeout_scaled", t.shaker_lies.timeout_scaled, 0.0, 1000.0);
+    field("shaker", "timeout_if_linked", t.shaker_lies.timeout_if_linked, 0, 0);
+    field("shaker", "timeout_if_unlinked", t.shaker_lies.timeout_if_unlinked, 0, 0);
+    field("shaker", "estop_contact_only", t.shaker_lies.estop_contact_only, 0, 0);
+    field("shaker", "estop_unseen", t.shaker_lies.estop_unseen, 0, 0);
+    field("shaker", "estop_restarts", t.shaker_lies.estop_restarts, 0, 0);
     field("shaker", "amplitude_scaled", t.shaker_lies.amplitude_scaled, 0.0, 1000.0);
     field("shaker", "readback_echo", t.shaker_lies.readback_echo, 0, 0);
     field("shaker", "stuck_contactor", t.shaker_lies.stuck_contactor, 0, 0);

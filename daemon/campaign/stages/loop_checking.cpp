@@ -13,13 +13,12 @@ using drivers::kSecond;
 using drivers::Time;
 
 namespace {
-constexpr Time kLook = 2 * kSecond;  // at rest, before
 // Peak at the table: a tenth of a g is beyond doubt only after a thirtieth.
 constexpr std::array kLadder_g{0.03, 0.1, 0.3};
+constexpr double kAbove_hz = 1;
+constexpr double kLaw = 0.05;          // pads are not quite a spring; both are measured by the same
 constexpr Time kRung = 5 * kSecond;    // how long each counts
 constexpr double kLadderUnit = 1.122;  // 1 dB: the table's own accelerometer is good to 2 %
-// What is called rest has to be so many times the noise.
-constexpr double kNoises = 6;
 }  // namespace
 
 void LoopChecking::aim(const std::string& by, bool climbs) {
@@ -31,11 +30,17 @@ void LoopChecking::aim(const std::string& by, bool climbs) {
 
 void LoopChecking::begin(Time now) {
     level_.loop.begin(by_);
-    level_.proof.begin(by_, level_.settings.loop.table_g);
     rung_ = 0;
     further_ = LoopCheck::further_frequencies(level_.settings);
     further_at_ = 0;
-    level_.begin(now);
+    above_hz_ = above_transmission_ = 0;
+    if (!rungs_.empty()) {
+        above_hz_ = level_.settings.frequency_hz + kAbove_hz;
+        std::erase_if(further_,
+                      [this](const Stop& stop) { return stop.frequency_hz == above_hz_; });
+        further_.push_back({{}, level_.settings.loop.table_g, above_hz_});
+    }
+    level_.begin(by_, level_.settings.loop.table_g, now);
     part_ = Part::look;
 }
 
@@ -88,13 +93,7 @@ StageStep LoopChecking::step(Time now) {
 }
 
 StageStep LoopChecking::look(Time now) {
-    auto position_deg = level_.excitation.position_deg();
-    auto still = level_.loop.look(position_deg);
-    level_.excitation.place(position_deg);
-    if (!still.empty()) return StageStep::failed(std::move(still));
-    if (!level_.stop.rest(now).measured())
-        return StageStep::failed("not at rest: " + level_.stop.what_moves(now));
-    if (!quiet()) return StageStep::failed("the noise at rest is too near to shaker.rest_g");
+    if (auto why = level_.look_at_rest(now); !why.empty()) return StageStep::failed(std::move(why));
     if (!rungs_.empty()) {
         go_on_to(Part::climb, now);
     } else if (at_further()) {
@@ -103,17 +102,6 @@ StageStep LoopChecking::look(Time now) {
         go_on_to(Part::ramp, now);
     }
     return StageStep::going_on(now + kStagePoll);
-}
-
-/// Rest is called by what is well above the noise of those who call it.
-bool LoopChecking::quiet() {
-    level_.loop.rests();
-    const auto noise = level_.loop.noise();
-    const double limit_g = level_.settings.rest.limit_g / kNoises;
-    auto& proof = level_.proof;
-    if (noise.table_g > 0) proof.row("noise at rest, table", "g", noise.table_g, 0, limit_g);
-    proof.row("noise at rest, platform", "g", noise.platform_g, 0, limit_g);
-    return proof.record().rows.back().passed();
 }
 
 StageStep LoopChecking::ramp(Part then, Time now) {
@@ -182,7 +170,14 @@ void LoopChecking::measured_further() {
     const Stop& stop = further_[further_at_++];
     const double expected =
         stop.transmission > 0 ? stop.transmission : level_.settings.rig.transmission;
-    const auto found = level_.loop.finish_at(stop.frequency_hz, expected);
+    const bool above = stop.frequency_hz == above_hz_;
+    const double tolerance = level_.settings.loop.transmission_tolerance;
+    const auto law = above ? isolator_ratio(level_.settings.rig.transmission,
+                                            level_.settings.frequency_hz, above_hz_)
+                           : std::array<double, 2>{1, 1};
+    const auto found = level_.loop.finish_at(stop.frequency_hz, expected * law[0] * (1 - tolerance),
+                                             expected * law[1] * (1 + tolerance));
+    if (above) above_transmission_ = found.transmission;
     bool passed = true;
     for (const auto& row : found.rows) {
         level_.proof.row(fmt::format("{:g} Hz, {}", found.hz, row.name), row.unit, row.value,
@@ -208,7 +203,20 @@ StageStep LoopChecking::measured() {
         if (std::isfinite(row.value) && std::isfinite(row.low) && std::isfinite(row.high))
             proof.row(row.name, row.unit, row.value, row.low, row.high);
     }
+    if (auto why = compare(); !why.empty()) return StageStep::failed(std::move(why));
     return StageStep::done();
+}
+
+std::string LoopChecking::compare() {
+    if (above_hz_ == 0 || !(level_.loop.transmission() > 0)) return {};
+    const auto law =
+        isolator_ratio(level_.loop.transmission(), level_.settings.frequency_hz, above_hz_);
+    auto& proof = level_.proof;
+    proof.row("f + 1 Hz over f, transmission", "", above_transmission_ / level_.loop.transmission(),
+              law[0] * (1 - kLaw), law[1] * (1 + kLaw));
+    return proof.record().rows.back().passed()
+               ? ""
+               : "1 Hz above the platform does not do what its pads would";
 }
 
 std::string LoopChecking::suspect_unit() const {

@@ -10,7 +10,8 @@ namespace vibrig::campaign {
 
 /// The loop check on the rig: a look at rest, up to a small level, by a ladder where that is asked
 /// for, and what table and platform make of it; before that, from rest each, at every further
-/// frequency of the plan. Leaves the table vibrating: the proof stops it.
+/// frequency of the plan, and where it climbs 1 Hz above: an alias moves the other way, and pads
+/// answer by their law. Leaves the table vibrating: the proof stops it.
 /// Asks once, at the level, for the orders that have to be refused while the table moves.
 class LoopChecking : public Stage {
   public:
@@ -46,8 +47,9 @@ class LoopChecking : public Stage {
     /// At rest: up to the level, at the next frequency.
     void next_frequency(drivers::Time now);
     void measured_further();
+    /// 1 Hz above against the frequency itself; why not, else empty.
+    [[nodiscard]] std::string compare();
     [[nodiscard]] bool at_further() const { return further_at_ < further_.size(); }
-    [[nodiscard]] bool quiet();
 
     SmallLevel& level_;
     Part part_ = Part::none;
@@ -57,6 +59,8 @@ class LoopChecking : public Stage {
     bool rung_counts_ = false;
     std::vector<Stop> further_;  ///< frequencies, each once
     std::size_t further_at_ = 0;
+    double above_hz_ = 0;  ///< one of them: 1 Hz above; 0: it does not climb
+    double above_transmission_ = 0;
 };
 
 }  // namespace vibrig::campaign

@@ -4,9 +4,36 @@ namespace vibrig::campaign {
 
 using drivers::Time;
 
-void SmallLevel::begin(Time now) {
+namespace {
+// What is called rest has to be so many times the noise.
+constexpr double kNoises = 6;
+}  // namespace
+
+void SmallLevel::begin(const std::string& by, double table_g, Time now) {
+    level_g = table_g;
+    proof.begin(by, table_g);
+    loop.measure();
     ports.rig.feed->order(rt::StageFeed::Mode::samples);
     last_motion_ = now;
+}
+
+std::string SmallLevel::look_at_rest(Time now) {
+    auto position_deg = excitation.position_deg();
+    auto still = loop.look(position_deg);
+    excitation.place(position_deg);
+    if (!still.empty()) return still;
+    if (!stop.rest(now).measured()) return "not at rest: " + stop.what_moves(now);
+    return quiet() ? "" : "the noise at rest is too near to shaker.rest_g";
+}
+
+/// Rest is called by what is well above the noise of those who call it.
+bool SmallLevel::quiet() {
+    loop.rests();
+    const auto noise = loop.noise();
+    const double limit_g = settings.rest.limit_g / kNoises;
+    if (noise.table_g > 0) proof.row("noise at rest, table", "g", noise.table_g, 0, limit_g);
+    proof.row("noise at rest, platform", "g", noise.platform_g, 0, limit_g);
+    return proof.record().rows.back().passed();
 }
 
 void SmallLevel::take_samples(Time now) {
@@ -25,13 +52,13 @@ std::string SmallLevel::lacks(Time now) {
 
 std::string SmallLevel::off_command(Time now) {
     if (ports.rig.shaker.reading().emergency_stop_open) return {};
-    return excitation.off_command(settings.loop.table_g, now);
+    return excitation.off_command(level_g, now);
 }
 
 void SmallLevel::begin_part(bool steady, Proving what, Time now) {
     excitation.begin_part(now);
     ports.rig.proving(what);
-    ports.rig.commanded(steady ? settings.loop.table_g : 0, excitation.position_deg());
+    ports.rig.commanded(steady ? level_g : 0, excitation.position_deg());
     ports.rig.guard(rt::Guard::excitation);
 }
 

@@ -9,8 +9,13 @@
 
 namespace vibrig::campaign {
 
-/// What the loop check and the safe-state proof act on and write into, and what is the same in
-/// both: the rig at their small level, watched sample by sample.
+/// At rest, before.
+inline constexpr drivers::Time kLook = 2 * drivers::kSecond;
+/// Of a stop that nobody saw end, s.
+inline constexpr double kNever_s = 1e3;
+
+/// What the run at 0 g, the loop check and the safe-state proof act on and write into, and what is
+/// the same in them: the rig at their small level, watched sample by sample.
 class SmallLevel {
   public:
     SmallLevel(const Settings& all, const Ports& used, Excitation& excited, StopMonitor& stopped,
@@ -28,8 +33,13 @@ class SmallLevel {
     StopMonitor& stop;
     LoopCheck& loop;
     SafetyProof& proof;
+    /// Of this check, peak at the table; 0: the controller runs, the table stands.
+    double level_g = 0;
 
-    void begin(drivers::Time now);
+    /// A proof by this person begins.
+    void begin(const std::string& by, double table_g, drivers::Time now);
+    /// After some seconds: gravity, rest and the noise of those who call it. Why not, else empty.
+    [[nodiscard]] std::string look_at_rest(drivers::Time now);
     void take_samples(drivers::Time now);
     /// Why it cannot go on; empty: it can. Takes the samples.
     [[nodiscard]] std::string lacks(drivers::Time now);
@@ -39,6 +49,8 @@ class SmallLevel {
     void begin_part(bool steady, Proving what, drivers::Time now);
 
   private:
+    [[nodiscard]] bool quiet();
+
     drivers::Time last_motion_ = 0;
 };
 

@@ -18,9 +18,7 @@ namespace {
 // its chain again.
 constexpr Time kPress = 60 * drivers::kSecond;
 // How long nothing may start with the chain closed.
-constexpr Time kClosed = 3 * drivers::kSecond;
-// Of a stop that nobody saw end, s.
-constexpr double kNever = 1e3;
+constexpr Time kClosed = 10 * drivers::kSecond;
 }  // namespace
 
 void StopProof::go_on_to(Part part, Time now) {
@@ -40,8 +38,10 @@ void StopProof::begin(Time now) {
     level_.excitation.stop("the proof");
 }
 
+void StopProof::begin_at_zero(Time now) { go_on_to(Part::press_ramp, now); }
+
 double StopProof::table_g() const {
-    return part_ == Part::none || part_ == Part::rest ? 0 : level_.settings.loop.table_g;
+    return part_ == Part::none || part_ == Part::rest ? 0 : level_.level_g;
 }
 
 StageStep StopProof::step(Time now) {
@@ -84,7 +84,7 @@ StageStep StopProof::step(Time now) {
 
 std::string StopProof::climb(Part then, Time now) {
     bool reached = false;
-    auto why = level_.excitation.climb(level_.settings.loop.table_g, now, reached);
+    auto why = level_.excitation.climb(level_.level_g, now, reached);
     if (reached) go_on_to(then, now);
     return why;
 }
@@ -96,8 +96,7 @@ void StopProof::keep_ring_down() {
         estimator::ring_down(level_.loop.readings_since(times_.from() + from_seconds(from_s)),
                              6 * level_.settings.rig.accelerometer_g);
     auto& record = level_.proof.record();
-    record.pads = {level_.settings.loop.table_g, times_.platform_s.value_or(0) - from_s,
-                   found.rate_per_s};
+    record.pads = {level_.level_g, times_.platform_s.value_or(0) - from_s, found.rate_per_s};
     record.pads_hz = found.frequency_hz;
     record.pads_damping = found.damping;
 }
@@ -117,11 +116,11 @@ std::string StopProof::stopped(Time now) {
     if (stop.stopping()) return {};
     auto& proof = level_.proof;
     const double deadline_s = level_.settings.stop.deadline_s;
-    proof.row("stop, controller", "s", times_.controller_s.value_or(kNever), 0, deadline_s);
+    proof.row("stop, controller", "s", times_.controller_s.value_or(kNever_s), 0, deadline_s);
     if (times_.table_known)
-        proof.row("stop, table", "s", times_.table_s.value_or(kNever), 0, deadline_s);
-    proof.row("stop, platform", "s", times_.platform_s.value_or(kNever), 0,
-              deadline_s + PadRingDown{}.from_s(level_.settings.loop.table_g));
+        proof.row("stop, table", "s", times_.table_s.value_or(kNever_s), 0, deadline_s);
+    proof.row("stop, platform", "s", times_.platform_s.value_or(kNever_s), 0,
+              deadline_s + PadRingDown{}.from_s(level_.level_g));
     keep_ring_down();
     // Out of band: no more of this.
     go_on_to(level_.loop.out_of_band().empty() ? Part::again : Part::rest, now);
@@ -144,14 +143,13 @@ std::string StopProof::starved(Time now) {
     times_.look(reading, rest);
     auto& proof = level_.proof;
     const double waited_s = to_seconds(now - times_.from());
-    const double longest_s =
-        settings.watchdog_timeout_s + level_.stop.longest_s(settings.loop.table_g);
+    const double longest_s = settings.watchdog_timeout_s + level_.stop.longest_s(level_.level_g);
     const bool still = rest.measured_since(times_.from());
     const bool faulty = reading.state == drivers::kShakerFault;
     if (still && faulty) {
         // Fed at most one period before; what stops much earlier was stopped by something else.
         proof.row("watchdog, rest", "s",
-                  times_.table_s.value_or(times_.platform_s.value_or(kNever)),
+                  times_.table_s.value_or(times_.platform_s.value_or(kNever_s)),
                   0.5 * settings.watchdog_timeout_s,
                   times_.table_known ? settings.watchdog_timeout_s + settings.stop.deadline_s
                                      : longest_s);
@@ -159,7 +157,7 @@ std::string StopProof::starved(Time now) {
         go_on_to(Part::clear, now);
         level_.excitation.stop("the proof, to clear the watchdog's fault");
     } else if (waited_s > longest_s) {
-        proof.row("watchdog, rest", "s", still ? waited_s : kNever, 0, longest_s);
+        proof.row("watchdog, rest", "s", still ? waited_s : kNever_s, 0, longest_s);
         proof.row("watchdog, the controller says fault", faulty);
         return still
                    ? "the watchdog was not fed, the table stands, but the controller says no fault"
@@ -172,7 +170,7 @@ std::string StopProof::starved(Time now) {
 std::string StopProof::cleared(Time now) {
     const auto reading = level_.ports.rig.shaker.reading();
     const Time since = level_.excitation.since();
-    const double table_g = level_.settings.loop.table_g;
+    const double table_g = level_.level_g;
     const bool cleared =
         !level_.stop.stopping() && reading.time > since && reading.at_rest() && reading.fault == 0;
     if (!cleared && now - since <= from_seconds(2 * level_.stop.longest_s(table_g))) return {};
@@ -208,7 +206,8 @@ void StopProof::see_pressed(Time now) {
     const auto reading = level_.ports.rig.shaker.reading();
     if (press_seen_ || !reading.valid || !reading.emergency_stop_open) return;
     press_seen_ = true;
-    const Time fell = level_.loop.last_at_half();
+    // At 0 g nothing falls: from whichever of the two was seen first, fault or open chain.
+    const Time fell = level_.level_g > 0 ? level_.loop.last_at_half() : pressed_at_;
     level_.proof.row("emergency stop, seen", "s", std::max(0.0, to_seconds(now - fell)), 0,
                      level_.settings.proof.seen_s);
 }
@@ -226,8 +225,11 @@ void StopProof::look(bool tripped, const std::string& reason, Time now) {
                             (reading.fault != 0 || reading.state == drivers::kShakerFault));
         if (level_.stop.stopping() && !level_.stop.disobeyed()) return;
         if (!press_seen_) return end_pressed("not completed: " + reason);
-        proof.row("emergency stop, rest", "s", times_.platform_s.value_or(kNever), 0,
-                  level_.stop.longest_s(level_.settings.loop.table_g));
+        proof.row("emergency stop, rest", "s", times_.platform_s.value_or(kNever_s), 0,
+                  level_.stop.longest_s(level_.level_g));
+        if (level_.level_g == 0)
+            proof.row("emergency stop, controller", "s", times_.controller_s.value_or(kNever_s), 0,
+                      level_.settings.proof.seen_s);
         proof.row("emergency stop, latched", tripped);
         // A contact alone cuts nothing: the trip's own stop brings the table to rest as well.
         proof.row("emergency stop, the controller says fault", press_felt_);
@@ -244,9 +246,11 @@ void StopProof::look(bool tripped, const std::string& reason, Time now) {
         pressed_ = Pressed::closed;
         pressed_at_ = now;
     }
-    const bool starts = reading.valid && (reading.running || !reading.still());
+    const bool starts =
+        reading.valid && (reading.running || !reading.still() || drivers::is_excited(reading));
     if (starts || rest.moving() || now - pressed_at_ >= kClosed) {
         proof.row("closing the chain starts nothing", !starts && !rest.moving());
+        if (starts) level_.excitation.order_stop("the proof: it starts by itself");
         end_pressed({});
     }
 }
@@ -268,15 +272,16 @@ void StopProof::conclude(const std::string& why) {
     level_.ports.rig.proving(Proving::nothing);
     auto& log = level_.ports.log;
     const auto& record = level_.proof.conclude(log.utc_ns(), why);
-    if (record.passed) level_.stop.pads(record.pads);
+    const bool at_zero = record.table_g == 0;
+    if (record.passed && !at_zero) level_.stop.pads(record.pads);
     for (const auto& row : record.rows) {
         log.event(row.passed() ? Severity::info : Severity::alarm,
                   fmt::format("proof: {} {:.4g}{}{}, expected {:.4g} to {:.4g}", row.name,
                               row.value, row.unit.empty() ? "" : " ", row.unit, row.low, row.high));
     }
+    const std::string what = at_zero ? "the run at 0 g is" : "the safe state is";
     log.event(record.passed ? Severity::info : Severity::alarm,
-              record.passed ? "the safe state is proved"
-                            : "the safe state is not proved: " + record.message);
+              record.passed ? what + " proved" : what + " not proved: " + record.message);
     if (const auto trend = level_.proof.trend(); !trend.empty())
         log.event(Severity::warning, "proof: " + trend);
     log.proved(record);

@@ -19,7 +19,10 @@ class StopProof : public Stage {
         press_wanted_ = wanted;
         pressed_ = Pressed::no;
     }
+    [[nodiscard]] bool wants_press() const { return press_wanted_; }
     void begin(drivers::Time now) override;
+    /// After the run at 0 g: the emergency stop alone, pressed while the controller runs there.
+    void begin_at_zero(drivers::Time now);
     [[nodiscard]] StageStep step(drivers::Time now) override;
     void leave() override { part_ = Part::none; }
     [[nodiscard]] double table_g() const override;

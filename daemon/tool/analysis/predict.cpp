@@ -75,14 +75,6 @@ bool under(const Profile& profile, const HeldOut& held) {
                            std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame);
 }
 
-/// What happened, not what was asked for.
-Eigen::Matrix3d realised_moment(const estimator::VibrationMoment& vibration) {
-    const estimator::LevelTensor& g = vibration.gamma;
-    Eigen::Matrix3d moment;
-    moment << g[0], g[3], g[4], g[3], g[1], g[5], g[4], g[5], g[2];
-    return moment * (vibration.kappa - 1);
-}
-
 Held held_out(const std::string& recording, const std::string& config, const Profile& profile,
               const AtPlatform& vibration) {
     if (!profile.psd.empty() && !profile.sines.empty())
@@ -103,8 +95,9 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
     held.rates.resize(count, 3);
     for (Index k = 0; k < count; ++k) {
         const estimator::DwellRow& row = found.held_out[static_cast<std::size_t>(k)].row;
+        // What happened, not what was asked for.
         held.situations.push_back(
-            {row.angles, realised_moment(row.vibration), vibration.bands, row.duration_s, true});
+            {row.angles, level_moment(row.vibration), vibration.bands, row.duration_s, true});
         held.rates.row(k) = row.rate;
         held.variances.push_back(row.variance);
         held.relative_errors.push_back(row.relative_error);

@@ -1,5 +1,5 @@
-// The shaker's parts of the commissioning record: proofs of the safe state, made by the daemon,
-// with each button of the emergency stop pressed once.
+// The shaker's parts of the commissioning record: a run at 0 g, there each button of the emergency
+// stop pressed once, then a proof of the safe state, all made by the daemon.
 #include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
@@ -38,22 +38,49 @@ void acknowledge_press(serve::Client& client, const ShakerCommission& options, s
         throw CommissionRefused(why + ": the buttons pressed so far are kept, go on after it");
 }
 
-/// Empty: it has passed.
-std::string prove_all_buttons(serve::Client& client, const ShakerCommission& options,
-                              const CommissionJson& left, std::ostream& out) {
-    const bool press = std::ranges::find(options.parts, "stop") != options.parts.end();
-    if (!press || left.empty()) return prove_safe_state(client, options.by, "", out);
+bool asked_for(const ShakerCommission& options, const char* part) {
+    return std::ranges::find(options.parts, part) != options.parts.end();
+}
+
+/// Each while the controller runs at 0 g. Empty: they have passed.
+std::string press_buttons(serve::Client& client, const ShakerCommission& options,
+                          const CommissionJson& left, std::ostream& out) {
     for (const std::string button : left) {
         if (!person_agrees(options, out,
-                           "The table will shake a little. Stand at the button \"" + button +
+                           "The controller will run at 0 g. Stand at the button \"" + button +
                                "\" and press it when asked. Ready?"))
             throw CommissionRefused("the button \"" + button + "\" was not pressed");
-        if (auto why = prove_safe_state(client, options.by, "emergency_stop " + button, out);
+        if (auto why =
+                prove_safe_state(client, options.by, "at_zero emergency_stop " + button, out);
             !why.empty())
             return why;
         acknowledge_press(client, options, out, button);
     }
     return {};
+}
+
+/// What stops it is tried at 0 g, then it shakes. Each is an arming of its own. Empty: it has
+/// passed.
+std::string prove_all(serve::Client& client, const ShakerCommission& options,
+                      const CommissionJson& record, std::ostream& out) {
+    if (record["ran_at_zero"] != true) {
+        if (!person_agrees(options, out,
+                           "The controller will run at 0 g, and its watchdog will stop it twice. "
+                           "Nothing should move; the chain is closed, its power on. Ready?"))
+            throw CommissionRefused("it does not run at 0 g without a person's word");
+        if (auto why = prove_safe_state(client, options.by, "at_zero", out); !why.empty())
+            return "at 0 g: " + why;
+    }
+    if (asked_for(options, "stop"))
+        if (auto why = press_buttons(client, options, record["buttons_left"], out); !why.empty())
+            return why;
+    const auto& parts = record["parts"];
+    const bool stop_alone = options.parts == std::vector<std::string>{"stop"};
+    if (stop_alone && parts["units"]["proven"] == true && parts["excitation"]["proven"] == true)
+        return {};
+    if (!person_agrees(options, out, "Now the table will shake, 0.5 g at most. Ready?"))
+        throw CommissionRefused("it does not shake without a person's word");
+    return prove_safe_state(client, options.by, "", out);
 }
 
 }  // namespace
@@ -78,7 +105,7 @@ int commission_shaker(const ShakerCommission& options) {
                                                {"display", options.display},
                                                {"reference_g", options.reference_g}}));
     else
-        why = prove_all_buttons(client, options, state["record"]["buttons_left"], out);
+        why = prove_all(client, options, state["record"], out);
     state = CommissionJson::parse(
         commission_command(client, options.by, {{"do", "read"}, {"shaker", true}}));
     const auto& parts = state["record"]["parts"];

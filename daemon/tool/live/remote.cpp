@@ -143,9 +143,11 @@ v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::St
             asked = status.proof().asks();
             if (!asked.empty()) out << ">>> " << asked << std::endl;
         }
-        if (status.loop_check().verdict() != "running" && asked.empty()) ++looks;
+        const bool over = status.loop_check().verdict() != "running" &&
+                          status.campaign().state() != v1::Campaign::checking;
+        if (over && asked.empty()) ++looks;
     } while (looks == 0 || (status.proof().utc_ns() == before && looks < kLooks));
-    show_rows(out, status.loop_check().rows());
+    if (status.proof().table_g() > 0) show_rows(out, status.loop_check().rows());
     show_rows(out, status.proof().rows());
     if (!status.proof().passed()) out << "not proved: " << status.proof().message() << '\n';
     if (status.proof().utc_ns() != before)

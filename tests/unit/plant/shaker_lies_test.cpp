@@ -79,6 +79,44 @@ TEST(ShakerLies, AStopThatWasOnlyAcknowledgedIsDoneWhenTheLieEnds) {
     EXPECT_EQ(shaker.input()[0], kIdle);
 }
 
+TEST(ShakerLies, TheWatchdogCountsOnlyWithOrWithoutALink) {
+    for (const bool linked : {true, false}) {
+        ShakerLies lies;
+        (linked ? lies.timeout_if_linked : lies.timeout_if_unlinked) = true;
+        ShakerController shaker = shaking({});
+        shaker.lie(lies);
+        shaker.linked(!linked);
+        wait(shaker, 10);
+        EXPECT_EQ(shaker.input()[0], kRunning) << linked;
+        shaker.linked(linked);
+        wait(shaker, 1.6);
+        EXPECT_EQ(shaker.input()[0], kFault) << linked;
+    }
+}
+
+TEST(ShakerLies, TheChainCutsNothingIsNotShownOrStartsAnew) {
+    ShakerController contact = shaking({.estop_contact_only = true});
+    contact.open_emergency_stop(true);
+    feed(contact, 2);
+    EXPECT_EQ(contact.amplitude_g(), 5);
+    EXPECT_EQ(contact.input()[2], 1);
+
+    ShakerController unseen = shaking({.estop_unseen = true});
+    unseen.open_emergency_stop(true);
+    wait(unseen, 0.2);
+    EXPECT_TRUE(unseen.at_rest());
+    EXPECT_EQ(unseen.input()[2], 0);
+
+    ShakerController eager = shaking({.estop_restarts = true});
+    eager.open_emergency_stop(true);
+    wait(eager, 0.2);
+    EXPECT_TRUE(eager.at_rest());
+    eager.open_emergency_stop(false);
+    feed(eager, 1);
+    EXPECT_EQ(eager.amplitude_g(), 5);
+    EXPECT_EQ(eager.holding()[5], 1);
+}
+
 TEST(ShakerLies, TheWatchdogNeverFiresOrLate) {
     ShakerController never = shaking({.timeout_ignored = true});
     wait(never, 100);

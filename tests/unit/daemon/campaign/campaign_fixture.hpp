@@ -50,6 +50,7 @@ struct CampaignTest : testing::Test {
     bool slewed_while_moving = false;
     FakeAccelerometers accelerometers;
     bool disobeyed = false;
+    Proving proving = Proving::nothing;
     std::int64_t utc_ns = 0;
     std::function<Time()> wall_clock;        ///< people's; none: the machine's
     std::function<rt::MeanMotion()> second;  ///< of force and angles; none: nobody asks
@@ -69,6 +70,7 @@ struct CampaignTest : testing::Test {
             return test.campaign ? test.second() : rt::MeanMotion{};
         }
         void guard(rt::Guard level) override { test.guard = level; }
+        void proving(Proving what) override { test.proving = what; }
         void disobeyed(bool now_so) override { test.disobeyed = test.disobeyed || now_so; }
     } rig_port{*this};
     struct TestDwells final : Dwells {
@@ -96,6 +98,7 @@ struct CampaignTest : testing::Test {
             ++test.positions_done;
             test.stops_done.push_back(stop);
         }
+        void proved(const ProofRecord& record) override { test.proofs.push_back(record); }
         std::int64_t utc_ns() const override { return test.utc_ns; }
         Time wall() const override { return test.wall_clock ? test.wall_clock() : Log::wall(); }
     } log_port{*this};
@@ -175,6 +178,7 @@ struct CampaignTest : testing::Test {
     std::vector<std::array<double, 3>> asked_from;
     std::vector<double> elapsed;
     std::vector<StopDone> stops_done;
+    std::vector<ProofRecord> proofs;
     int thinking_steps = 0;
 
     void run_for(double seconds) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 
@@ -19,6 +20,7 @@ struct FakeAccelerometers {
     bool silent = false;
     bool table_good = true;
     bool table_bound = true;
+    std::function<void(const drivers::Sample&)> also;
 
     void run_to(drivers::Time now, double controller_g) {
         fed = std::max(fed, now - drivers::kSecond);
@@ -39,6 +41,7 @@ struct FakeAccelerometers {
                 sample.quality[static_cast<std::size_t>(drivers::Channel::table_accel)] =
                     drivers::Quality::unbound;
             monitor.add(sample);
+            if (also) also(sample);
         }
     }
 };

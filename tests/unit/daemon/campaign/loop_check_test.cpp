@@ -46,6 +46,18 @@ TEST(LoopCheck, FurtherFrequenciesOfAPlanAreLookedAtOnceEach) {
     EXPECT_TRUE(LoopCheck::further_frequencies(Settings{}).empty());
 }
 
+// Of a mass on a spring without damping T = 1 / (x - 1), x = (f/fn)^2: 2/3 is x = 2.5, at 16
+// instead of 15 Hz x = 2.8444. With half of the critical damping the roots are those of 4/9 x^2 -
+// 13/9 x - 5/9 = 0.
+TEST(LoopCheck, PadsAnswerAnotherFrequencyByTheirLaw) {
+    const auto [low, high] = isolator_ratio(2.0 / 3, 15, 16);
+    EXPECT_NEAR(low, 1.5 / (2.5 * 256 / 225 - 1), 1e-9);
+    const double x = (13.0 / 9 + std::sqrt(169.0 / 81 + 80.0 / 81)) / (8.0 / 9) * 256 / 225;
+    EXPECT_NEAR(high, 1.5 * std::sqrt((1 + x) / ((1 - x) * (1 - x) + x)), 1e-9);
+    EXPECT_LT(high * 1.05, 1) << "a table that keeps its frequency is told from it";
+    EXPECT_EQ(isolator_ratio(1, 15, 16), (std::array<double, 2>{1, 1}));
+}
+
 TEST(LoopCheck, LimitsHoldAtEveryFrequency) {
     Settings settings = survey();
     EXPECT_EQ(LoopCheck::beyond_limits(settings), "");

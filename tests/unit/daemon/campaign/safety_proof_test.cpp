@@ -58,6 +58,30 @@ TEST(SafetyProof, TheNewestWordCounts) {
     EXPECT_THAT(proof.refusal(kNow + 2 * kHour), HasSubstr("not completed: aborted"));
 }
 
+TEST(SafetyProof, ARunAtZeroProvesNoSafeState) {
+    SafetyProof proof(demanded());
+    const auto at_zero = [&](bool passed) {
+        proof.begin("Ada", 0);
+        proof.row("watchdog at 0 g, not fed", "s", passed ? 1.5 : 1e3, 0.75, 2);
+        return proof.conclude(kNow, "").passed;
+    };
+    EXPECT_TRUE(at_zero(true));
+    EXPECT_TRUE(proof.ran_at_zero());
+    EXPECT_THAT(proof.refusal(kNow), HasSubstr("there is no proof"));
+    proved(proof, kNow);
+    EXPECT_EQ(proof.refusal(kNow), "");
+    // A later one takes nothing away, as long as it passes.
+    EXPECT_TRUE(at_zero(true));
+    EXPECT_EQ(proof.refusal(kNow), "");
+    EXPECT_EQ(proof.pads().level_g, 0.5);
+    EXPECT_FALSE(at_zero(false));
+    EXPECT_THAT(proof.refusal(kNow), HasSubstr("watchdog at 0 g, not fed 1000 s"));
+    // AND a proof that failed is not made good by one
+    EXPECT_FALSE(proved(proof, kNow + kHour, 7).passed);
+    EXPECT_TRUE(at_zero(true));
+    EXPECT_THAT(proof.refusal(kNow + kHour), HasSubstr("stop, platform 7 s"));
+}
+
 TEST(SafetyProof, SaysWhatHasChangedSince) {
     SafetyProof before(demanded());
     const ProofRecord record = proved(before, kNow);

@@ -37,8 +37,18 @@ SectionJson result() {
             {{"hz", hz}, {"dwells", 7}, {"coefficients", coefficients}, {"sigma", sigma}});
     SectionJson mixture = SectionJson::array();
     for (int j = 0; j < 3; ++j) mixture.push_back(SectionJson::array({hypothesis}));
-    return {{"spectrum",
-             {{"model", "resonance"},
+    const SectionJson dwell{{"rate", {1, 2, 3}}, {"residual", {0.1, 0.2, 0.3}}};
+    const SectionJson apart{{"run", 2},
+                            {"position", 5},
+                            {"hz", 55},
+                            {"rate", {1.25, -0.5, 0}},
+                            {"predicted", {1, 0, 0}},
+                            {"u", {0.1, 0.1, 0.1}},
+                            {"z", {2.5, -5, 0}}};
+    return {{"dwell_rates", SectionJson::array({dwell})},
+            {"spectrum",
+             {{"held_out", SectionJson::array({apart})},
+              {"model", "resonance"},
               {"frequencies", frequencies},
               {"flat", {{"chi_square", 100}, {"dof", 18}, {"p", 0.0}}},
               {"log_odds", {5, 5, 5}},
@@ -77,12 +87,23 @@ TEST(SpectrumSection, ChartsOfEachCoefficientAndWhatIsNotTold) {
     std::size_t charts = 0;
     for (auto at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1))
         ++charts;
-    EXPECT_EQ(charts, 18U);
+    EXPECT_EQ(charts, 19U) << "one more of predicted and measured";
     EXPECT_THAT(html, HasSubstr("D_OOz over frequency"));
-    EXPECT_THAT(html, HasSubstr("the first thing. the second thing."));
+    EXPECT_THAT(html, HasSubstr("the first thing; the second thing."));
     SectionJson groups = result();
     groups["spectrum"]["model"] = "groups";
-    EXPECT_EQ(page_of(groups).find("<svg"), std::string::npos) << "between them nothing is known";
+    EXPECT_EQ(page_of(groups).find("over frequency</"), std::string::npos)
+        << "between them nothing is known";
+}
+
+TEST(SpectrumSection, DwellsHeldOutStandBesideWhatWasForetold) {
+    const std::string html = page_of(result());
+    EXPECT_THAT(html, HasSubstr("Drift predicted against measured"));
+    for (const char* cell : {"2, 5", "55", "1.2500", "-0.5000", "1.0000", "2.5", "-5.0"})
+        EXPECT_THAT(html, HasSubstr(std::string("<td>") + cell + "</td>"));
+    SectionJson earlier = result();
+    earlier["spectrum"].erase("held_out");
+    EXPECT_THAT(page_of(earlier), HasSubstr("No dwell was held out"));
 }
 
 }  // namespace

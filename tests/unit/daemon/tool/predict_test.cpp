@@ -3,10 +3,13 @@
 #include <sys/wait.h>
 
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -35,22 +38,8 @@ class Predict : public ::testing::Test {
         truth["isolator"]["hard"] = true;
         truth["elastic"]["share"] = {0.5, 0.5, 0.5};
         write("truth.json", truth.dump());
-        // Balanced over time by a step of 26 through the 63, which have no common factor.
-        std::vector<std::string> dwells;
-        const auto add = [&](int position, int run) {
-            dwells.push_back(std::to_string(position) + "." + std::to_string(run));
-        };
-        for (int p = 1; p <= 14; ++p) add(p, 1);
-        for (int p = 1; p <= 13; p += 2) add(p, 2);
-        for (int run = 3; run <= 8; ++run) {
-            for (const int p : {4, 5, 6, 7, 10, 13, 14}) add(p, run);
-        }
-        std::string order;
-        for (std::size_t i = 0; i < dwells.size(); ++i)
-            order += (i > 0 ? "," : "") + dwells[i * 26 % dwells.size()];
-        ASSERT_EQ(plant("--truth truth.json --seed 5 --dwell 40 --table-g 6,0,6,6,6,6,6,6 "
-                        "--frequency 15,15,25,35,45,65,85,125 --order " +
-                        order + " -o survey.csv")
+        ASSERT_EQ(plant("--truth truth.json --seed 5 --dwell 40" + std::string(kSurvey) +
+                        " --order " + survey_order() + " -o survey.csv")
                       .exit_code,
                   0);
         const Ended found = run("identify survey.csv --json");
@@ -67,6 +56,24 @@ class Predict : public ::testing::Test {
     }
     static void TearDownTestSuite() { std::filesystem::remove_all(folder()); }
 
+    static constexpr const char* kSurvey =
+        " --table-g 6,0,6,6,6,6,6,6 --frequency 15,15,25,35,45,65,85,125";
+    /// Balanced over time by a step of 26 through the 63, which have no common factor.
+    static std::string survey_order() {
+        std::vector<std::string> dwells;
+        const auto add = [&](int position, int run) {
+            dwells.push_back(std::to_string(position) + "." + std::to_string(run));
+        };
+        for (int p = 1; p <= 14; ++p) add(p, 1);
+        for (int p = 1; p <= 13; p += 2) add(p, 2);
+        for (int run = 3; run <= 8; ++run) {
+            for (const int p : {4, 5, 6, 7, 10, 13, 14}) add(p, run);
+        }
+        std::string order;
+        for (std::size_t i = 0; i < dwells.size(); ++i)
+            order += (i > 0 ? "," : "") + dwells[i * 26 % dwells.size()];
+        return order;
+    }
     static std::filesystem::path& folder() {
         static std::filesystem::path path;
         return path;
@@ -90,8 +97,9 @@ class Predict : public ::testing::Test {
         std::ofstream(folder() / name, std::ios::binary) << text;
     }
     static PredictJson result() { return PredictJson::parse(content("result.json")); }
-    static void write_without_elastic_part(const std::string& name) {
-        PredictJson broken = result();
+    static void write_without_elastic_part(const std::string& name,
+                                           const char* of = "result.json") {
+        PredictJson broken = PredictJson::parse(content(of));
         for (auto& gyro : broken["spectrum"]["mixture"]) {
             for (auto& one : gyro) {
                 for (std::size_t i = 10; i < one["x"].size(); ++i) one["x"][i] = 0.0;
@@ -185,6 +193,77 @@ TEST_F(Predict, TimeAndPadsMatter) {
     EXPECT_GT(short_one["budget"]["realisation"][0], 0);
     EXPECT_GT(short_one["u"][0], for_ever["u"][0]);
     EXPECT_NE(pads["drift"][0], for_ever["drift"][0]);
+}
+
+/// Section 1's truth from samples: four profiles at four attitudes that no fit has seen, with a
+/// controller whose gain is as uncertain as it is declared to be.
+TEST_F(Predict, SoakHeldOutDwellsOfFourProfilesFromSamples) {
+    constexpr unsigned kCampaigns = 20;
+    std::ifstream in(folder() / "truth.json");
+    PredictJson truth = PredictJson::parse(in);
+    truth["shaker"]["limit_mm"] = 1000;
+    truth["shaker"]["limit_g"] = 100;
+    const std::vector<PredictJson> densities = {{{20, 0.05}, {200, 0.05}},
+                                                {{10, 0.1241}, {40, 0.1241}, {500, 0.001241}},
+                                                {{20, 0.04}, {1000, 0.04}, {2000, 0.01}}};
+    // Without the allowance for what lies above the survey: all of this truth lies within.
+    std::string config = "[spectrum]\nmount = \"hard\"\nelastic_beyond = 0.0\n";
+    for (std::size_t k = 0; k < densities.size(); ++k) {
+        const std::string number = std::to_string(k + 1);
+        truth["shaker"]["profiles"].push_back({{"number", k + 1}, {"psd", densities[k]}});
+        config += "[[profile]]\nname = \"profile " + number + "\"\nnumber = " + number +
+                  "\nat = \"table\"\npsd = " + densities[k].dump() + "\n";
+    }
+    write("four.toml", config +
+                           "[shaker.limits]\ndisplacement_mm = 1000\nacceleration_g = 100\n"
+                           "velocity_mps = 10\n");
+    write("75.json", R"({"name": "75 Hz", "sines": [[75, 3]]})");
+    write("four.csv", "alpha_deg,beta_deg,gamma_deg\n30,10,-20\n-50,0,70\n100,15,30\n60,-20,140\n");
+    std::mt19937_64 random(77);
+    std::normal_distribution<double> normal;
+    unsigned confirmed = 0, asked = 0;
+    std::map<std::string, double> squares;
+    for (unsigned seed = 1; seed <= kCampaigns; ++seed) {
+        // 1 % of the mean square; the survey, whose sines are measured, has its own.
+        truth["shaker"]["amplitude_scaled"] = 1 + 0.005 * normal(random);
+        write("four.json", truth.dump());
+        ASSERT_EQ(plant("--truth truth.json --seed " + std::to_string(seed) + kSurvey +
+                        " --dwell 100 --order " + survey_order() + " -o four_survey.csv")
+                      .exit_code,
+                  0);
+        write("four_result.json", run("identify four_survey.csv --json").out);
+        write_without_elastic_part("four_broken.json", "four_result.json");
+        ASSERT_EQ(plant("--truth four.json --seed " + std::to_string(1000 + seed) +
+                        " --dwell 100 --table-g 3,3,3,7.69 --frequency 75,15,15,15 --profile "
+                        "0,1,2,3 --positions four.csv -o four_held.csv")
+                      .exit_code,
+                  0);
+        unsigned contradicted = 0;
+        for (const std::string profile : {"75.json", "'profile 1'", "'profile 2'", "'profile 3'"}) {
+            const auto verified = [&](const std::string& result) {
+                return run("predict " + result + " --profile " + profile +
+                           " --verify four_held.csv --config four.toml --json")
+                    .json()["prediction"]["verification"];
+            };
+            const PredictJson right = verified("four_result.json");
+            ++asked;
+            confirmed += right["word"] == "contradicted" ? 0U : 1U;
+            for (const auto& dwell : right["dwells"]) {
+                for (const double z : dwell["z"]) squares[profile] += z * z / (12 * kCampaigns);
+            }
+            contradicted += verified("four_broken.json")["word"] == "contradicted" ? 1U : 0U;
+        }
+        EXPECT_GT(contradicted, 0U) << "seed " << seed;
+    }
+    // A right one is contradicted with a probability of 0.01 for the profile and 0.001 for each
+    // dwell: of 80 more than four are so once in a thousand.
+    EXPECT_GE(confirmed, asked - 4);
+    // Rates of a dwell are correlated within a campaign and profile by the gain and the common
+    // coefficients: of 240 values some 80 are of their own, 8 % for one standard deviation.
+    for (const auto& [profile, square] : squares) EXPECT_NEAR(std::sqrt(square), 1, 0.2) << profile;
+    double all = 0;
+    for (const auto& [profile, square] : squares) all += square / 4;
+    EXPECT_NEAR(std::sqrt(all), 1, 0.15);
 }
 
 /// Octave bands and a broad one, which a configuration and a controller know by number.

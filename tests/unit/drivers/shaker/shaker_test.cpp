@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <limits>
+#include <thread>
 
 #include "test_bench.hpp"
 
@@ -95,6 +97,52 @@ TEST(Shaker, EndsARunWithAmplitudeZeroAndRunZero) {
     EXPECT_EQ(addresses_written(server), (std::vector{kRampTime, kAmplitude, kRun}));
     EXPECT_EQ(server.holding(kRun), 0);
     EXPECT_TRUE(bench.shaker->reading().at_rest());
+}
+
+TEST(Shaker, RunsAtZeroWhereThatIsAskedFor) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ShakerSetPoint nothing{15.0, 0, 1.0};
+    nothing.run_at_zero = true;
+    ASSERT_TRUE(bench.apply(nothing));
+    EXPECT_EQ(server.holding(kRun), 1);
+    EXPECT_EQ(server.holding(kAmplitude) << 16 | server.holding(kAmplitude + 1), 0);
+    // AND what another master makes of it is noticed
+    server.set_holding(kAmplitude + 1, 200);
+    EXPECT_TRUE(
+        bench.eventually([&] { return bench.shaker->counters().read_back_mismatches == 1; }));
+    ASSERT_TRUE(bench.eventually([&] { return bench.shaker->state() == LinkState::degraded; }));
+}
+
+TEST(Shaker, HangsUpUntilItIsTimeOrAStopIsOrdered) {
+    TestServer server;
+    Bench bench(settings_for(server));
+    ASSERT_TRUE(bench.apply({15.0, 1.0, 1.0}));
+    const auto connections = [&] {
+        int highest = 0;
+        for (const Request& request : server.requests())
+            highest = std::max(highest, request.connection);
+        return highest;
+    };
+    ASSERT_EQ(connections(), 1);
+    // WHEN it hangs up for 300 ms THEN nothing is asked or fed meanwhile
+    RealClock clock;
+    bench.shaker->hang_up_until(clock.now() + 300 * kMillisecond);
+    ASSERT_TRUE(bench.reaches(LinkState::connecting));
+    server.forget();
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    EXPECT_TRUE(server.requests().empty());
+    // AND then it goes on by itself
+    ASSERT_TRUE(bench.reaches(LinkState::running));
+    EXPECT_EQ(connections(), 2);
+    // WHEN a stop is ordered while it has hung up THEN that does not wait
+    bench.shaker->hang_up_until(clock.now() + 1000 * kSecond);
+    ASSERT_TRUE(bench.reaches(LinkState::connecting));
+    server.forget();
+    bench.shaker->stop_now();
+    ASSERT_TRUE(server.saw([](const Request& r) { return r.writes(kRun, 0); }));
+    ASSERT_TRUE(bench.eventually([&] { return !bench.shaker->stop_pending(); }));
+    EXPECT_EQ(server.holding(kRun), 0);
 }
 
 TEST(Shaker, ComesDownWhateverTheFrequency) {
