@@ -57,9 +57,12 @@ rt::AmplitudeWitness::Settings witness_settings(const Configuration& configurati
 }
 
 rt::Interlock::Limits interlock_limits(const Configuration& configuration, const proto::Dbc& dbc) {
-    return {configuration.campaign.max_acceleration_g, configuration.gimbal.status_deadline,
-            configuration.interlock, witness_settings(configuration, dbc),
-            configuration.estimator.transmission};
+    return {configuration.campaign.max_acceleration_g,
+            configuration.gimbal.status_deadline,
+            configuration.interlock,
+            witness_settings(configuration, dbc),
+            configuration.estimator.transmission,
+            configuration.abort_bands};
 }
 
 std::unique_ptr<record::Recorder> make_recorder(Parts& parts) {
