@@ -11,6 +11,7 @@
 #include "daemon/app/campaign_forecast.hpp"
 #include "daemon/app/start_checks.hpp"
 #include "daemon/commission/acceptance.hpp"
+#include "daemon/configuration/random_profiles.hpp"
 #include "daemon/results/result_json.hpp"
 
 namespace vibrig {
@@ -223,7 +224,8 @@ void CampaignDwells::write_out(campaign::Campaign& campaign) {
     if (written() || with_estimator_ != 0) return;
     assessing_.abandon();
     write_result(judge(configuration_.estimator, whole_result(), again(),
-                       estimator::uncertainty::Stage::ended, with_.identification.rows()),
+                       estimator::uncertainty::Stage::ended, with_.identification.rows(),
+                       configuration::numbered_kinds(configuration_)),
                  campaign);
 }
 

@@ -103,7 +103,8 @@ class CampaignDwells final : public campaign::Dwells {
                                       const estimator::Result& result,
                                       const std::optional<Again>& again,
                                       estimator::uncertainty::Stage stage,
-                                      const std::vector<estimator::DwellRow>& all_rows);
+                                      const std::vector<estimator::DwellRow>& all_rows,
+                                      const tool::NumberedKinds& profiles);
     [[nodiscard]] static std::vector<estimator::DwellRow> assess(
         Judged& out, const estimator::Settings& settings, const estimator::Result& result,
         const std::optional<Again>& again, estimator::uncertainty::Stage stage);

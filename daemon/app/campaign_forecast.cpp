@@ -21,8 +21,8 @@ std::vector<plan::PlannedRun> runs_of(const campaign::Settings& campaign, double
         runs.push_back({position, table_g * transmission, table_g, 1});
     };
     for (const auto& stop : campaign.stops) {
-        const bool apart =
-            stop.verify || (stop.frequency_hz > 0 && stop.table_g > 0 &&
+        const bool apart = stop.verify || stop.random ||
+                           (stop.frequency_hz > 0 && stop.table_g > 0 &&
                             !estimator::at_reference(campaign.rig, stop.frequency_hz));
         if (!apart) add(stop.position_deg, stop.table_g);
     }
@@ -77,7 +77,7 @@ PlanData plan_data(const configuration::Configuration& c) {
     std::vector<std::pair<double, double>> levels;
     for (const auto& stop : campaign.stops) {
         // Each level is a run, as in the campaign.
-        const std::pair one{stop.table_g, stop.frequency_hz};
+        const std::pair one{stop.table_g, stop.kind()};
         auto level = std::ranges::find(levels, one);
         if (level == levels.end()) level = levels.insert(level, one);
         plan.stops.push_back({static_cast<int>(level - levels.begin()) + 1,

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "daemon/app/campaign_dwells.hpp"
+#include "daemon/configuration/random_profiles.hpp"
 #include "daemon/journal/reread.hpp"
 
 namespace vibrig {
@@ -103,12 +104,14 @@ CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings
                                              const estimator::Result& result,
                                              const std::optional<Again>& again,
                                              uncertainty::Stage stage,
-                                             const std::vector<estimator::DwellRow>& all_rows) {
+                                             const std::vector<estimator::DwellRow>& all_rows,
+                                             const tool::NumberedKinds& profiles) {
     Judged out;
     const auto anew = assess(out, settings, result, again, stage);
     if (stage != uncertainty::Stage::ended || !out.assessed.done) return out;
     const auto in_force = out.anew ? dwells::Anew::settings_of(settings, again->found) : settings;
-    out.spectrum = tool::spectrum_of(in_force, out.anew ? anew : all_rows);
+    out.spectrum = tool::spectrum_of(in_force, out.anew ? anew : all_rows,
+                                     estimator::spectrum::Form::automatic, profiles);
     if (out.spectrum) tool::adopt(*out.spectrum, in_force, out.assessed);
     return out;
 }
@@ -151,16 +154,18 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
     if (verdict_wanted()) {
         // In a thread of its own also where one may wait: what it has of memory, more with each
         // dwell, is in nobody's way.
-        const auto work =
-            [settings = configuration_.estimator, result = whole_result(),
-             rows = with_.identification.rows(), anew = concluding_ ? again() : std::nullopt,
-             stage = concluding_ ? uncertainty::Stage::ended : uncertainty::Stage::under_way,
-             trim = !with_.memory_locked] {
-                auto found = judge(settings, result, anew, stage, rows);
-                // Locked memory is not given back; asking for it would only disturb.
-                if (trim) rt::give_free_memory_back();
-                return found;
-            };
+        const auto work = [settings = configuration_.estimator, result = whole_result(),
+                           rows = with_.identification.rows(),
+                           profiles = configuration::numbered_kinds(configuration_),
+                           anew = concluding_ ? again() : std::nullopt,
+                           stage = concluding_ ? uncertainty::Stage::ended
+                                               : uncertainty::Stage::under_way,
+                           trim = !with_.memory_locked] {
+            auto found = judge(settings, result, anew, stage, rows, profiles);
+            // Locked memory is not given back; asking for it would only disturb.
+            if (trim) rt::give_free_memory_back();
+            return found;
+        };
         // The rig's clock waits for this thread: there a verdict takes no time.
         if (with_.at_once) {
             judged = assessing_.compute(work);

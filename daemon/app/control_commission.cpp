@@ -57,6 +57,7 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
             text.is_string() ? text.get<std::string>() : value.value;
     }
     names.command = configuration_.gimbal.message;
+    names.torque = configuration_.campaign.level.torquer.message;
     commission::Ports ports;
     ports.sample = [this] {
         const auto sample = acquisition_.view().sample;
@@ -76,6 +77,14 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     };
     ports.release = [this](Time now) { gimbal_.release(now); };
     ports.gimbal = [this] { return gimbal_.state(); };
+    if (parts_.torquer)
+        ports.torque = [this](const commission::Vec3& deg_per_h) {
+            // As the commands are sent: the sign of the rate over them is what is looked for.
+            commission::Vec3 rate{};
+            for (std::size_t i = 0; i < 3; ++i)
+                rate[i] = configuration_.campaign.level.torquer.sign[i] * deg_per_h[i];
+            return parts_.torquer->command(rate);
+        };
     ports.event = [this](Severity severity, const std::string& text) {
         log(severity, "commissioning", text);
     };
@@ -92,9 +101,12 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     };
     return std::make_unique<commission::Procedure>(
         std::move(names),
-        commission::Stated{configuration_.estimator.latitude_deg,
-                           configuration_.commission.linear_sigma,
-                           configuration_.simulated() && !real_wire(configuration_.can)},
+        commission::Stated{
+            configuration_.estimator.latitude_deg, configuration_.commission.linear_sigma,
+            configuration_.simulated() && !real_wire(configuration_.can),
+            parts_.torquer ? std::min(parts_.torquer->limit(),
+                                      configuration_.campaign.level.torquer_limit_deg_h)
+                           : 0},
         std::move(ports));
 }
 
@@ -169,6 +181,7 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const Json reply{{"record", record},
                      {"simulated", configuration_.simulated()},
                      {"configuration", loaded_.path},
+                     {"progress", procedure_ && procedure_->active() ? procedure_->progress() : ""},
                      {"procedure", procedure_ ? procedure_->state(after) : Json()}};
     waiting.reply.set_value({true, reply.dump(-1, ' ', false, Json::error_handler_t::replace)});
 }
@@ -181,13 +194,15 @@ CommandReply ControlLoop::do_commission(const CommandRequest& request, const Jso
     const std::string word = text("do");
     const bool active = procedure_ && procedure_->active();
     if (word == "accept" || word == "state") return enter_in_record(request, what, now);
+    if (word == "sign") return sign_record(request, what);
     if (word == "begin") {
         if (active) return {false, "the rig is being commissioned by " + procedure_->by()};
         return begin_commissioning(request, what, now);
     }
     if (word != "answer" && word != "answers" && word != "stop" && word != "end")
         return {false, "commission: do: found \"" + word +
-                           "\", expected begin, read, answer, answers, stop, end, accept or state"};
+                           "\", expected begin, read, answer, answers, stop, end, accept, state or "
+                           "sign"};
     if (!active) return {false, "the rig is not being commissioned"};
     procedure_->attend(request.by, rt::wall_clock());
     if (word == "answer") {
@@ -321,6 +336,9 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
         if (const auto why = commission::not_as_running({Part::gyros}, {}, book_, file);
             !why.empty())
             return {false, why + ": restart vibrigd first"};
+        const Json torquers = book_.evidence(Part::gimbals).value("torquers", Json());
+        if (const auto why = commission::not_as_torqued(torquers, file); !why.empty())
+            return {false, why};
         // Of a simulated rig a script may leave it out.
         const Json said = what.value("statements", Json::array());
         if (!said.empty() || !configuration_.simulated())
@@ -330,11 +348,35 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
                 return {false, why};
         return record_parts(request, second, {Part::gyros},
                             {{"stated", "by two persons, from the drawing; nothing measures it"},
+                             {"torquers", torquers},
                              {"drift_sign", said}},
                             file);
     } catch (const std::exception& error) {
         return {false, std::string("nothing is recorded: ") + error.what()};
     }
+}
+
+CommandReply ControlLoop::sign_record(const CommandRequest& request, const Json& what) {
+    std::vector<Part> parts;
+    for (const Json& name : what.value("parts", Json::array()))
+        if (const auto part =
+                name.is_string() ? commission::part_named(name.get<std::string>()) : std::nullopt)
+            parts.push_back(*part);
+    const std::string by = commission::name_of_person(request.by);
+    try {
+        book_.sign(parts, by, what.value("cms", std::string()));
+    } catch (const std::exception& error) {
+        return {false, std::string("not signed: ") + error.what()};
+    }
+    std::string names;
+    for (const Part part : parts) names += (names.empty() ? "" : ", ") + std::string(name_of(part));
+    const auto text =
+        fmt::format("{} signed with the certificate of {}, record {}", names, by, book_.sha256());
+    log(Severity::info, "commissioning", text);
+    for (const Part part : parts)
+        keep_commissioned({name_of(part), "", request.by, "", "sign",
+                           Json{{"record_sha256", book_.sha256()}, {"cms", what["cms"]}}.dump()});
+    return {true, text};
 }
 
 CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,

@@ -115,6 +115,8 @@ class ControlLoop {
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,
                                                     const configuration::Loaded& file);
+    [[nodiscard]] CommandReply sign_record(const CommandRequest& request,
+                                           const commission::Json& what);
     [[nodiscard]] CommandReply record_parts(const CommandRequest& request,
                                             const std::string& second,
                                             const std::vector<commission::Part>& parts,

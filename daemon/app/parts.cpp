@@ -57,9 +57,12 @@ rt::AmplitudeWitness::Settings witness_settings(const Configuration& configurati
 }
 
 rt::Interlock::Limits interlock_limits(const Configuration& configuration, const proto::Dbc& dbc) {
-    return {configuration.campaign.max_acceleration_g, configuration.gimbal.status_deadline,
-            configuration.interlock, witness_settings(configuration, dbc),
-            configuration.estimator.transmission};
+    return {configuration.campaign.max_acceleration_g,
+            configuration.gimbal.status_deadline,
+            configuration.interlock,
+            witness_settings(configuration, dbc),
+            configuration.estimator.transmission,
+            configuration.abort_bands};
 }
 
 std::unique_ptr<record::Recorder> make_recorder(Parts& parts) {
@@ -103,9 +106,11 @@ rt::Acquisition::Wiring wiring(Parts& parts) {
 
 std::unique_ptr<drivers::Torquer> make_torquer(Parts& parts) {
     const auto& campaign = parts.configuration.campaign;
-    return campaign.levelling ? std::make_unique<drivers::Torquer>(
-                                    parts.dbc, campaign.level.torquer, parts.sending_port())
-                              : nullptr;
+    // Commissioning wants it of every rig that has torquers.
+    if (!campaign.levelling && !drivers::Torquer::known(parts.dbc, campaign.level.torquer))
+        return nullptr;
+    return std::make_unique<drivers::Torquer>(parts.dbc, campaign.level.torquer,
+                                              parts.sending_port());
 }
 
 /// Levelling and zeroing, where they are asked for, act by way of these.

@@ -87,7 +87,7 @@ struct Parts {
 
     // The campaign, and what it acts on.
     drivers::Gimbal gimbal;
-    std::unique_ptr<drivers::Torquer> torquer;  ///< null: no levelling
+    std::unique_ptr<drivers::Torquer> torquer;  ///< null: no torquers
     CampaignRig rig;
     CampaignDwells dwells;
     CampaignLog campaign_log;

@@ -23,6 +23,29 @@ std::string duration_text(double seconds) {
     return fmt::format("{} h {} min", minutes / 60, minutes % 60);
 }
 
+/// Which profiles the plan plays, and how loud they are at most.
+template <typename Stops>
+std::string profiles_text(const Stops& stops) {
+    std::string profiles;
+    std::vector<std::uint16_t> told;
+    for (const auto& [stop, run, position] : stops) {
+        if (!stop.random || std::ranges::find(told, stop.random->set_point.profile) != told.end())
+            continue;
+        const auto& point = stop.random->set_point;
+        told.push_back(point.profile);
+        double highest_g = 0;
+        for (const auto& other : stops) {
+            if (other.stop.kind() == stop.kind())
+                highest_g = std::max(highest_g, other.stop.table_g);
+        }
+        profiles += fmt::format(
+            ", random by profile '{}' (number {}, checksum {:08x}, up to {:.3g} g "
+            "rms, 3 sigma {:.3g} g)",
+            stop.random->name, point.profile, point.checksum, highest_g, 3 * highest_g);
+    }
+    return profiles;
+}
+
 }  // namespace
 
 void Campaign::take_over_trip(const std::string& causes, double table_g) {
@@ -102,8 +125,9 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
                                  : std::string("until its targets are met")
                            : "about " + duration_text(left_s + times_.opening_s + times_.closing_s);
     return fmt::format(
-        "{}, plan \"{}\" ({}), up to {:g} g at the table, {}; to be started within {}", unit,
-        settings_.name, plan, highest_level(), lasts, duration_text(settings_.arming_valid_s));
+        "{}, plan \"{}\" ({}), up to {:g} g at the table{}, {}; to be started within {}", unit,
+        settings_.name, plan, highest_level(), profiles_text(stops_), lasts,
+        duration_text(settings_.arming_valid_s));
 }
 
 /// Nobody started it: whoever armed may long have gone home.

@@ -54,7 +54,8 @@ void Campaign::leave_stage() {
 }
 
 void Campaign::insist_on_zero_torque(Time now) {
-    if (ports_.rig.torquer == nullptr || state_ == State::levelling) return;
+    // Levelling torques by itself, and so does what is commissioned.
+    if (ports_.rig.torquer == nullptr || state_ == State::levelling || commissioning()) return;
     if (ports_.rig.torquer->zero() && !(active() && torquing(ports_.rig))) return;
     if (now - torque_sent_ < kStagePoll) return;
     torque_sent_ = now;

@@ -19,14 +19,14 @@ constexpr int kMostRepeats = 2;
 constexpr Time kLongInterruption = 3600 * drivers::kSecond;
 
 bool same(const Stop& a, const Stop& b) {
-    return a.position_deg == b.position_deg && a.table_g == b.table_g &&
-           a.frequency_hz == b.frequency_hz && a.verify == b.verify;
+    return a.position_deg == b.position_deg && a.table_g == b.table_g && a.kind() == b.kind() &&
+           a.verify == b.verify;
 }
 
 }  // namespace
 
 void Campaign::add_stop(const Stop& stop) {
-    const std::pair one{stop.table_g, stop.frequency_hz};
+    const std::pair one{stop.table_g, stop.kind()};
     const auto level = std::ranges::find(levels_, one);
     const auto run = level - levels_.begin();
     if (level == levels_.end()) levels_.push_back(one);
@@ -69,8 +69,10 @@ bool Campaign::put_first(const std::vector<estimator::DwellSummary>& done) {
         if (is_repeat(again) && offered_stops_.size() == done.size()) {
             const auto of = std::find_if(stops_.begin(), from, [&](const NumberedStop& stop) {
                 const StopDone& offered = offered_stops_[i];
-                return same(stop.stop, {offered.position_deg, offered.table_g, offered.frequency_hz,
-                                        offered.held_out});
+                const Stop& mine = stop.stop;
+                return mine.position_deg == offered.position_deg &&
+                       mine.table_g == offered.table_g && mine.kind() == offered.kind() &&
+                       mine.verify == offered.held_out;
             });
             if (of == from) return false;
             stops_.insert(from, {of->stop, again.run, again.position});

@@ -15,16 +15,22 @@ using drivers::Time;
 void Excitation::from_rest(const Stop& stop, Time now) {
     frequency_hz_ = stop.frequency_hz > 0 ? stop.frequency_hz : settings_.frequency_hz;
     const auto measured = measured_.find(stop.frequency_hz);
-    transmission_ = measured != measured_.end() ? measured->second : stop.transmission;
+    random_ = stop.random;
+    transmission_ = measured != measured_.end() && !random_ ? measured->second : stop.transmission;
     asked_g_ = 0;
     tell_ramp(0, now);
 }
 
+drivers::ShakerSetPoint Excitation::set_point(double table_g, bool run_at_zero) const {
+    drivers::ShakerSetPoint point{
+        frequency_hz_, table_g, settings_.ramp_s, {}, run_at_zero && !random_};
+    if (random_) point.random = random_->set_point;
+    return point;
+}
+
 bool Excitation::ask(double table_g, Time now, bool run_at_zero) {
     stop_.excited(table_g);
-    if (!rig_.shaker.request({frequency_hz_, table_g, settings_.ramp_s, {}, run_at_zero},
-                             armed_under_))
-        return false;
+    if (!rig_.shaker.request(set_point(table_g, run_at_zero), armed_under_)) return false;
     asked_ = true;
     tell_ramp(table_g, now);
     return true;
@@ -35,6 +41,7 @@ std::string Excitation::climb(double table_g, Time now, bool& reached) {
     if (!asked_) return ask(table_g, now, table_g == 0) ? "" : "the shaker takes no set-point";
     reached = !rig_.shaker.busy() && as_commanded(table_g);
     if (reached || now - since_ <= from_seconds(settings_.ramp_s) + kRampGrace) return {};
+    if (random_) return off_command(table_g, now);
     const bool degraded = rig_.shaker.state() == drivers::LinkState::degraded;
     return fmt::format(
         "shaker: measured {:.3f} g, expected {:g} g within {:g} %{}",
@@ -47,7 +54,8 @@ void Excitation::tell_ramp(double table_g, Time now) {
     asked_at_ = now;
     const RigFrame frame(settings_.rig);
     rig_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_g_, campaign_,
-                  frame.to_raw(frame.up_at_deg(position_deg_)), frequency_hz_, transmission_});
+                  frame.to_raw(frame.up_at_deg(position_deg_)), frequency_hz_, transmission_,
+                  random_ ? random_->place : std::uint16_t{0}});
 }
 
 Excitation::Rests Excitation::come_to_rest(Time now) {
@@ -90,9 +98,32 @@ bool Excitation::stopped_by_another(Time now) {
     return now - stopped_since_ < drivers::kSecond;
 }
 
+/// Its own mean of squares strays, and is no witness: that it is at the level is its word here, and
+/// that it is so the accelerometers' abort bands tell.
+bool Excitation::plays_as_commanded(const drivers::ShakerReading& reading) const {
+    return reading.random->state == drivers::RandomReading::State::at_level && chosen();
+}
+
+bool Excitation::chosen() const {
+    constexpr double kWritten_hz = 1e-3;  // a register resolves 1 mHz
+    constexpr double kWritten_db = 0.05;  // or 0.1 dB
+    const auto reading = rig_.shaker.reading();
+    if (!reading.valid) return false;
+    const bool plays = reading.random && reading.random->random;
+    if (!random_) return !plays && std::abs(reading.frequency_hz - frequency_hz_) <= kWritten_hz;
+    const auto& wanted = random_->set_point;
+    return plays && reading.random->profile == wanted.profile &&
+           reading.random->checksum == wanted.checksum &&
+           std::abs(reading.random->level_db - wanted.level_db) < kWritten_db;
+}
+
 bool Excitation::as_commanded(double table_g) const {
     constexpr double kFrequencyToleranceHz = 0.01;  // read back; a register resolves 1 mHz
     const auto reading = rig_.shaker.reading();
+    const bool running =
+        reading.valid && reading.running && reading.state == drivers::kShakerRunning;
+    if (random_) return running && reading.random && plays_as_commanded(reading);
+    if (reading.random && reading.random->random) return false;
     const bool there = reading.state == drivers::kShakerRunning ||
                        (table_g == 0 && reading.state == drivers::kShakerRamping);
     const double tolerance_g = table_g > 0 ? settings_.amplitude_tolerance * table_g : kAtZero_g;
@@ -104,6 +135,16 @@ bool Excitation::as_commanded(double table_g) const {
 std::string Excitation::off_command(double table_g, Time now) {
     if (as_commanded(table_g) || stopped_by_another(now)) return {};
     const auto reading = rig_.shaker.reading();
+    if (random_)
+        return fmt::format(
+            "shaker off command: state {}, {}; expected profile {} at {:g} dB, at level",
+            reading.state,
+            reading.random ? fmt::format("random control {}, profile {} at {:g} dB",
+                                         static_cast<int>(reading.random->state),
+                                         reading.random->random ? reading.random->profile : 0,
+                                         reading.random->level_db)
+                           : "no registers of random vibration",
+            random_->set_point.profile, random_->set_point.level_db);
     return fmt::format("shaker off command: state {}, measured {:.3f} g, expected {:g} g",
                        reading.state, reading.measured_g, table_g);
 }

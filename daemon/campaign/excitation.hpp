@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "daemon/campaign/ports.hpp"
@@ -37,6 +38,10 @@ class Excitation {
     void place(const std::array<double, 3>& position_deg) { position_deg_ = position_deg; }
     [[nodiscard]] const std::array<double, 3>& position_deg() const { return position_deg_; }
     [[nodiscard]] double frequency_hz() const { return frequency_hz_; }
+    /// In place of a sine; none: a sine.
+    [[nodiscard]] const std::optional<RandomStop>& random() const { return random_; }
+    /// The controller has been told this kind of vibration already, by what it reads back.
+    [[nodiscard]] bool chosen() const;
 
     /// A part begins in which one thing is asked for at most: its time counts from here.
     void begin_part(drivers::Time now) {
@@ -81,12 +86,15 @@ class Excitation {
 
   private:
     void tell_ramp(double table_g, drivers::Time now);
+    [[nodiscard]] drivers::ShakerSetPoint set_point(double table_g, bool run_at_zero) const;
+    [[nodiscard]] bool plays_as_commanded(const drivers::ShakerReading& reading) const;
 
     const Settings& settings_;
     Rig& rig_;
     StopMonitor& stop_;
     std::array<double, 3> position_deg_{};
     double frequency_hz_;
+    std::optional<RandomStop> random_;
     double transmission_ = 0;            ///< see Stop
     std::map<double, double> measured_;  ///< transmissions by frequency
     double highest_g_ = 0;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,8 @@
 #include "daemon/campaign/stop_monitor.hpp"
 #include "daemon/interlock/rest_monitor.hpp"
 #include "drivers/gimbal/torquer.hpp"
+#include "drivers/shaker/shaker.hpp"
+#include "estimator/filter/measurement.hpp"
 #include "estimator/filter/settings.hpp"
 
 namespace vibrig::campaign {
@@ -18,6 +21,14 @@ inline const std::vector<std::array<double, 3>> kTable1Positions{
     {0, 0, 0},   {0, 0, 45},   {0, 0, 90},    {0, 0, 180}, {180, 0, 45}, {45, 0, 0},  {45, 0, 90},
     {90, 0, 90}, {90, 0, 180}, {180, 0, 270}, {270, 0, 0}, {270, 0, 90}, {-45, 0, 0}, {-45, 0, 90}};
 
+/// Random vibration in place of a sine.
+struct RandomStop {
+    drivers::RandomSetPoint set_point;
+    estimator::RandomVibration at_platform;
+    std::uint16_t place = 0;  ///< of its abort bands: rt::Ramp::random
+    std::string name{};       ///< of the profile
+};
+
 /// One dwell of a campaign.
 struct Stop {
     std::array<double, 3> position_deg{};  ///< as the encoders count
@@ -25,6 +36,14 @@ struct Stop {
     double frequency_hz = 0;  ///< 0: [vibration] frequency_hz
     bool verify = false;      ///< held out: no part of the fit
     double transmission = 0;  ///< platform over table at that frequency; 0: as configured
+    /// Then table_g and transmission are of the rms, and the frequency is 0.
+    std::optional<RandomStop> random = {};
+
+    /// What tells one kind of vibration from another: its frequency, or a profile's number, which
+    /// is below 0.
+    [[nodiscard]] double kind() const {
+        return random ? -static_cast<double>(random->set_point.profile) : frequency_hz;
+    }
 };
 
 /// Before each position: the platform's two channels across the vertical are brought level by fast

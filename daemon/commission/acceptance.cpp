@@ -96,6 +96,16 @@ std::string not_as_running(const std::vector<Part>& parts, const Finding& findin
     return {};
 }
 
+std::string not_as_torqued(const Json& torquers, const configuration::Loaded& file) {
+    if (!torquers.is_object() || !torquers.contains("sign")) return {};
+    const Json said = value_in(file, "levelling.torque_sign");
+    if (same_value(said, torquers["sign"])) return {};
+    return fmt::format(
+        "{}: levelling.torque_sign: found {}, expected {} as the torquers were "
+        "measured",
+        file.path, said.dump(), torquers["sign"].dump());
+}
+
 std::vector<SignStatement> sign_statements(const Json& json) {
     std::vector<SignStatement> all;
     if (!json.is_array()) return all;

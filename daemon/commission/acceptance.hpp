@@ -22,6 +22,10 @@ namespace vibrig::commission {
 [[nodiscard]] std::string not_as_running(const std::vector<Part>& parts, const Finding& finding,
                                          const Book& running, const configuration::Loaded& file);
 
+/// Why a file's levelling.torque_sign is not that of the torquers as they were measured
+/// (Finding::evidence); empty: it is, or nothing was measured.
+[[nodiscard]] std::string not_as_torqued(const Json& torquers, const configuration::Loaded& file);
+
 /// Coefficients of the certificate that a campaign has found with the other sign at more than 5
 /// sigma, in words; empty: none. Values and sigmas by estimator::parameter_names(); NaN: not known.
 [[nodiscard]] std::string against_certificate(

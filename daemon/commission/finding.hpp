@@ -19,7 +19,7 @@ inline constexpr std::array<const char*, 3> kLoudNames{"OUTER", "INNER", "AZIMUT
 struct Names {
     std::array<std::string, 3> angle;  ///< "Resolvers.Outer"
     std::array<std::string, 3> force;  ///< "AccelerometersXY.X"
-    std::string command = "GimbalCommand";
+    std::string command = "GimbalCommand", torque = "TorqueCommand";
 };
 
 /// What the configuration says that cannot be measured.
@@ -27,6 +27,7 @@ struct Stated {
     double latitude_deg = 0;
     double linear_sigma = 2;
     bool simulated = false;  ///< the rig: it cannot hurt, whatever its commands count in
+    double torque_limit_deg_h = 60;
 };
 
 /// A key and its value as the file has it, with what speaks for it.

@@ -29,7 +29,7 @@ const char* yes_no_or_unknown(std::string& value) {
 }
 
 /// Least squares, per hour.
-double slope(const std::vector<Look>& seconds, std::size_t c) {
+double slope_of(const std::vector<Look>& seconds, std::size_t c) {
     double t = 0, y = 0, tt = 0, ty = 0;
     const double n = static_cast<double>(seconds.size());
     for (const Look& one : seconds) {
@@ -201,9 +201,12 @@ void Procedure::next_drift() {
     });
 }
 
+Vec3 Procedure::drift_slope() const {
+    return {slope_of(seconds_, 0), slope_of(seconds_, 1), slope_of(seconds_, 2)};
+}
+
 void Procedure::drifted() {
-    room::FreeDrift drift{mean_.angle, {}};
-    for (std::size_t c = 0; c < 3; ++c) drift.slope[c] = slope(seconds_, c);
+    const room::FreeDrift drift{mean_.angle, drift_slope()};
     drifts_.push_back(drift);
     if (at_++ == 0) return watch_azimuth();
     next_drift();
@@ -326,6 +329,11 @@ void Procedure::decide() {
     if (earth.verdict != Verdict::decided) return conclude(Verdict::undecided, earth.why);
     if (const auto wrong = outvoted_latitude(earth, *said_of_rig_.latitude_deg); !wrong.empty())
         return conclude(Verdict::undecided, wrong);
+    earth_ = std::move(earth);
+    ask_torques();
+}
+
+void Procedure::name_rig() {
     Commanded commanded;
     commanded.known = !by_hand_;
     commanded.ratio = ratio_;
@@ -337,7 +345,7 @@ void Procedure::decide() {
         commanded.slot[c] = k;
         if (free_[k]) commanded.travel[c] = {-360, 360};
     }
-    fill_keys(finding_, earth.description, earth.rate, names_, said_of_rig_, commanded);
+    fill_keys(finding_, earth_.description, earth_.rate, names_, said_of_rig_, commanded);
     conclude(Verdict::decided, {});
 }
 

@@ -23,6 +23,7 @@ constexpr Time kStill = 20 * kSecond;  // what does not stand within it does not
 constexpr double kOneWay_deg = 165;    // a longer move goes by the start: there is one shorter way
 // Of the force's direction: a platform rocks when a slew ends.
 constexpr double kRocks_deg = 2;
+constexpr double kSlewShare = 0.02;  // ratios agree to it
 
 /// Of a force of 1 g, at least: where an accelerometer is dead the rest turns less.
 double turned_deg(const Vec3& a, const Vec3& b) {
@@ -70,6 +71,7 @@ void Procedure::attend(const std::string& by, Time wall) {
 }
 
 std::string Procedure::step_name() const {
+    if (torquing_) return "G";
     if (!gravity_.hypotheses.empty() && gravity_.verdict == Verdict::decided) return "F";
     if (extra_ > 0) return "E";
     if (at_ < plan_.size() && !careful_) return plan_[at_].slot >= 0 ? "C" : "D";
@@ -79,7 +81,8 @@ std::string Procedure::step_name() const {
 void Procedure::note(const char* what, const Json& data) const {
     if (replaying_ || !ports_.note) return;
     const std::string step = step_name();
-    ports_.note({step == "F" ? "earth" : "gimbals", step, by_, what, data});
+    const char* part = step == "F" ? "earth" : step == "G" ? "gyros" : "gimbals";
+    ports_.note({part, step, by_, what, data});
 }
 
 void Procedure::tell(const std::string& line) {
@@ -280,9 +283,11 @@ void Procedure::watch_move(Time now) {
         case drivers::GimbalState::timed_out:
             return conclude(
                 Verdict::undecided,
-                fmt::format("the command of the {} is not obeyed: not in position within its time",
-                            moving_slot_ < 3 ? std::string(kLoudNames[moving_slot_]) + " gimbal"
-                                             : std::string("gimbals")));
+                fmt::format(
+                    "the command of the {} is not obeyed: not in position within its time{}",
+                    moving_slot_ < 3 ? std::string(kLoudNames[moving_slot_]) + " gimbal"
+                                     : std::string("gimbals"),
+                    stopped_short().empty() ? "" : "; " + stopped_short()));
         case drivers::GimbalState::no_status:
             return stop("no gimbal status", now);
         default:
@@ -290,8 +295,35 @@ void Procedure::watch_move(Time now) {
     }
 }
 
+/// Why a gimbal that says it is in position is not; empty: it is, or nobody knows yet.
+std::string Procedure::stopped_short() const {
+    const Vec3 asked = legs_.front(), read = read_travel(asked);
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (channel_of_[k] == 3 || ratio_[channel_of_[k]] == 0) continue;
+        if (std::abs(read[k] - asked[k]) <= kHolds_deg + kSlewShare * std::abs(asked[k])) continue;
+        return fmt::format(
+            "the {} gimbal stands at a travel of {:+.1f} deg, {:+.1f} commanded: a "
+            "soft stop?",
+            kLoudNames[k], read[k], asked[k]);
+    }
+    return {};
+}
+
+/// What is in position short of where it was sent has a stop there, and is sent no further.
+void Procedure::keep_within(const std::string& why) {
+    const Vec3 asked = legs_.front();
+    travel_ = read_travel(asked);
+    for (std::size_t k = 0; k < 3; ++k) {
+        auto& [least, most] = limits_deg_[k];
+        if (asked[k] > 0 && travel_[k] < asked[k] - kHolds_deg) most = std::max(travel_[k], 0.0);
+        if (asked[k] < 0 && travel_[k] > asked[k] + kHolds_deg) least = std::min(travel_[k], 0.0);
+    }
+    tell("   " + why);
+}
+
 void Procedure::arrive(Time now) {
     travel_ = legs_.front();
+    if (const auto why = stopped_short(); !why.empty()) keep_within(why);
     legs_.erase(legs_.begin());
     if (!legs_.empty()) return next_leg();
     since_ = now;
@@ -345,6 +377,15 @@ Vec3 Procedure::read_travel(const Vec3& near) const {
 /// What "stop" is on this rig. Where a command's effect is not known yet nothing can be held by it.
 void Procedure::stand() {
     if (by_hand_ || !commanded_) return;
+    if (torquing_) {
+        if (!replaying_) static_cast<void>(ports_.torque({}));
+        // Held, a platform turns no further whatever its torquers do.
+        if (hold_ && released_ && ports_.sample().good) {
+            travel_ = read_travel(travel_);
+            return command_to({command_0_[0] + travel_[0], command_0_[1] + travel_[1],
+                               command_0_[2] + travel_[2]});
+        }
+    }
     if (doing_ != Doing::moving) {
         if (!hold_ && !released_) release();
         return;
@@ -369,7 +410,8 @@ void Procedure::stop(const std::string& why, Time now) {
     if (!active() || doing_ == Doing::asking) return;
     const bool drifted = doing_ == Doing::averaging && released_;
     stand();
-    interrupted_ = Interrupted{doing_, std::move(then_), drifted, unkept_};
+    interrupted_ = Interrupted{doing_, std::move(then_), drifted, unkept_, torque_};
+    torque_ = {};
     tell("stopped: " + why);
     ask_yes("go_on", "Stopped: " + why + ". Go on?", "stopped: " + why,
             [this] { go_on_after_stop(); });
@@ -383,10 +425,11 @@ void Procedure::go_on_after_stop() {
         unkept_ = unkept;
         average(wanted, then);
     };
-    if (by_hand_ || !released_) return measure();
+    if (by_hand_ || (!released_ && !was.drifted)) return measure();
     if (!was.drifted) return move(asked_, std::move(measure));
-    move(asked_, [this, measure = std::move(measure)] {
+    move(asked_, [this, again = was.torque, measure = std::move(measure)] {
         release();
+        if (torquing_) torque(again);
         unkept_ = true;  // it is, once already
         average(kLetGo_s, measure);
     });
@@ -401,6 +444,7 @@ void Procedure::halt(const std::string& why, Time now) {
 
 void Procedure::conclude(Verdict verdict, const std::string& why) {
     stand();
+    torquing_ = false;
     doing_ = Doing::nothing;
     question_ = {};
     interrupted_.reset();
@@ -419,6 +463,7 @@ Time Procedure::step(Time now, Time wall) {
     if (doing_ != Doing::asking && !by_hand_ && wall - attended_ > kAbsent)
         stop(fmt::format("nobody has been at the tool for {:.0f} s", to_seconds(kAbsent)), now);
     if (doing_ == Doing::moving) watch_move(now);
+    watch_torque(now);
     if (doing_ == Doing::settling && now - since_ >= drivers::from_seconds(careful_ ? 1.5 : 3)) {
         auto then = std::move(then_);
         then();
@@ -437,8 +482,8 @@ std::string Procedure::progress() const {
     const std::string what = doing_ == Doing::asking ? "asked: " + question_.text
                              : lines_.empty()        ? "first look"
                                                      : lines_.back();
-    return fmt::format("{}: {}, {} positions, {} free drifts", by_, what, stops_.size(),
-                       drifts_.size());
+    return fmt::format("{}, step {}, {} positions, {} free drifts; {}", by_, step_name(),
+                       stops_.size(), drifts_.size(), what);
 }
 
 Json Procedure::state(std::size_t after) const {

@@ -10,7 +10,7 @@
 #include "daemon/commission/finding.hpp"
 #include "daemon/domain/events.hpp"
 #include "drivers/gimbal/gimbal.hpp"
-#include "estimator/commissioning/earth.hpp"
+#include "estimator/commissioning/torques.hpp"
 
 namespace vibrig::commission {
 
@@ -34,6 +34,8 @@ struct Ports {
     std::function<void(const Vec3& command_deg, drivers::Time now)> slew;
     std::function<void(drivers::Time now)> release;
     std::function<drivers::GimbalState()> gimbal;
+    /// By the commands' names, as they are sent: without levelling.torque_sign. Empty: no torquers.
+    std::function<bool(const Vec3& deg_per_h)> torque;
     std::function<void(Severity, const std::string&)> event;
     /// What was answered and measured so far, on disk when this returns: begin_again() takes it.
     std::function<void(const Json& log)> keep;
@@ -55,9 +57,10 @@ struct Question {
     std::function<std::string(std::string&)> wrong;
 };
 
-/// Steps A to F (docs/commissioning.md): looks, moves one gimbal at a time, names the rig by
-/// gravity and the Earth's rate. What moves is decided here: nothing moves without a permission,
-/// beyond the travel that was stated, or while nobody is there. Control thread only; never waits.
+/// Steps A to G (docs/commissioning.md): looks, moves one gimbal at a time, names the rig by
+/// gravity, the Earth's rate and torques. What moves is decided here: nothing moves without a
+/// permission, beyond the travel that was stated, or while nobody is there. Control thread only;
+/// never waits.
 class Procedure {
   public:
     Procedure(Names names, Stated stated, Ports ports)
@@ -118,6 +121,8 @@ class Procedure {
     void conclude(Verdict verdict, const std::string& why);
     void watch_move(drivers::Time now);
     void arrive(drivers::Time now);
+    [[nodiscard]] std::string stopped_short() const;
+    void keep_within(const std::string& why);
     void take_second(drivers::Time now);
     void stand();
     void release();
@@ -180,9 +185,20 @@ class Procedure {
     void ask_latitude();
     void ask_drawing();
     void decide();
+    void name_rig();
+    [[nodiscard]] Vec3 drift_slope() const;
     /// Travel that brings a gimbal of the description to an angle, the shorter way.
     [[nodiscard]] double travel_to(std::size_t gimbal, double angle_deg) const;
     [[nodiscard]] std::size_t slot_of(std::size_t gimbal) const;
+
+    // torques.cpp: G
+    void ask_torques();
+    void plan_torques();
+    void next_torque();
+    void torque(const Vec3& deg_per_h);
+    void watch_torque(drivers::Time now);
+    void decide_torques();
+    void take_torques(const estimator::commissioning::TorqueFinding& f);
 
     Names names_;
     Stated stated_;
@@ -200,6 +216,7 @@ class Procedure {
         Then then;
         bool drifted = false;  ///< it was let go for a measurement
         bool unkept = false;
+        Vec3 torque{};
     };
     std::optional<Interrupted> interrupted_;  ///< by a stop, or the end of a daemon
 
@@ -262,6 +279,13 @@ class Procedure {
     estimator::commissioning::GravityFinding gravity_;
     estimator::commissioning::Description named_;
     estimator::commissioning::Statements said_of_rig_;
+    estimator::commissioning::EarthFinding earth_;
+    double torque_deg_h_ = 0;
+    bool torquing_ = false;  ///< step G, whatever is commanded now
+    Vec3 torque_{};          ///< commanded, or to be commanded once it goes on
+    Look torque_from_;       ///< when it was
+    std::vector<Vec3> torque_plan_;
+    std::vector<estimator::commissioning::Torqued> torqued_;
     Look sense_before_;
     bool sense_again_ = false;  ///< asked when all was measured
     Finding finding_;

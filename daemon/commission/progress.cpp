@@ -167,7 +167,8 @@ bool Procedure::replay_mean(const Json& entry) {
 /// What was said behind the question that is asked again stands.
 void Procedure::leave_answers(const Json& log, std::size_t from) {
     for (; from < log.size(); ++from)
-        if (const std::string id = log.at(from).value("id", ""); !id.empty() && id != again_)
+        if (const std::string id = log.at(from).value("id", "");
+            !id.empty() && id != again_ && id != "permit.torque")  // what moves it is asked anew
             left_[id] = log.at(from).at("value");
 }
 
@@ -177,8 +178,8 @@ void Procedure::permit_again() {
     tell(done);
     if (by_hand_ && doing_ == Doing::asking) return;  // nothing is commanded
     if (doing_ == Doing::asking) waiting_ = Waiting{std::move(question_), std::move(answered_)};
-    interrupted_ =
-        Interrupted{doing_, std::move(then_), doing_ == Doing::averaging && released_, unkept_};
+    interrupted_ = Interrupted{doing_, std::move(then_), doing_ == Doing::averaging && released_,
+                               unkept_, std::exchange(torque_, Vec3{})};
     if (by_hand_)
         return ask_yes("permit.resume", "Is the platform as it was left?",
                        "the platform is not as it was left", [this] { go_on_after_stop(); });

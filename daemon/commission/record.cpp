@@ -12,6 +12,7 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "daemon/commission/person_signature.hpp"
 #include "daemon/journal/latches.hpp"
 #include "daemon/journal/signing_key.hpp"
 #include "daemon/record/digest.hpp"
@@ -185,22 +186,51 @@ std::string instant_of(std::int64_t utc_ns) {
 
 std::string date_of(std::int64_t utc_ns) { return instant_of(utc_ns).substr(0, 10); }
 
+namespace {
+
+Json json_of(const PartRecord& r) {
+    Json keys = Json::object();
+    for (const auto& [name, value] : r.keys) keys[name] = value;
+    return {{"keys", keys},
+            {"meaning", r.meaning},
+            {"sha256", record::sha256_of_text(text_of(r.keys))},
+            {"evidence", r.evidence},
+            {"by", r.by},
+            {"utc", instant_of(r.utc_ns)},
+            {"utc_ns", r.utc_ns},
+            {"vibrig", r.version}};
+}
+
+/// Of parts that are proven anew, or no more.
+void drop_signatures_of(Record& record, const std::vector<Part>& parts) {
+    std::erase_if(record.persons, [&parts](const PersonSignature& one) {
+        return std::ranges::find_first_of(one.parts, parts) != one.parts.end();
+    });
+}
+
+}  // namespace
+
+std::string digest_of(const PartRecord& part) {
+    return record::sha256_of_text(json_of(part).dump());
+}
+
+std::string statement_of(const std::string& rig, const std::map<Part, std::string>& digests) {
+    std::string text = "commissioning of rig " + rig + "\n";
+    for (const auto& [part, digest] : digests)
+        text += std::string(name_of(part)) + " " + digest + "\n";
+    return text;
+}
+
 std::string to_json(const Record& record, const journal::SigningKey* key) {
     Json parts = Json::object();
-    for (const auto& [part, r] : record.parts) {
-        Json keys = Json::object();
-        for (const auto& [name, value] : r.keys) keys[name] = value;
-        parts[name_of(part)] = {{"keys", keys},
-                                {"meaning", r.meaning},
-                                {"sha256", record::sha256_of_text(text_of(r.keys))},
-                                {"evidence", r.evidence},
-                                {"by", r.by},
-                                {"utc", instant_of(r.utc_ns)},
-                                {"utc_ns", r.utc_ns},
-                                {"vibrig", r.version}};
-    }
+    for (const auto& [part, r] : record.parts) parts[name_of(part)] = json_of(r);
     Json whole{
         {"version", 1}, {"rig", record.rig}, {"simulated", record.simulated}, {"parts", parts}};
+    for (const auto& one : record.persons) {
+        Json names = Json::array();
+        for (const Part part : one.parts) names.push_back(name_of(part));
+        whole["persons"].push_back({{"by", one.by}, {"parts", names}, {"cms", one.cms}});
+    }
     const std::string hash = record::sha256_of_text(whole.dump());
     whole["sha256"] = hash;
     whole["signature"] = nullptr;
@@ -238,6 +268,12 @@ Record record_from_json(const std::string& text) {
             r.version = json.at("vibrig");
             if (json.at("sha256") != record::sha256_of_text(text_of(r.keys)))
                 throw std::invalid_argument(name + ": its SHA-256 is not that of its keys");
+        }
+        for (const auto& json : whole.value("persons", Json::array())) {
+            PersonSignature one{json.at("by"), {}, json.at("cms")};
+            for (const std::string name : json.at("parts"))
+                if (const auto part = part_named(name)) one.parts.push_back(*part);
+            record.persons.push_back(std::move(one));
         }
         return record;
     } catch (const nlohmann::json::exception& error) {
@@ -282,6 +318,35 @@ std::string Book::doubt() const {
     return "it is signed with another key than " + key_path();
 }
 
+/// Why a person's signature is not what it is said to be; empty: it is.
+std::string Book::doubt_of(const PersonSignature& one) const {
+    const std::string& authority = loaded_.configuration.server.clients_ca;
+    if (authority.empty()) return "server.clients_ca, its authority, is not stated";
+    std::map<Part, std::string> digests;
+    std::int64_t utc_ns = 0;
+    for (const Part part : one.parts) {
+        if (!record_->parts.contains(part)) return fmt::format("{} is gone", name_of(part));
+        digests[part] = digest_of(record_->parts.at(part));
+        utc_ns = std::max(utc_ns, record_->parts.at(part).utc_ns);
+    }
+    try {
+        const auto name =
+            signer_of_detached(statement_of(record_->rig, digests), one.cms, authority, utc_ns);
+        return journal::same_person(name, one.by) ? "" : "it is that of " + name;
+    } catch (const std::invalid_argument& wrong) {
+        return wrong.what();
+    }
+}
+
+void Book::sign(const std::vector<Part>& parts, const std::string& by, const std::string& cms) {
+    if (!record_ || parts.empty()) throw std::invalid_argument("there is nothing to sign");
+    PersonSignature one{by, parts, cms};
+    if (const auto why = doubt_of(one); !why.empty()) throw std::invalid_argument(why);
+    Record fresh = *record_;
+    fresh.persons.push_back(std::move(one));
+    write(std::move(fresh));
+}
+
 std::string Book::key_path() const {
     return (std::filesystem::path(loaded_.configuration.commission.folder) / "record.key").string();
 }
@@ -294,7 +359,7 @@ std::string Book::path() const {
 std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
     std::vector<Standing> all;
     for (const Part part : kParts) {
-        Standing s{part, false, "no record", {}, std::nullopt};
+        Standing s{part, false, "no record", {}, {}, std::nullopt};
         if (record_ && record_->parts.contains(part)) {
             const PartRecord& r = record_->parts.at(part);
             s.record = r;
@@ -314,11 +379,27 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
             else if (age_days > valid)
                 s.why = fmt::format("proven on {}, {:.0f} days ago, {:g} at most",
                                     date_of(r.utc_ns), age_days, valid);
+            for (const auto& one : record_->persons) {
+                if (std::ranges::find(one.parts, part) == one.parts.end()) continue;
+                if (const auto why = doubt_of(one); !why.empty())
+                    s.why = fmt::format(
+                        "the signature of {} is not that of what the record says "
+                        "({})",
+                        one.by, why);
+                else
+                    s.signed_by += (s.signed_by.empty() ? "" : ", ") + one.by;
+            }
             s.proven = s.why.empty();
         }
         all.push_back(std::move(s));
     }
     return all;
+}
+
+Json Book::evidence(Part part) const {
+    if (!record_ || !record_->parts.contains(part)) return Json::object();
+    const Json& all = record_->parts.at(part).evidence;
+    return all.is_object() ? all : Json::object();
 }
 
 std::string Book::refusal(std::int64_t utc_ns, bool the_shaker) const {
@@ -342,6 +423,7 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
     Record fresh = record_.value_or(Record{});
     fresh.simulated = loaded_.configuration.simulated();
     fresh.rig = host_name();
+    drop_signatures_of(fresh, parts);
     for (const Part part : parts) {
         PartRecord one = what;
         one.keys = keys_of(part, as);
@@ -354,6 +436,7 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
 void Book::withdraw(Part part) {
     if (!record_ || !record_->parts.contains(part)) return;
     Record fresh = *record_;
+    drop_signatures_of(fresh, {part});
     fresh.parts.erase(part);
     write(std::move(fresh));
 }
@@ -385,6 +468,8 @@ Json Book::status(std::int64_t utc_ns) const {
             one["by"] = s.record->by;
             one["utc"] = instant_of(s.record->utc_ns);
             one["evidence"] = s.record->evidence;
+            one["signed_by"] = s.signed_by;
+            one["digest"] = digest_of(*s.record);
         }
         parts[name_of(s.part)] = one;
     }
@@ -393,6 +478,7 @@ Json Book::status(std::int64_t utc_ns) const {
             {"simulated", c.simulated()},
             {"refusal", refusal(utc_ns)},
             {"trouble", trouble_},
+            {"rig", record_ ? record_->rig : host_name()},
             {"file", path()},
             {"sha256", sha256()},
             {"signed_with", signed_with()},

@@ -59,11 +59,19 @@ struct PartRecord {
     std::string version;  ///< of Vibrig
 };
 
+/// A person's own signature under parts of a record, made with the person's certificate.
+struct PersonSignature {
+    std::string by;  ///< as the certificate names the person
+    std::vector<Part> parts;
+    std::string cms;  ///< detached, over statement_of() these parts; hexadecimal
+};
+
 /// What is proven of a rig, one file for all parts.
 struct Record {
     std::string rig;
     bool simulated = false;
     std::map<Part, PartRecord> parts;
+    std::vector<PersonSignature> persons{};
     std::string signed_with;  ///< public key, hexadecimal; empty: it carries no signature
 };
 
@@ -76,12 +84,19 @@ struct Record {
 /// Throws std::invalid_argument: no such text, or one that is not as it was written.
 [[nodiscard]] Record record_from_json(const std::string& text);
 
+/// SHA-256 of all that a record says of a part.
+[[nodiscard]] std::string digest_of(const PartRecord& part);
+/// What a person signs: rig, and each part with its digest_of().
+[[nodiscard]] std::string statement_of(const std::string& rig,
+                                       const std::map<Part, std::string>& digests);
+
 /// How a part stands against a configuration.
 struct Standing {
     Part part = Part::bus;
     bool proven = false;
-    std::string why;   ///< not proven
-    std::string told;  ///< proven, but a zero has moved since
+    std::string why;          ///< not proven
+    std::string told;         ///< proven, but a zero has moved since
+    std::string signed_by{};  ///< a person's certificate
     std::optional<PartRecord> record;
 };
 
@@ -102,9 +117,15 @@ class Book {
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
     /// What the daemon runs with, as it was when it started.
     [[nodiscard]] const Keys& keys(Part part) const { return keys_.at(part); }
+    /// Of a part as it was proven; empty: it was not.
+    [[nodiscard]] Json evidence(Part part) const;
     /// Takes a part in and writes the file. Throws std::runtime_error that names the file.
     void prove(const std::vector<Part>& parts, const PartRecord& what,
                const configuration::Loaded& as);
+    /// Takes a person's signature in, and writes the file. The authority that the certificate has
+    /// to come from is server.clients_ca. Throws std::invalid_argument that says what does not
+    /// hold, and as prove().
+    void sign(const std::vector<Part>& parts, const std::string& by, const std::string& cms);
     /// Takes a part out, if it is in, and writes the file. Throws as prove().
     void withdraw(Part part);
     [[nodiscard]] Json status(std::int64_t utc_ns) const;
@@ -117,6 +138,7 @@ class Book {
     [[nodiscard]] std::string path() const;
     [[nodiscard]] std::string key_path() const;
     [[nodiscard]] std::string doubt() const;
+    [[nodiscard]] std::string doubt_of(const PersonSignature& one) const;
     void write(Record fresh);
 
     const configuration::Loaded& loaded_;

@@ -15,6 +15,7 @@
 #include "daemon/configuration/cross_checks.hpp"
 #include "daemon/configuration/forms.hpp"
 #include "daemon/configuration/nearest.hpp"
+#include "daemon/configuration/random_profiles.hpp"
 #include "daemon/configuration/schema.hpp"
 #include "daemon/configuration/value.hpp"
 #include "daemon/plan/plan_file.hpp"
@@ -165,7 +166,14 @@ void take_plan(Configuration& c) {
     const auto transmission = [&c](std::optional<double> hz) {
         return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
     };
+    std::size_t number = 0;
     for (const auto& run : plan::read_plan(c.campaign.plan, transmission)) {
+        const std::string place =
+            c.campaign.plan + ": runs[" + std::to_string(number++) + "].profile";
+        if (!run.profile.empty()) {
+            c.campaign.stops.insert(c.campaign.stops.end(), run.count, random_stop(c, run, place));
+            continue;
+        }
         campaign::Stop stop{run.position_deg, run.table_g, run.table_g > 0 ? run.frequency_hz : 0,
                             run.verify};
         // At the reference frequency the loop check measures it.
@@ -344,8 +352,9 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     if (!reader.places().contains("zeroing.both_ways"))
         take_the_ways_of_zeroing(c, reader.places().contains("zeroing.second_axis"));
     take_mount(c, reader.places());
-    loaded.effective = effective_of(c, name, reader.places());
     if (!c.profiles.empty()) take_profiles(c, name, reader.places().at("profile"), problems);
+    // With what the profiles' files say: a recording is read without them.
+    loaded.effective = effective_of(c, name, reader.places());
 
     const double factor = to_g_peak(c.amplitude_unit, c.estimator.gravity_mps2);
     c.shaker.registers.amplitude.scale *= factor;

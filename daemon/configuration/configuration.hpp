@@ -9,6 +9,7 @@
 #include "daemon/campaign/settings.hpp"
 #include "daemon/fleet/settings.hpp"
 #include "daemon/interlock/interlock_table.hpp"
+#include "daemon/interlock/random_witness.hpp"
 #include "daemon/record/settings.hpp"
 #include "drivers/annunciator/annunciator.hpp"
 #include "drivers/can/can_port.hpp"
@@ -78,6 +79,8 @@ struct Configuration {
         /// transmission: Hz and platform over table; empty: "pads"
         std::vector<std::pair<double, double>> transmission;
         double pads_damping = 0.2;
+        /// Of the mean square that a controller plays about its profile, 1 sigma.
+        double controller_gain = 0.01;
         double highest_hz = 500;           ///< of what a survey plans
         double elastic_beyond = 1;         ///< see estimator::spectrum::PredictionOptions
         double tolerance_deg_h = 0;        ///< of a verification; 0: any
@@ -91,6 +94,10 @@ struct Configuration {
         bool at_table = false;
     };
     std::vector<NamedProfile> profiles;
+    /// Of the profiles that the plan plays: numbers, and abort bands; places as RandomStop::place
+    /// less 1.
+    std::vector<std::uint16_t> played_numbers;
+    std::vector<rt::RandomWitness::Settings> abort_bands;
     std::string socket = "/run/vibrig/vibrigd.sock";  ///< [server] socket
     /// [server]: who may command at the socket, and where else is listened; empty: all, nowhere
     struct Server {

@@ -353,6 +353,7 @@ void CrossCheck::limits() {
     // Each level at its frequency, once.
     std::vector<std::pair<double, double>> asked;
     for (const auto& stop : c_.campaign.stops) {
+        if (stop.random) continue;  // its peaks are the profile's
         const std::pair one{stop.table_g,
                             stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz};
         if (std::find(asked.begin(), asked.end(), one) == asked.end()) asked.push_back(one);

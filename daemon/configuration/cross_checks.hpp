@@ -42,6 +42,7 @@ class CrossCheck {
     void real_rig();
     void registers_stated();
     void registers();
+    void random_registers();
     void writable_registers_apart();
     void set_points_fit();
     void limits();

@@ -67,6 +67,8 @@ std::string registers() {
     Configuration defaults;
     for (const Key& first : schema()) {
         if (!first.name.starts_with(kPrefix) || !first.name.ends_with(kAddress)) continue;
+        // Registers that a controller need not have stand in the keys' reference.
+        if (first.write(defaults).empty()) continue;
         const std::string role =
             first.name.substr(kPrefix.size(), first.name.size() - kPrefix.size() - kAddress.size());
         std::string row = role + " = { address = \"" + kBlank + '"';

@@ -39,16 +39,24 @@ void CrossCheck::registers_stated() {
     };
     if (!sound({"shaker.registers"}) || !c_.shaker.registers.watchdog) return;
     const proto::ShakerRegisters& r = c_.shaker.registers;
-    for (const Role& role : {Role{"frequency", &r.frequency, true},
-                             {"amplitude", &r.amplitude, true},
-                             {"ramp_time", &r.ramp_time, true},
-                             {"run", &r.run, false},
-                             {"watchdog", &*r.watchdog, false},
-                             {"watchdog_timeout", &r.watchdog_timeout, true},
-                             {"state", &r.state, false},
-                             {"fault", &r.fault, false},
-                             {"emergency_stop", &r.emergency_stop, false},
-                             {"measured_amplitude", &r.measured_amplitude, true}}) {
+    std::vector<Role> roles{{"frequency", &r.frequency, true},
+                            {"amplitude", &r.amplitude, true},
+                            {"ramp_time", &r.ramp_time, true},
+                            {"run", &r.run, false},
+                            {"watchdog", &*r.watchdog, false},
+                            {"watchdog_timeout", &r.watchdog_timeout, true},
+                            {"state", &r.state, false},
+                            {"fault", &r.fault, false},
+                            {"emergency_stop", &r.emergency_stop, false},
+                            {"measured_amplitude", &r.measured_amplitude, true}};
+    if (const auto& random = r.random)
+        roles.insert(roles.end(), {{"mode", &random->mode, false},
+                                   {"profile_number", &random->profile_number, false},
+                                   {"profile_level_db", &random->profile_level_db, true},
+                                   {"profile_checksum", &random->profile_checksum, false},
+                                   {"measured_g_rms", &random->measured_g_rms, true},
+                                   {"control_state", &random->control_state, false}});
+    for (const Role& role : roles) {
         const std::string key = std::string("shaker.registers.") + role.name;
         const auto stated = [&](const char* part) { return places_.contains(key + "." + part); };
         const auto miss = [&](const std::string& what) {

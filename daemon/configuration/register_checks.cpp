@@ -35,6 +35,13 @@ std::vector<Role> roles_of(const proto::ShakerRegisters& r) {
     if (r.watchdog) {
         roles.push_back({"watchdog", &*r.watchdog, true});
     }
+    if (const auto& random = r.random)
+        roles.insert(roles.end(), {{"mode", &random->mode, true},
+                                   {"profile_number", &random->profile_number, true},
+                                   {"profile_level_db", &random->profile_level_db, true},
+                                   {"profile_checksum", &random->profile_checksum, false},
+                                   {"measured_g_rms", &random->measured_g_rms, false},
+                                   {"control_state", &random->control_state, false}});
     return roles;
 }
 
@@ -42,6 +49,24 @@ int words_of(const Register& reg) {
     const bool two = reg.type == RegisterType::u32 || reg.type == RegisterType::i32 ||
                      reg.type == RegisterType::f32;
     return two ? 2 : 1;
+}
+
+std::string name_of(const Register& reg) {
+    switch (reg.type) {
+        case RegisterType::u16:
+            return "u16";
+        case RegisterType::i16:
+            return "i16";
+        case RegisterType::u32:
+            return "u32";
+        case RegisterType::i32:
+            return "i32";
+        case RegisterType::f32:
+            return "f32";
+        case RegisterType::bits:
+            return "bits";
+    }
+    return "?";
 }
 
 double largest(RegisterType type) {
@@ -95,6 +120,40 @@ void CrossCheck::registers() {
         }
     }
     writable_registers_apart();
+    random_registers();
+}
+
+/// All of them or none: what is not read back cannot be played.
+void CrossCheck::random_registers() {
+    const auto& random = c_.shaker.registers.random;
+    if (!random) return;
+    for (const char* role : {"mode", "profile_number", "profile_level_db", "profile_checksum",
+                             "measured_g_rms", "control_state"}) {
+        const std::string key = std::string("shaker.registers.") + role + ".address";
+        if (!places_.contains(key))
+            problems_.add({}, key, "nothing",
+                          "an address: random vibration needs mode, profile_number, "
+                          "profile_level_db, profile_checksum, measured_g_rms and control_state");
+    }
+    const auto type_of = [this](const char* role, const Register& reg, bool good,
+                                const char* expected) {
+        if (good) return;
+        const std::string key = std::string("shaker.registers.") + role;
+        refuse({key + ".type", key + ".address"}, name_of(reg), expected);
+    };
+    using enum RegisterType;
+    const RegisterType level = random->profile_level_db.type;
+    type_of("profile_level_db", random->profile_level_db,
+            level == i16 || level == i32 || level == f32,
+            "i16, i32 or f32: levels are below 0 too");
+    type_of("profile_checksum", random->profile_checksum, random->profile_checksum.type == u32,
+            "u32");
+    for (const auto& [role, reg] :
+         {std::pair{"mode", &random->mode}, std::pair{"profile_number", &random->profile_number},
+          std::pair{"control_state", &random->control_state}})
+        type_of(role, *reg, reg->type == u16 || reg->type == u32, "u16 or u32");
+    type_of("measured_g_rms", random->measured_g_rms, random->measured_g_rms.type != bits,
+            "a number");
 }
 
 void CrossCheck::writable_registers_apart() {

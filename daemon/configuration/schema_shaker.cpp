@@ -150,6 +150,39 @@ void add_watchdog_keys(std::vector<Key>& keys) {
     }
 }
 
+/// Of a controller that plays random vibration too: what states one of them has them all, and
+/// --check shows none where there are none.
+void add_random_keys(std::vector<Key>& keys) {
+    using proto::RandomRegisters;
+    const std::size_t first = keys.size();
+    const auto add = [&keys](const char* role, const char* unit, const char* doc,
+                             Register RandomRegisters::*member) {
+        add_register_keys(keys, role, unit, doc, [member](C& c) -> Register& {
+            auto& random = c.shaker.registers.random;
+            if (!random) random.emplace();
+            return (*random).*member;
+        });
+    };
+    add("mode", "", "0 sine, 1 random; with spectrum.mode \"mixed\", as the five that follow",
+        &RandomRegisters::mode);
+    add("profile_number", "", "of the profile that the controller is to play",
+        &RandomRegisters::profile_number);
+    add("profile_level_db", "dB", "level about the profile; a type with a sign",
+        &RandomRegisters::profile_level_db);
+    add("profile_checksum", "",
+        "CRC-32 of the profile in force, over Hz and g^2/Hz of each point as big-endian floats",
+        &RandomRegisters::profile_checksum);
+    add("measured_g_rms", "g", "measured rms at the table", &RandomRegisters::measured_g_rms);
+    add("control_state", "",
+        "low four bits 0 idle, 1 levelling, 2 at level, 3 aborted; 0x10: its abort bands are "
+        "armed; high byte: why it aborted",
+        &RandomRegisters::control_state);
+    for (std::size_t i = first; i < keys.size(); ++i)
+        keys[i].write = [write = std::move(keys[i].write)](C& c) {
+            return c.shaker.registers.random ? write(c) : std::string();
+        };
+}
+
 }  // namespace
 
 void add_shaker_keys(std::vector<Key>& keys) {
@@ -175,6 +208,7 @@ void add_shaker_keys(std::vector<Key>& keys) {
     add_register_keys(keys, "measured_amplitude", "amplitude_unit",
                       "measured amplitude at the table",
                       [](C& c) -> Register& { return c.shaker.registers.measured_amplitude; });
+    add_random_keys(keys);
 }
 
 }  // namespace vibrig::configuration

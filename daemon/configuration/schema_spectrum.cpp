@@ -188,6 +188,10 @@ void read_profiles(const toml::node& node, C& c, Problems& problems) {
                 problems.add(place_of(table->source()), key + ".name",
                              write_text(profile.profile.name) + " a second time",
                              "a name of its own");
+            if (profile.number > 0 && other.number == profile.number)
+                problems.add(place_of(table->source()), key + ".number",
+                             std::to_string(profile.number) + " a second time",
+                             "a number of its own");
         }
         c.profiles.push_back(std::move(profile));
     }
@@ -199,8 +203,9 @@ std::string write_profiles(C& c) {
         const auto& d = one.profile.direction;
         text += (text.empty() ? "{ name = " : ", { name = ") + write_text(one.profile.name) +
                 (one.number > 0 ? ", number = " + std::to_string(one.number) : "") +
-                (one.file.empty() ? ", psd = " + write_pairs(one.profile.psd)
-                                  : ", file = " + write_text(one.file)) +
+                (one.file.empty() || !one.profile.psd.empty()
+                     ? ", psd = " + write_pairs(one.profile.psd)
+                     : ", file = " + write_text(one.file)) +
                 (one.profile.g_rms > 0 ? ", g_rms = " + write_number(one.profile.g_rms) : "") +
                 ", direction = " + write_triple({d[0], d[1], d[2]}) +
                 ", at = " + (one.at_table ? "\"table\"" : "\"platform\"") + " }";
@@ -233,6 +238,10 @@ void add_spectrum_keys(std::vector<Key>& keys) {
                     kTransmissionSchema});
     keys.push_back(number("spectrum.pads_damping", "", {0.001, 1}, "of the isolators, of critical",
                           [](C& c) -> double& { return c.spectrum.pads_damping; }));
+    keys.push_back(number("spectrum.controller_gain", "", {1e-6, 1},
+                          "of the mean square that the controller plays about a profile, relative, "
+                          "1 sigma",
+                          [](C& c) -> double& { return c.spectrum.controller_gain; }));
     keys.push_back(number("spectrum.highest_hz", "Hz", {1, 20'000},
                           "up to which a survey is planned for a profile",
                           [](C& c) -> double& { return c.spectrum.highest_hz; }));

@@ -17,6 +17,11 @@ struct StopDone {
     std::int64_t begun_utc_ns = 0;
     double frequency_hz = 0;  ///< 0: the configuration's
     bool held_out = false;
+    std::uint16_t profile = 0;  ///< of random vibration, its number in the controller; 0: none
+    /// As campaign::Stop::kind().
+    [[nodiscard]] double kind() const {
+        return profile > 0 ? -static_cast<double>(profile) : frequency_hz;
+    }
 };
 
 /// What the platform drifted by at the end of a levelling, which torqued it out.

@@ -6,8 +6,10 @@ namespace {
 
 std::set<std::string> registers(std::set<std::string> names) {
     const std::string table = "shaker.registers.";
-    for (const char* role : {"frequency", "amplitude", "watchdog", "watchdog_timeout", "state",
-                             "fault", "emergency_stop"})
+    for (const char* role :
+         {"frequency", "amplitude", "watchdog", "watchdog_timeout", "state", "fault",
+          "emergency_stop", "mode", "profile_number", "profile_level_db", "profile_checksum",
+          "measured_g_rms", "control_state"})
         for (const char* field :
              {"address", "type", "word_order", "table", "access", "scale", "mask"})
             names.insert(table + role + "." + field);

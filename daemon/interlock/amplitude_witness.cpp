@@ -185,6 +185,12 @@ AmplitudeWitness::Verdict AmplitudeWitness::verdict(const Situation& now) noexce
     return verdict;
 }
 
+AmplitudeWitness::Verdict::Finding AmplitudeWitness::stuck(const Situation& now) const noexcept {
+    Verdict verdict;
+    static_cast<void>(look_for_stuck(now, now.steady ? now.ramp.target_g : 0, verdict));
+    return verdict.stuck;
+}
+
 double AmplitudeWitness::range(std::size_t channel, std::size_t blocks) const noexcept {
     const double fewest = std::max(
         3.0, fewest_ * static_cast<double>(blocks) / static_cast<double>(LockIn<1>::kBlocks));

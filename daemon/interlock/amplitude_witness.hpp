@@ -20,6 +20,9 @@ struct Ramp {
     std::array<double, 3> raw_up{};
     double frequency_hz = 0;  ///< 0: the configuration's
     double transmission = 0;  ///< platform over table there; 0: as configured or measured
+    /// Random vibration: its place in Interlock::Limits::random, from 1; amplitudes are rms then,
+    /// and so is the transmission. 0: a sine.
+    std::uint16_t random = 0;
 
     std::uint64_t number = 0;  ///< the interlock's
 
@@ -72,6 +75,9 @@ class AmplitudeWitness {
     /// True: a block is complete, and verdict() judges the newest.
     [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
     [[nodiscard]] Verdict verdict(const Situation& situation) noexcept;
+    /// Whether an accelerometer does not move that should; all that is told of random vibration,
+    /// whose peaks are beyond its rms.
+    [[nodiscard]] Verdict::Finding stuck(const Situation& situation) const noexcept;
     [[nodiscard]] double window_s() const noexcept { return drivers::to_seconds(window_); }
 
   private:

@@ -52,6 +52,9 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
     std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
     if (rules_.size() > kMostRules) rules_.resize(kMostRules);
     mismatches_ = shaker_.counters().read_back_mismatches;
+    for (const auto& one : limits.random) random_.emplace_back(one);
+    bands_needed_ =
+        !std::ranges::all_of(random_, [](const RandomWitness& one) { return one.fast(); });
 }
 
 void Interlock::command(double table_g, const std::array<double, 3>& position_deg) noexcept {
@@ -140,15 +143,18 @@ void Interlock::check(const drivers::Sample& sample,
     const Time now = sample.time;
     const Guard guard = follow_guard();
     table_bound_ = sample.of(Channel::table_accel) != drivers::Quality::unbound;
-    if (seconds_.add(sample)) second_.publish(seconds_.mean());
+    if (seconds_.add(sample)) {
+        MeanMotion second = seconds_.mean();
+        // A second of random vibration has a mean of its own.
+        second.good = second.good && !(guard == Guard::excitation && at_random());
+        second_.publish(second);
+    }
     if (guard == Guard::excitation) {
         judge(By::sample, Trip::loop_open, !platform.loop_closed, now);
         judge(By::sample, Trip::platform_fault, platform.fault, now);
         check_witnesses(sample);
-        const bool told = sample.of(Channel::table_accel) == drivers::Quality::good;
         judge(By::sample, Trip::over_amplitude,
-              verdict_.over_limit.wrong || (told && !(std::abs(sample.table_accel) <= table_g_)),
-              now);
+              verdict_.over_limit.wrong || table_beyond_limit(sample), now);
         check_motion(sample);
         if (const double nis = nis_.load(); nis != 0)
             judge(By::sample, Trip::filter_divergence, nis, now);
@@ -160,7 +166,18 @@ void Interlock::check(const drivers::Sample& sample,
     judge(By::sample, Trip::server, server_stuck_.load(), now);
 }
 
-void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
+/// One reading of the table. Of random vibration single values go beyond three sigma all the time,
+/// to which its level was checked; beyond six hardly ever.
+bool Interlock::table_beyond_limit(const drivers::Sample& sample) const noexcept {
+    constexpr double kHardlyEver = 6.1;  // sigmas, once in 1e9
+    if (sample.of(Channel::table_accel) != drivers::Quality::good) return false;
+    const double limit_g =
+        at_random() ? std::max(table_g_, kHardlyEver * std::max(told_.start_g, told_.target_g))
+                    : table_g_;
+    return !(std::abs(sample.table_accel) <= limit_g);
+}
+
+void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
     const std::uint64_t before = told_.number;
     static_cast<void>(ramp_.try_read(told_));
     if (told_.number != before) {
@@ -168,14 +185,39 @@ void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
         const double hz = told_.frequency_hz > 0 ? told_.frequency_hz : frequency_hz_;
         witness_.retune(hz);
         seconds_.retune(hz);
+        if (told_.random > random_.size()) told_.random = 0;
+        if (told_.random > 0 && told_.target_g > told_.start_g) {
+            RandomWitness& witness = random_[told_.random - 1U];
+            if (told_.start_g == 0) witness.begin();
+            motion_.begin(witness.time_for_tilt_s(told_.target_g * transmission_told()));
+            verdict_ = {};
+        }
     }
     const Time now = std::max(sample.time, now_);
     if (controller_began_ == 0 && !shaker_.busy() && !shaker_.stop_pending())
         controller_began_ = std::max(now, told_.begin);
+}
+
+void Interlock::check_random(const drivers::Sample& sample) noexcept {
+    const bool steady = commanded_g_.load() > 0;
+    const auto found = random_[told_.random - 1U].add(sample, {told_, steady, transmission_told()});
+    for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(found.seen_g[i]);
+    const bool complete = witness_.add(sample);
+    if (proving_.load()) return;
+    judge(Trip::amplitude_witness, found.off_command, sample.time);
+    if (complete)
+        judge(Trip::stuck,
+              witness_.stuck(
+                  {told_, controller_began_, sample.time, steady, transmission_told(), table_g_}),
+              sample.time);
+}
+
+void Interlock::check_witnesses(const drivers::Sample& sample) noexcept {
+    follow_ramp(sample);
+    if (at_random()) return check_random(sample);
     if (!witness_.add(sample)) return;
-    verdict_ = witness_.verdict({told_, controller_began_, now, commanded_g_.load() > 0,
-                                 told_.transmission > 0 ? told_.transmission : transmission_.load(),
-                                 table_g_});
+    verdict_ = witness_.verdict({told_, controller_began_, std::max(sample.time, now_),
+                                 commanded_g_.load() > 0, transmission_told(), table_g_});
     for (std::size_t i = 0; i < 2; ++i) seen_g_[i].store(verdict_.seen_g[i]);
     judge(Trip::over_armed, verdict_.over_armed, sample.time);
     if (proving_.load()) return;
@@ -267,7 +309,13 @@ void Interlock::check(const drivers::ShakerReading& reading) noexcept {
     judge(By::read_back, Trip::read_back, mismatch, now);
     judge(By::read_back, Trip::watchdog_changed,
           reading.watchdog == drivers::WatchdogTimeout::changed, now);
-    if (const double commanded = commanded_g_.load(); commanded > 0) {
+    const bool random = reading.random && reading.random->random;
+    judge(By::read_back, Trip::abort_bands,
+          guard == Guard::excitation && bands_needed_ && random && reading.running &&
+              !reading.random->bands_armed,
+          now);
+    // Of random vibration a read-back is a mean that strays: the accelerometers' bands judge it.
+    if (const double commanded = commanded_g_.load(); commanded > 0 && !random) {
         judge(By::read_back, Trip::amplitude_off,
               std::abs(20 * std::log10(reading.measured_g / commanded)), now);
     }
@@ -301,9 +349,10 @@ std::string Interlock::text_of(const Tripped& tripped) const {
     if (tripped.channel < drivers::kChannels) {
         const Ramp ramp = ramp_.read();
         const bool armed = tripped.cause == Trip::over_armed;
-        std::snprintf(words.data(), words.size(), ": %s %.3g g at the table, %.3g g %s",
+        std::snprintf(words.data(), words.size(), ": %s %.3g g%s at the table, %.3g g %s",
                       channel == Channel::table_accel ? "table accelerometer" : "platform", value,
-                      armed ? ramp.armed_g : ramp.target_g, armed ? "armed" : "commanded");
+                      ramp.random > 0 ? " rms" : "", armed ? ramp.armed_g : ramp.target_g,
+                      armed ? "armed" : "commanded");
         return std::string(condition.text) + words.data();
     }
     if (!condition.has_limit() || tripped.row >= rules_.size() ||

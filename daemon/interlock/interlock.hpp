@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include "daemon/interlock/interlock_motion.hpp"
 #include "daemon/interlock/interlock_table.hpp"
 #include "daemon/interlock/mean_motion.hpp"
+#include "daemon/interlock/random_witness.hpp"
 #include "drivers/base/snapshot.hpp"
 #include "drivers/sample/assembler.hpp"
 #include "drivers/sample/sample.hpp"
@@ -66,6 +68,8 @@ class Interlock {
         std::vector<Rule> rules = default_interlock();             ///< kMostRules at most
         AmplitudeWitness::Settings witness = {};
         double transmission = 1;  ///< platform over table, until it is measured
+        /// Of each random vibration that there may be: Ramp::random is a place in it, from 1.
+        std::vector<RandomWitness::Settings> random = {};
     };
     /// One row as it stands now.
     struct RowState {
@@ -180,7 +184,18 @@ class Interlock {
                    std::uint8_t channel = drivers::kChannels) noexcept;
     void forget(By by, Guard above) noexcept;
     void trip(Trip cause, std::size_t row, double value, std::uint8_t channel) noexcept;
+    void follow_ramp(const drivers::Sample& sample) noexcept;
     void check_witnesses(const drivers::Sample& sample) noexcept;
+    void check_random(const drivers::Sample& sample) noexcept;
+    [[nodiscard]] bool table_beyond_limit(const drivers::Sample& sample) const noexcept;
+    /// What the table is told is random vibration, and it is not at rest.
+    [[nodiscard]] bool at_random() const noexcept {
+        return told_.random > 0 && std::max(told_.start_g, told_.target_g) > 0;
+    }
+    /// Platform over table, of what the table is told.
+    [[nodiscard]] double transmission_told() const noexcept {
+        return told_.transmission > 0 ? told_.transmission : transmission_.load();
+    }
     Guard follow_guard() noexcept;
     void check_motion(const drivers::Sample& sample) noexcept;
 
@@ -216,6 +231,8 @@ class Interlock {
     MeanMotionMeter seconds_;
     AmplitudeWitness witness_;
     AmplitudeWitness::Verdict verdict_;  ///< the newest
+    std::vector<RandomWitness> random_;
+    bool bands_needed_ = false;  ///< of the controller itself
     Ramp told_;
     drivers::Time controller_began_ = 0;
     Guard sampled_under_ = Guard::idle;

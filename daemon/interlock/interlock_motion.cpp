@@ -7,6 +7,7 @@
 namespace vibrig::rt {
 
 void MotionMonitor::add(const drivers::Sample& sample) noexcept {
+    if (!(time_constant_s_ > 0)) return;
     const Vector& f = sample.force;
     if (last_ == 0) {
         first_ = last_ = sample.time;
@@ -18,7 +19,7 @@ void MotionMonitor::add(const drivers::Sample& sample) noexcept {
     last_ = sample.time;
     const double age = drivers::to_seconds(sample.time - first_);
     // As a plain mean at first, so that the first sample has no lasting weight.
-    const double weight = dt / std::clamp(age, dt, kTimeConstant_s);
+    const double weight = dt / std::clamp(age, dt, std::max(dt, time_constant_s_));
     Vector away{};
     for (std::size_t i = 0; i < 3; ++i) {
         away[i] = f[i] - mean_[i];
@@ -28,7 +29,7 @@ void MotionMonitor::add(const drivers::Sample& sample) noexcept {
                                         away[0] * away[1], away[0] * away[2], away[1] * away[2]};
     for (std::size_t i = 0; i < product.size(); ++i)
         covariance_[i] += weight * (product[i] - covariance_[i]);
-    if (!known_ && age >= 2 * kTimeConstant_s) {
+    if (!known_ && age >= 2 * time_constant_s_) {
         reference_ = mean_;
         known_ = true;
     }

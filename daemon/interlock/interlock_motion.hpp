@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "drivers/sample/sample.hpp"
 
@@ -12,11 +13,17 @@ namespace vibrig::rt {
 /// does not lie along it is cross-axis motion. Exponential means; fixed memory.
 class MotionMonitor {
   public:
-    static constexpr double kTimeConstant_s = 2.0;
-    static constexpr double kLeastAxial_g = 0.05;  ///< rms; below, a share means nothing
+    static constexpr double kTimeConstant_s = 2.0;  ///< of a sine
+    static constexpr double kLeastAxial_g = 0.05;   ///< rms; below, a share means nothing
 
     /// Excitation begins: the vertical is learnt anew.
     void begin() noexcept { *this = {}; }
+    /// The same under a random vibration, whose mean takes so long to show the vertical; none:
+    /// nothing is told.
+    void begin(std::optional<double> time_constant_s) noexcept {
+        *this = {};
+        time_constant_s_ = time_constant_s.value_or(0);
+    }
     /// Samples whose force is good only.
     void add(const drivers::Sample& sample) noexcept;
 
@@ -31,6 +38,7 @@ class MotionMonitor {
     Vector mean_{}, reference_{};
     std::array<double, 6> covariance_{};  ///< xx yy zz xy xz yz
     bool known_ = false;
+    double time_constant_s_ = kTimeConstant_s;  ///< 0: nothing can be told
 };
 
 /// Share of samples that were lost or incomplete over the last ten seconds or so.

@@ -40,9 +40,10 @@ enum class Trip : std::uint8_t {
     guard_lost,
     guard_stop,
     horn,
-    wrong_vibration
+    wrong_vibration,
+    abort_bands
 };
-inline constexpr std::size_t kTrips = 31;
+inline constexpr std::size_t kTrips = 32;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -115,6 +116,9 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::horn, "annunciator_silent", "horn or lamp do not read back as told"},
     {Trip::wrong_vibration, "wrong_vibration",
      "the accelerometers do not show the vibration that was asked for", Guard::excitation, true},
+    {Trip::abort_bands, "abort_bands",
+     "the controller plays random vibration without abort bands of its own", Guard::excitation,
+     true},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];

@@ -62,15 +62,29 @@ RandomBands::RandomBands(const Settings& s) : mean_square_(s.mean_square) {
     squares_.resize(longest);
 }
 
+std::array<double, 2> RandomBands::by_chance(double n) noexcept {
+    return {chi_square_mean(n, -kOnceIn1e9), chi_square_mean(n, kOnceIn1e9)};
+}
+
 void RandomBands::begin() noexcept {
     sums_ = {};
-    next_ = count_ = 0;
+    next_ = count_ = below_from_ = 0;
+    below_ = true;
+    judged_ = 0;
+}
+
+void RandomBands::watch_below(bool watch) noexcept {
+    if (watch && !below_) below_from_ = count_;
+    below_ = watch;
 }
 
 RandomBands::Finding RandomBands::add(double acceleration) noexcept {
     const double square = acceleration * acceleration;
     // A reading that is no number is wrong, and not forgotten.
-    if (!std::isfinite(square)) return Finding::far_above;
+    if (!std::isfinite(square)) {
+        judged_ = square;
+        return Finding::far_above;
+    }
     const std::size_t size = squares_.size();
     for (std::size_t r = 0; r < rules_.size(); ++r) {
         sums_[r] += square;
@@ -90,9 +104,12 @@ RandomBands::Finding RandomBands::add(double acceleration) noexcept {
     }
     for (std::size_t r = 0; r < rules_.size(); ++r) {
         const Rule& rule = rules_[r];
-        if (count_ < rule.values) continue;
+        const bool below = rule.decibels < 0;
+        if (count_ < rule.values + (below ? below_from_ : 0) || (below && !below_)) continue;
         const double is = sums_[r] / (static_cast<double>(rule.values) * mean_square_);
-        if (rule.decibels > 0 ? is > rule.threshold : is < rule.threshold) return rule.finding;
+        if (below ? is >= rule.threshold : is <= rule.threshold) continue;
+        judged_ = is;
+        return rule.finding;
     }
     return Finding::none;
 }

@@ -39,6 +39,11 @@ class RandomBands {
     /// the square root of `mean_square`. A missing reading is one that is not added. The first rule
     /// that is broken.
     [[nodiscard]] Finding add(double acceleration) noexcept;
+    /// Whether too little is looked for; what was before does not count then. After the constructor
+    /// and begin() it is.
+    void watch_below(bool watch) noexcept;
+    /// The mean square over what it is to be that the newest finding rests on.
+    [[nodiscard]] double judged() const noexcept { return judged_; }
     /// Newest mean square over what it is to be, over the shortest window; 0: none yet.
     [[nodiscard]] double ratio() const noexcept;
     [[nodiscard]] const std::array<Rule, 3>& rules() const noexcept { return rules_; }
@@ -47,6 +52,9 @@ class RandomBands {
     /// chance once in 1e9 looks; with values enough, where neither a right level nor one that is
     /// wrong by so much is likely to be; never beyond `decibels` itself.
     [[nodiscard]] static double threshold(double decibels, double n) noexcept;
+    /// Mean square over what it is to be that n independent values fall short of (first) or go
+    /// beyond (second) by chance, once in 1e9 looks each.
+    [[nodiscard]] static std::array<double, 2> by_chance(double n) noexcept;
 
   private:
     double mean_square_;
@@ -54,6 +62,9 @@ class RandomBands {
     std::array<double, 3> sums_{};
     std::vector<double> squares_;  ///< a ring
     std::size_t next_ = 0, count_ = 0;
+    bool below_ = true;
+    std::size_t below_from_ = 0;  ///< of count_
+    double judged_ = 0;
 };
 
 }  // namespace vibrig::rt

@@ -80,6 +80,16 @@ void each_part(Stop& stop, Each&& each) {
     each(stop.used_s);
 }
 
+template <typename Random, typename Each>
+void each_of_random(Random& random, Each&& each) {
+    each(random.mean_square_g2);
+    each(random.bandwidth_hz);
+    each(random.gain_error);
+    each(random.highest_hz);
+    each(random.profile);
+    each(random.level_db);
+}
+
 std::string bytes_of(const estimator::NoiseLevels& levels) {
     std::string bytes;
     each_level(levels, [&bytes](double value) { put(bytes, value); });
@@ -143,6 +153,7 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     bytes.push_back(dwell.info.power_lost ? 1 : 0);
     put(bytes, dwell.info.frequency_hz);
     bytes.push_back(dwell.info.held_out ? 1 : 0);
+    each_of_random(dwell.info.random, [&bytes](auto value) { put(bytes, value); });
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -214,6 +225,16 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
         if (reader.good() && !(dwell.info.frequency_hz >= 0)) return "corrupt: frequency";
     }
     dwell.info.held_out = held_out != 0;
+    auto& random = dwell.info.random = {};
+    if (version >= 7) {
+        each_of_random(random, [&reader](auto& value) { reader.get(value); });
+        bool good = random.mean_square_g2 >= 0 && random.bandwidth_hz >= 0;
+        each_of_random(random, [&good](auto value) {
+            good = good && std::isfinite(static_cast<double>(value));
+        });
+        if (reader.good() && !good) return "corrupt: random vibration";
+    }
+    dwell.stop.profile = random.profile;
     dwell.stop.frequency_hz = dwell.info.frequency_hz;
     dwell.stop.held_out = dwell.info.held_out;
     std::uint64_t count = 0;

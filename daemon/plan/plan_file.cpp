@@ -69,12 +69,34 @@ void take_frequency(PlannedRun& run, double hz, const std::string& place) {
     run.frequency_hz = hz;
 }
 
-bool held_out(const Json& json, const std::string& place) {
-    for (const char* other : {"profile", "sweep", "level_db"}) {
-        if (const auto found = json.find(other); found != json.end())
-            refuse(place + "." + other, found->dump().substr(0, 60),
-                   "a sine with frequency_hz and level_g: random vibration and sweeps are not run");
+/// A profile in place of frequency and levels; false: there is none.
+bool take_profile(PlannedRun& run, const Json& json, const std::string& place) {
+    constexpr double kMostDb = 60;
+    if (const auto found = json.find("sweep"); found != json.end())
+        refuse(place + ".sweep", found->dump().substr(0, 60),
+               "a sine with frequency_hz and level_g, or a profile: sweeps are not run");
+    const auto found = json.find("profile");
+    const auto level = number_at(json, "level_db", place);
+    if (found == json.end()) {
+        if (level) refuse(place + ".level_db", number(*level), "a profile beside it");
+        return false;
     }
+    if (found->is_string()) run.profile = found->get<std::string>();
+    if (found->is_number_unsigned() && *found != 0) run.profile = found->dump();
+    if (run.profile.empty())
+        refuse(place + ".profile", found->dump().substr(0, 60), "a profile's name or number");
+    for (const char* other : {"frequency_hz", "level_g", "table_g"}) {
+        if (const auto beside = json.find(other); beside != json.end())
+            refuse(place + "." + other, beside->dump().substr(0, 60) + " beside a profile",
+                   "level_db alone: the profile has frequencies and g");
+    }
+    run.level_db = level.value_or(0);
+    if (!(std::abs(run.level_db) <= kMostDb))
+        refuse(place + ".level_db", number(run.level_db), "-60 to 60 dB");
+    return true;
+}
+
+bool held_out(const Json& json, const std::string& place) {
     const auto role = json.find("role");
     if (role == json.end() || *role == "identify") return false;
     if (*role != "verify")
@@ -96,11 +118,13 @@ PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
     }
     for (std::size_t k = 0; k < 3; ++k) run.position_deg[k] = (*position)[k].get<double>();
     check_position(run.position_deg, place + ".position");
-    if (const auto hz = number_at(json, "frequency_hz", place))
-        take_frequency(run, *hz, place + ".frequency_hz");
     run.verify = held_out(json, place);
-    join_levels(run, number_at(json, "level_g", place), number_at(json, "table_g", place),
-                transmission, place);
+    if (!take_profile(run, json, place)) {
+        if (const auto hz = number_at(json, "frequency_hz", place))
+            take_frequency(run, *hz, place + ".frequency_hz");
+        join_levels(run, number_at(json, "level_g", place), number_at(json, "table_g", place),
+                    transmission, place);
+    }
     if (const auto count = number_at(json, "count", place)) {
         if (!(*count >= 1 && *count <= kMostRuns && *count == std::floor(*count))) {
             refuse(place + ".count", number(*count), "a whole number from 1");
@@ -171,7 +195,13 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
 }  // namespace
 
 std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
-    return read_plan(path, [transmission](auto) { return std::optional(transmission); });
+    auto runs = read_plan(path, [transmission](auto) { return std::optional(transmission); });
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        if (!runs[i].profile.empty())
+            refuse(path + ": runs[" + std::to_string(i) + "].profile", runs[i].profile,
+                   "a sine: random vibration is for vibrigd's campaigns");
+    }
+    return runs;
 }
 
 std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt& transmission) {

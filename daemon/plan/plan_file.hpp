@@ -23,6 +23,10 @@ struct PlannedRun {
     std::size_t count = 1;
     double frequency_hz = 0;  ///< 0: the configuration's
     bool verify = false;      ///< role "verify": held out of the fit
+    /// Random vibration: name or number of a profile, at this level about it; the levels in g are
+    /// 0 then. Empty: a sine.
+    std::string profile{};
+    double level_db = 0;
 };
 
 /// Platform over table; of a frequency, or, for none, of the configuration's. None: not known.
@@ -30,12 +34,13 @@ using TransmissionAt = std::function<std::optional<double>(std::optional<double>
 
 /// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; others
 /// ignored), or CSV with the columns alpha_deg, beta_deg, gamma_deg, level_g or table_g, and count
-/// if not 1; and per run frequency_hz, and (JSON) role "identify" or "verify". Where one level is
-/// missing, `transmission` (platform over table) gives it; where both are there and disagree by
-/// more than 1 %, the file is refused. Throws PlanFileError.
+/// if not 1; and per run frequency_hz, and (JSON) role "identify" or "verify", and `profile` with
+/// level_db in place of frequency and levels. Where one level is missing, `transmission` (platform
+/// over table) gives it; where both are there and disagree by more than 1 %, the file is refused.
+/// Throws PlanFileError.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,
                                                 const TransmissionAt& transmission);
-/// The same at every frequency.
+/// The same at every frequency; random vibration is refused.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path, double transmission);
 
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError.

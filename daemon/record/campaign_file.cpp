@@ -114,7 +114,21 @@ void read_orders(const File& file, Campaign& to) {
                level = c.doubles("level_sigma_g"), angle = c.doubles("noise_angle_arcsec"),
                walk = c.doubles("noise_walk", 3), begin = c.doubles_if_any("begin_s"),
                frequency = c.doubles_if_any("frequency_hz");
-    const auto power = c.integers_if_any("power_lost"), held_out = c.integers_if_any("held_out");
+    const auto power = c.integers_if_any("power_lost"), held_out = c.integers_if_any("held_out"),
+               profile = c.integers_if_any("profile");
+    const auto level_db = c.doubles_if_any("level_db"),
+               square = c.doubles_if_any("random_mean_square_g2"),
+               bandwidth = c.doubles_if_any("random_bandwidth_hz"),
+               gain = c.doubles_if_any("random_gain_error"),
+               highest = c.doubles_if_any("random_highest_hz");
+    const auto random = [&](std::size_t i) -> estimator::RandomVibration {
+        if (i >= std::min({profile.size(), level_db.size(), square.size(), bandwidth.size(),
+                           gain.size(), highest.size()}))
+            return {};
+        return {
+            square[i],  bandwidth[i], gain[i], highest[i], static_cast<std::uint16_t>(profile[i]),
+            level_db[i]};
+    };
     for (std::size_t i = 0; i < c.rows(); ++i) {
         to.orders.push_back({announced[i],
                              from[i],
@@ -129,7 +143,8 @@ void read_orders(const File& file, Campaign& to) {
                              i < begin.size() ? begin[i] : kNotKnown,
                              i < power.size() && power[i] != 0,
                              i < frequency.size() ? frequency[i] : 0,
-                             i < held_out.size() && held_out[i] != 0});
+                             i < held_out.size() && held_out[i] != 0,
+                             random(i)});
     }
 }
 
@@ -390,8 +405,8 @@ Span part_span(const std::string& path) {
 
 std::string identification_sections(const std::string& configuration) {
     static const std::set<std::string> kSections{
-        "site",      "vibration",   "platform", "accelerometer", "noise",
-        "estimator", "uncertainty", "drift",    "unit",          "instrument"};
+        "site",        "vibration", "platform", "accelerometer", "noise",    "estimator",
+        "uncertainty", "drift",     "unit",     "instrument",    "spectrum", "profile"};
     std::istringstream lines(configuration);
     std::string kept;
     for (std::string line; std::getline(lines, line);) {

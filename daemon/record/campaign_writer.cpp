@@ -38,7 +38,13 @@ std::vector<ColumnSpec> order_columns() {
             {"begin_s", Type::f64, {}, "s", "of the dwell, since the campaign's first one"},
             {"power_lost", Type::u8, {}, "", "1: the gyros were without power since the last"},
             {"frequency_hz", Type::f64, {}, "Hz", "commanded; 0: the configuration's"},
-            {"held_out", Type::u8, {}, "", "1: for verification, no part of the fit"}};
+            {"held_out", Type::u8, {}, "", "1: for verification, no part of the fit"},
+            {"profile", Type::i32, {}, "", "of random vibration, its number; 0: a sine or rest"},
+            {"level_db", Type::f64, {}, "dB", "about the profile"},
+            {"random_mean_square_g2", Type::f64, {}, "g^2", "as the profile has it, platform"},
+            {"random_bandwidth_hz", Type::f64, {}, "Hz", "(Int S)^2 over Int S^2"},
+            {"random_gain_error", Type::f64, {}, "", "of the mean square, relative, 1 sigma"},
+            {"random_highest_hz", Type::f64, {}, "Hz", "up to which there is power"}};
 }
 
 std::vector<ColumnSpec> dwell_columns() {
@@ -316,6 +322,9 @@ void CampaignWriter::order(const Order& order) {
     put(*orders_, order.noise.gyro_random_walk_deg_per_rt_h);
     orders_->put(order.begin_s).put(byte(order.power_lost));
     orders_->put(order.frequency_hz).put(byte(order.held_out));
+    const auto& random = order.random;
+    orders_->put(std::int32_t{random.profile}).put(random.level_db).put(random.mean_square_g2);
+    orders_->put(random.bandwidth_hz).put(random.gain_error).put(random.highest_hz);
 }
 
 void CampaignWriter::dwell(const Dwell& dwell) {

@@ -96,7 +96,8 @@ void Recorder::campaign_begun(Head head) { put(std::move(head)); }
 void Recorder::ordered(const rt::DwellOrder& order, Time now, const estimator::NoiseLevels& noise) {
     put(Order{now, order.from, order.to, order.dwell.run, order.dwell.position, order.dwell.table_g,
               order.cancel, order.zero_g, order.level_sigma_g, noise, order.dwell.begin_s,
-              order.dwell.power_lost, order.dwell.frequency_hz, order.dwell.held_out});
+              order.dwell.power_lost, order.dwell.frequency_hz, order.dwell.held_out,
+              order.dwell.random});
 }
 void Recorder::dwell_done(Dwell dwell) { put(std::move(dwell)); }
 void Recorder::event(const EventRecord& event) { put(event); }
@@ -380,15 +381,17 @@ void Recorder::write_order_line(const Order& order) {
         return fmt::format("{}.{:06d}", t / 1'000'000, t % 1'000'000);
     };
     append_dwells(fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", order.run, order.position,
-        order.table_g, order.cancel ? "" : seconds(us(order.from)),
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", order.run,
+        order.position, order.table_g, order.cancel ? "" : seconds(us(order.from)),
         order.cancel ? "" : seconds(us(order.to)), order.cancel ? seconds(us(order.announced)) : "",
         head_->utc_offset_ns / drivers::kMicrosecond, order.zero_g[0], order.zero_g[1],
         order.zero_g[2], order.level_sigma_g, order.noise.angle_arcsec,
         order.noise.gyro_random_walk_deg_per_rt_h[0], order.noise.gyro_random_walk_deg_per_rt_h[1],
         order.noise.gyro_random_walk_deg_per_rt_h[2],
         std::isfinite(order.begin_s) ? fmt::format("{}", order.begin_s) : "",
-        order.power_lost ? 1 : 0, order.frequency_hz, order.held_out ? 1 : 0));
+        order.power_lost ? 1 : 0, order.frequency_hz, order.held_out ? 1 : 0, order.random.profile,
+        order.random.level_db, order.random.mean_square_g2, order.random.bandwidth_hz,
+        order.random.gain_error, order.random.highest_hz));
 }
 
 void Recorder::append_dwells(const std::string& line) {

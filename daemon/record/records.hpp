@@ -52,20 +52,22 @@ struct Order {
     estimator::NoiseLevels noise{};  ///< that the filter takes in it; angle 0: not known
     /// Since the campaign's first dwell, a restart included; NaN: not known.
     double begin_s = std::numeric_limits<double>::quiet_NaN();
-    bool power_lost = false;  ///< the gyros were without power since the dwell before
-    double frequency_hz = 0;  ///< commanded; 0: the configuration's
-    bool held_out = false;    ///< for verification
+    bool power_lost = false;              ///< the gyros were without power since the dwell before
+    double frequency_hz = 0;              ///< commanded; 0: the configuration's
+    bool held_out = false;                ///< for verification
+    estimator::RandomVibration random{};  ///< in place of a sine
     [[nodiscard]] estimator::DwellInfo dwell() const {
-        return {run, position, table_g, begin_s, power_lost, frequency_hz, held_out};
+        return {run, position, table_g, begin_s, power_lost, frequency_hz, held_out, random};
     }
 };
 
-/// dwells.csv beside the raw log: orders in the log's times. Older ones end before frequency_hz,
-/// power_lost or begin_s.
+/// dwells.csv beside the raw log: orders in the log's times. Older ones end before profile,
+/// frequency_hz, power_lost or begin_s.
 inline constexpr const char* kDwellsHeader =
     "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us,zero_x_g,zero_y_g,zero_z_g,"
     "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z,begin_s,"
-    "power_lost,frequency_hz,held_out";
+    "power_lost,frequency_hz,held_out,profile,level_db,random_mean_square_g2,random_bandwidth_hz,"
+    "random_gain_error,random_highest_hz";
 /// In it, with a number: the daemon was started again and went on after so many dwells.
 inline constexpr const char* kRestartLine = "# restart after dwells: ";
 

@@ -228,10 +228,9 @@ void read_dwells(const std::string& path, Campaign& to) {
     std::ifstream file(path);
     std::string line;
     const std::string header = kDwellsHeader;
-    const std::string before_power = header.substr(0, header.rfind(','));
-    const std::string before_begin = before_power.substr(0, before_power.rfind(','));
-    if (!std::getline(file, line) ||
-        (line != header && line != before_power && line != before_begin))
+    constexpr std::ptrdiff_t kOldest = 14;  // commas, of what recordings had at first
+    if (!std::getline(file, line) || (line != header && !header.starts_with(line + ",")) ||
+        std::ranges::count(line, ',') < kOldest)
         throw std::runtime_error(path + ":1: found '" + proto::printable(line.substr(0, 80)) +
                                  "', expected the header " + kDwellsHeader);
     for (std::size_t number = 2; std::getline(file, line); ++number) {
@@ -269,12 +268,19 @@ void read_dwells(const std::string& path, Campaign& to) {
              {14, &walk[2]}}};
         const bool dated = fields.size() >= 16 && !fields[15].empty();
         order.power_lost = fields.size() >= 17 && fields[16] == "1";
-        order.held_out = fields.size() == 19 && fields[18] == "1";
+        order.held_out = fields.size() >= 19 && fields[18] == "1";
+        auto& random = order.random;
+        const std::array<std::pair<std::size_t, double*>, 5> of_random{
+            {{20, &random.level_db},
+             {21, &random.mean_square_g2},
+             {22, &random.bandwidth_hz},
+             {23, &random.gain_error},
+             {24, &random.highest_hz}}};
         const auto yes_or_no = [&fields](std::size_t at) {
             return fields.size() <= at || fields[at] == "1" || fields[at] == "0";
         };
-        bool good = fields.size() >= 15 && fields.size() <= 19 && fields.size() != 18 &&
-                    yes_or_no(16) && yes_or_no(18) &&
+        bool good = fields.size() >= 15 && (fields.size() <= 19 || fields.size() == 25) &&
+                    fields.size() != 18 && yes_or_no(16) && yes_or_no(18) &&
                     (fields.size() < 19 ||
                      (proto::read_number(fields[17], order.frequency_hz) &&
                       std::isfinite(order.frequency_hz) && order.frequency_hz >= 0)) &&
@@ -283,6 +289,11 @@ void read_dwells(const std::string& path, Campaign& to) {
                     proto::read_number(fields[0], order.run) &&
                     proto::read_number(fields[1], order.position) &&
                     proto::read_number(fields[6], offset_us);
+        if (fields.size() == 25) {
+            good = good && proto::read_number(fields[19], random.profile);
+            for (const auto& [field, value] : of_random)
+                good = good && proto::read_number(fields[field], *value) && std::isfinite(*value);
+        }
         for (const auto& [field, value] : numbers)
             good = good && proto::read_number(fields[field], *value) && std::isfinite(*value);
         if (!good)

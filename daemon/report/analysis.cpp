@@ -119,7 +119,9 @@ std::vector<HeldOut> judge_fold(const Campaign& campaign, const estimator::Setti
         const RecordedDwell& dwell = dwells[d];
         // What is apart is nothing that these coefficients foretell.
         const double hz = dwell.order->frequency_hz;
-        if (dwell.order->held_out || (hz > 0 && !estimator::at_reference(settings, hz))) continue;
+        if (dwell.order->held_out || dwell.order->random.mean_square_g2 > 0 ||
+            (hz > 0 && !estimator::at_reference(settings, hz)))
+            continue;
         if (!left_out.contains(dwell.order->position)) continue;
         const auto blocks = blocks_of(campaign, dwell);
         if (blocks.size() < 10) continue;

@@ -310,7 +310,8 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
 }
 
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
-                                          const std::vector<estimator::DwellRow>& rows, Form form) {
+                                          const std::vector<estimator::DwellRow>& rows, Form form,
+                                          const NumberedKinds& profiles) {
     std::vector<SpectralDwell> dwells;
     std::vector<Kind> kinds;
     std::vector<estimator::DwellRow> held_out;
@@ -319,11 +320,21 @@ std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
             if (!row.random) held_out.push_back(row);
             continue;
         }
+        const auto profile = std::ranges::find_if(
+            profiles, [&row](const auto& one) { return one.first == row.profile; });
+        if (row.random && profile == profiles.end()) continue;
         dwells.push_back({row, {}, row.relative_error});
+        if (row.random) {
+            const Kind& kind = profile->second;
+            const auto known = std::ranges::find(kinds, kind.profile, &Kind::profile);
+            dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
+            if (known == kinds.end()) kinds.push_back(kind);
+            continue;
+        }
         if (!(row.vibration.kappa > 1)) continue;
         const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
-        const auto known =
-            std::ranges::find_if(kinds, [hz](const Kind& k) { return k.hz() == hz; });
+        const auto known = std::ranges::find_if(
+            kinds, [hz](const Kind& k) { return k.profile.empty() && k.hz() == hz; });
         dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
         if (known == kinds.end()) kinds.push_back({"", {{hz, 1, 0}}});
     }

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/spectrum/analysis.hpp"
@@ -32,11 +34,16 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
                                          std::vector<estimator::spectrum::Kind> kinds,
                                          estimator::spectrum::Form form);
 
-/// Of a campaign's rows that say with which frequency they shook, those held out left aside;
-/// nothing where there are not several frequencies, or too few or too many rows.
+/// The kinds of random vibration by their numbers in the controller.
+using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>>;
+
+/// Of a campaign's rows that say with which frequency they shook, or under which of `profiles`
+/// (others are left out), those held out left aside; nothing where there are not several kinds, or
+/// too few or too many rows.
 [[nodiscard]] std::optional<SpectrumResult> spectrum_of(
     const estimator::Settings& settings, const std::vector<estimator::DwellRow>& rows,
-    estimator::spectrum::Form form = estimator::spectrum::Form::automatic);
+    estimator::spectrum::Form form = estimator::spectrum::Form::automatic,
+    const NumberedKinds& profiles = {});
 
 /// With several frequencies the assessment's coefficients become those of the analysis, its rates
 /// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.

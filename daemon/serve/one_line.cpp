@@ -30,7 +30,7 @@ std::string escape(std::string_view bytes) {
 
 }  // namespace
 
-std::string one_line(std::string_view text) {
+std::string one_line(std::string_view text, std::size_t longest) {
     const std::string whole = mend_utf8(text);
     std::string out;
     for (std::size_t i = 0; i < whole.size();) {
@@ -38,7 +38,7 @@ std::string one_line(std::string_view text) {
         const std::size_t length = lead < 0x80 ? 1 : lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : 4;
         std::string next = escape(std::string_view(whole).substr(i, length));
         if (next.empty()) next = whole.substr(i, length);
-        if (out.size() + next.size() > kLongestLine) return out + "...";
+        if (out.size() + next.size() > longest) return out + "...";
         out += next;
         i += length;
     }

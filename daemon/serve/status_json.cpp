@@ -35,7 +35,7 @@ void check_line(const std::string& field, const std::string& text, std::size_t l
         throw std::invalid_argument(field + ": " + std::to_string(text.size()) +
                                     " bytes, expected " + std::to_string(longest) + " at most");
     }
-    if (one_line(text) != text) {
+    if (one_line(text, longest) != text) {
         throw std::invalid_argument(field + ": contains a control character, expected one line");
     }
 }

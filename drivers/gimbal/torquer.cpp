@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <string_view>
 
 #include "drivers/sample/assembler.hpp"
 #include "drivers/sample/signal_binding.hpp"
@@ -24,6 +25,12 @@ Torquer::Torquer(const proto::Dbc& dbc, const TorquerSettings& settings, CanPort
         if (rate->minimum != rate->maximum)
             limit_ = std::min({limit_, std::abs(rate->minimum), std::abs(rate->maximum)});
     }
+}
+
+bool Torquer::known(const proto::Dbc& dbc, const TorquerSettings& settings) {
+    const auto* message = dbc.find(std::string_view(settings.message));
+    return message != nullptr && message->find("X") != nullptr && message->find("Y") != nullptr &&
+           message->find("Z") != nullptr && message->find("Counter") != nullptr;
 }
 
 bool Torquer::command(const std::array<double, 3>& deg_per_h) noexcept {

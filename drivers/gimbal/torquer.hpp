@@ -21,6 +21,9 @@ class Torquer {
     /// must outlive this.
     Torquer(const proto::Dbc& dbc, const TorquerSettings& settings, CanPort& port);
 
+    /// The DBC has the message and all its signals.
+    [[nodiscard]] static bool known(const proto::Dbc& dbc, const TorquerSettings& settings);
+
     /// False: the port took no frame.
     bool command(const std::array<double, 3>& deg_per_h) noexcept;
     /// Largest rate that the message can carry on every axis, deg/h.

@@ -172,6 +172,12 @@ EarthRate earth_rate(const Description& description, const std::vector<FreeDrift
             std::max(0.0, all - right.dot(x))};
 }
 
+Eigen::Vector3d platform_rate(const Description& d, const FreeDrift& drift, const EarthRate& rate) {
+    const auto pose = Kinematics{Settings{}}.pose(d.angles(drift.reading));
+    return pose.m.inverse() * rates_of(d, drift.slope) +
+           pose.c * rig_from_level(d.elevation_deg) * rate.neu;
+}
+
 std::string time_unit_doubt(double horizontal, double latitude_deg) {
     const double expected = kEarthRateDegPerHour * std::cos(latitude_deg / kDegree);
     const double ratio = horizontal / expected;

@@ -38,6 +38,11 @@ struct EarthRate {
                                    const std::vector<FreeDrift>& drifts,
                                    const EarthSettings& settings = {});
 
+/// The platform's rate in inertial space during a drift, platform axes, deg/h: M^-1 times the rates
+/// of the angles, plus the Earth's.
+[[nodiscard]] Eigen::Vector3d platform_rate(const Description& description, const FreeDrift& drift,
+                                            const EarthRate& rate);
+
 /// What people say, each if it is known.
 struct Statements {
     std::optional<double> latitude_deg{};

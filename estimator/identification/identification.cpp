@@ -398,6 +398,7 @@ void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
     row.held_out = record_.info.held_out;
     row.apart = apart_;
     row.random = random_;
+    row.profile = record_.info.random.profile;
     row.relative_error = summary.relative_error;
     if (row.frequency_hz > 0)
         row.sync_arcsec =

@@ -469,6 +469,43 @@ def check_page(checks, rig, page, address, remote, pki):
     return seen
 
 
+def check_commissioning(checks, programs, folder):
+    """Somebody commissions a rig: the page shows what `vibrig commission status` says, read-only."""
+    rig, page = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1), None
+    try:
+        rig.start_plant("--warm-up", "1", "--start-temperature", "45", "--speed", "5")
+        rig.configure(CAMPAIGN, server={"page": f"127.0.0.1:{free_port()}"})
+        rig.start_daemon()
+        rig.wait_for(lambda s: s["platform"].get("ready") and s["shaker"].get("rest") == "at rest", 60)
+        address, page = page_address(rig), Page()
+        page.ask("open", url=address)
+        dialogue = subprocess.Popen([rig.program("vibrig"), "commission", "--by", "Ada", "--socket", rig.socket], stdin=subprocess.PIPE,
+                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=r.die_with_parent)
+        shown = page.until("document.getElementById('state').textContent === 'commissioning' && "
+                           "document.getElementById('reason').textContent.includes('power stage off?')")
+        checks.check(shown.get("value") is True, "the page shows that a rig is commissioned, and what is asked", str(shown) + rig.logs(8))
+        page.ask("shot", file=os.path.join(SHOTS, "commissioning.png"), width=1400, height=1000, scheme="light")
+        check_whole(checks, page, "a rig that is commissioned")
+        reason = page.ask("text", selector="#reason").get("value", "")
+        said = rig.tool("commission", "status").stdout.replace("\n   ", " ").splitlines()
+        checks.check(reason.startswith("Ada") and ", step A, 0 positions, 0 free drifts; asked: " in reason and "now: " + reason in said,
+                     "the same as `vibrig commission status` says", [reason, said])
+        checks.equal(page.ask("text", selector="#position").get("value"), "step A, 0 positions, 0 free drifts", "its step stands where positions do")
+        checks.check(page.ask("text", selector="#left").get("value") == "" and page.ask("text", selector="#stops").get("value") == "",
+                     "no share of a campaign and no plan of it are shown")
+        for body in ({"do": "answer", "id": "power", "value": "yes"}, {"do": "end"}):
+            status, _, _ = get(address, "/api/v1/commands", {"Content-Type": "application/json"}, "POST",
+                               json.dumps({"kind": "commission", "by": "Ada", "argument": json.dumps(body)}))
+            checks.check(status >= 400, f"the page's door takes no {body['do']}", status)
+        checks.equal(rig.status()["campaign"]["state"], "commissioning", "and nothing has changed by it")
+        checks.equal(page.ask("errors").get("value"), [], "the page has no errors")
+        dialogue.communicate(timeout=20)   # nobody answers any more: it ends
+    finally:
+        if page is not None:
+            page.end()
+        rig.stop()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
@@ -506,6 +543,8 @@ def main():
             if page is not None:
                 page.end()
             rig.stop()
+    with tempfile.TemporaryDirectory(prefix="vibrig-page-") as folder:
+        check_commissioning(checks, programs, folder)
     return checks.end()
 
 

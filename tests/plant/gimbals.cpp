@@ -23,7 +23,12 @@ bool Gimbals::advance(double dt_s, Vec3& encoder_deg) noexcept {
         const double gap = std::remainder(target_[i] - encoder_deg[i], 360.0);
         first = std::max(first, std::abs(gap));
         const bool stuck = stuck_ && static_cast<std::size_t>(*stuck_) == i;
-        const double step = stuck ? 0 : std::clamp(gap, -rate_ * dt_s, rate_ * dt_s);
+        double step = stuck ? 0 : std::clamp(gap, -rate_ * dt_s, rate_ * dt_s);
+        const double from_middle = std::remainder(encoder_deg[i] - stops_.middle_deg[i], 360.0);
+        const double reach = stops_.reach_deg[i];
+        // One that has drifted beyond it may come back.
+        if (step > 0) step = std::min(step, std::max(0.0, reach - from_middle));
+        if (step < 0) step = std::max(step, std::min(0.0, -reach - from_middle));
         encoder_deg[i] += step;
         largest = std::max(largest, std::abs(gap - step));
     }

@@ -20,7 +20,8 @@ Rig::Rig(const Truth& truth)
       steps_((truth.elastic_share == Vec3{} && truth.profiles.empty() ? 2 : 8) *
              static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
-      gimbals_(truth.slew_deg_per_s, truth.stuck_gimbal),
+      gimbals_(truth.slew_deg_per_s, truth.stuck_gimbal,
+               {truth.encoder_zero_deg, truth.soft_stop_deg}),
       isolator_(truth.hard ? Isolator::hard(passing_s_ / static_cast<double>(steps_))
                            : Isolator(truth.transmission, truth.frequency_hz, truth.damping,
                                       passing_s_ / static_cast<double>(steps_))),

@@ -78,8 +78,10 @@ struct Truth {
     std::array<AngleUnit, 3> angle_unit{AngleUnit::deg, AngleUnit::deg, AngleUnit::deg};
     Vec3 command_offset_deg{};                 ///< by gimbal: where it goes over where it was sent
     std::optional<GimbalAxis> stuck_gimbal{};  ///< does not move, and is never in position
-    double slew_deg_per_s = 5;                 ///< per gimbal
-    double slew_error_deg = 0;                 ///< 1 sigma of where a slew ends, per gimbal
+    /// By gimbal, either way from angle 0: there it stops, and is not in position; 360: nowhere.
+    Vec3 soft_stop_deg{360, 360, 360};
+    double slew_deg_per_s = 5;  ///< per gimbal
+    double slew_error_deg = 0;  ///< 1 sigma of where a slew ends, per gimbal
     /// Rate of the platform over the rate commanded to the torquers; -1: wired the wrong way round.
     Vec3 torquer_scale{1, 1, 1};
     std::array<int, 3> increment_sign{1, 1, 1};  ///< of the gyros' angle increments

@@ -24,6 +24,7 @@ void for_each_field(T& t, Field&& field) {
     field("platform", "command_channel", t.command_channel, 0, 0);
     field("platform", "command_offset_deg", t.command_offset_deg, -180.0, 180.0);
     field("platform", "stuck_gimbal", t.stuck_gimbal, 0, 0);
+    field("platform", "soft_stop_deg", t.soft_stop_deg, 1.0, 360.0);
     field("platform", "slew_deg_per_s", t.slew_deg_per_s, 0.01, 360.0);
     field("platform", "slew_error_deg", t.slew_error_deg, 0.0, 5.0);
     field("platform", "torquer_scale", t.torquer_scale, -100.0, 100.0);

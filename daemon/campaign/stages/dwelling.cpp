@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/campaign/rig_frame.hpp"
+#include "daemon/interlock/random_bands.hpp"
 
 namespace vibrig::campaign {
 
@@ -21,7 +22,6 @@ constexpr Time kOrderLead = kSecond;
 // How much later than the last sample of a dwell the estimator may report it as done.
 constexpr Time kDoneGrace = 2 * kSecond;
 constexpr double kAtRestG = 1e-9;
-constexpr double kWritten_hz = 1e-3;  // a register resolves 1 mHz
 // Of the settling, left for what follows when the vibration is not shown.
 constexpr Time kAhead = 200 * drivers::kMillisecond;
 
@@ -58,7 +58,7 @@ StageStep Dwelling::ramp(Time now) {
     bool reached = table_g() <= kAtRestG;
     if (!reached) {
         bool may = excitation_.asked();
-        std::string why = may ? "" : frequency_may_change(now, may);
+        std::string why = may ? "" : vibration_may_change(now, may);
         if (may) why = excitation_.climb(table_g(), now, reached);
         if (!why.empty()) return StageStep::failed(std::move(why));
     }
@@ -67,14 +67,15 @@ StageStep Dwelling::ramp(Time now) {
     return StageStep::going_on(now);
 }
 
-std::string Dwelling::frequency_may_change(Time now, bool& may) const {
+/// Mode, profile, level and frequency are written at measured rest.
+std::string Dwelling::vibration_may_change(Time now, bool& may) const {
     const auto reading = ports_.rig.shaker.reading();
-    const double wanted_hz = excitation_.frequency_hz();
-    const bool same = reading.valid && std::abs(reading.frequency_hz - wanted_hz) <= kWritten_hz;
-    may = same || (reading.at_rest() && stop_.rest(now).measured());
+    may = excitation_.chosen() || (reading.at_rest() && stop_.rest(now).measured());
     if (may || now - excitation_.since() <= Excitation::kRampGrace) return {};
-    return fmt::format("rest is not measured ({}): {:g} Hz are not written", stop_.what_moves(now),
-                       wanted_hz);
+    const auto& random = excitation_.random();
+    return fmt::format("rest is not measured ({}): {} not written", stop_.what_moves(now),
+                       random ? fmt::format("profile {} is", random->set_point.profile)
+                              : fmt::format("{:g} Hz are", excitation_.frequency_hz()));
 }
 
 StageStep Dwelling::settled_or_recording(Time now) {
@@ -137,7 +138,8 @@ estimator::DwellInfo Dwelling::info() const {
             drivers::to_seconds(from_ - origin_.value_or(from_)),
             power_lost_ && !aim_.first,
             aim_.stop.frequency_hz,
-            aim_.stop.verify};
+            aim_.stop.verify,
+            aim_.stop.random ? aim_.stop.random->at_platform : estimator::RandomVibration{}};
 }
 
 void Dwelling::leave() {
@@ -159,7 +161,7 @@ double Dwelling::left_s(Time now) const { return std::max(drivers::to_seconds(to
 
 /// Of a plan that says no frequency there is one only, which the loop check has measured.
 void Dwelling::watch_vibration() {
-    watching_ = aim_.stop.frequency_hz > 0 && table_g() > kAtRestG && ports_.rig.feed != nullptr;
+    watching_ = aim_.stop.kind() != 0 && table_g() > kAtRestG && ports_.rig.feed != nullptr;
     shown_.clear();
     if (watching_) ports_.rig.feed->order(rt::StageFeed::Mode::samples);
 }
@@ -176,17 +178,56 @@ void Dwelling::look_at_vibration(Time now) {
     if (now < from_ - kAhead) return;
     watching_ = false;
     ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    const std::string other = excitation_.random() ? other_level() : other_frequency();
+    if (other.empty()) return;
+    ports_.log.event(Severity::trip, other);
+    ports_.rig.wrong_vibration();
+    excitation_.order_stop("another vibration than was asked for");
+}
+
+std::string Dwelling::other_frequency() const {
     const double asked_hz = excitation_.frequency_hz();
     const auto found = estimator::loop_response(shown_, asked_hz);
     if (found.platform_g > 0 &&
         std::abs(found.frequency_hz - asked_hz) <= settings_.loop.frequency_tolerance_hz)
-        return;
-    ports_.log.event(Severity::trip,
-                     fmt::format("the accelerometers show {:.3f} Hz, {:.3f} Hz were asked for and "
-                                 "read back",
-                                 found.frequency_hz, asked_hz));
-    ports_.rig.wrong_vibration();
-    excitation_.order_stop("another vibration than was asked for");
+        return {};
+    return fmt::format("the accelerometers show {:.3f} Hz, {:.3f} Hz were asked for and read back",
+                       found.frequency_hz, asked_hz);
+}
+
+/// Of a random vibration slow samples tell the rms alone, as well as so many values know it; which
+/// profile it is tells the controller's checksum.
+std::string Dwelling::other_level() const {
+    const RandomStop& random = *excitation_.random();
+    const double expected_g = std::sqrt(random.at_platform.mean_square_g2);
+    const auto up = RigFrame(settings_.rig).up_at_deg(excitation_.position_deg());
+    double platform = 0, table = 0, tables = 0;
+    for (const auto& reading : shown_) {
+        double along = -1;
+        for (std::size_t i = 0; i < 3; ++i) along += up[i] * reading.force_g[i];
+        platform += along * along;
+        if (!reading.table_good) continue;
+        table += reading.table_g * reading.table_g;
+        ++tables;
+    }
+    const auto told = [&](const char* where, double sum, double count, double rms_g) {
+        // As many independent values as there are readings, or as the band has.
+        const double values =
+            std::min(count, 2 * random.at_platform.bandwidth_hz * count * settings_.sample_s);
+        const auto [least, most] = rt::RandomBands::by_chance(std::max(values, 1.0));
+        const double over = count > 0 ? sum / count / (rms_g * rms_g) : 0;
+        if (over >= least && over <= most) return std::string();
+        return fmt::format(
+            "the {} {:.3g} g rms, {:.3g} g of profile {} at {:g} dB were asked "
+            "for and read back",
+            where, rms_g * std::sqrt(over), rms_g, random.set_point.profile,
+            random.set_point.level_db);
+    };
+    std::string other = told("accelerometers of the platform show", platform,
+                             static_cast<double>(shown_.size()), expected_g);
+    if (other.empty() && tables > 0)
+        other = told("accelerometer of the table shows", table, tables, table_g());
+    return other;
 }
 
 }  // namespace vibrig::campaign

@@ -56,9 +56,12 @@ class Dwelling : public Stage {
     [[nodiscard]] StageStep order(drivers::Time now);
     void take_over_origin();
     /// Why it may not, else empty; `may` once it may.
-    [[nodiscard]] std::string frequency_may_change(drivers::Time now, bool& may) const;
+    [[nodiscard]] std::string vibration_may_change(drivers::Time now, bool& may) const;
     void watch_vibration();
     void look_at_vibration(drivers::Time now);
+    /// What the accelerometers show in place of what was asked for; empty: that.
+    [[nodiscard]] std::string other_frequency() const;
+    [[nodiscard]] std::string other_level() const;
 
     const Settings& settings_;
     Ports ports_;

@@ -68,14 +68,15 @@
     set('campaign', c.name + (c.armed_by ? ', armed by ' + c.armed_by : ', not armed'));
     document.querySelector('header').className = kBad.includes(c.state) ? 'bad' : kCalm.includes(c.state) ? 'good' : 'active';
     const done = 100 * (c.progress || 0), broken = kBad.includes(c.state);
-    document.title = `${c.state.toUpperCase()} ${done.toFixed(0)} % – ${c.name}`;
-    set('position', c.run > 0 ? `run ${c.run}/${c.runs}, position ${c.position}/${c.positions}` : 'no position');
-    set('left', `${done.toFixed(1)} %` + (broken ? ', interrupted' : c.remaining_s > 0 ? `, ${duration(c.remaining_s)} left` : ''));
+    const commissioned = c.state === 'commissioning';   // no campaign: its steps have no share of a whole
+    document.title = `${c.state.toUpperCase()}${commissioned ? '' : ` ${done.toFixed(0)} %`} – ${c.name}`;
+    set('position', commissioned ? (/step [^;]*/.exec(c.reason) || ['first look'])[0] : c.run > 0 ? `run ${c.run}/${c.runs}, position ${c.position}/${c.positions}` : 'no position');
+    set('left', commissioned ? '' : `${done.toFixed(1)} %` + (broken ? ', interrupted' : c.remaining_s > 0 ? `, ${duration(c.remaining_s)} left` : ''));
     byId('progress').value = done;
     stops(c, broken);
   }
   function stops(c, broken) {
-    const e = byId('stops'), all = plan ? plan.stops : [];
+    const e = byId('stops'), all = plan && c.state !== 'commissioning' ? plan.stops : [];
     const dwells = new Map((c.dwells || []).map(d => [d.run + '/' + d.position, d]));
     const key = JSON.stringify([all.length, [...dwells].map(([k, d]) => k + d.flagged), c.run, c.position, broken]);
     if (e.dataset.key === key) return;

@@ -16,8 +16,6 @@ namespace {
 using estimator::spectrum::Band;
 using SpectraJson = nlohmann::json;
 
-/// Of the mean square that a controller plays about its profile, 1 sigma.
-constexpr double kControllerGain = 0.01;
 constexpr double kSameFrequency = 0.02;  ///< relative: the rules of the reference frequency
 
 int count_of(const SpectraJson& entry, const char* key, const std::string& place) {
@@ -205,8 +203,8 @@ void DwellKinds::add_random(const StatedSpectrum& of, const std::string& place) 
                                  "' with sines, expected a psd alone");
     AtPlatform there = at_platform(profile, stated.at, rig_);
     random_.push_back({there.moment(1, 1) * std::pow(10, of.level_db / 10),
-                       estimator::spectrum::bandwidth_hz(there.bands), kControllerGain,
-                       profile.psd.back().first});
+                       estimator::spectrum::bandwidth_hz(there.bands),
+                       rig_.spectrum.controller_gain, profile.psd.back().first});
     const std::string name = of.psd.empty() ? profile.name : of.profile;
     for (std::size_t k = 0; k < kinds_.size(); ++k) {
         if (kinds_[k].profile == name) return of_dwell_.push_back(k);

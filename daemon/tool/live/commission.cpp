@@ -29,6 +29,7 @@
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/answers.hpp"
 #include "daemon/tool/live/commission_client.hpp"
+#include "daemon/tool/live/commission_record.hpp"
 #include "daemon/tool/live/key_by_key.hpp"
 #include "daemon/tool/live/remote.hpp"
 #include "daemon/tool/live/toml_edit.hpp"
@@ -42,14 +43,6 @@ namespace {
 constexpr const char* kCommission = "vibrig commission: ";
 constexpr auto kCommissionPoll = std::chrono::milliseconds(250);
 constexpr std::size_t kColumns = 79;
-
-struct CommissionOptions {
-    serve::Address at;
-    std::string by, second, answers, configuration, ask, display;
-    double reference_g = 0;
-    std::vector<std::string> parts;
-    bool json = false, by_hand = false, yes = false, resume = false;
-};
 
 }  // namespace
 
@@ -208,23 +201,6 @@ class Dialogue {
     std::string waiting_;
 };
 
-/// `mark`: in front of each comment.
-std::vector<TomlValue> values_of(const CommissionJson& found, const CommissionJson& by,
-                                 const std::string& mark) {
-    std::vector<TomlValue> values;
-    for (const auto& [key, value] : found.items()) {
-        std::string text;
-        // One blank behind a comma, as --check prints it.
-        for (const char c : value.dump()) text += c == ',' ? std::string(", ") : std::string(1, c);
-        values.push_back({key, text, mark + by.value(key, std::string())});
-    }
-    return values;
-}
-
-std::string mark_of(const CommissionJson& of) {
-    return of.value("simulated", false) ? "SIMULATED: " : "";
-}
-
 void print_found(std::ostream& out, const CommissionJson& result) {
     std::string table;
     auto values = values_of(result["found"], result["found_by"], mark_of(result));
@@ -268,9 +244,14 @@ int commission_rig(const CommissionOptions& options) {
 
 int show_commission(const CommissionOptions& options) {
     serve::Client client(options.at);
-    const auto record = commission_state(client, options.by, 0)["record"];
+    const auto state = commission_state(client, options.by, 0);
+    const auto& record = state["record"];
     if (options.json) std::cout << record.dump(1) << '\n';
     bool all = true;
+    // As the live page has it.
+    if (const std::string now = state.value("progress", std::string());
+        !options.json && !now.empty())
+        print_wrapped(std::cout, "now: " + now);
     for (const auto& [name, part] : record["parts"].items()) {
         const bool proven = part["proven"];
         all = all && proven;
@@ -282,6 +263,8 @@ int show_commission(const CommissionOptions& options) {
             for (const auto& one : part["by"])
                 by += (by.empty() ? "" : ", ") + one.get<std::string>();
             text += by;
+            if (const std::string person = part["signed_by"]; !person.empty())
+                text += ", signed with the certificate of " + person;
             if (const std::string told = part["told"]; !told.empty()) text += "; " + told;
         } else {
             text += "NOT: " + part["why"].get<std::string>();
@@ -297,138 +280,6 @@ int show_commission(const CommissionOptions& options) {
                                                      : "arming demands no record\n");
     }
     return all ? 0 : kNo;
-}
-
-std::string text_of_file(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw std::runtime_error(path + ": cannot be read");
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-bool agreed(const CommissionOptions& options, const std::string& question) {
-    if (options.yes) return true;
-    std::cout << "? " << question << " [yes or no]\n> " << std::flush;
-    std::string line;
-    return std::getline(std::cin, line) && (line == "yes" || line == "y");
-}
-
-/// What was there is kept beside the file itself, not beside a link to it.
-void save_file(const std::string& path, const std::string& before, const std::string& text) {
-    const std::string real = std::filesystem::canonical(path).string();
-    std::string kept = real + ".1";
-    for (int n = 2; std::filesystem::exists(kept); ++n) kept = real + "." + std::to_string(n);
-    proto::write_durably(kept, before, 0600);
-    std::filesystem::permissions(kept, std::filesystem::status(real).permissions());
-    proto::write_durably(path, text);
-    print_wrapped(std::cout, path + " is written; as it was: " + kept);
-}
-
-/// Before anything is written or asked.
-void expect_two(const CommissionOptions& options) {
-    if (const auto why = commission::not_two(options.by, options.second); !why.empty())
-        throw CommissionRefused(why);
-}
-
-int accept_commission(const CommissionOptions& options) {
-    expect_two(options);
-    serve::Client client(options.at);
-    const auto state = commission_state(client, options.by, 0);
-    const auto& procedure = state["procedure"];
-    if (procedure.is_null() || procedure["active"] == true ||
-        procedure["result"]["outcome"] != "decided")
-        throw CommissionRefused("nothing is decided: vibrig commission --by NAME");
-    const auto& result = procedure["result"];
-    const std::string path = options.configuration.empty()
-                                 ? state["configuration"].get<std::string>()
-                                 : options.configuration;
-    if (path.empty()) throw std::runtime_error("the daemon has no configuration file");
-    if (!result["corrections"].empty())
-        throw CommissionRefused("the DBC first, then commission anew: " +
-                                result["corrections"][0].get<std::string>());
-    const std::string before = text_of_file(path);
-    std::vector<TomlValue> changed;
-    const auto now = configuration::load(path, true);
-    for (auto& value : values_of(result["found"], result["found_by"], mark_of(state))) {
-        const auto at =
-            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
-        std::string found = at == now.effective.end() ? "nothing" : at->value;
-        if (CommissionJson::parse(found, nullptr, false) ==
-            CommissionJson::parse(value.value, nullptr, false))
-            continue;
-        print_wrapped(std::cout, "- " + value.key + " = " + found);
-        print_wrapped(std::cout, "+ " + value.key + " = " + value.value);
-        changed.push_back(std::move(value));
-    }
-    if (!changed.empty()) {
-        const std::string after = with_values(before, path, changed);
-        // Before it takes the place of one that works.
-        static_cast<void>(configuration::parse(after, path, true));
-        if (!agreed(options, options.by + " and " + options.second + ": write " + path + "?"))
-            throw CommissionRefused("not accepted: nothing is written");
-        save_file(path, before, after);
-    } else if (!agreed(options, options.by + " and " + options.second + ": record it?")) {
-        throw CommissionRefused("not accepted");
-    }
-    print_wrapped(std::cout, commission_command(client, options.by,
-                                                {{"do", "accept"}, {"second", options.second}}));
-    return 0;
-}
-
-/// A line of a person, with blanks around it taken off.
-std::string line_of_person() {
-    std::string line;
-    std::cout << "> " << std::flush;
-    if (!std::getline(std::cin, line)) throw CommissionRefused("nobody answers: not stated");
-    const auto first = line.find_first_not_of(" \t"), last = line.find_last_not_of(" \t");
-    return first == std::string::npos ? "" : line.substr(first, last - first + 1);
-}
-
-/// Of one person alone; what was said before is out of sight.
-CommissionJson sign_said_by(const std::string& person) {
-    if (isatty(STDOUT_FILENO) != 0) std::cout << "\x1b[H\x1b[2J\x1b[3J";
-    print_wrapped(std::cout,
-                  "drift_sign cannot be measured. " + person +
-                      ", please, alone at the keyboard: a positive drift coefficient is");
-    std::cout << "  1  the gyro's output at zero input (IEEE Std 517)\n"
-                 "  2  the rate at which the platform turns\n"
-                 "  3  the torque that stops it\n";
-    std::string says;
-    while (says != "1" && says != "2" && says != "3") {
-        std::cout << "? Which? [1, 2 or 3]\n";
-        says = line_of_person();
-    }
-    std::string source;
-    while (source.empty()) {
-        std::cout << "? Where is that written? [name of the drawing or certificate]\n";
-        source = line_of_person();
-    }
-    if (isatty(STDOUT_FILENO) != 0) std::cout << "\x1b[H\x1b[2J\x1b[3J";
-    return {{"by", person}, {"says", says[0] - '0'}, {"source", source}};
-}
-
-/// What nothing measures, by two persons.
-int state_gyros(const CommissionOptions& options) {
-    expect_two(options);
-    serve::Client client(options.at);
-    const auto state = commission_state(client, options.by, 0);
-    if (options.yes && state["simulated"] != true)
-        throw std::runtime_error("--yes: persons answer on a real rig");
-    const auto now = configuration::load(state["configuration"].get<std::string>(), true);
-    auto said = CommissionJson::array();
-    if (!options.yes) said = {sign_said_by(options.by), sign_said_by(options.second)};
-    std::cout << "From the drawing; nothing measures signs, output and spin axes or drift_sign:\n";
-    for (const auto& value : now.effective)
-        if (value.key.starts_with("platform.gyro_") || value.key == "platform.drift_sign" ||
-            value.key.starts_with("levelling.torque_"))
-            std::cout << "  " << value.key << " = " << value.value << '\n';
-    if (!agreed(options, options.by + " and " + options.second + ": is that so?"))
-        throw CommissionRefused("not stated");
-    print_wrapped(std::cout, commission_command(client, options.by,
-                                                {{"do", "state"},
-                                                 {"part", "gyros"},
-                                                 {"second", options.second},
-                                                 {"statements", said}}));
-    return 0;
 }
 
 int commission(const CommissionOptions& options) {
@@ -482,6 +333,11 @@ void run_as(CLI::App& command, int& exit_code, std::shared_ptr<CommissionOptions
     });
 }
 
+void add_identity(CLI::App& command, CommissionOptions& options) {
+    command.add_option("--identity", options.identity,
+                       "Sign what is recorded: FOLDER/NAME of `vibrig pki init`");
+}
+
 void add_persons(CLI::App& command, CommissionOptions& options) {
     options.at.socket = default_socket();
     command.add_option("--socket", options.at.socket, "Unix socket of the daemon")
@@ -510,6 +366,7 @@ void add_commission(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     commissioning.add_option("--by", options->by, "Who stands at the rig; goes into the record");
     commissioning.add_option("--second", options->second, "Another person, for gyros");
+    add_identity(commissioning, *options);
     commissioning.add_flag("--by-hand", options->by_hand,
                            "Nothing is commanded: a person turns the gimbals");
     commissioning.add_flag("--resume", options->resume,
@@ -559,6 +416,7 @@ void add_commission(CLI::App& app, int& exit_code) {
         "accept", "Write what was found into the configuration, and record it by two persons");
     add_persons(accepting, *accepted);
     accepting.add_option("--second", accepted->second, "Another person")->required();
+    add_identity(accepting, *accepted);
     accepting.add_option("--config", accepted->configuration,
                          "The daemon's configuration file; default: as the daemon names it");
     accepting.add_flag("--yes", accepted->yes, "Do not ask");

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/configuration/random_profiles.hpp"
 #include "daemon/record/in_order.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/results/progress.hpp"
@@ -52,13 +53,15 @@ struct Found {
     std::string contradiction;  ///< the first; empty: none
     std::vector<estimator::spectrum::SpectralDwell> spectral;
     std::vector<estimator::spectrum::Kind> kinds;
+    NumberedKinds profiles;                 ///< of a campaign's random dwells
     std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
 };
 
 /// `rows`: of all dwells.
 Found with_doubts(estimator::Result result, const std::vector<estimator::DwellRow>& rows,
                   const RigDoubts& doubts) {
-    Found found{std::move(result), {}, {}, {}, {}};
+    Found found;
+    found.result = std::move(result);
     found.contradiction = doubts.tell(found.result, rows);
     return found;
 }
@@ -330,7 +333,9 @@ Found identify_campaign(const std::string& path, const std::string& config,
         live->assessed = estimator::uncertainty::assess(settings, live->result);
     }
     settings = dwells::Anew::settings_of(settings, campaign.found);
-    return identify(campaign, settings);
+    Found found = identify(campaign, settings);
+    found.profiles = configuration::numbered_kinds(loaded.configuration);
+    return found;
 }
 
 /// Numbers of a rig that is not the configuration's are not valid, whatever their residuals.
@@ -398,12 +403,17 @@ Identified identify_recording(const std::string& file, const std::string& config
                                           std::move(found.kinds), request.form);
         adopt(*identified.spectrum, identified.settings, identified.assessed);
     } else if (identified.assessed.done) {
-        identified.spectrum = spectrum_of(identified.settings, found.rows, request.form);
+        identified.spectrum =
+            spectrum_of(identified.settings, found.rows, request.form, found.profiles);
         if (identified.spectrum)
             adopt(*identified.spectrum, identified.settings, identified.assessed);
     }
     for (const estimator::DwellRow& row : found.rows) {
-        if (row.held_out) identified.held_out.push_back({row, ""});
+        if (!row.held_out) continue;
+        const auto profile = std::ranges::find_if(
+            found.profiles, [&row](const auto& one) { return one.first == row.profile; });
+        if (row.random && profile == found.profiles.end()) continue;
+        identified.held_out.push_back({row, row.random ? profile->second.profile : ""});
     }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;

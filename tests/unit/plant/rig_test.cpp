@@ -25,6 +25,26 @@ void start(Rig& rig, std::uint32_t tenths_of_mg) {
     ASSERT_EQ(rig.shaker().write(2, words), ShakerController::Answer::accepted);
 }
 
+TEST(Gimbals, StopAtASoftStopAndAreNeverInPositionBeyondIt) {
+    // GIVEN a stop 60 deg either way of an encoder reading of 170
+    Gimbals gimbals(5, std::nullopt, {{170, 0, 0}, {60, 360, 360}});
+    Vec3 angle{170, 0, 0};
+    gimbals.slew_to({260, 10, 0});
+    for (int n = 0; n < 400; ++n) gimbals.advance(0.1, angle);
+    // THEN it stands there, the others go where they were sent
+    EXPECT_NEAR(angle[0], 230, 1e-9);
+    EXPECT_NEAR(angle[1], 10, 0.006);
+    EXPECT_FALSE(gimbals.in_position());
+    // AND comes back, and stops at the other end
+    gimbals.slew_to({90, 0, 0});
+    for (int n = 0; n < 400; ++n) gimbals.advance(0.1, angle);
+    EXPECT_NEAR(angle[0], 110, 1e-9);
+    EXPECT_FALSE(gimbals.in_position());
+    gimbals.slew_to({150, 0, 0});
+    for (int n = 0; n < 400; ++n) gimbals.advance(0.1, angle);
+    EXPECT_TRUE(gimbals.in_position());
+}
+
 TEST(Gimbals, SlewAtFiniteRateTheShorterWayRound) {
     // GIVEN gimbals at 5 deg/s
     Gimbals gimbals(5);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "daemon/commission/procedure.hpp"
@@ -33,17 +35,42 @@ class Commissioned : public ::testing::Test {
         p.slew = [this](const Vec3& command, Time) { slew(command); };
         p.release = [this](Time) {
             ++released;
-            drift = rig->drift();
+            drift = rig->drift(turned_by(torque));
             drifting_since = now;
         };
         p.gimbal = [this] {
             return now >= arrives ? drivers::GimbalState::in_position
                                   : drivers::GimbalState::slewing;
         };
+        if (torquers)
+            p.torque = [this](const Vec3& command) {
+                if (command != torque) torque_to(command);
+                ++torques;
+                return true;
+            };
         p.keep = [this](const Json& log) { kept = log; };
         p.note = [this](const Note& note) { notes.push_back(note); };
         p.event = [this](Severity, const std::string& text) { events.push_back(text); };
         return p;
+    }
+
+    [[nodiscard]] Vec3 turned_by(const Vec3& command) const {
+        if (!torquers) return {};
+        const Eigen::Vector3d turn = *torquers * Eigen::Vector3d(command.data());
+        return {turn[0], turn[1], turn[2]};
+    }
+
+    void torque_to(const Vec3& command) {
+        torque = command;
+        for (std::size_t i = 0; i < 3; ++i)
+            most_torque = std::max(most_torque, std::abs(torque[i]));
+        if (drifting_since == 0) return;
+        const double hours = drivers::to_seconds(now - drifting_since) / 3600;
+        auto next = rig->drift(turned_by(command));
+        for (std::size_t c = 0; c < 3; ++c)
+            next.reading[c] = drift.reading[c] + hours * drift.slope[c];
+        drift = next;
+        drifting_since = now;
     }
 
     void slew(const Vec3& command) {
@@ -177,7 +204,10 @@ class Commissioned : public ::testing::Test {
     double gain = 1, offset_deg = 0;
     Vec3 base{}, travel{}, most_travel{}, by_hand_deg{};
     estimator::commissioning::FreeDrift drift;
-    int slews = 0, released = 0;
+    std::optional<Eigen::Matrix3d> torquers;  ///< truth's platform rate over the command
+    Vec3 torque{};
+    double most_torque = 0;
+    int slews = 0, released = 0, torques = 0;
     Json kept;  ///< what is on disk
 };
 

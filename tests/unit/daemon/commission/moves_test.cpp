@@ -197,5 +197,62 @@ TEST_F(Moved, AStopInAFreeDriftBeginsTheDriftAnew) {
     EXPECT_EQ(result["outcome"], "decided") << result.dump(1);
 }
 
+TEST_F(Commissioned, ASoftStopIsToldWithItsGimbalAndATravelWithinItIsScaledInto) {
+    int ended = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        // Says that it is in position where its stop is.
+        rig_of(seed);
+        based = false;
+        travel = {};
+        drifting_since = 0;
+        const std::size_t short_one = seed % 3;
+        rig->travel_deg = {140, 35, 178};
+        rig->travel_deg[short_one] = short_one == 1 ? 18 : 60;
+        answers["travel"] = "-130 130 -30 30 -175 175";
+        const Json state = run();
+        constexpr std::array<const char*, 3> kLoud{"OUTER", "INNER", "AZIMUTH"};
+        EXPECT_THAT(state["lines"].get<std::vector<std::string>>(),
+                    ::testing::Contains(::testing::AllOf(
+                        HasSubstr(std::string("the ") + kLoud[short_one] + " gimbal stands"),
+                        HasSubstr("a soft stop?"))));
+        const Json& result = state["result"];
+        EXPECT_NE(result["outcome"], "refused") << result["why"];
+        if (result["outcome"] != "decided") {
+            EXPECT_FALSE(result["why"].get<std::string>().empty());
+            EXPECT_TRUE(result["found"].empty());
+            continue;
+        }
+        // The travel that is written is shorter than the one that was stated.
+        ++ended;
+        const auto found =
+            result["found"]["gimbal.travel_deg"].get<std::array<std::array<double, 2>, 3>>();
+        constexpr std::array<double, 3> kStated{260, 60, 350};
+        EXPECT_LT((found[short_one][1] - found[short_one][0]) * rig->degrees[short_one],
+                  kStated[short_one] - 1);
+    }
+    EXPECT_GE(ended, 10);
+    // The travel that it has is stated: sweeps and positions are scaled into it.
+    int decided = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        rig_of(seed);
+        based = false;
+        travel = most_travel = {};
+        drifting_since = 0;
+        rig->travel_deg = {60, 20, 70};
+        answers["travel"] = "-60 60 -20 20 -70 70";
+        const Json result = run()["result"];
+        for (std::size_t k = 0; k < 3; ++k) EXPECT_LE(most_travel[k], rig->travel_deg[k] + 1e-9);
+        EXPECT_NE(result["outcome"], "refused") << result["why"];
+        if (result["outcome"] == "decided") ++decided;
+        if (result["outcome"] == "undecided") {
+            EXPECT_FALSE(result["why"].get<std::string>().empty());
+            EXPECT_TRUE(result["found"].empty());
+        }
+    }
+    EXPECT_GE(decided, 10);
+}
+
 }  // namespace
 }  // namespace vibrig::commission

@@ -344,5 +344,18 @@ TEST_F(Books, ASimulatedRigNeedsNoneUnlessItIsEnforcedWithAFolder) {
     EXPECT_THAT(Book(as).refusal(kNow), Not(""));
 }
 
+TEST_F(Books, ATorqueSignThatWasMeasuredIsTheOneThatIsStated) {
+    const Json measured{{"sign", {1, -1, 1}}};
+    const auto with = [this](const std::string& sign) {
+        return loaded("[levelling]\ntorque_sign = " + sign + "\n");
+    };
+    EXPECT_EQ(not_as_torqued(measured, with("[1, -1, 1]")), "");
+    EXPECT_THAT(not_as_torqued(measured, with("[1, 1, 1]")),
+                HasSubstr("levelling.torque_sign: found [1,1,1], expected [1,-1,1] as the torquers "
+                          "were measured"));
+    EXPECT_EQ(not_as_torqued(Json(), with("[1, 1, 1]")), "") << "nothing was measured";
+    EXPECT_EQ(not_as_torqued(Json::object(), with("[1, 1, 1]")), "");
+}
+
 }  // namespace
 }  // namespace vibrig::commission

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -52,6 +53,10 @@ TEST(SpectrumKeys, EachBadProfileIsToldWithPlaceValueAndWhatWasExpected) {
     EXPECT_THAT(said("file = \"nowhere.json\"\n"), HasSubstr("nowhere.json"));
     const std::string one = profile_with("psd = [[20, 0.04], [30, 0.04]]\n");
     EXPECT_THAT(complaint(one + one, false), HasSubstr("profile[1].name"));
+    EXPECT_THAT(complaint(one + "number = 4\n[[profile]]\nname = \"q\"\nnumber = 4\n" +
+                              "psd = [[20, 0.04], [30, 0.04]]\n",
+                          false),
+                HasSubstr("profile[1].number: found 4 a second time"));
 }
 
 TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemon) {
@@ -133,6 +138,110 @@ TEST(SpectrumKeys, FrequenciesThatSamplingForbidsAreRefusedWithTheNearestFreeOne
     EXPECT_EQ(plan_at("15"), "");
     EXPECT_THAT(complaint("spectrum.mode = \"mixed\"\n", true),
                 HasSubstr("found \"mixed\" without registers of mode and profile"));
+}
+
+const std::string kRandomRegisters = R"([shaker.registers]
+mode = { address = 8 }
+profile_number = { address = 9 }
+profile_level_db = { address = 10 }
+profile_checksum = { address = 5 }
+measured_g_rms = { address = 7 }
+control_state = { address = 9 }
+)";
+
+TEST(RandomRegisters, AreNoneUnlessStatedAndThenAsStated) {
+    EXPECT_FALSE(accepted("", true).shaker.registers.random);
+    const auto map = accepted("spectrum.mode = \"mixed\"\n" + kRandomRegisters, true)
+                         .shaker.registers.random.value();
+    EXPECT_EQ(map.profile_level_db.type, proto::RegisterType::i16);
+    EXPECT_EQ(map.profile_level_db.scale, 0.1);
+    EXPECT_EQ(map.control_state.table, proto::RegisterTable::input);
+    const auto shown = [](const std::string& text) {
+        return format_effective(parse(as_simulated(text, true), "rig.toml", true));
+    };
+    EXPECT_THAT(shown(kRandomRegisters), HasSubstr("shaker.registers.profile_checksum.address"));
+    EXPECT_THAT(shown(""), Not(HasSubstr("profile_checksum")));
+}
+
+TEST(RandomRegisters, EachMissingOrUnfitRoleIsNamed) {
+    const auto without = [](const std::string& role) {
+        std::string text = kRandomRegisters;
+        const auto at = text.find(role);
+        return complaint(text.erase(at, text.find('\n', at) + 1 - at), true);
+    };
+    for (const char* role : {"mode", "profile_number", "profile_level_db", "profile_checksum",
+                             "measured_g_rms", "control_state"})
+        EXPECT_THAT(without(role), AllOf(HasSubstr(std::string("shaker.registers.") + role +
+                                                   ".address: found nothing, expected an address"),
+                                         HasSubstr("random vibration needs mode, profile_number")))
+            << role;
+    const auto with = [](const std::string& line) {
+        std::string text = kRandomRegisters;
+        const auto at = text.find(line.substr(0, line.find(' ')));
+        text.replace(at, text.find("\n", at) - at, line);
+        return complaint(text, true);
+    };
+    EXPECT_THAT(with("profile_level_db = { address = 10, type = \"u16\" }"),
+                AllOf(StartsWith("rig.toml:4:"), HasSubstr("profile_level_db.type"),
+                      HasSubstr("found u16, expected i16, i32 or f32")));
+    EXPECT_THAT(with("profile_checksum = { address = 5, type = \"f32\" }"),
+                HasSubstr("profile_checksum.type: found f32, expected u32"));
+    EXPECT_THAT(with("mode = { address = 8, table = \"input\" }"),
+                HasSubstr("mode.table: found \"input\", expected \"holding\""));
+    EXPECT_THAT(with("mode = { address = 5 }"),
+                HasSubstr("expected written registers that do not"));
+    EXPECT_THAT(with("control_state = { address = 9, type = \"bits\" }"),
+                HasSubstr("control_state.type: found bits"));
+}
+
+TEST(RandomDwells, OfAPlanAreStopsWithChecksumLevelAndBands) {
+    const plant::TemporaryFolder folder;
+    const std::string path = folder.file("plan.json");
+    const auto text = [&](const std::string& run, const std::string& profile,
+                          const std::string& mode = "mixed") {
+        std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3},{"position":[0,0,0],)"
+                            << run << "}]}";
+        return "campaign.plan = \"" + path + "\"\nspectrum.mode = \"" + mode + "\"\n" +
+               kRandomRegisters + profile_with(profile);
+    };
+    const auto said = [&](const std::string& run, const std::string& profile) {
+        return complaint(text(run, profile), true);
+    };
+    const std::string psd = "psd = [[20, 0.02], [120, 0.02]]\n";
+    const std::string whole = psd + "number = 4\nat = \"table\"\n";
+    const auto c = accepted(text(R"("profile":"p","level_db":-3.0)", whole), true);
+    ASSERT_EQ(c.campaign.stops.size(), 2U);
+    const auto& stop = c.campaign.stops[1];
+    ASSERT_TRUE(stop.random);
+    EXPECT_EQ(stop.random->set_point.profile, 4);
+    EXPECT_EQ(stop.random->set_point.level_db, -3);
+    // zlib.crc32(struct.pack(">4f", 20, 0.02, 120, 0.02))
+    EXPECT_EQ(stop.random->set_point.checksum, 0xbb19bad6U);
+    // sqrt(2) g less 3 dB, and a flat band's width
+    EXPECT_NEAR(stop.table_g, std::sqrt(2.0) * std::pow(10, -0.15), 1e-6);
+    ASSERT_EQ(c.abort_bands.size(), 1U);
+    EXPECT_EQ(stop.random->place, 1);
+    EXPECT_NEAR(c.abort_bands[0].table_bandwidth_hz, 100, 0.5);
+    // Behind the pads it is less, and narrower.
+    EXPECT_LT(stop.transmission, 0.4);
+    EXPECT_LT(c.abort_bands[0].platform_bandwidth_hz, 50);
+    EXPECT_NEAR(stop.random->at_platform.mean_square_g2,
+                std::pow(stop.table_g * stop.transmission, 2), 1e-9);
+    EXPECT_EQ(stop.random->at_platform.gain_error, 0.01);
+
+    EXPECT_THAT(said(R"("profile":"q")", whole),
+                AllOf(HasSubstr("runs[1].profile: found 'q'"), HasSubstr("one of p")));
+    EXPECT_THAT(said(R"("profile":"p")", psd + "at = \"table\"\n"),
+                HasSubstr("found 'p' without a number, expected its number in the controller"));
+    EXPECT_THAT(said(R"("profile":"p")", psd + "number = 4\n"),
+                HasSubstr("at the platform, behind isolators, expected at = \"table\""));
+    EXPECT_THAT(said(R"("profile":"p","table_g":3)", whole),
+                HasSubstr("runs[1].table_g: found 3 beside a profile, expected level_db alone"));
+    EXPECT_THAT(said(R"("sweep":{"from_hz":20},"table_g":3)", whole),
+                HasSubstr("sweeps are not run"));
+    EXPECT_THAT(said(R"("profile":"p","level_db":20)", whole), HasSubstr("3 sigma of 42.4"));
+    EXPECT_THAT(complaint(text(R"("profile":"p")", whole, "sine"), true),
+                HasSubstr("expected spectrum.mode \"mixed\" for random vibration"));
 }
 
 }  // namespace

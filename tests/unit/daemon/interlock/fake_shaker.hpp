@@ -45,6 +45,19 @@ class FakeShaker final : public drivers::Shaker {
         now.frequency_hz = wanted.frequency_hz;
         now.running = wanted.amplitude_g > 0;
         now.state = wanted.amplitude_g > 0 ? 2 : 0;
+        if (!wanted.random) {
+            now.random.reset();
+            return;
+        }
+        using State = drivers::RandomReading::State;
+        now.random = {true,
+                      wanted.random->profile,
+                      wanted.random->level_db,
+                      wanted.random->checksum,
+                      wanted.amplitude_g,
+                      now.running ? levelled : State::idle,
+                      true,
+                      0};
     }
 
     drivers::ShakerReading now;
@@ -54,6 +67,8 @@ class FakeShaker final : public drivers::Shaker {
     std::atomic<bool> stop_waits{false};
     drivers::Time hung_up_until = 0;
     bool refuse = false, writing = false;
+    /// Of random vibration, once it runs.
+    drivers::RandomReading::State levelled = drivers::RandomReading::State::at_level;
 };
 
 }  // namespace vibrig

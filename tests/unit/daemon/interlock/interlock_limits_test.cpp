@@ -46,7 +46,9 @@ struct Rig {
             Interlock::Limits{kTable_g,
                               500 * drivers::kMillisecond,
                               std::move(rules),
-                              {.frequency_hz = 15.3, .count_g = {1e-4, 1e-4, 1e-4, 1e-4}}});
+                              {.frequency_hz = 15.3, .count_g = {1e-4, 1e-4, 1e-4, 1e-4}},
+                              1,
+                              {{40, 100, 100}}});
         sample.quality.fill(drivers::Quality::good);
         sample.force = {0, 1, 0};
         platform.loop_closed = true;
@@ -214,6 +216,11 @@ const Case kCases[] = {
     {"wrong_vibration", Trip::wrong_vibration, 0,
      [](Rig& rig, bool beyond) { rig.interlock->wrong_vibration(beyond); }, Guard::excitation,
      Guard::excitation, 0},
+    {"abort_bands", Trip::abort_bands, 0,
+     [](Rig& rig, bool beyond) {
+         rig.shaker.now.running = true;
+         rig.shaker.now.random = {.random = true, .bands_armed = !beyond};
+     }},
     {"watchdog_changed", Trip::watchdog_changed, 0,
      [](Rig& rig, bool beyond) {
          rig.shaker.now.watchdog =

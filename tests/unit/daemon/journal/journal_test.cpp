@@ -256,12 +256,12 @@ TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
         const char* says;
     };
     std::string newer = good, foreign = good;
-    newer[8] = 7;
+    newer[8] = 8;
     foreign[0] = 'X';
     std::vector<Case> cases{{"", "truncated: 0 bytes"},
                             {good.substr(0, 11), "truncated"},
                             {foreign, "not a checkpoint"},
-                            {newer, "version 7, newer than 6"}};
+                            {newer, "version 8, newer than 7"}};
     // any cut and any flipped bit
     for (std::size_t at = 12; at < good.size(); at += good.size() / 50) {
         cases.push_back({good.substr(0, at), ""});
@@ -387,12 +387,12 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
 }
 
 /// As version 1 wrote it: without the four noise levels, position, repeats, time used, times of
-/// the beginning, whether power was lost, frequency and whether it was held out.
+/// the beginning, whether power was lost, frequency, whether it was held out, random vibration.
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers,
-                (4 + 7) * sizeof(double) + sizeof(std::int32_t) + sizeof(std::int64_t) + 2);
+    bytes.erase(numbers, (4 + 7 + 5) * sizeof(double) + sizeof(std::int32_t) +
+                             sizeof(std::int64_t) + 2 + sizeof(std::uint16_t));
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(
@@ -422,6 +422,22 @@ TEST_F(JournalTest, KnowsFrequencyAndRoleOfADwell) {
     EXPECT_EQ(read.stop.frequency_hz, 25.1);
     one.info.frequency_hz = -1;
     EXPECT_EQ(decode(encode(one, kHash), kHash, read), "corrupt: frequency");
+}
+
+TEST_F(JournalTest, KnowsTheRandomVibrationOfADwell) {
+    estimator::Identification filter{estimator::Settings{}};
+    DwellCheckpoint one = dwell(filter, 1), read;
+    one.info.random = {1.5, 100, 0.01, 500, 4, -1.5};
+    ASSERT_EQ(decode(encode(one, kHash), kHash, read), "");
+    EXPECT_EQ(read.info.random.mean_square_g2, 1.5);
+    EXPECT_EQ(read.info.random.bandwidth_hz, 100);
+    EXPECT_EQ(read.info.random.gain_error, 0.01);
+    EXPECT_EQ(read.info.random.highest_hz, 500);
+    EXPECT_EQ(read.info.random.profile, 4);
+    EXPECT_EQ(read.info.random.level_db, -1.5);
+    EXPECT_EQ(read.stop.profile, 4);
+    one.info.random.mean_square_g2 = -1;
+    EXPECT_EQ(decode(encode(one, kHash), kHash, read), "corrupt: random vibration");
 }
 
 TEST_F(JournalTest, ReadsCheckpointsOfVersion1AndSaysWhatItAssumes) {

@@ -153,8 +153,13 @@ TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
         << error;
     EXPECT_TRUE(refuses(at + R"(,"frequency_hz":-3}]})", "runs[0].frequency_hz: found -3"))
         << error;
-    EXPECT_TRUE(refuses(at + R"(,"profile":"truck"}]})", "runs[0].profile: found \"truck\""))
+    EXPECT_TRUE(refuses(at + R"(,"profile":"truck"}]})", "runs[0].level_g: found 6 beside a"))
         << error;
+    const std::string bare = R"({"runs":[{"position":[0,0,0])";
+    EXPECT_TRUE(refuses(bare + R"(,"profile":"truck"}]})", "runs[0].profile: found truck"))
+        << error;
+    EXPECT_TRUE(refuses(bare + R"(,"profile":0}]})", "runs[0].profile: found 0")) << error;
+    EXPECT_TRUE(refuses(at + R"(,"level_db":-3}]})", "runs[0].level_db: found -3")) << error;
     EXPECT_TRUE(refuses(at + R"(,"sweep":{"s":9}}]})", "runs[0].sweep: found")) << error;
     EXPECT_TRUE(refuses(at + R"(,"role":"test"}]})", "\"identify\" or \"verify\"")) << error;
     write("plan.csv",

@@ -43,6 +43,13 @@ TEST(Command, IsRefusedWithTheFieldAndWhatWasExpected) {
     EXPECT_NE(error_of(R"({"kind":"arm","by":"   "})").find("by: empty"), std::string::npos);
     EXPECT_NE(error_of(R"({"kind":"arm","by":"A\nfaked line"})").find("control character"),
               std::string::npos);
+    // What is one line is taken up to its own limit, which is beyond that of a log's line.
+    const std::string dots(3000, '.');
+    const auto script = [&dots](const char* more) {
+        return R"({"kind":"commission","by":"A","argument":")" + dots + more + "\"}";
+    };
+    EXPECT_EQ(parse_command(script("")).argument.size(), dots.size());
+    EXPECT_NE(error_of(script("\\n")).find("control character"), std::string::npos);
     for (const char* c : {"\\u001b", "\\u009b", "\\u2028", "\\u202e"})
         EXPECT_NE(error_of(std::string(R"({"kind":"arm","by":"A)") + c + "\"}").find("control"),
                   std::string::npos)

@@ -137,9 +137,9 @@ std::vector<Stop> UnknownRig::stops() {
     return all;
 }
 
-FreeDrift UnknownRig::drift() {
+FreeDrift UnknownRig::drift(const plant::Vec3& torque) {
     FreeDrift drift{look().reading, {}};
-    const auto rate = model_.angle_rates(kRadPerDegree * angle_deg_, 0, {});  // rad/s
+    const auto rate = model_.angle_rates(kRadPerDegree * angle_deg_, 0, torque);  // rad/s
     for (std::size_t i = 0; i < 3; ++i)
         drift.slope[static_cast<std::size_t>(channel[i])] =
             (sign[i] * rate[i] / kRadPerDegree * 3600 + 0.03 * random.normal()) / degrees[i];

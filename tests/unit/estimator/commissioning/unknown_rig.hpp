@@ -36,7 +36,8 @@ class UnknownRig {
     /// To where the azimuth axis has an upper end.
     void stand_up();
     [[nodiscard]] Stop look(int swept = -1);
-    [[nodiscard]] FreeDrift drift();
+    /// `torque`: of the platform in its axes, deg/h.
+    [[nodiscard]] FreeDrift drift(const plant::Vec3& torque = {});
     /// The whole sequence of look, moves, sweeps and common positions.
     [[nodiscard]] std::vector<Stop> stops();
     /// Free drift where a description has the gimbals at these angles, as far as it is right.

@@ -1,0 +1,131 @@
+#include "daemon/configuration/random_profiles.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <boost/crc.hpp>
+#include <cmath>
+
+#include "daemon/configuration/value.hpp"
+
+namespace vibrig::configuration {
+
+namespace spectrum = estimator::spectrum;
+
+namespace {
+
+using Named = Configuration::NamedProfile;
+
+/// CRC-32 over Hz and g^2/Hz of each point as big-endian IEEE 754 floats.
+std::uint32_t checksum_of(const std::vector<std::pair<double, double>>& psd) {
+    boost::crc_32_type crc;
+    for (const auto& [hz, density] : psd) {
+        for (const double value : {hz, density}) {
+            const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+            for (const int shift : {24, 16, 8, 0})
+                crc.process_byte(static_cast<unsigned char>(bits >> shift));
+        }
+    }
+    return crc.checksum();
+}
+
+[[noreturn]] void refuse(const std::string& place, const std::string& found,
+                         const std::string& expected) {
+    throw plan::PlanFileError(place + ": found " + found + ", expected " + expected);
+}
+
+const Named& profile_of(const Configuration& rig, const plan::PlannedRun& run,
+                        const std::string& place) {
+    std::string known;
+    for (const Named& one : rig.profiles) {
+        if (one.profile.name == run.profile ||
+            (one.number > 0 && std::to_string(one.number) == run.profile))
+            return one;
+        known += (known.empty() ? "" : ", ") + one.profile.name;
+    }
+    refuse(place, "'" + run.profile + "'",
+           "the name or number of a [[profile]]" + (known.empty() ? "" : ": one of " + known));
+}
+
+/// Of bands with a ratio each: their mean square becomes so many times as large.
+double weigh(const Configuration& rig, std::vector<spectrum::Band>& bands, bool up) {
+    double kept = 0;
+    for (spectrum::Band& band : bands) {
+        const auto ratio = rig.spectrum.mount.transmission(band.hz);
+        if (!ratio) return 0;
+        band.share *= up ? *ratio * *ratio : 1 / (*ratio * *ratio);
+        kept += band.share;
+    }
+    for (spectrum::Band& band : bands) band.share /= kept;
+    return kept;
+}
+
+}  // namespace
+
+std::optional<PlayedProfile> played(const Configuration& rig, const Named& of) {
+    if (of.profile.psd.empty()) return std::nullopt;
+    const auto stated = spectrum::bands_of(of.profile);
+    auto other = stated;
+    const double power = spectrum::mean_square(of.profile);
+    const double kept = weigh(rig, other, of.at_table);
+    if (!(kept > 0)) return std::nullopt;
+    PlayedProfile out;
+    const auto& table = of.at_table ? stated : other;
+    const auto& platform = of.at_table ? other : stated;
+    out.table_g = std::sqrt(of.at_table ? power : power * kept);
+    out.platform_g = std::sqrt(of.at_table ? power * kept : power);
+    out.table_bandwidth_hz = spectrum::bandwidth_hz(table);
+    out.platform_bandwidth_hz = spectrum::bandwidth_hz(platform);
+    out.highest_hz = of.profile.psd.back().first;
+    out.at_platform = platform;
+    out.checksum = checksum_of(of.profile.psd);
+    return out;
+}
+
+campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run,
+                           const std::string& place) {
+    const Named& named = profile_of(rig, run, place);
+    const std::string name = "'" + named.profile.name + "'";
+    if (named.number == 0)
+        refuse(place, name + " without a number", "its number in the controller: profile.number");
+    if (!named.profile.sines.empty()) refuse(place, name + " with sines", "a psd alone");
+    if (std::abs(std::abs(named.profile.direction[1]) - 1) > 1e-6)
+        refuse(place, name + " across the vertical", "what a shaker under the platform plays");
+    if (!named.at_table && !rig.spectrum.mount.hard)
+        refuse(place, name + " at the platform, behind isolators",
+               "at = \"table\": the controller's breakpoints, of which the checksum is");
+    const auto found = played(rig, named);
+    if (!found) refuse(place, name, "a psd within spectrum.transmission");
+    const auto number = static_cast<std::uint16_t>(named.number);
+    const double level = std::pow(10, run.level_db / 20);
+    campaign::Stop stop{run.position_deg, found->table_g * level, 0, run.verify,
+                        found->platform_g / found->table_g};
+    const double platform_g = found->platform_g * level;
+    stop.random = campaign::RandomStop{
+        {number, run.level_db, found->checksum},
+        {platform_g * platform_g, found->platform_bandwidth_hz, rig.spectrum.controller_gain,
+         found->highest_hz, number, run.level_db},
+        0,
+        named.profile.name};
+    auto& numbers = rig.played_numbers;
+    const auto known = std::ranges::find(numbers, number);
+    stop.random->place = static_cast<std::uint16_t>(known - numbers.begin() + 1);
+    if (known != numbers.end()) return stop;
+    numbers.push_back(number);
+    rig.abort_bands.push_back({1e9 / static_cast<double>(rig.assembler.sample_period),
+                               found->table_bandwidth_hz, found->platform_bandwidth_hz,
+                               rig.estimator.accelerometer_zero_g});
+    return stop;
+}
+
+std::vector<std::pair<std::uint16_t, spectrum::Kind>> numbered_kinds(const Configuration& rig) {
+    std::vector<std::pair<std::uint16_t, spectrum::Kind>> kinds;
+    for (const Named& one : rig.profiles) {
+        if (one.number == 0) continue;
+        if (auto found = played(rig, one))
+            kinds.push_back({static_cast<std::uint16_t>(one.number),
+                             {one.profile.name, std::move(found->at_platform)}});
+    }
+    return kinds;
+}
+
+}  // namespace vibrig::configuration

@@ -1,0 +1,210 @@
+#include "daemon/tool/live/commission_record.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <stdexcept>
+#include <string_view>
+
+#include "daemon/commission/acceptance.hpp"
+#include "daemon/commission/person_signature.hpp"
+#include "daemon/configuration/configuration.hpp"
+#include "proto/durable_file.hpp"
+
+namespace vibrig::tool {
+
+namespace {
+
+std::string text_of_file(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw std::runtime_error(path + ": cannot be read");
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+bool agreed(const CommissionOptions& options, const std::string& question) {
+    if (options.yes) return true;
+    std::cout << "? " << question << " [yes or no]\n> " << std::flush;
+    std::string line;
+    return std::getline(std::cin, line) && (line == "yes" || line == "y");
+}
+
+/// What was there is kept beside the file itself, not beside a link to it.
+void save_file(const std::string& path, const std::string& before, const std::string& text) {
+    const std::string real = std::filesystem::canonical(path).string();
+    std::string kept = real + ".1";
+    for (int n = 2; std::filesystem::exists(kept); ++n) kept = real + "." + std::to_string(n);
+    proto::write_durably(kept, before, 0600);
+    std::filesystem::permissions(kept, std::filesystem::status(real).permissions());
+    proto::write_durably(path, text);
+    print_wrapped(std::cout, path + " is written; as it was: " + kept);
+}
+
+/// Before anything is written or asked.
+void expect_two(const CommissionOptions& options) {
+    if (const auto why = commission::not_two(options.by, options.second); !why.empty())
+        throw CommissionRefused(why);
+}
+
+std::string signed_by(const CommissionOptions& options, const std::string& text) {
+    return commission::sign_detached(text, options.identity + ".crt", options.identity + ".key");
+}
+
+/// Before anything is written or asked, too.
+void expect_identity(const CommissionOptions& options) {
+    if (!options.identity.empty()) static_cast<void>(signed_by(options, "may it be used?"));
+}
+
+/// What was recorded just now, with the certificate of who is at the tool, if there is one.
+void sign_recorded(serve::Client& client, const CommissionOptions& options,
+                   const std::vector<std::string>& parts) {
+    if (options.identity.empty()) return;
+    const auto record = commission_state(client, options.by, 0)["record"];
+    std::map<commission::Part, std::string> digests;
+    for (const auto& name : parts)
+        digests[commission::part_named(name).value()] = record["parts"][name]["digest"];
+    const auto cms =
+        signed_by(options, commission::statement_of(record["rig"].get<std::string>(), digests));
+    print_wrapped(std::cout, commission_command(client, options.by,
+                                                {{"do", "sign"}, {"parts", parts}, {"cms", cms}}));
+}
+
+/// A line of a person, with blanks around it taken off.
+std::string line_of_person() {
+    std::string line;
+    std::cout << "> " << std::flush;
+    if (!std::getline(std::cin, line)) throw CommissionRefused("nobody answers: not stated");
+    const auto first = line.find_first_not_of(" \t"), last = line.find_last_not_of(" \t");
+    return first == std::string::npos ? "" : line.substr(first, last - first + 1);
+}
+
+/// What was said before is out of sight; where a terminal knows no way to clear itself it is
+/// scrolled away.
+void clear_terminal() {
+    if (isatty(STDOUT_FILENO) == 0) return;
+    const char* const kind = std::getenv("TERM");
+    const bool dumb = kind == nullptr || *kind == '\0' || std::string_view(kind) == "dumb";
+    constexpr std::size_t kRows = 100;
+    std::cout << (dumb ? std::string(kRows, '\n') : "\x1b[H\x1b[2J\x1b[3J") << std::flush;
+}
+
+/// Of one person alone.
+CommissionJson sign_said_by(const std::string& person) {
+    clear_terminal();
+    print_wrapped(std::cout,
+                  "drift_sign cannot be measured. " + person +
+                      ", please, alone at the keyboard: a positive drift coefficient is");
+    std::cout << "  1  the gyro's output at zero input (IEEE Std 517)\n"
+                 "  2  the rate at which the platform turns\n"
+                 "  3  the torque that stops it\n";
+    std::string says;
+    while (says != "1" && says != "2" && says != "3") {
+        std::cout << "? Which? [1, 2 or 3]\n";
+        says = line_of_person();
+    }
+    std::string source;
+    while (source.empty()) {
+        std::cout << "? Where is that written? [name of the drawing or certificate]\n";
+        source = line_of_person();
+    }
+    clear_terminal();
+    return {{"by", person}, {"says", says[0] - '0'}, {"source", source}};
+}
+
+}  // namespace
+
+std::vector<TomlValue> values_of(const CommissionJson& found, const CommissionJson& by,
+                                 const std::string& mark) {
+    std::vector<TomlValue> values;
+    for (const auto& [key, value] : found.items()) {
+        std::string text;
+        // One blank behind a comma, as --check prints it.
+        for (const char c : value.dump()) text += c == ',' ? std::string(", ") : std::string(1, c);
+        values.push_back({key, text, mark + by.value(key, std::string())});
+    }
+    return values;
+}
+
+std::string mark_of(const CommissionJson& of) {
+    return of.value("simulated", false) ? "SIMULATED: " : "";
+}
+
+int accept_commission(const CommissionOptions& options) {
+    expect_two(options);
+    expect_identity(options);
+    serve::Client client(options.at);
+    const auto state = commission_state(client, options.by, 0);
+    const auto& procedure = state["procedure"];
+    if (procedure.is_null() || procedure["active"] == true ||
+        procedure["result"]["outcome"] != "decided")
+        throw CommissionRefused("nothing is decided: vibrig commission --by NAME");
+    const auto& result = procedure["result"];
+    const std::string path = options.configuration.empty()
+                                 ? state["configuration"].get<std::string>()
+                                 : options.configuration;
+    if (path.empty()) throw std::runtime_error("the daemon has no configuration file");
+    if (!result["corrections"].empty())
+        throw CommissionRefused("the DBC first, then commission anew: " +
+                                result["corrections"][0].get<std::string>());
+    const std::string before = text_of_file(path);
+    std::vector<TomlValue> changed;
+    const auto now = configuration::load(path, true);
+    for (auto& value : values_of(result["found"], result["found_by"], mark_of(state))) {
+        const auto at =
+            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
+        std::string found = at == now.effective.end() ? "nothing" : at->value;
+        if (CommissionJson::parse(found, nullptr, false) ==
+            CommissionJson::parse(value.value, nullptr, false))
+            continue;
+        print_wrapped(std::cout, "- " + value.key + " = " + found);
+        print_wrapped(std::cout, "+ " + value.key + " = " + value.value);
+        changed.push_back(std::move(value));
+    }
+    if (!changed.empty()) {
+        const std::string after = with_values(before, path, changed);
+        // Before it takes the place of one that works.
+        static_cast<void>(configuration::parse(after, path, true));
+        if (!agreed(options, options.by + " and " + options.second + ": write " + path + "?"))
+            throw CommissionRefused("not accepted: nothing is written");
+        save_file(path, before, after);
+    } else if (!agreed(options, options.by + " and " + options.second + ": record it?")) {
+        throw CommissionRefused("not accepted");
+    }
+    print_wrapped(std::cout, commission_command(client, options.by,
+                                                {{"do", "accept"}, {"second", options.second}}));
+    sign_recorded(client, options, {"bus", "gimbals", "accelerometers", "earth"});
+    return 0;
+}
+
+int state_gyros(const CommissionOptions& options) {
+    expect_two(options);
+    expect_identity(options);
+    serve::Client client(options.at);
+    const auto state = commission_state(client, options.by, 0);
+    if (options.yes && state["simulated"] != true)
+        throw std::runtime_error("--yes: persons answer on a real rig");
+    const auto now = configuration::load(state["configuration"].get<std::string>(), true);
+    auto said = CommissionJson::array();
+    if (!options.yes) said = {sign_said_by(options.by), sign_said_by(options.second)};
+    std::cout << "From the drawing; nothing measures signs, output and spin axes or drift_sign:\n";
+    for (const auto& value : now.effective)
+        if (value.key.starts_with("platform.gyro_") || value.key == "platform.drift_sign" ||
+            value.key.starts_with("levelling.torque_"))
+            std::cout << "  " << value.key << " = " << value.value << '\n';
+    if (!agreed(options, options.by + " and " + options.second + ": is that so?"))
+        throw CommissionRefused("not stated");
+    print_wrapped(std::cout, commission_command(client, options.by,
+                                                {{"do", "state"},
+                                                 {"part", "gyros"},
+                                                 {"second", options.second},
+                                                 {"statements", said}}));
+    sign_recorded(client, options, {"gyros"});
+    return 0;
+}
+
+}  // namespace vibrig::tool

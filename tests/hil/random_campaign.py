@@ -1,0 +1,130 @@
+#!/usr/bin/python3
+"""Random dwells among sine ones, unattended, over the seqpacket bus on the rig's clock: chosen at rest, read back, shown by the
+accelerometers, recorded and predicted. And controllers that lie about profile, level and abort bands.
+
+usage: random_campaign.py PROGRAMS [--soak]     soak: half an hour at level
+"""
+import json
+import os
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import rig as r  # noqa: E402
+import survey_campaign  # noqa: E402
+
+PSD = [[20, 0.02], [120, 0.02]]   # 1.41 g rms
+OTHER = [[30, 0.04], [80, 0.04]]  # the same rms
+NUMBER, LEVEL_DB = 4, -1.5
+TRUTH = {"isolator": {"hard": True},
+         "shaker": {"profiles": [{"number": NUMBER, "psd": PSD}, {"number": 5, "psd": OTHER}]}}
+POSITIONS = [[0, 0, 0], [45, 0, 90], [90, 0, 180], [180, 0, 45], [-45, 0, 90], [270, 0, 0]]
+HELD_OUT = [[30, 10, -20], [-50, 0, 70]]
+CONFIGURATION = f"""
+[[profile]]
+name = "broad"
+number = {NUMBER}
+at = "table"
+psd = {json.dumps(PSD)}
+"""
+REGISTERS = {"mode": {"address": 8}, "profile_number": {"address": 9}, "profile_level_db": {"address": 10},
+             "profile_checksum": {"address": 5}, "measured_g_rms": {"address": 7}, "control_state": {"address": 9}}
+ENDS = ("finished", "aborted", "tripped", "paused")
+WALL_S = 540
+
+
+def random_run(position, role):
+    return {"position": position, "profile": "broad", "level_db": LEVEL_DB, "role": role}
+
+
+def plan_of(folder, sines):
+    runs = [{"position": position, "table_g": 6.0, "level_g": 6.0, "frequency_hz": 15} for position in POSITIONS[:sines]]
+    runs += [random_run(position, "identify") for position in POSITIONS]
+    runs += [random_run(position, "verify") for position in HELD_OUT]
+    path = os.path.join(folder, "plan.json")
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump({"runs": runs}, file)
+    return path, len(runs)
+
+
+def start(rig, folder, sines, dwell_s, *plant):
+    plan, count = plan_of(folder, sines)
+    rig.start_plant("--seed", "3", "--truth", rig.truth_file(TRUTH), *plant)
+    rig.configure({"name": "random", "plan": plan, "dwell_s": dwell_s, "temperature_window_s": 5.0, "identify": "what-it-can"},
+                  spectrum={"mount": "hard", "mode": "mixed"}, **{f"shaker.registers.{role}": keys for role, keys in REGISTERS.items()})
+    with open(rig.configuration, "a", encoding="utf-8") as file:
+        file.write(CONFIGURATION)
+    rig.start_daemon()
+    rig.wait_for(r.measuring, 60)
+    return count, [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+
+
+def honest(checks, programs, folder, dwell_s):
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        count, commands = start(rig, folder, len(POSITIONS), dwell_s)
+        last = rig.wait_for_state(ENDS, WALL_S)
+        path, text = rig.result()
+        if not checks.check(last and last["campaign"]["state"] == "finished" and text, "random dwells run unattended to the end",
+                            f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.daemon.text()[-4000:]}"):
+            return
+        dwells, log = last["campaign"]["dwells"], rig.daemon.text()
+    finally:
+        rig.stop()
+    checks.equal([d for d in dwells if d.get("flagged")], [], "no dwell is flagged")
+    checks.equal(len(dwells), count, "all are taken")
+    checks.check("stop of the shaker" not in log, "the shaker was never stopped on the way", log[-2000:])
+    checks.check("profile 'broad' (number 4, checksum" in commands[0].stdout, "arming names the profile and its checksum",
+                 commands[0].stdout)
+    result = json.loads(text)
+    under = [row for row in result.get("dwell_rates", []) if row.get("profile") == "broad"]
+    checks.equal(len(under), len(POSITIONS), "the fit has the random dwells, but for those held out")
+    checks.check(all(0.004 < row["r_relative_error"] < 0.02 for row in under), "each with what is not known of its level",
+                 [row["r_relative_error"] for row in under])
+    recorded = survey_campaign.recording(rig)
+    again = survey_campaign.vibrig(programs, "identify", recorded, "--json")
+    same = json.loads(again.stdout) if again.stdout else {}
+    checks.equal(([p["value"] for p in same.get("parameters", [])], len(same.get("dwell_rates", []))),
+                 ([p["value"] for p in result["parameters"]], len(result["dwell_rates"])),
+                 "identify over the recording gives the live result to the last bit")
+    profile = os.path.join(folder, "broad.json")
+    with open(profile, "w", encoding="utf-8") as file:
+        json.dump({"name": "broad", "psd": PSD}, file)
+    proof = survey_campaign.vibrig(programs, "predict", path, "--profile", profile, "--verify", recorded, "--json", "--force")
+    verification = (json.loads(proof.stdout) if proof.stdout else {}).get("prediction", {}).get("verification") or {}
+    checks.check(verification.get("word", "").startswith("confirmed") and len(verification.get("dwells", [])) == len(HELD_OUT),
+                 "the prediction is confirmed on the dwells held out under the profile", proof.stdout + proof.stderr)
+
+
+def lies(checks, programs, folder, fault, trips, says):
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        start(rig, folder, 1, 20.0, "--fault", fault)
+        last = rig.wait_for_state(ENDS, 180)
+        taken = [d for d in last["campaign"]["dwells"] if d["used"] > 0] if last else []
+        name = fault.split("=", maxsplit=1)[0].replace("-", "_")
+        log = rig.daemon.text()
+        checks.check(last and last["campaign"]["state"] == "tripped" and any(trip in log for trip in trips),
+                     f"{name}: the daemon trips", f"{r.state_of(last)}\n{log[-3000:]}")
+        checks.equal(len(taken), 1, f"{name}: not a sample is taken under it")
+        checks.check(rig.daemon.says(says), f"{name}: what is wrong is told", log[-3000:])
+    finally:
+        rig.stop()
+
+
+def main():
+    programs = r.programs_from_command_line(__doc__)
+    checks = r.Checks()
+    with tempfile.TemporaryDirectory() as folder:
+        honest(checks, programs, folder, 1800.0 if "--soak" in sys.argv else 60.0)
+    for fault, trips, says in (
+            ("wrong-profile=5", ("read_back_mismatch",), "profile checksum reads back as"),
+            ("profile-level-wrong=6", ("wrong_vibration", "amplitude_witness", "over_amplitude"), "g rms"),
+            ("no-abort-bands", ("abort_bands",), "without abort bands of its own")):
+        with tempfile.TemporaryDirectory() as folder:
+            lies(checks, programs, folder, fault, trips, says)
+    return checks.end()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+#include "tests/unit/daemon/campaign/campaign_fixture.hpp"
+
+namespace vibrig::campaign {
+namespace {
+
+using drivers::RandomReading;
+
+/// A sine at 9 g, then a profile at 2 g rms.
+struct RandomDwellTest : CampaignTest {
+    RandomDwellTest() {
+        settings.table_g = {9};
+        settings.stops = {{{0, 0, 0}, 9}, {{0, 0, 90}, 2, 0, false, 0.5}};
+        settings.stops[1].random =
+            RandomStop{{4, -3, 0x89abcdef}, {1, 100, 0.01, 500, 4, -3}, 1, "broad"};
+        make();
+    }
+    CommandReply begin() {
+        static_cast<void>(command(Kind::arm));
+        return command(Kind::start);
+    }
+};
+
+TEST_F(RandomDwellTest, IsChosenAtRestAndSaidToTheEstimator) {
+    EXPECT_NE(
+        command(Kind::arm).message.find("profile 'broad' (number 4, checksum 89abcdef, up to 2 g "
+                                        "rms, 3 sigma 6 g)"),
+        std::string::npos);
+    static_cast<void>(command(Kind::start));
+    ASSERT_TRUE(run_until(CampaignState::finished, 200)) << status().reason;
+    const auto first = std::ranges::find_if(shaker.requests,
+                                            [](const auto& one) { return one.random.has_value(); });
+    ASSERT_NE(first, shaker.requests.end());
+    EXPECT_EQ(*first->random, (drivers::RandomSetPoint{4, -3, 0x89abcdef}));
+    EXPECT_EQ(first->amplitude_g, 2);
+    // The set-point before it is the ramp down of the sine.
+    ASSERT_NE(first, shaker.requests.begin());
+    EXPECT_EQ((first - 1)->amplitude_g, 0);
+    ASSERT_EQ(orders.size(), 2U);
+    EXPECT_EQ(orders[0].dwell.random.mean_square_g2, 0);
+    EXPECT_EQ(orders[1].dwell.random.mean_square_g2, 1);
+    EXPECT_EQ(orders[1].dwell.random.profile, 4);
+    ASSERT_EQ(stops_done.size(), 2U);
+    EXPECT_EQ(stops_done[1].profile, 4);
+    EXPECT_NE(orders[0].dwell.run, orders[1].dwell.run);
+}
+
+TEST_F(RandomDwellTest, DoesNotBeginUntilTheControllerIsAtLevel) {
+    shaker.levelled = RandomReading::State::levelling;
+    static_cast<void>(begin());
+    EXPECT_FALSE(run_until(CampaignState::finished, 200));
+    EXPECT_EQ(orders.size(), 1U);
+    EXPECT_NE(status().reason.find("expected profile 4 at -3 dB, at level"), std::string::npos)
+        << status().reason;
+}
+
+TEST_F(RandomDwellTest, EndsWhereTheControllerAborts) {
+    static_cast<void>(begin());
+    while (orders.size() < 2 && drivers::to_seconds(now) < 200) run_rig();
+    ASSERT_EQ(orders.size(), 2U);
+    shaker.levelled = RandomReading::State::aborted;
+    run_for(2);
+    EXPECT_EQ(status().state, CampaignState::aborted);
+    EXPECT_NE(status().reason.find("random control 3"), std::string::npos) << status().reason;
+}
+
+TEST_F(RandomDwellTest, IsNotWrittenWhileThePlatformMoves) {
+    static_cast<void>(begin());
+    while (shaker.requests.empty() && drivers::to_seconds(now) < 100) run_rig();
+    // Whatever the table does: the platform swings on.
+    accelerometers.platform_g = 0.3;
+    run_for(100);
+    EXPECT_TRUE(std::ranges::none_of(shaker.requests,
+                                     [](const auto& one) { return one.random.has_value(); }));
+}
+
+}  // namespace
+}  // namespace vibrig::campaign
