@@ -128,7 +128,12 @@ void fill_keys(Finding& f, const room::Description& d, const room::EarthRate& ra
         std::string travel;
         bool limited = false;
         for (std::size_t g = 0; g < 3; ++g) {
-            const auto& [low, high] = commanded.travel[static_cast<std::size_t>(d.channel[g])];
+            const auto channel = static_cast<std::size_t>(d.channel[g]);
+            const bool free = commanded.free[channel];
+            // Readings in degrees: the file of a bus that counts otherwise is corrected.
+            const double degrees = unit_of(d, g).degrees;
+            const double low = free ? -360 : degrees * commanded.travel[channel][0];
+            const double high = free ? 360 : degrees * commanded.travel[channel][1];
             limited = limited || high - low < 360;
             travel += fmt::format("{}[{:.1f}, {:.1f}]", g == 0 ? "" : ", ", low, high);
         }

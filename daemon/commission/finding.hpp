@@ -59,6 +59,7 @@ struct Finding {
 struct Commanded {
     Vec3 ratio{};
     std::array<std::array<double, 2>, 3> travel{};
+    std::array<bool, 3> free{};         ///< turns as far as it likes, by channel
     std::array<std::size_t, 3> slot{};  ///< of the command, by channel
     bool known = false;
 };

@@ -343,7 +343,7 @@ void Procedure::name_rig() {
         const double b = start_[c] + ratio_[c] * limits_deg_[k][1];
         commanded.travel[c] = {std::min(a, b), std::max(a, b)};
         commanded.slot[c] = k;
-        if (free_[k]) commanded.travel[c] = {-360, 360};
+        commanded.free[c] = free_[k];
     }
     fill_keys(finding_, earth_.description, earth_.rate, names_, said_of_rig_, commanded);
     conclude(Verdict::decided, {});

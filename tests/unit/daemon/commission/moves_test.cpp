@@ -224,6 +224,19 @@ TEST_F(Commissioned, ASoftStopIsToldWithItsGimbalAndATravelWithinItIsScaledInto)
             continue;
         }
         ++ended;
+        // The travel that is written is shorter than the one that was stated, in degrees whatever
+        // the readings count in.
+        constexpr std::array<double, 3> kStated{260, 60, 350};
+        const auto& found = result["found"];
+        ASSERT_TRUE(found.contains("gimbal.travel_deg")) << found.dump();
+        for (std::size_t g = 0; g < 3; ++g) {
+            const auto& of = found["gimbal.travel_deg"][g];
+            const double wide = of[1].get<double>() - of[0].get<double>();
+            if (g == short_one)
+                EXPECT_LT(wide, kStated[g] - 1) << g;
+            else
+                EXPECT_NEAR(wide, kStated[g], 0.03 * kStated[g]) << g;
+        }
     }
     EXPECT_GE(ended, 10);
     // The travel that it has is stated: sweeps and positions are scaled into it.
