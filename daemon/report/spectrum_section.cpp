@@ -173,12 +173,13 @@ void add_predicted(Page& page, const SpectrumJson& root) {
     const SpectrumJson none = SpectrumJson::array();
     const auto found = root.at("spectrum").find("held_out");
     const SpectrumJson& apart = found != root.at("spectrum").end() ? *found : none;
-    std::vector<std::vector<std::string>> rows{
-        {"run, position", "Hz", "measured x", "y", "z", "predicted x", "y", "z", "z x", "y", "z"}};
+    std::vector<std::vector<std::string>> rows{{"run, position", "Hz or profile", "measured x", "y",
+                                                "z", "predicted x", "y", "z", "z x", "y", "z"}};
     for (const SpectrumJson& row : apart) {
         std::vector<std::string> cells{
             fmt::format("{}, {}", row.at("run").get<int>(), row.at("position").get<int>()),
-            shown(row.at("hz"), "{:g}")};
+            row.value("profile", SpectrumJson()).is_string() ? row.at("profile").get<std::string>()
+                                                             : shown(row.at("hz"), "{:g}")};
         for (const char* key : {"rate", "predicted"}) {
             for (const SpectrumJson& value : row.at(key)) cells.push_back(shown(value, "{:.4f}"));
         }

@@ -135,31 +135,32 @@ Json effects_json(const std::vector<Effect>& effects) {
 /// between the two in standard uncertainties of both.
 Json held_out_json(const SpectrumResult& of) {
     Json list = Json::array();
+    if (of.held_out.empty()) return list;
     std::vector<Situation> situations;
-    for (const estimator::DwellRow& row : of.held_out) {
-        const double hz = row.commanded_hz > 0 ? row.commanded_hz : row.frequency_hz;
+    std::vector<Eigen::Matrix3d> variances;
+    std::vector<double> errors;
+    MatrixXd rates(static_cast<Index>(of.held_out.size()), 3);
+    for (const auto& [row, kind] : of.held_out) {
+        rates.row(static_cast<Index>(situations.size())) = row.rate;
         situations.push_back(
-            {row.angles, level_moment(row.vibration), {{hz, 1, 0}}, row.duration_s, true});
+            {row.angles, level_moment(row.vibration), kind.bands, row.duration_s, true});
+        variances.push_back(row.variance);
+        errors.push_back(row.relative_error);
     }
-    if (situations.empty()) return list;
     const Prediction foretold = predict(of.analysis.model, situations);
-    for (Index k = 0; k < foretold.drift.rows(); ++k) {
-        const estimator::DwellRow& row = of.held_out[static_cast<std::size_t>(k)];
-        VectorXd u(3), z(3);
-        for (Index j = 0; j < 3; ++j) {
-            u[j] = foretold.u(k, j);
-            z[j] =
-                (row.rate[j] - foretold.drift(k, j)) / std::sqrt(u[j] * u[j] + row.variance(j, j));
-        }
-        list.push_back(
-            {{"run", row.run},
-             {"position", row.position},
-             {"hz",
-              row.vibration.kappa > 1 ? situations[static_cast<std::size_t>(k)].bands[0].hz : 0.0},
-             {"rate", numbers_of(row.rate)},
-             {"predicted", numbers_of(foretold.drift.row(k))},
-             {"u", numbers_of(u)},
-             {"z", numbers_of(z)}});
+    const Verification verified = verify(foretold, rates, variances, errors);
+    for (Index k = 0; k < rates.rows(); ++k) {
+        const auto& [row, kind] = of.held_out[static_cast<std::size_t>(k)];
+        VectorXd u(3);
+        for (Index j = 0; j < 3; ++j) u[j] = foretold.u(k, j);
+        list.push_back({{"run", row.run},
+                        {"position", row.position},
+                        {"hz", kind.hz()},
+                        {"profile", kind.profile.empty() ? Json(nullptr) : Json(kind.profile)},
+                        {"rate", numbers_of(row.rate)},
+                        {"predicted", numbers_of(foretold.drift.row(k))},
+                        {"u", numbers_of(u)},
+                        {"z", numbers_of(verified.z.row(k))}});
     }
     return list;
 }
@@ -309,34 +310,43 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
     return {std::move(analysis), std::move(table), hz};
 }
 
+namespace {
+
+/// With what a row shook; nothing: it is not known. No bands: at rest.
+std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator::DwellRow& row,
+                            const NumberedKinds& profiles) {
+    if (row.random) {
+        const auto profile =
+            std::ranges::find(profiles, row.profile, &NumberedKinds::value_type::first);
+        return profile == profiles.end() ? std::nullopt : std::optional(profile->second);
+    }
+    if (!(row.vibration.kappa > 1)) return Kind{};
+    const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
+    return Kind{"", {{hz, 1, 0}}};
+}
+
+}  // namespace
+
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
                                           const std::vector<estimator::DwellRow>& rows, Form form,
                                           const NumberedKinds& profiles) {
     std::vector<SpectralDwell> dwells;
     std::vector<Kind> kinds;
-    std::vector<estimator::DwellRow> held_out;
+    std::vector<SpectrumResult::HeldOut> held_out;
     for (const estimator::DwellRow& row : rows) {
+        std::optional<Kind> kind = kind_of(settings, row, profiles);
+        if (!kind) continue;
         if (row.held_out) {
-            if (!row.random) held_out.push_back(row);
+            held_out.push_back({row, std::move(*kind)});
             continue;
         }
-        const auto profile = std::ranges::find_if(
-            profiles, [&row](const auto& one) { return one.first == row.profile; });
-        if (row.random && profile == profiles.end()) continue;
         dwells.push_back({row, {}, row.relative_error});
-        if (row.random) {
-            const Kind& kind = profile->second;
-            const auto known = std::ranges::find(kinds, kind.profile, &Kind::profile);
-            dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
-            if (known == kinds.end()) kinds.push_back(kind);
-            continue;
-        }
-        if (!(row.vibration.kappa > 1)) continue;
-        const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
-        const auto known = std::ranges::find_if(
-            kinds, [hz](const Kind& k) { return k.profile.empty() && k.hz() == hz; });
+        if (kind->bands.empty()) continue;
+        const auto known = std::ranges::find_if(kinds, [&kind](const Kind& one) {
+            return one.profile == kind->profile && (!one.profile.empty() || one.hz() == kind->hz());
+        });
         dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
-        if (known == kinds.end()) kinds.push_back({"", {{hz, 1, 0}}});
+        if (known == kinds.end()) kinds.push_back(std::move(*kind));
     }
     if (kinds.size() < 2 || dwells.size() > kMostSpectralDwells) return std::nullopt;
     SpectrumResult found = spectrum_of(settings, std::move(dwells), std::move(kinds), form);

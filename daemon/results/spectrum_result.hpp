@@ -17,8 +17,12 @@ namespace vibrig::tool {
 struct SpectrumResult {
     estimator::spectrum::Analysis analysis;
     estimator::spectrum::SpectralTable table;
-    double reference_hz = 0;                         ///< of the coefficients that are not static
-    std::vector<estimator::DwellRow> held_out = {};  ///< under a sine or at rest
+    double reference_hz = 0;  ///< of the coefficients that are not static
+    struct HeldOut {
+        estimator::DwellRow row;
+        estimator::spectrum::Kind kind;  ///< no bands: at rest
+    };
+    std::vector<HeldOut> held_out = {};
 
     [[nodiscard]] bool several() const { return table.kinds().size() > 1; }
 };

@@ -94,6 +94,10 @@ def honest(checks, programs, folder, dwell_s):
     verification = (json.loads(proof.stdout) if proof.stdout else {}).get("prediction", {}).get("verification") or {}
     checks.check(verification.get("word", "").startswith("confirmed") and len(verification.get("dwells", [])) == len(HELD_OUT),
                  "the prediction is confirmed on the dwells held out under the profile", proof.stdout + proof.stderr)
+    held = [row for row in (result.get("spectrum") or {}).get("held_out", []) if row["profile"] == "broad"]
+    checks.equal([[round(z, 4) for z in row["z"]] for row in held],
+                 [[round(z, 4) for z in row["z"]] for row in verification.get("dwells", [])],
+                 "the result has them beside what was foretold")
 
 
 def lies(checks, programs, folder, fault, trips, says):
