@@ -11,6 +11,7 @@ import math
 import os
 import random
 import re
+import signal
 import socket
 import sqlite3
 import subprocess
@@ -583,7 +584,9 @@ class Terminal:
 
     def __init__(self, rig, *more, **environment):
         self.child = pexpect.spawn(rig.program("vibrig"), ["commission", "--by", "Ada", "--socket", rig.socket, *more], encoding="utf-8",
-                                   dimensions=(24, 80), timeout=30, env={**os.environ, **environment})
+                                   dimensions=(24, 80), timeout=30, env={**os.environ, **environment},
+                                   # A shell starts what runs beside it with Ctrl-C ignored; a person's does not.
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
         self.text = ""
 
     def until(self, word, timeout_s=30):
