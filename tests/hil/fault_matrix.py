@@ -170,7 +170,7 @@ def no_hog(rig):
 
 BUSY = ("all processors busy", hog, 10, no_hog, ON)
 # In real time the whole machine may be late; that is not what is looked at there.
-PATIENT = {"can": {"stale_deadline_ms": 5000}, "gimbal": {"status_deadline_ms": 5000},
+PATIENT = {"can": {"join_deadline_ms": 2000, "stale_deadline_ms": 5000}, "gimbal": {"status_deadline_ms": 5000},
            "shaker": {"response_timeout_ms": 5000, "watchdog_period_ms": 1000}}
 
 
