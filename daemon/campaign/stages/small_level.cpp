@@ -55,6 +55,27 @@ std::string SmallLevel::off_command(Time now) {
     return excitation.off_command(level_g, now);
 }
 
+StageStep SmallLevel::come_to_rest(Time now) {
+    switch (excitation.come_to_rest(now)) {
+        case Excitation::Rests::not_yet:
+            break;
+        case Excitation::Rests::at_rest:
+            return StageStep::done();
+        case Excitation::Rests::overdue:
+            return StageStep::failed("the shaker did not come to rest in time");
+    }
+    return StageStep::going_on(now + kStagePoll);
+}
+
+std::optional<bool> SmallLevel::fault_cleared(Time now) const {
+    const auto reading = ports.rig.shaker.reading();
+    const Time since = excitation.since();
+    if (!stop.stopping() && reading.time > since && reading.at_rest() && reading.fault == 0)
+        return true;
+    if (now - since <= drivers::from_seconds(2 * stop.longest_s(level_g))) return std::nullopt;
+    return false;
+}
+
 void SmallLevel::begin_part(bool steady, Proving what, Time now) {
     excitation.begin_part(now);
     ports.rig.proving(what);

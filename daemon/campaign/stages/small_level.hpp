@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "daemon/campaign/excitation.hpp"
@@ -45,6 +46,10 @@ class SmallLevel {
     [[nodiscard]] std::string lacks(drivers::Time now);
     /// Likewise, of a table that is to do this now. An open chain is the interlock's.
     [[nodiscard]] std::string off_command(drivers::Time now);
+    /// The way down at the end: done() at rest.
+    [[nodiscard]] StageStep come_to_rest(drivers::Time now);
+    /// Whether the stop since the part began has cleared the watchdog's fault; none: not yet.
+    [[nodiscard]] std::optional<bool> fault_cleared(drivers::Time now) const;
     /// `steady`: the table is at the level all the time.
     void begin_part(bool steady, Proving what, drivers::Time now);
 

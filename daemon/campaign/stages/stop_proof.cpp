@@ -70,14 +70,7 @@ StageStep StopProof::step(Time now) {
             why = press(now);
             break;
         case Part::rest:
-            switch (level_.excitation.come_to_rest(now)) {
-                case Excitation::Rests::not_yet:
-                    break;
-                case Excitation::Rests::at_rest:
-                    return StageStep::done();
-                case Excitation::Rests::overdue:
-                    why = "the shaker did not come to rest in time";
-            }
+            return level_.come_to_rest(now);
     }
     return why.empty() ? StageStep::going_on(now + kStagePoll) : StageStep::failed(std::move(why));
 }
@@ -168,14 +161,10 @@ std::string StopProof::starved(Time now) {
 }
 
 std::string StopProof::cleared(Time now) {
-    const auto reading = level_.ports.rig.shaker.reading();
-    const Time since = level_.excitation.since();
-    const double table_g = level_.level_g;
-    const bool cleared =
-        !level_.stop.stopping() && reading.time > since && reading.at_rest() && reading.fault == 0;
-    if (!cleared && now - since <= from_seconds(2 * level_.stop.longest_s(table_g))) return {};
-    level_.proof.row("watchdog, fault acknowledged", cleared);
-    go_on_to(cleared && press_wanted_ ? Part::press_ramp : Part::rest, now);
+    const auto cleared = level_.fault_cleared(now);
+    if (!cleared) return {};
+    level_.proof.row("watchdog, fault acknowledged", *cleared);
+    go_on_to(*cleared && press_wanted_ ? Part::press_ramp : Part::rest, now);
     return {};
 }
 

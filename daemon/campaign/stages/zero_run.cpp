@@ -73,14 +73,7 @@ StageStep ZeroRun::step(Time now) {
             why = cleared(now);
             break;
         case Part::rest:
-            switch (level_.excitation.come_to_rest(now)) {
-                case Excitation::Rests::not_yet:
-                    break;
-                case Excitation::Rests::at_rest:
-                    return StageStep::done();
-                case Excitation::Rests::overdue:
-                    why = "the shaker did not come to rest in time";
-            }
+            return level_.come_to_rest(now);
     }
     return why.empty() ? StageStep::going_on(now + kStagePoll) : StageStep::failed(std::move(why));
 }
@@ -219,12 +212,9 @@ std::string ZeroRun::stay(Time now) {
 }
 
 std::string ZeroRun::cleared(Time now) {
-    const auto reading = level_.ports.rig.shaker.reading();
-    const Time since = level_.excitation.since();
-    const bool cleared =
-        !level_.stop.stopping() && reading.time > since && reading.at_rest() && reading.fault == 0;
-    if (!cleared && now - since <= from_seconds(2 * level_.stop.longest_s(0))) return {};
-    level_.proof.row("watchdog at 0 g, fault acknowledged", cleared);
+    const auto cleared = level_.fault_cleared(now);
+    if (!cleared) return {};
+    level_.proof.row("watchdog at 0 g, fault acknowledged", *cleared);
     if (auto why = unless_passed("the watchdog's fault is not acknowledged by a stop");
         !why.empty())
         return why;
