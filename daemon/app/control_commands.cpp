@@ -83,6 +83,7 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
         !why.empty())
         return why;
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
+    if (auto why = device_not_known(); !why.empty()) return why;
     if (auto why = outside_.refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
         return changed->cause + kJournalToDo;

@@ -37,6 +37,7 @@ void ControlLoop::run() {
         supervisor_.look();
         watch_outside();
         interlock_.filter(rig_.excitation() ? estimator_stage_.view().estimate.nis_per_dof : 0);
+        watch_device(now);
         take_commands(now);
         if (shut_down_.load()) campaign_.shut_down(now);
         dwells_.take_done(campaign_);

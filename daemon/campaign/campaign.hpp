@@ -106,6 +106,8 @@ class Campaign {
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
     [[nodiscard]] const SafetyProof& proof() const { return proof_; }
+    /// Who the shaker's controller says it is.
+    void shaker_is(const std::string& device) { proof_.device_is(device); }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that

@@ -46,6 +46,7 @@ struct ProofRecord {
     /// The same at further frequencies of the plan, Hz first.
     std::vector<std::pair<double, double>> transmissions;
     std::string keys, keys_sha256;  ///< as in ProofSettings
+    std::string device;             ///< who the shaker's controller says it is; empty: not asked
 };
 
 /// As the journal and people's tools keep it.
@@ -79,6 +80,9 @@ class SafetyProof {
 
     /// Oldest first, of earlier lives.
     void take_over(std::vector<ProofRecord> history);
+    /// Who the shaker's controller says it is: a proof of another one counts for nothing. Until it
+    /// is known each counts.
+    void device_is(std::string device) { device_ = std::move(device); }
     void begin(const std::string& by, double table_g);
     void row(std::string name, std::string unit, double value, double low, double high);
     /// A step that either is so or is not.
@@ -120,6 +124,12 @@ class SafetyProof {
     [[nodiscard]] PadRingDown pads() const;
 
   private:
+    [[nodiscard]] bool of_this_rig(const ProofRecord& one) const {
+        return one.keys_sha256 == keys_sha256_ && of_this_device(one);
+    }
+    [[nodiscard]] bool of_this_device(const ProofRecord& one) const {
+        return device_.empty() || one.device == device_;
+    }
     [[nodiscard]] const ProofRecord* newest_passed() const;
     /// Not of a run at 0 g.
     [[nodiscard]] const ProofRecord* newest_shaken() const;
@@ -127,7 +137,7 @@ class SafetyProof {
     [[nodiscard]] const ProofRecord* newest_of_these_keys() const;
 
     ProofSettings settings_;
-    std::string keys_sha256_;
+    std::string keys_sha256_, device_;
     std::vector<ProofRecord> history_;
     ProofRecord record_;
 };

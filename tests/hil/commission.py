@@ -214,6 +214,7 @@ def whole(checks, programs, folder, seed):
         signed = tool("commission", "status").stdout.replace("\n   ", " ")
         checks.check(re.search("^gyros .*Bo, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
         shaker_is_proven(checks, u)
+        another_controller(checks, u)
         proven = tool("commission", "status")
         checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
                      proven.stdout)
@@ -378,6 +379,24 @@ def shaker_is_proven(checks, u):
     ended(stop)
     checks.check(0.49 < highest_g(rig) < 0.51, "the table has never done more than 0.5 g", highest_g(rig))
     checks.check(stop.process.poll() == 0 and "stop: proven" in stop.text(), "each was pressed and seen", stop.text() + rig.logs())
+
+
+def another_controller(checks, u):
+    """At the same address: what was proven is that of the one before."""
+    rig = u.rig
+    rig.order("fault other-device")
+    u.restart()
+    refused = rig.tool("arm", "--by", "Ada")
+    checks.check("identity of the shaker's controller is \"another controller\", was proven as \"LMB" in refused.stderr and "(registers)" in refused.stderr,
+                 "another controller voids the shaker's parts", refused.stderr)
+    status = json.loads(rig.tool("commission", "status", "--json").stdout or "{}").get("parts", {})
+    checks.equal(sorted(name for name, part in status.items() if not part["proven"]), ["excitation", "registers", "stop", "units", "watchdog"],
+                 "and none of the platform's")
+    lacking = rig.tool("commission", "units", "--by", "Ada")   # nobody answers
+    checks.check("will run at 0 g, and its watchdog will stop it" in unwrapped(lacking.stdout), "it has to run at 0 g first, as any other", lacking.stdout + lacking.stderr)
+    checks.check(rig.daemon.says("registers is void: identity of the shaker's controller is"), "and it is told", rig.logs())
+    rig.order("clear other-device")
+    u.restart()
 
 
 def turned(value, by):
