@@ -225,6 +225,20 @@ bool SafetyProof::ran_at_zero() const {
     });
 }
 
+std::string SafetyProof::lacks_at_zero() const {
+    if (!ran_at_zero())
+        return "the controller has not run at 0 g yet: vibrig commission watchdog stop units "
+               "excitation";
+    std::string names;
+    for (const auto& button : buttons_left())
+        names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", button);
+    if (names.empty()) return {};
+    return fmt::format(
+        "the emergency stop was not pressed at 0 g yet ({}), which comes before it shakes for the "
+        "first time: vibrig commission stop",
+        names);
+}
+
 std::string SafetyProof::refusal(std::int64_t utc_ns) const {
     if (!settings_.demanded) return {};
     const std::string what = "the safe state is not proved: ";

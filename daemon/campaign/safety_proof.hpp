@@ -113,6 +113,9 @@ class SafetyProof {
     [[nodiscard]] std::vector<ProofRecord> with_these_keys() const;
     /// With these keys the controller has run at 0 g, and its watchdog has stopped it there.
     [[nodiscard]] bool ran_at_zero() const;
+    /// Why a shaker whose numbers nobody understands yet does not shake: what comes before it, at
+    /// 0 g, was not proved with these keys. Empty: it was.
+    [[nodiscard]] std::string lacks_at_zero() const;
     /// Of the emergency stop's buttons: none of those proofs that passed had them pressed.
     [[nodiscard]] std::vector<std::string> buttons_left() const;
     /// As the newest loop check in band has measured it with the configuration as it is; nothing
