@@ -113,6 +113,7 @@ bool ControlLoop::first_shaking() const {
 }
 
 void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
+    if (!arming_) take_attendance(waiting.request);
     campaign_.climb_next_proof(first_shaking());
     if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty()) {
         if (why == book_.refusal(utc_now(), waiting.request.kind == CommandRequest::Kind::arm))

@@ -99,6 +99,10 @@ class ControlLoop {
     /// Why there is nothing of the name it gives; empty: there is, or it gives none.
     [[nodiscard]] std::string unknown_to_acknowledge(const CommandRequest& request) const;
 
+    // control_attendance.cpp
+    void take_attendance(CommandRequest& request);
+    void watch_attendance(drivers::Time now);
+
     // control_device.cpp
     void watch_device(drivers::Time now);
     [[nodiscard]] std::string device_not_known() const;
@@ -161,6 +165,12 @@ class ControlLoop {
 
     commission::Book book_{loaded_};
     std::unique_ptr<commission::Procedure> procedure_;  ///< made when it is asked for
+    /// Of a proof that a tool waits for: it ends with the tool.
+    struct Attendance {
+        std::string by;
+        drivers::Time wall = 0;  ///< when the tool was last there
+    };
+    std::optional<Attendance> attendance_;
     std::string device_;            ///< who the shaker's controller says it is; empty: not known
     std::size_t proofs_taken_ = 0;  ///< into the record, of the campaign's
     /// An arming that the journal is writing.

@@ -88,6 +88,7 @@ class Campaign {
     /// an abort, a trip and a shaker that does not rest end it. Why not, else empty.
     [[nodiscard]] std::string begin_commissioning(const std::string& by, drivers::Time now);
     void end_commissioning(drivers::Time now);
+    [[nodiscard]] bool checking() const { return state_ == CampaignState::checking; }
     [[nodiscard]] bool commissioning() const { return state_ == CampaignState::commissioning; }
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
