@@ -130,6 +130,7 @@ void ControlLoop::take_over() {
     proofs_taken_ = campaign_.proof().history().size();
     if (!book_.trouble().empty()) log(Severity::warning, "commissioning", book_.trouble());
     keep_voided();
+    keep_trials();
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign)
         dwells_.offer_unfinished(*campaign, campaign_);

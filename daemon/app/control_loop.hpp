@@ -118,6 +118,8 @@ class ControlLoop {
     [[nodiscard]] commission::Progress progress() const;
     void keep_commissioned(journal::Commissioned row);
     void keep_voided();
+    void keep_trials();
+    void end_procedure(drivers::Time now);
     void void_gyros(const std::string& why);
     [[nodiscard]] bool first_shaking() const;
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,

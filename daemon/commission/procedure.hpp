@@ -154,6 +154,7 @@ class Procedure {
     void ask_stop_means();
     void look();
     void looked();
+    [[nodiscard]] std::vector<std::string> stuck_channels() const;
     void hold_still();
     void held_still();
     void try_gimbal();
@@ -187,6 +188,7 @@ class Procedure {
     void ask_drawing();
     void decide();
     void name_rig();
+    [[nodiscard]] std::string why_not_torqued() const;
     [[nodiscard]] Vec3 drift_slope() const;
     /// Travel that brings a gimbal of the description to an angle, the shorter way.
     [[nodiscard]] double travel_to(std::size_t gimbal, double angle_deg) const;
@@ -254,6 +256,7 @@ class Procedure {
 
     // what is known
     std::array<std::array<double, 2>, 3> limits_deg_{{{-130, 130}, {-30, 30}, {-175, 175}}};
+    bool met_a_stop_ = false;     ///< a travel ends where a gimbal did
     std::array<bool, 3> free_{};  ///< cables limit nothing
     bool hold_ = true;            ///< what "stop" is on this rig
     bool holds_ = false;          ///< commanded where they are, the gimbals stay

@@ -39,6 +39,11 @@ void Progress::write(const std::string& by, bool by_hand, const Json& log,
     proto::write_durably(path_, all.dump() + "\n", 0640);
 }
 
+void Progress::write_found(const std::string& toml) const {
+    proto::write_durably((std::filesystem::path(path_).parent_path() / "found.toml").string(), toml,
+                         0644);
+}
+
 void Progress::remove() const {
     std::error_code error;
     std::filesystem::remove(path_, error);
@@ -149,6 +154,7 @@ void Procedure::replay(const Json& log) {
 
 /// It stood short of where it was sent, and is sent no further.
 void Procedure::replay_stop(const Json& entry) {
+    met_a_stop_ = true;
     travel_ = entry.at("short").get<Vec3>();
     limits_deg_ = entry.at("limits").get<decltype(limits_deg_)>();
     keep(entry);

@@ -159,6 +159,10 @@ def whole(checks, programs, folder, seed):
             checks.note(run.stderr + u.rig.logs())
             return
         keys, truth = found["found"], u.truth
+        with open(os.path.join(os.path.dirname(u.record), "found.toml"), encoding="utf-8") as file:
+            kept = file.read()
+        checks.check(kept.startswith("# SIMULATED: ") and f'encoder_sign = {json.dumps(keys["platform.encoder_sign"])}' in kept and "# SIMULATED: ln LR" in kept,
+                     "what was found is in found.toml, each key with its evidence", kept)
         checks.equal(run.returncode, 0, "exit code 0")
         checks.check(found["simulated"] and "SIMULATED: DECIDED" in run.stderr, "that it is simulated is said", run.stderr)
         # Of two ends of the outer axis the one with encoder_sign[0] = 1; the other one is a turn of everything.
@@ -241,10 +245,12 @@ def journal_has_it(checks, u):
         rows = database.execute("SELECT part, step, by, identity, what, data_json FROM commissioning ORDER BY id").fetchall()
     whats = {row[4] for row in rows}
     checks.equal(sorted(whats - {"answer"}), ["accept", "begin", "hypothesis", "move", "permission", "question", "reading", "refused arm",
-                                              "sign", "torque", "verdict", "void"], "the journal has each kind of step")
+                                              "sign", "torque", "verdict", "void", "write"], "the journal has each kind of step")
     checks.check(all(row[2] == "Ada" for row in rows if row[4] != "void") and
                  any(row[3].startswith("uid ") for row in rows if row[4] == "permission") and all(json.loads(row[5]) for row in rows),
                  "with the person and who the socket says it was", rows[:3])
+    writes = [(row[0], row[2], row[3], json.loads(row[5])["old"]) for row in rows if row[4] == "write"]
+    checks.equal(writes, [("registers", "Ada", "uid 0, root", {"value": 15})], "what was written to the controller without a daemon is in it, once")
     signed = [json.loads(row[5]).get("signed_with") for row in rows if row[4] == "accept" and row[0] == "gimbals"]
     with open(u.record, encoding="utf-8") as file:
         checks.equal(signed, [json.load(file)["signature"]["public_key"]], "and the key of the record's signature")
@@ -448,6 +454,10 @@ def another_controller(checks, u):
     """At the same address: what was proven is that of the one before."""
     rig = u.rig
     rig.order("fault other-device")
+    tried = {"utc": "2026-11-23T10:00:00Z", "by": "Ada", "identity": "uid 0, root", "what": "write", "register": "frequency", "address": 100,
+             "old": {"value": 15}, "new": {"value": 16}}
+    with open(os.path.join(os.path.dirname(u.record), "registers.jsonl"), "w", encoding="utf-8") as file:
+        file.write(json.dumps(tried) + "\n")   # as vibrig commission registers --write leaves it
     u.restart()
     refused = rig.tool("arm", "--by", "Ada")
     checks.check("identity of the shaker's controller is \"another controller\", was proven as \"LMB" in refused.stderr and "(registers)" in refused.stderr,
@@ -756,6 +766,45 @@ def dialogue(checks, programs, folder):
         u.rig.stop()
 
 
+def bits(checks, rig, dbc, folder):
+    """Bits that never change: one is changed by hand, one confirmed by two persons, the others are left out."""
+    asked, text = [], ""
+    with subprocess.Popen([rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "3", "--dbc", dbc, "--bits", "--by", "Ada", "--folder", folder],
+                          stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=r.die_with_parent) as tool:
+        def type_in(line):
+            tool.stdin.write(line + "\n")
+            tool.stdin.flush()
+        while True:
+            one = tool.stderr.read(1)
+            text += one
+            if not one:
+                break
+            if not text.endswith("\n> "):
+                continue
+            name = re.findall(r"\? (\S+) reads [01]", text)[-1]
+            asked.append(name)
+            if name.endswith(".LoopClosed"):
+                type_in("")
+                if asked.count(name) == 2:   # the first time nobody does it
+                    time.sleep(0.7)
+                    rig.order("fault loop-open")
+                    time.sleep(0.7)
+                    rig.order("clear loop-open")
+            elif name.endswith(".Fault"):
+                type_in("Ada" if asked.count(name) == 1 else "Ada, ada" if asked.count(name) == 2 else "Ada, Bo")
+            else:
+                type_in("-")
+        code = tool.wait()
+    with open(os.path.join(folder, "bus_bits.json"), encoding="utf-8") as file:
+        kept = json.load(file)["bits"]
+    loop, fault = (next((v for k, v in kept.items() if k.endswith(word)), {}) for word in (".LoopClosed", ".Fault"))
+    checks.check("it did not change and come back" in unwrapped(text) and (loop.get("proven"), loop.get("by"), loop.get("rests_at")) == ("changed once and back", ["Ada"], 1),
+                 "a bit is proven by changing it once, and back", text)
+    checks.check('found "Ada", expected nothing, two names or -' in unwrapped(text) and 'found "Ada, ada"' in unwrapped(text) and (fault.get("proven"), fault.get("by")) == ("confirmed", ["Ada", "Bo"]),
+                 "or confirmed by two persons", text)
+    checks.check(code == 1 and len(kept) == 2 and any(name.endswith(".OuterValid") for name in asked), "what is left out is not proven", kept)
+
+
 def real(checks, programs, folder):
     """A configuration that does not say that its rig is simulated: persons answer, and its gimbals are moved with their permission."""
     rig = r.Rig(programs, "seqpacket", "real", folder)
@@ -773,6 +822,7 @@ def real(checks, programs, folder):
         checks.check(bus.returncode == 1 and signals["outcome"] == "undecided" and signals["answers"] == [] and
                      "Sync.SyncCount" in signals["counters"] and "Resolvers.OuterValid" in signals["unproven"] and signals["unknown"] == [],
                      "with a DBC its signals are, and nobody has turned any", bus.stdout + bus.stderr)
+        bits(checks, rig, dbc, os.path.join(folder, "bits"))
         rig.configure(CAMPAIGN, **r.PATIENT)
         check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
         stated = {}

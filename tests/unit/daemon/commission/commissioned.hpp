@@ -101,6 +101,7 @@ class Commissioned : public ::testing::Test {
             const auto c = static_cast<std::size_t>(rig->channel[i]);
             look.angle[c] += noise_deg / rig->degrees[i] * rig->random.normal();
             look.force[i] += 1e-5 * rig->random.normal();
+            if (sticks == static_cast<int>(i)) look.force[i] = 0.0031;
             if (drifting_since > 0)
                 look.angle[c] = drift.reading[c] +
                                 drift.slope[c] * drivers::to_seconds(from - drifting_since) / 3600;
@@ -208,6 +209,7 @@ class Commissioned : public ::testing::Test {
     std::optional<Eigen::Matrix3d> torquers;  ///< truth's platform rate over the command
     Vec3 torque{};
     double most_torque = 0;
+    int sticks = -1;  ///< accelerometer that shows the same all the time
     int slews = 0, released = 0, torques = 0;
     std::array<int, 2> beyond{};  ///< commands into a stop, to lower and to higher angles
     Json kept;                    ///< what is on disk
