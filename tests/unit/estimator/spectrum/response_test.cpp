@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "estimator/identification/identification.hpp"
 #include "estimator/spectrum/profile.hpp"
 #include "estimator/spectrum/seen.hpp"
-#include "tests/plant/recording.hpp"
+#include "tests/unit/estimator/spectrum/from_samples.hpp"
 
 // What accelerometers see of a vibration: bandwidth, order, table and skew, against the numbers of
 // first-order accelerometers that docs/theory/spectrum.md has, and against the simulated rig's.
@@ -68,46 +69,6 @@ TEST(AccelerometerResponse, SkewIsAnUncertaintyOfTheSecondMoment) {
     EXPECT_NEAR(seen_of(of, two).error, (0.25 + 0.75 * 4) * 3.553e-4, 1e-6);
 }
 
-/// Rows of a rig whose accelerometers are so, dwell by dwell.
-std::vector<DwellRow> rows_through(const plant::Truth& truth, const plant::CampaignPlan& plan,
-                                   const Settings& settings) {
-    std::optional<Identification> dwell;
-    std::pair<std::size_t, std::size_t> now{0, 0};
-    std::vector<DwellRow> rows;
-    const auto close = [&] {
-        if (!dwell) return;
-        const DwellSummary summary = dwell->end_dwell();
-        ASSERT_EQ(dwell->rows().size(), 1U) << summary.reason;
-        rows.push_back(dwell->rows()[0]);
-    };
-    plant::simulate(truth, plan, [&](const plant::PlannedSample& sample) {
-        if (now != std::pair{sample.run, sample.position}) {
-            close();
-            now = {sample.run, sample.position};
-            dwell.emplace(settings, 1);
-            DwellInfo info{static_cast<int>(sample.run), static_cast<int>(sample.position)};
-            const int number = plan.profile_of(sample.run);
-            if (number == 0) info.frequency_hz = plan.hz_of(sample.run);
-            for (const auto& played : truth.profiles) {
-                if (played.number != number) continue;
-                const Profile profile{"", played.psd, {}, {0, 1, 0}, 0};
-                info.random = {mean_square(profile), bandwidth_hz(bands_of(profile)), 0.01,
-                               played.psd.back().first, static_cast<std::uint16_t>(number)};
-            }
-            dwell->begin_dwell(info);
-        }
-        Measurement m;
-        m.time_s = sample.time_s;
-        for (std::size_t i = 0; i < 3; ++i) {
-            m.angle_rad[i] = sample.readings.encoder_deg[i] * std::numbers::pi / 180;
-            m.force_g[i] = sample.readings.raw_g[i];
-        }
-        static_cast<void>(dwell->add(m));
-    });
-    close();
-    return rows;
-}
-
 plant::Truth quiet_rig() {
     plant::Truth truth;
     truth.hard = true;
@@ -128,8 +89,8 @@ TEST(AccelerometerResponse, OfTheSimulatedRigIsTakenOutOfTheRows) {
         plan.dwell_s = 30;
         Settings settings;
         settings.accelerometer_response = low_pass(100, order);
-        const auto declared = rows_through(truth, plan, settings);
-        const auto blind = rows_through(truth, plan, {});
+        const auto declared = testing::rows_through(truth, plan, settings);
+        const auto blind = testing::rows_through(truth, plan, {});
         ASSERT_EQ(declared.size(), 3U);
         for (std::size_t i = 0; i < 3; ++i) {
             const double hz = plan.frequency_hz[i], power = low_pass(100, order).power(hz);
@@ -154,7 +115,7 @@ TEST(AccelerometerResponse, OfTheSimulatedRigIsTakenOutOfRandomVibration) {
     settings.accelerometer_response = low_pass(120);
     const auto bands = bands_of({"", {{20, 0.02}, {200, 0.02}}, {}, {0, 1, 0}, 0});
     settings.seen_profiles = {{3, seen_of(settings.accelerometer_response, bands)}};
-    const auto rows = rows_through(truth, plan, settings);
+    const auto rows = testing::rows_through(truth, plan, settings);
     ASSERT_EQ(rows.size(), 1U);
     // 4 sigma of profile and samples together.
     EXPECT_NEAR(rows[0].vibration.kappa - 1, 3.6, 3.6 * 4 * rows[0].relative_error);
@@ -193,7 +154,7 @@ TEST(AccelerometerResponse, SkewOfTheSimulatedRigMakesTheMomentSmallByWhatIsDecl
     plan.dwell_s = 30;
     Settings settings;
     settings.accelerometer_response.skew_ms = 1;
-    const auto rows = rows_through(truth, plan, settings);
+    const auto rows = testing::rows_through(truth, plan, settings);
     ASSERT_EQ(rows.size(), 1U);
     const double error = std::pow(std::numbers::pi * 65.1 * 1e-3, 2);
     EXPECT_NEAR(rows[0].relative_error, error, 1e-9);
