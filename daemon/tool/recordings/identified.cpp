@@ -29,6 +29,7 @@
 #include "estimator/identification/identification.hpp"
 #include "estimator/level/vibration_level.hpp"
 #include "estimator/spectrum/sampling.hpp"
+#include "estimator/spectrum/seen.hpp"
 #include "proto/recording_csv.hpp"
 
 namespace vibrig::tool {
@@ -222,6 +223,23 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
     }
 }
 
+/// Divided by what is left of it, a vibration that they hardly see would be anything.
+void refuse_unseen(const DwellKinds& kinds, const estimator::Settings& settings,
+                   const std::string& file) {
+    for (const estimator::spectrum::Kind& kind : kinds.kinds()) {
+        const double share =
+            estimator::spectrum::seen_of(settings.accelerometer_response, kind.bands).share;
+        if (share >= estimator::kLeastSeen) continue;
+        std::array<char, 240> text{};
+        const std::string name = kind.profile.empty() ? "" : "profile '" + kind.profile + "' ";
+        std::snprintf(text.data(), text.size(),
+                      ": found %.120sabout %g Hz, of which the accelerometers see %.3g of the "
+                      "power, expected half of it at least",
+                      name.c_str(), kind.hz(), share);
+        throw std::runtime_error(file + text.data());
+    }
+}
+
 /// A recording that says with which frequency each dwell shook: kept whole, since the frequency
 /// that the filter takes is known at its end.
 Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::string>& profiles,
@@ -233,6 +251,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
     const auto reference = kinds.reference();
     if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
     refuse_forbidden(kinds, rows, settings, file);
+    refuse_unseen(kinds, settings, file);
     const bool common_clock = has_common_clock(dwells);
     estimator::Identification identification(settings, dwells.size());
     RigDoubts doubts(settings);
@@ -250,6 +269,9 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
         info.random = kinds.random(d);
         const bool random = info.random.mean_square_g2 > 0;
         if (kind && !random) info.frequency_hz = kinds.kinds()[*kind].hz();
+        if (kind)
+            info.seen = estimator::spectrum::seen_of(settings.accelerometer_response,
+                                                     kinds.kinds()[*kind].bands);
         identification.begin_dwell(info);
         doubts.begin_dwell();
         plan.begin_dwell(dwell.run);
