@@ -165,6 +165,11 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const Json what = Json::parse(request.argument, nullptr, false);
     if (!what.is_object() || !what.contains("do") || !what["do"].is_string())
         return answer(waiting, {false, "commission: found no JSON object with \"do\""});
+    if (what["do"] == "attend") {
+        if (attendance_ && journal::same_person(request.by, attendance_->by))
+            attendance_->wall = rt::wall_clock();
+        return waiting.reply.set_value({true, "there"});
+    }
     if (what["do"] != "read") return answer(waiting, do_commission(request, what, now));
     // Several times a second: no row of the audit.
     if (procedure_) procedure_->attend(request.by, rt::wall_clock());
@@ -200,9 +205,11 @@ CommandReply ControlLoop::do_commission(const CommandRequest& request, const Jso
         return begin_commissioning(request, what, now);
     }
     if (word != "answer" && word != "answers" && word != "stop" && word != "end")
-        return {false, "commission: do: found \"" + word +
-                           "\", expected begin, read, answer, answers, stop, end, accept, state or "
-                           "sign"};
+        return {
+            false,
+            "commission: do: found \"" + word +
+                "\", expected begin, read, attend, answer, answers, stop, end, accept, state or "
+                "sign"};
     if (!active) return {false, "the rig is not being commissioned"};
     procedure_->attend(request.by, rt::wall_clock());
     if (word == "answer") {

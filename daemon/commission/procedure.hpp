@@ -143,6 +143,7 @@ class Procedure {
     void keep_mean();
     void replay(const Json& log);
     [[nodiscard]] bool replay_mean(const Json& entry);
+    void replay_stop(const Json& entry);
     void leave_answers(const Json& log, std::size_t from);
     void permit_again();
     void measure_again();

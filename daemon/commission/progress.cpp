@@ -118,6 +118,7 @@ void Procedure::replay(const Json& log) {
     for (std::size_t at = 0; active();) {
         if (doing_ == Doing::moving || doing_ == Doing::settling) {
             travel_ = asked_;
+            for (; at < log.size() && log.at(at).contains("short"); ++at) replay_stop(log.at(at));
             legs_.clear();
             doing_ = Doing::averaging;
             auto then = std::move(then_);
@@ -144,6 +145,13 @@ void Procedure::replay(const Json& log) {
         ++at;
         take_answer(value);
     }
+}
+
+/// It stood short of where it was sent, and is sent no further.
+void Procedure::replay_stop(const Json& entry) {
+    travel_ = entry.at("short").get<Vec3>();
+    limits_deg_ = entry.at("limits").get<decltype(limits_deg_)>();
+    keep(entry);
 }
 
 bool Procedure::replay_mean(const Json& entry) {

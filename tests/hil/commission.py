@@ -214,6 +214,7 @@ def whole(checks, programs, folder, seed):
         signed = tool("commission", "status").stdout.replace("\n   ", " ")
         checks.check(re.search("^gyros .*Bo, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
         shaker_is_proven(checks, u)
+        another_controller(checks, u)
         proven = tool("commission", "status")
         checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
                      proven.stdout)
@@ -298,10 +299,13 @@ def with_swapped_words(checks, u):
         with open(rig.configuration, "w", encoding="utf-8") as file:
             file.write(wrong)
         u.restart()
-        refused = rig.tool("commission", "units", "--by", "Ada", "--yes", timeout=120)
-        checks.check(wrong != right and refused.returncode == 1 and "REFUSED" in refused.stdout and "ladder" not in refused.stdout and
-                     "a register was refused" in unwrapped(refused.stdout) and rig.daemon.says("amplitude refused: exception 3") and highest_g(rig) == 0, "words the wrong way round: refused before the first rung, and nothing has moved",
-                     refused.stdout + refused.stderr + rig.logs())
+        refused = in_background(rig, "units")
+        checks.check(press(rig, "rack") and press(rig, "door"), "each button comes before it shakes, whatever was asked for", refused.text())
+        ended(refused)
+        said = unwrapped(refused.text())
+        checks.check(wrong != right and refused.process.poll() == 1 and "REFUSED" in said and "ladder" not in said and
+                     "a register was refused" in said and rig.daemon.says("amplitude refused: exception 3") and highest_g(rig) == 0, "words the wrong way round: refused before the first rung, and nothing has moved",
+                     refused.text() + rig.logs())
     finally:
         with open(rig.configuration, "w", encoding="utf-8") as file:
             file.write(right)
@@ -326,6 +330,23 @@ def shaker_is_proven(checks, u):
         checks.check(refused.returncode == 1 and "REFUSED: at 0 g: not completed: " + word in unwrapped(refused.stdout) and
                      highest_g(rig) == 0, f"it ends at 0 g, and nothing has moved: {lie}", refused.stdout + refused.stderr + rig.logs())
         at_rest_again(rig)
+    checks.equal(tool("selftest", "--by", "Ada", "--at-zero", timeout=120).returncode != 2, True, "the run at 0 g")
+    early = tool("selftest", "--by", "Ada", timeout=120)
+    checks.check('the emergency stop was not pressed at 0 g yet ("rack", "door")' in unwrapped(early.stderr) and highest_g(rig) == 0,
+                 "nor before each button was pressed there", early.stdout + early.stderr)
+    for lie, word in BUTTON:
+        rig.order("fault " + lie)
+        with_button = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
+        rig.wait_for(lambda s: "press" in s.get("proof", {}).get("asks", ""), 60)
+        rig.order("estop open")
+        rig.wait_for(lambda s: "press" not in s.get("proof", {}).get("asks", ""), 60)
+        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 2)
+        rig.order("estop close")
+        ended(with_button)
+        checks.check(with_button.process.poll() == 1 and word in unwrapped(with_button.text()),
+                     f"a button is found out at 0 g: {lie}", with_button.text() + rig.logs())
+        at_rest_again(rig)
+    killed_in_steps(checks, u)
     for lie, word in (("unit-rms", "g rms for g peak?"), ("unit-mps2", "m/s2 for g?"), ("dead-table readback-echo", "the platform does")):
         for one in lie.split():
             rig.order("fault " + one)
@@ -354,30 +375,91 @@ def shaker_is_proven(checks, u):
                  0.75 < found["parts"]["registers"]["evidence"]["f + 1 Hz over f, transmission"] < 0.97 and
                  found["parts"]["registers"]["proven"] and found["parts"]["units"]["evidence"]["hypotheses"][0]["unit"] == "g peak",
                  "a proof shows registers, watchdog, units and excitation", plain.stdout + plain.stderr + rig.logs())
-    lacks = tool("arm", "--by", "Ada")
-    checks.check("no record of stop: vibrig commission watchdog stop" in lacks.stderr, "but no button", lacks.stderr)
-    for lie, word in BUTTON:
-        rig.order("fault " + lie)
-        with_button = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
-        rig.wait_for(lambda s: "press" in s.get("proof", {}).get("asks", ""), 60)
-        rig.order("estop open")
-        rig.wait_for(lambda s: "press" not in s.get("proof", {}).get("asks", ""), 60)
-        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 2)
-        rig.order("estop close")
-        ended(with_button)
-        checks.check(with_button.process.poll() == 1 and word in unwrapped(with_button.text()),
-                     f"a button is found out at 0 g: {lie}", with_button.text() + rig.logs())
-        at_rest_again(rig)
-    stop = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
-    for button in ("rack", "door"):
-        asked = rig.wait_for(lambda s, b=button: f'press the emergency stop "{b}" now' in s.get("proof", {}).get("asks", ""), 60)
-        checks.check(asked and button in asked["proof"].get("asks", ""), f'the button "{button}" is asked for', stop.text())
-        rig.order("estop open")
-        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
-        rig.order("estop close")
-    ended(stop)
     checks.check(0.49 < highest_g(rig) < 0.51, "the table has never done more than 0.5 g", highest_g(rig))
-    checks.check(stop.process.poll() == 0 and "stop: proven" in stop.text(), "each was pressed and seen", stop.text() + rig.logs())
+    checks.check(found["parts"]["stop"]["proven"] and sorted(found["parts"]["stop"]["evidence"]["buttons"]) == ["door", "rack"] and
+                 all(button["table_g"] == 0 for button in found["parts"]["stop"]["evidence"]["buttons"].values()),
+                 "each button was pressed at 0 g and seen", found["parts"]["stop"])
+
+
+def in_background(rig, *parts):
+    return r.Child("vibrig", [rig.program("vibrig"), "commission", *parts, "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
+
+
+def press(rig, button):
+    asked = rig.wait_for(lambda s: f'press the emergency stop "{button}" now' in s.get("proof", {}).get("asks", ""), 60)
+    rig.order("estop open")
+    rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
+    rig.order("estop close")
+    return asked and button in asked["proof"].get("asks", "")
+
+
+def stays_at_rest(rig):
+    """Nobody has asked for anything: for seconds of the rig's time nothing runs."""
+    still = rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest" and s["shaker"].get("state") in (0, None), 60)
+    begin = still["sample"]["time_s"]
+    moves = []
+    rig.wait_for(lambda s: moves.append(s["shaker"].get("state")) or s["sample"]["time_s"] > begin + 20, 60)
+    return still["shaker"].get("rest") == "at rest" and set(moves) <= {0, None}
+
+
+def asks_first(rig, word):
+    """With --resume, and nobody who answers: the question comes before anything moves."""
+    resumed = rig.tool("commission", "stop", "units", "excitation", "--by", "Ada", "--resume")
+    return resumed.returncode == 1 and word in unwrapped(resumed.stdout) and "nobody answers" in resumed.stderr and stays_at_rest(rig)
+
+
+def killed_in_steps(checks, u):
+    """Terminal and daemon are killed in each of the shaker's steps: all stops, nothing goes on by itself, and that step begins anew."""
+    rig = u.rig
+    steps = (("a button", "Stand at the button \"rack\"", lambda s: "press" in s.get("proof", {}).get("asks", "")),
+             ("the ladder", "Now the table will shake", lambda s: s["shaker"].get("state") == 2 and s["shaker"].get("measured_g", 0) > 0.02))
+    rig.order("speed 4")   # time enough to see who is gone
+    for step, word, there in steps:
+        for who in ("terminal", "daemon"):
+            tool = in_background(rig, "stop", "units", "excitation")
+            if not checks.check(rig.wait_for(there, 60) and tool.running(), f"{step} is begun", tool.text() + rig.logs()):
+                return
+            if who == "terminal":
+                tool.process.send_signal(signal.SIGKILL)
+                ended(tool)
+                ends = rig.wait_for(lambda s: s["campaign"]["state"] != "checking", 30)
+                checks.check("nobody has been at the tool of Ada" in r.state_of(ends), f"{step}: without its terminal it ends", r.state_of(ends))
+            else:
+                rig.daemon.process.send_signal(signal.SIGKILL)
+                ended(tool)
+                checks.equal(tool.process.poll(), 2, f"{step}: without a daemon the tool ends")
+                u.start()
+            checks.check(stays_at_rest(rig), f"{step}: nothing goes on by itself without its {who}", rig.logs())
+            for what in ("trip", "stop_disobeyed"):
+                rig.tool("ack", what, "--by", "Ada")
+            checks.check(asks_first(rig, word), f"{step}: it is begun anew, by a question", rig.logs())
+        if step == "a button":
+            tool = in_background(rig, "stop", "units", "excitation")
+            checks.check(press(rig, "rack") and press(rig, "door"), "both buttons are pressed when they are asked for", tool.text())
+            rig.wait_for(steps[1][2], 60)
+            tool.process.send_signal(signal.SIGTERM)
+            ended(tool)
+            rig.wait_for(lambda s: s["campaign"]["state"] != "checking", 30)
+            stays_at_rest(rig)
+    rig.order("speed max")
+
+
+def another_controller(checks, u):
+    """At the same address: what was proven is that of the one before."""
+    rig = u.rig
+    rig.order("fault other-device")
+    u.restart()
+    refused = rig.tool("arm", "--by", "Ada")
+    checks.check("identity of the shaker's controller is \"another controller\", was proven as \"LMB" in refused.stderr and "(registers)" in refused.stderr,
+                 "another controller voids the shaker's parts", refused.stderr)
+    status = json.loads(rig.tool("commission", "status", "--json").stdout or "{}").get("parts", {})
+    checks.equal(sorted(name for name, part in status.items() if not part["proven"]), ["excitation", "registers", "stop", "units", "watchdog"],
+                 "and none of the platform's")
+    lacking = rig.tool("commission", "units", "--by", "Ada")   # nobody answers
+    checks.check("will run at 0 g, and its watchdog will stop it" in unwrapped(lacking.stdout), "it has to run at 0 g first, as any other", lacking.stdout + lacking.stderr)
+    checks.check(rig.daemon.says("registers is void: identity of the shaker's controller is"), "and it is told", rig.logs())
+    rig.order("clear other-device")
+    u.restart()
 
 
 def turned(value, by):

@@ -94,6 +94,7 @@ class Commissioned : public ::testing::Test {
             EXPECT_LT(std::abs(to - travel[i]), 170) << "there are two ways round";
             travel[i] = to;
             most_travel[i] = std::max(most_travel[i], std::abs(to));
+            if (std::abs(to) > rig->travel_deg[i] + 1) ++beyond[to > 0 ? 1 : 0];
         }
         rig->go(travel);
         arrives = now + drivers::from_seconds(farthest / 5);
@@ -220,7 +221,8 @@ class Commissioned : public ::testing::Test {
     Vec3 torque{};
     double most_torque = 0;
     int slews = 0, released = 0, torques = 0;
-    Json kept;  ///< what is on disk
+    std::array<int, 2> beyond{};  ///< commands into a stop, to lower and to higher angles
+    Json kept;                    ///< what is on disk
 };
 
 }  // namespace vibrig::commission
