@@ -263,5 +263,36 @@ TEST(Sweep, OneFrequencyNeitherShowsNorExcludesAResonance) {
     }
 }
 
+/// One sweep of the simulated rig over 100 s, up or down, beside what 15 Hz and rest tell: its
+/// frequency within the theory's table (0.27 and 0.21 Hz from samples), and as well as it says.
+TEST(SweepOfThePlant, TellsTheFrequencyAsWellAsItSays) {
+    constexpr unsigned kSeeds = 20;
+    for (const bool up : {true, false}) {
+        double sum = 0, square = 0, z = 0;
+        for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+            plant::Truth truth = elastic_rig();
+            truth.seed = seed;
+            plant::CampaignPlan plan = swept(104, {{0, 0, 0}});
+            plan.table_g = {6};
+            plan.sweep = {plan.sweep[up ? 0 : 1]};
+            const Campaign campaign(0.5, seed);
+            const auto sweeps = swept_by_plant(truth, plan, campaign.settings);
+            // Gyro y has its input axis along the vibration.
+            const Mixture mixture = campaign.mixture(1, sweeps);
+            EXPECT_TRUE(mixture.named()) << "seed " << seed;
+            ASSERT_TRUE(mixture.resonant()) << "seed " << seed;
+            const Told told = tell(mixture).front();
+            sum += told.hz.mean - 60;
+            square += (told.hz.mean - 60) * (told.hz.mean - 60);
+            z += std::pow((told.hz.mean - 60) / told.hz.sigma, 2);
+        }
+        const double rms = std::sqrt(square / kSeeds), mean = sum / kSeeds;
+        std::printf("# %s: %.3f Hz off, rms %.3f, %.2f of its sigma\n", up ? "up" : "down", mean,
+                    rms, std::sqrt(z / kSeeds));
+        EXPECT_LT(rms, 0.27 * std::sqrt(1 + 3 * std::sqrt(2.0 / kSeeds)));
+        EXPECT_NEAR(z / kSeeds, 1, 3 * std::sqrt(2.0 / kSeeds));
+    }
+}
+
 }  // namespace
 }  // namespace vibrig::estimator::spectrum
