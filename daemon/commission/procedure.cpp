@@ -165,12 +165,22 @@ Vec3 Procedure::within_travel(Vec3 travel) const {
     return travel;
 }
 
+/// Of a channel, in its unit. A ratio that was measured would be wrong by its noise at each turn's
+/// end: 1e-4 of a turn are two arc minutes, as much as a torque turns in seconds. So it is that of
+/// the unit, where it is one that is known.
+double Procedure::whole_turn(std::size_t c) const {
+    constexpr double kIsUnit = 0.02;  // they are 10 % apart at least
+    const double ratio = std::abs(ratio_[c]);
+    if (ratio == 0) return 360;
+    for (const auto& unit : estimator::commissioning::angle_units())
+        if (std::abs(ratio * unit.degrees - 1) < kIsUnit) return 360 / unit.degrees;
+    return 360 * ratio;
+}
+
 Vec3 Procedure::unwrapped(const Vec3& angle, const Vec3& near) const {
     Vec3 out = angle;
-    for (std::size_t c = 0; c < 3; ++c) {
-        const double turn = ratio_[c] != 0 ? 360 * std::abs(ratio_[c]) : 360;
-        out[c] = near[c] + std::remainder(angle[c] - near[c], turn);
-    }
+    for (std::size_t c = 0; c < 3; ++c)
+        out[c] = near[c] + std::remainder(angle[c] - near[c], whole_turn(c));
     return out;
 }
 

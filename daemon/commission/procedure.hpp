@@ -134,6 +134,7 @@ class Procedure {
     [[nodiscard]] Vec3 read_travel(const Vec3& near) const;
     [[nodiscard]] std::string contradiction(const Look& seen) const;
     [[nodiscard]] Vec3 within_travel(Vec3 travel_deg) const;
+    [[nodiscard]] double whole_turn(std::size_t channel) const;
     [[nodiscard]] Vec3 unwrapped(const Vec3& angle, const Vec3& near) const;
 
     // progress.cpp: what is kept, and gone on from

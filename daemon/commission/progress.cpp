@@ -234,9 +234,8 @@ std::string Procedure::moved_since() const {
     double force = 0;
     for (std::size_t i = 0; i < 3; ++i) {
         force = std::hypot(force, mean_.force[i] - held_.mean.force[i]);
-        const double turn = 360 * std::abs(ratio_[i]);
-        const double off =
-            std::remainder(mean_.angle[i] - held_.mean.angle[i], turn) / std::abs(ratio_[i]);
+        const double off = std::remainder(mean_.angle[i] - held_.mean.angle[i], whole_turn(i)) /
+                           std::abs(ratio_[i]);
         if (std::abs(off) > kSameAngle_deg)
             return fmt::format("{} is {:.3f} deg off the position that was measured",
                                names_.angle[i], off);

@@ -18,8 +18,7 @@ namespace {
 
 constexpr double kTorque_deg_h = 60;
 constexpr double kFree_s = 15, kTorqued_s = 12;
-// What follows a new torque is not yet its rate: a second is taken off the next one's slope, and a
-// frame that comes late, of a simulated rig whose clock runs fast above all, is no axis askew.
+// A torquer, and the frame that commands it, take their time.
 constexpr double kFollows_s = 3;
 // Twice what is commanded, and 30 deg/h of drift, turn by 0.55 deg while one torque lasts.
 constexpr double kTurns_deg = 1;

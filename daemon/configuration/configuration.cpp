@@ -160,18 +160,23 @@ toml::table parse_toml(const std::string& text, const std::string& name) {
 
 namespace {
 
+/// The witnesses look through the accelerometers.
+void see(const estimator::Settings& rig, campaign::Stop& stop) {
+    if (rig.accelerometer_response.flat()) return;
+    const double hz = stop.frequency_hz > 0 ? stop.frequency_hz : rig.frequency_hz;
+    if (!(stop.transmission > 0)) stop.transmission = rig.transmission;
+    stop.transmission *= std::sqrt(rig.accelerometer_response.power(hz));
+}
+
 /// The plan's dwells, one by one; its levels stand in for table_g and are checked like them.
 void take_plan(Configuration& c) {
     c.campaign.table_g.clear();
     const auto transmission = [&c](std::optional<double> hz) {
         return hz ? c.spectrum.mount.transmission(*hz) : std::optional(c.estimator.transmission);
     };
-    std::size_t number = 0;
     for (const auto& run : plan::read_plan(c.campaign.plan, transmission)) {
-        const std::string place =
-            c.campaign.plan + ": runs[" + std::to_string(number++) + "].profile";
         if (!run.profile.empty()) {
-            c.campaign.stops.insert(c.campaign.stops.end(), run.count, random_stop(c, run, place));
+            c.campaign.stops.insert(c.campaign.stops.end(), run.count, random_stop(c, run));
             continue;
         }
         campaign::Stop stop{run.position_deg, run.table_g, run.table_g > 0 ? run.frequency_hz : 0,
@@ -179,6 +184,7 @@ void take_plan(Configuration& c) {
         // At the reference frequency the loop check measures it.
         if (stop.frequency_hz > 0 && !estimator::at_reference(c.estimator, stop.frequency_hz))
             stop.transmission = *transmission(stop.frequency_hz);
+        see(c.estimator, stop);
         c.campaign.stops.insert(c.campaign.stops.end(), run.count, stop);
         auto& levels = c.campaign.table_g;
         if (std::find(levels.begin(), levels.end(), run.table_g) == levels.end())
@@ -368,6 +374,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     c.campaign.level.block =
         static_cast<std::uint32_t>(std::max(1.0, std::round(0.1 / c.campaign.sample_s)));
 
+    take_seen(c);
     resolve(c.campaign.plan, std::filesystem::path(name).parent_path());
     if (!c.campaign.plan.empty()) {
         try {

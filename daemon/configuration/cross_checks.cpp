@@ -50,6 +50,7 @@ void CrossCheck::everywhere() {
     bus();
     inputs();
     mount();
+    response();
     if (sound({"shaker.backoff_min_ms", "shaker.backoff_max_ms"}) &&
         c_.shaker.backoff_min > c_.shaker.backoff_max) {
         refuse({"shaker.backoff_min_ms", "shaker.backoff_max_ms"},

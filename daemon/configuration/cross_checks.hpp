@@ -49,6 +49,7 @@ class CrossCheck {
     void frequency();
     void inputs();
     void mount();
+    void response();
     void mode();
     void profiles();
     void frequencies_of_plan();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/configuration/value.hpp"
+#include "estimator/spectrum/seen.hpp"
 
 namespace vibrig::configuration {
 
@@ -81,8 +82,8 @@ std::optional<PlayedProfile> played(const Configuration& rig, const Named& of) {
     return out;
 }
 
-campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run,
-                           const std::string& place) {
+campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run) {
+    const std::string& place = run.profile_place;
     const Named& named = profile_of(rig, run, place);
     const std::string name = "'" + named.profile.name + "'";
     if (named.number == 0)
@@ -97,8 +98,10 @@ campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run,
     if (!found) refuse(place, name, "a psd within spectrum.transmission");
     const auto number = static_cast<std::uint16_t>(named.number);
     const double level = std::pow(10, run.level_db / 20);
+    const double seen =
+        spectrum::seen_of(rig.estimator.accelerometer_response, found->at_platform).share;
     campaign::Stop stop{run.position_deg, found->table_g * level, 0, run.verify,
-                        found->platform_g / found->table_g};
+                        found->platform_g / found->table_g * std::sqrt(seen)};
     const double platform_g = found->platform_g * level;
     stop.random = campaign::RandomStop{
         {number, run.level_db, found->checksum},
@@ -115,6 +118,13 @@ campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run,
                                found->table_bandwidth_hz, found->platform_bandwidth_hz,
                                rig.estimator.accelerometer_zero_g});
     return stop;
+}
+
+void take_seen(Configuration& rig) {
+    const auto& response = rig.estimator.accelerometer_response;
+    if (response.flat() && response.skew_ms == 0) return;
+    for (const auto& [number, kind] : numbered_kinds(rig))
+        rig.estimator.seen_profiles.emplace_back(number, spectrum::seen_of(response, kind.bands));
 }
 
 std::vector<std::pair<std::uint16_t, spectrum::Kind>> numbered_kinds(const Configuration& rig) {

@@ -24,9 +24,11 @@ struct PlayedProfile {
                                                   const Configuration::NamedProfile& profile);
 
 /// The dwell of a plan's run under a profile, and its abort bands with the configuration's. Throws
-/// plan::PlanFileError with `place`, what was found and what was expected.
-[[nodiscard]] campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run,
-                                         const std::string& place);
+/// plan::PlanFileError with its place, what was found and what was expected.
+[[nodiscard]] campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run);
+
+/// What the accelerometers see of the profiles that have a number, where they do not see all.
+void take_seen(Configuration& rig);
 
 /// Kinds of the profiles that have a number, by it.
 [[nodiscard]] std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>> numbered_kinds(

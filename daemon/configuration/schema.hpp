@@ -32,6 +32,7 @@ struct Key {
 
 // The parts of the schema.
 void add_identification_keys(std::vector<Key>& keys);
+void add_response_keys(std::vector<Key>& keys);  ///< of the accelerometers
 void add_spectrum_keys(std::vector<Key>& keys);
 void add_uncertainty_keys(std::vector<Key>& keys);
 void add_campaign_keys(std::vector<Key>& keys);

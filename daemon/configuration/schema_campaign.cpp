@@ -143,7 +143,8 @@ void add_campaign_keys(std::vector<Key>& keys) {
          {"pairs", VisitOrder::pairs},
          {"random", VisitOrder::random}},
         "of the positions at the levels: so that no slow change of a bias looks like a coefficient "
-        "(from 12 dwells on), level by level, all levels of a position at once, or by chance",
+        "(from 12 dwells on), level by level, all levels of a position at once, or by chance; a "
+        "plan's dwells stay in its order unless balanced or random is stated",
         [](C & c) -> auto& { return c.campaign.order; }));
     keys.push_back(text(
         "campaign.plan", "a file",

@@ -70,6 +70,7 @@ void add_estimation_keys(std::vector<Key>& keys) {
     keys.push_back(number("accelerometer.range_g", "g", {0, 1000},
                           "raw readings of this size are saturated; 0: not known",
                           [](C& c) -> double& { return c.estimator.accelerometer_range_g; }));
+    add_response_keys(keys);
 
     keys.push_back(number("noise.resolver_arcsec", "arcsec", {0, 3600},
                           "resolver noise, 1 sigma per sample",

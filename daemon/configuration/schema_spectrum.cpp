@@ -22,6 +22,8 @@ constexpr const char* kProfileSchema =
     R"("number":{"type":"integer"},"psd":{"type":"array"},"file":{"type":"string"},)"
     R"("g_rms":{"type":"number"},"direction":{"type":"array"},)"
     R"("at":{"enum":["platform","table"]}}}})";
+constexpr const char* kPairsSchema = R"({"type":"array","items":{"type":"array",)"
+                                     R"("minItems":2,"maxItems":2,"items":{"type":"number"}}})";
 constexpr const char* kTransmissionSchema =
     R"({"anyOf":[{"const":"pads"},{"type":"array","minItems":2,"items":{"type":"array",)"
     R"("minItems":2,"maxItems":2,"items":{"type":"number"}}}]})";
@@ -51,6 +53,17 @@ std::string write_pairs(const Pairs& pairs) {
     return "[" + text + "]";
 }
 
+bool growing(const toml::node& node, const char* key, const Pairs& pairs, Problems& problems) {
+    for (std::size_t i = 1; i < pairs.size(); ++i) {
+        if (pairs[i].first > pairs[i - 1].first) continue;
+        problems.add(place_of(node.source()), std::string(key) + "[" + std::to_string(i) + "]",
+                     plain(pairs[i].first) + " Hz after " + plain(pairs[i - 1].first) + " Hz",
+                     "growing frequencies");
+        return false;
+    }
+    return true;
+}
+
 void read_transmission(const toml::node& node, C& c, Problems& problems) {
     constexpr const char* kKey = "spectrum.transmission";
     if (const auto* word = node.as_string()) {
@@ -60,14 +73,17 @@ void read_transmission(const toml::node& node, C& c, Problems& problems) {
     }
     Pairs pairs;
     if (!read_pairs(node, kKey, "[hz, ratio]", kFrequency, kRatio, pairs, problems)) return;
-    for (std::size_t i = 1; i < pairs.size(); ++i) {
-        if (pairs[i].first > pairs[i - 1].first) continue;
-        return problems.add(
-            place_of(node.source()), std::string(kKey) + "[" + std::to_string(i) + "]",
-            plain(pairs[i].first) + " Hz after " + plain(pairs[i - 1].first) + " Hz",
-            "growing frequencies");
-    }
-    c.spectrum.transmission = std::move(pairs);
+    if (growing(node, kKey, pairs, problems)) c.spectrum.transmission = std::move(pairs);
+}
+
+void read_response(const toml::node& node, C& c, Problems& problems) {
+    constexpr const char* kKey = "accelerometer.response";
+    Pairs pairs;
+    if (node.is_array() && node.as_array()->empty())
+        return c.estimator.accelerometer_response.table.clear();
+    if (read_pairs(node, kKey, "[[hz, ratio], ..]", kFrequency, kRatio, pairs, problems) &&
+        growing(node, kKey, pairs, problems))
+        c.estimator.accelerometer_response.table = std::move(pairs);
 }
 
 /// One [[profile]]; its breakpoints are looked at by whoever has all of it.
@@ -214,6 +230,28 @@ std::string write_profiles(C& c) {
 }
 
 }  // namespace
+
+void add_response_keys(std::vector<Key>& keys) {
+    keys.push_back(
+        number("accelerometer.bandwidth_hz", "Hz", {0, 100'000},
+               "where accelerometers see half of the power of what vibrates; 0: no "
+               "limit",
+               [](C& c) -> double& { return c.estimator.accelerometer_response.bandwidth_hz; }));
+    keys.push_back(integer("accelerometer.order", "", 1, 8,
+                           "of the Butterworth low-pass that bandwidth_hz is of",
+                           [](C& c) -> int& { return c.estimator.accelerometer_response.order; }));
+    keys.push_back({"accelerometer.response", "pairs", "Hz, 1",
+                    "[[hz, ratio], ..], growing frequencies; none: []",
+                    "in place of bandwidth_hz: what is shown over what is, over frequency; beyond "
+                    "the last one nothing is known",
+                    read_response,
+                    [](C& c) { return write_pairs(c.estimator.accelerometer_response.table); },
+                    kPairsSchema});
+    keys.push_back(
+        number("accelerometer.skew_ms", "ms", {0, 100},
+               "between the samples of two accelerometers, at most",
+               [](C& c) -> double& { return c.estimator.accelerometer_response.skew_ms; }));
+}
 
 void add_spectrum_keys(std::vector<Key>& keys) {
     keys.push_back(choice<bool>(

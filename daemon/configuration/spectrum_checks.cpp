@@ -61,6 +61,26 @@ void CrossCheck::mount() {
                "\"pads\" (ignored), or spectrum.mount \"isolated\"");
 }
 
+void CrossCheck::response() {
+    const auto& response = c_.estimator.accelerometer_response;
+    if (response.order != 1 && !(response.bandwidth_hz > 0))
+        refuse({"accelerometer.order"}, plain(response.order) + " without a bandwidth",
+               "accelerometer.bandwidth_hz");
+    if (response.flat() || !sound({"accelerometer.bandwidth_hz", "accelerometer.response"})) return;
+    if (response.bandwidth_hz > 0 && !response.table.empty())
+        refuse({"accelerometer.response", "accelerometer.bandwidth_hz"},
+               "a table beside accelerometer.bandwidth_hz", "one of them");
+    if (c_.estimator.method != estimator::Method::joint)
+        refuse({"accelerometer.bandwidth_hz", "accelerometer.response"},
+               "accelerometers that do not see all",
+               "estimator.method = \"joint\": the two-step route takes readings as they are");
+    const double hz = c_.estimator.frequency_hz, seen = response.power(hz);
+    if (sound({"vibration.frequency_hz"}) && seen < estimator::kLeastSeen)
+        refuse({"vibration.frequency_hz", "accelerometer.bandwidth_hz"},
+               plain(hz) + " Hz, of which the accelerometers see " + rounded(seen),
+               "a frequency of which they see half of the power at least");
+}
+
 void CrossCheck::profiles() {
     if (!sound({"profile", "spectrum.transmission", "accelerometer.range_g"})) return;
     for (std::size_t i = 0; i < c_.profiles.size(); ++i) {
@@ -96,6 +116,13 @@ void CrossCheck::profiles() {
               "shaker.limits.velocity_mps");
         check(motion->displacement_mm, c_.campaign.max_displacement_mm, "mm",
               "shaker.limits.displacement_mm");
+        const auto seen = std::ranges::find(c_.estimator.seen_profiles, profile.number,
+                                            [](const auto& one) { return int{one.first}; });
+        if (highest_db && seen != c_.estimator.seen_profiles.end() &&
+            seen->second.share < estimator::kLeastSeen)
+            blame("a vibration of which the accelerometers see " + rounded(seen->second.share),
+                  "one of which they see half of its power at least "
+                  "(accelerometer.bandwidth_hz, accelerometer.response)");
         const double needed = 1 + kHardlyEver * motion->platform_g * level;
         if (c_.estimator.accelerometer_range_g > 0 && needed > c_.estimator.accelerometer_range_g)
             blame("peaks of 1 g + 5 sigma of " + rounded(needed) + " g at the platform",
@@ -151,6 +178,12 @@ void CrossCheck::frequencies_of_plan() {
             return blame("vibration.transmission", rounded(c_.spectrum.mount.lowest_hz()) +
                                                        " Hz at least: below it the isolators "
                                                        "amplify");
+        const double seen = c_.estimator.accelerometer_response.power(stop.frequency_hz);
+        if (seen < estimator::kLeastSeen)
+            return refuse({"campaign.plan", "accelerometer.bandwidth_hz"},
+                          "dwell " + std::to_string(i + 1) + " at " + plain(stop.frequency_hz) +
+                              " Hz, of which the accelerometers see " + rounded(seen),
+                          "a frequency of which they see half of the power at least");
         const bool apart = stop.verify || !estimator::at_reference(c_.estimator, stop.frequency_hz);
         if (!apart) reference = true;
         if (apart && c_.estimator.method != estimator::Method::joint)

@@ -23,7 +23,11 @@ std::set<std::string> registers(std::set<std::string> names) {
 
 const std::set<std::string>& keys_of_the_daemon() {
     static const std::set<std::string> names = registers({
+        "accelerometer.bandwidth_hz",
+        "accelerometer.order",
         "accelerometer.range_g",
+        "accelerometer.response",
+        "accelerometer.skew_ms",
         "can.join_deadline_ms",
         "can.samples_per_frame",
         "can.signals.azimuth",

@@ -198,13 +198,19 @@ void Journal::look() {
         }
     } catch (const DatabaseError& error) {
         file_.roll_back();
-        if (error.damaged() && to_replace_.empty()) to_replace_ = {error.what()};
+        if (error.damaged() && to_replace_.empty()) to_replace_ = {cause_of(error)};
         const std::lock_guard lock(mutex_);
         status_.running = false;
         status_.note = error.what();
         return;
     }
     show();
+}
+
+/// A file that was taken away reads as a damaged one.
+std::string Journal::cause_of(const DatabaseError& error) const {
+    auto why = watch_.changed_files();
+    return why.empty() ? error.what() : why;
 }
 
 /// For the status.
@@ -250,7 +256,7 @@ bool Journal::write(const std::deque<Entry>& entries) {
         why = error.what();
         campaign_ = campaign;
         file_.roll_back();
-        if (error.damaged()) to_replace_ = {why};
+        if (error.damaged()) to_replace_ = {cause_of(error)};
     }
     {
         const std::lock_guard lock(mutex_);

@@ -157,6 +157,7 @@ class Journal {
     void follow(const Safety& safety);
     void note_proof(std::int64_t row);
     void look();
+    [[nodiscard]] std::string cause_of(const DatabaseError& error) const;
     void begin_anew(const std::vector<std::string>& found);
     void carry_over(const std::string& why);
     void carry_campaign(const std::vector<Row>& campaign);

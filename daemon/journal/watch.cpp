@@ -114,7 +114,7 @@ bool Watch::look(Pass& pass, bool rows) {
         if (!report_.found.empty()) return true;  // until it is replaced
     }
     try {
-        if (auto why = changed_files(pass); !why.empty()) {
+        if (auto why = changed_files(pass.files); !why.empty()) {
             found.push_back(std::move(why));
         } else if (rows) {
             look_at_rows(pass, found);
@@ -125,6 +125,11 @@ bool Watch::look(Pass& pass, bool rows) {
         } else {
             cannot = error.what();
         }
+    }
+    // A file that went after the first look is the cause of what was read since.
+    if (!found.empty() || !cannot.empty()) {
+        if (auto why = changed_files(pass.files); !why.empty() && found != std::vector{why})
+            found.insert(found.begin(), std::move(why));
     }
     const std::lock_guard lock(mutex_);
     // Of another journal meanwhile, or to be looked at anew.
@@ -138,7 +143,16 @@ bool Watch::look(Pass& pass, bool rows) {
     return cannot.empty();
 }
 
-std::string Watch::changed_files(Pass& pass) const {
+std::string Watch::changed_files() const {
+    Files files;
+    {
+        const std::lock_guard lock(mutex_);
+        files = files_;
+    }
+    return changed_files(files);
+}
+
+std::string Watch::changed_files(Files& files) const {
     const auto compare = [](const std::string& path, const Identity& was, const Identity& now) {
         if (was.size < 0) return std::string();
         if (now.size < 0) return path + ": was deleted while the daemon ran";
@@ -148,18 +162,18 @@ std::string Watch::changed_files(Pass& pass) const {
     };
     const Identity file = identity_of(path_), log = identity_of(path_ + "-wal");
     const Identity key = identity_of(path_ + kKeySuffix);
-    if (auto why = compare(path_, pass.files.file, file); !why.empty()) return why;
-    if (file.size < pass.files.file.size) {
+    if (auto why = compare(path_, files.file, file); !why.empty()) return why;
+    if (file.size < files.file.size) {
         return fmt::format("{}: was cut from {} to {} bytes while the daemon ran", path_,
-                           pass.files.file.size, file.size);
+                           files.file.size, file.size);
     }
-    if (auto why = compare(path_ + "-wal", pass.files.log, log); !why.empty()) return why;
-    if (auto why = compare(path_ + kKeySuffix, pass.files.key, key); !why.empty()) return why;
-    const Identity& was = pass.files.key;
+    if (auto why = compare(path_ + "-wal", files.log, log); !why.empty()) return why;
+    if (auto why = compare(path_ + kKeySuffix, files.key, key); !why.empty()) return why;
+    const Identity& was = files.key;
     if (key.mode != was.mode || key.owner != was.owner || key.size != was.size)
         return path_ + kKeySuffix + ": the journal's key was changed, or opened to others";
-    pass.files.file = file;
-    pass.files.log = log;
+    files.file = file;
+    files.log = log;
     return {};
 }
 

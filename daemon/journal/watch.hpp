@@ -55,6 +55,8 @@ class Watch {
         std::string cannot;              ///< why it could not look; empty: it could
     };
     [[nodiscard]] Report report() const;
+    /// Which of the files that were opened is gone or another one now; empty: none. Any thread.
+    [[nodiscard]] std::string changed_files() const;
 
   private:
     struct Identity {
@@ -80,7 +82,8 @@ class Watch {
     void loop();
     void take_orders(Pass& pass);
     [[nodiscard]] bool look(Pass& pass, bool rows);
-    [[nodiscard]] std::string changed_files(Pass& pass) const;
+    /// Takes the sizes that it finds.
+    [[nodiscard]] std::string changed_files(Files& files) const;
     void look_at_rows(Pass& pass, std::vector<std::string>& found);
     void look_at_new_rows(Pass& pass, Database& reader, std::vector<std::string>& found);
 

@@ -1,5 +1,8 @@
 #include "daemon/order/campaign_order.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
 #include <random>
 
@@ -32,6 +35,21 @@ std::vector<std::size_t> from_table(const std::array<int, 2 * kPositions>& table
     return sequence;
 }
 
+void shuffle(std::vector<std::size_t>& sequence) {
+    std::mt19937_64 random(kSeed);
+    for (std::size_t i = sequence.size(); i > 1; --i)
+        std::swap(sequence[i - 1], sequence[random() % i]);
+}
+
+plan::Timing timing_of(const configuration::Configuration& c) {
+    return {c.campaign.dwell_s, c.campaign.settle_s, c.campaign.ramp_s};
+}
+
+double variance_of(const configuration::Configuration& c) {
+    return estimator::rate_variance(c.estimator, c.campaign.dwell_s,
+                                    drivers::to_seconds(c.assembler.sample_period));
+}
+
 std::vector<std::size_t> searched(const configuration::Configuration& c) {
     std::vector<plan::Visit> visits;
     std::vector<plan::Row> rows;
@@ -42,13 +60,98 @@ std::vector<std::size_t> searched(const configuration::Configuration& c) {
                 plan::vibration_row(plan::up_at(c.estimator, position), visits.back().level_g));
         }
     }
-    const plan::Timing timing{c.campaign.dwell_s, c.campaign.settle_s, c.campaign.ramp_s};
-    const double variance = estimator::rate_variance(
-        c.estimator, c.campaign.dwell_s, drivers::to_seconds(c.assembler.sample_period));
     estimator::uncertainty::SearchSettings how;
     how.starts = 2;
     how.moves = 3000;
-    return estimator::uncertainty::balanced_order(visits, rows, timing, variance, how);
+    return estimator::uncertainty::balanced_order(visits, rows, timing_of(c), variance_of(c), how);
+}
+
+/// Of a stop: six quadratic coefficients for each kind of vibration but the reference frequency,
+/// which has the ten with gravity's.
+class KindRows {
+  public:
+    explicit KindRows(const configuration::Configuration& c) : c_(c) {
+        for (const auto& stop : c.campaign.stops) {
+            if (!stop.verify && !at_reference(stop) && place(stop.kind()) == kinds_.size())
+                kinds_.push_back(stop.kind());
+        }
+    }
+
+    [[nodiscard]] plan::Visit visit(const campaign::Stop& stop) const {
+        if (stop.random)
+            return {stop.position_deg, std::sqrt(2 * stop.random->at_platform.mean_square_g2)};
+        const double ratio = stop.transmission > 0 ? stop.transmission : c_.estimator.transmission;
+        return {stop.position_deg, stop.table_g * ratio};
+    }
+    [[nodiscard]] Eigen::RowVectorXd row(const campaign::Stop& stop) const {
+        constexpr auto kAll = static_cast<Eigen::Index>(plan::kTerms);
+        Eigen::RowVectorXd out =
+            Eigen::RowVectorXd::Zero(kAll + kQuadratic * static_cast<Eigen::Index>(kinds_.size()));
+        const auto up = plan::up_at(c_.estimator, stop.position_deg);
+        const double level_g = visit(stop).level_g;
+        const bool reference = at_reference(stop);
+        const auto base = plan::vibration_row(up, reference ? level_g : 0);
+        for (Eigen::Index k = 0; k < kAll; ++k) out[k] = base[static_cast<std::size_t>(k)];
+        if (!reference)
+            out.segment(kAll + kQuadratic * static_cast<Eigen::Index>(place(stop.kind())),
+                        kQuadratic) =
+                (plan::kappa_of(level_g) - 1) * out.segment(kAll - kQuadratic, kQuadratic);
+        return out;
+    }
+
+  private:
+    static constexpr Eigen::Index kQuadratic = 6;
+
+    [[nodiscard]] bool at_reference(const campaign::Stop& stop) const {
+        return !stop.random && (!(stop.table_g > 0) || !(stop.frequency_hz > 0) ||
+                                estimator::at_reference(c_.estimator, stop.frequency_hz));
+    }
+    [[nodiscard]] std::size_t place(double kind) const {
+        return static_cast<std::size_t>(std::ranges::find(kinds_, kind) - kinds_.begin());
+    }
+
+    const configuration::Configuration& c_;
+    std::vector<double> kinds_;
+};
+
+/// A plan's dwells, no kind of vibration early or late; those held out, of which the coefficients
+/// take nothing, evenly among them.
+std::vector<campaign::Stop> balanced(const configuration::Configuration& c) {
+    std::vector<campaign::Stop> fitted, held_out;
+    for (const auto& stop : c.campaign.stops) (stop.verify ? held_out : fitted).push_back(stop);
+    const KindRows kinds(c);
+    std::vector<plan::Visit> visits;
+    Eigen::MatrixXd rows;
+    for (const auto& stop : fitted) {
+        visits.push_back(kinds.visit(stop));
+        const Eigen::RowVectorXd row = kinds.row(stop);
+        rows.conservativeResize(static_cast<Eigen::Index>(visits.size()), row.size());
+        rows.bottomRows<1>() = row;
+    }
+    estimator::uncertainty::SearchSettings how;
+    how.starts = 1;
+    const plan::Order order =
+        estimator::uncertainty::balanced_order(visits, rows, timing_of(c), variance_of(c), how);
+    std::vector<campaign::Stop> out;
+    for (const std::size_t i : order) out.push_back(fitted[i]);
+    for (std::size_t i = 0; i < held_out.size(); ++i) {
+        const std::size_t at = (2 * i + 1) * c.campaign.stops.size() / (2 * held_out.size());
+        out.insert(out.begin() + static_cast<std::ptrdiff_t>(std::min(at, out.size())),
+                   held_out[i]);
+    }
+    return out;
+}
+
+void order_stops(configuration::Configuration& c) {
+    auto& stops = c.campaign.stops;
+    if (c.campaign.order == VisitOrder::balanced) stops = balanced(c);
+    if (c.campaign.order != VisitOrder::random) return;
+    std::vector<std::size_t> sequence(stops.size());
+    std::iota(sequence.begin(), sequence.end(), std::size_t{0});
+    shuffle(sequence);
+    std::vector<campaign::Stop> out;
+    for (const std::size_t i : sequence) out.push_back(stops[i]);
+    stops = std::move(out);
 }
 
 }  // namespace
@@ -65,12 +168,9 @@ std::vector<std::size_t> visit_sequence(const configuration::Configuration& c) {
             for (std::size_t i = 0; i < sequence.size(); ++i)
                 sequence[i] = i % levels * positions + i / levels;
             break;
-        case VisitOrder::random: {
-            std::mt19937_64 random(kSeed);
-            for (std::size_t i = sequence.size(); i > 1; --i)
-                std::swap(sequence[i - 1], sequence[random() % i]);
+        case VisitOrder::random:
+            shuffle(sequence);
             break;
-        }
         case VisitOrder::balanced:
             if (c.campaign.positions_deg == campaign::kTable1Positions && levels == 2)
                 return from_table(c.campaign.table_g[1] > 0 ? kTwoLevels : kLevelAndRest);
@@ -82,6 +182,11 @@ std::vector<std::size_t> visit_sequence(const configuration::Configuration& c) {
 configuration::Loaded put_in_order(configuration::Loaded loaded) {
     auto& c = loaded.configuration;
     if (c.campaign.stops.empty() && !c.campaign.adaptive) c.campaign.sequence = visit_sequence(c);
+    // A plan is in an order already: only where another one is stated it is not kept.
+    const auto stated = std::ranges::any_of(loaded.effective, [](const auto& value) {
+        return value.key == "campaign.order" && value.origin != "default";
+    });
+    if (!c.campaign.stops.empty() && stated) order_stops(c);
     return loaded;
 }
 

@@ -42,8 +42,10 @@ std::string content_of(const std::string& path) {
     }
 }
 
-NumberTable read_table(const std::string& text, const std::string& path,
-                       const std::vector<std::string_view>& wanted) {
+NumberTable read_table(const std::string& text, const std::string& path, const TableForm& form) {
+    const auto among = [](const std::vector<std::string_view>& list, std::string_view name) {
+        return std::find(list.begin(), list.end(), name) != list.end();
+    };
     NumberTable table;
     std::string_view rest = proto::without_byte_order_mark(text);
     for (std::size_t number = 1; !rest.empty(); ++number) {
@@ -61,15 +63,20 @@ NumberTable read_table(const std::string& text, const std::string& path,
             continue;
         }
         std::vector<double> row(table.names.size(), std::nan(""));
+        std::vector<std::string> words(table.names.size());
         for (std::size_t c = 0; c < table.names.size(); ++c) {
-            if (std::find(wanted.begin(), wanted.end(), table.names[c]) == wanted.end()) continue;
             const std::string_view field = c < fields.size() ? fields[c] : "";
+            const bool maybe = among(form.maybe_numbers, table.names[c]);
+            if (among(form.words, table.names[c])) words[c] = field;
+            if (!maybe && !among(form.numbers, table.names[c])) continue;
+            if (maybe && field.empty()) continue;
             if (field.empty() || !proto::read_number(field, row[c]) || !std::isfinite(row[c])) {
                 refuse(place + ": column " + table.names[c],
                        field.empty() ? "nothing" : "'" + proto::printable(field) + "'", "a number");
             }
         }
         table.rows.push_back(std::move(row));
+        table.words.push_back(std::move(words));
         table.lines.push_back(number);
     }
     if (table.rows.empty()) refuse(path, "no row after a header", "rows of numbers");

@@ -8,22 +8,28 @@
 
 namespace vibrig::plan {
 
+/// Which columns of a CSV file are looked at; none of them has to be there, others are ignored.
+struct TableForm {
+    std::vector<std::string_view> numbers;          ///< a finite one in each row
+    std::vector<std::string_view> maybe_numbers{};  ///< the same, or nothing
+    std::vector<std::string_view> words{};          ///< any, or nothing
+};
+
 /// Numbers of a CSV file with a header row.
 struct NumberTable {
     std::vector<std::string> names;
-    std::vector<std::vector<double>> rows;  ///< NaN in columns that were not wanted
-    std::vector<std::size_t> lines;         ///< of the rows, from 1
+    std::vector<std::vector<double>> rows;        ///< NaN in columns that are no numbers
+    std::vector<std::vector<std::string>> words;  ///< of the rows; empty in columns that are none
+    std::vector<std::size_t> lines;               ///< of the rows, from 1
 
     [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const;
 };
 
 /// The whole file; at most 16 MiB. Throws PlanFileError.
 [[nodiscard]] std::string content_of(const std::string& path);
-/// `text` is the content of `path`. Columns that are `wanted` hold a finite number in each row;
-/// whether they exist is the caller's to ask, others are ignored. Throws PlanFileError with file,
-/// line and column.
+/// `text` is the content of `path`. Throws PlanFileError with file, line and column.
 [[nodiscard]] NumberTable read_table(const std::string& text, const std::string& path,
-                                     const std::vector<std::string_view>& wanted);
+                                     const TableForm& form);
 
 /// Throws PlanFileError "place: found X, expected Y".
 [[noreturn]] void refuse(const std::string& place, const std::string& found,

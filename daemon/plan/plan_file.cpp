@@ -69,9 +69,14 @@ void take_frequency(PlannedRun& run, double hz, const std::string& place) {
     run.frequency_hz = hz;
 }
 
+void take_level_db(PlannedRun& run, double db, const std::string& place) {
+    constexpr double kMostDb = 60;
+    if (!(std::abs(db) <= kMostDb)) refuse(place, number(db), "-60 to 60 dB");
+    run.level_db = db;
+}
+
 /// A profile in place of frequency and levels; false: there is none.
 bool take_profile(PlannedRun& run, const Json& json, const std::string& place) {
-    constexpr double kMostDb = 60;
     if (const auto found = json.find("sweep"); found != json.end())
         refuse(place + ".sweep", found->dump().substr(0, 60),
                "a sine with frequency_hz and level_g, or a profile: sweeps are not run");
@@ -90,9 +95,8 @@ bool take_profile(PlannedRun& run, const Json& json, const std::string& place) {
             refuse(place + "." + other, beside->dump().substr(0, 60) + " beside a profile",
                    "level_db alone: the profile has frequencies and g");
     }
-    run.level_db = level.value_or(0);
-    if (!(std::abs(run.level_db) <= kMostDb))
-        refuse(place + ".level_db", number(run.level_db), "-60 to 60 dB");
+    run.profile_place = place + ".profile";
+    take_level_db(run, level.value_or(0), place + ".level_db");
     return true;
 }
 
@@ -166,29 +170,95 @@ std::vector<std::array<double, 3>> positions_of(const NumberTable& table, const 
     return result;
 }
 
+/// A row of a CSV plan.
+class PlanRow {
+  public:
+    PlanRow(const NumberTable& table, std::size_t row, const std::string& path)
+        : table_(table), row_(row), place_(path + ":" + std::to_string(table.lines[row])) {}
+
+    [[nodiscard]] const std::string& place() const { return place_; }
+    [[nodiscard]] std::string place(std::string_view column) const {
+        return place_ + ": column " + std::string(column);
+    }
+    /// None: no such column, or nothing in it.
+    [[nodiscard]] std::optional<double> maybe(std::string_view column) const {
+        const auto at = table_.find(column);
+        if (!at || std::isnan(table_.rows[row_][*at])) return std::nullopt;
+        return table_.rows[row_][*at];
+    }
+    /// None: no such column. Throws where there is nothing in it.
+    [[nodiscard]] std::optional<double> number(std::string_view column) const {
+        const auto value = maybe(column);
+        if (!value && table_.find(column)) refuse(place(column), "nothing", "a number");
+        return value;
+    }
+    [[nodiscard]] std::string word(std::string_view column) const {
+        const auto at = table_.find(column);
+        return at ? table_.words[row_][*at] : "";
+    }
+
+  private:
+    const NumberTable& table_;
+    std::size_t row_;
+    std::string place_;
+};
+
+/// As take_profile() of JSON; what a sine would have may be 0 beside it.
+bool take_profile(PlannedRun& run, const PlanRow& row) {
+    if (const std::string sweep = row.word("sweep"); !sweep.empty() && sweep != "0")
+        refuse(row.place("sweep"), "'" + proto::printable(sweep) + "'",
+               "a sine with frequency_hz and level_g, or a profile: sweeps are not run");
+    const std::string profile = row.word("profile");
+    const auto level = row.maybe("level_db");
+    if (profile.empty() || profile == "0") {
+        if (level && *level != 0)
+            refuse(row.place("level_db"), number(*level), "a profile beside it");
+        return false;
+    }
+    for (const char* other : {"frequency_hz", "level_g", "table_g"}) {
+        if (const auto beside = row.maybe(other); beside && *beside != 0)
+            refuse(row.place(other), number(*beside) + " beside a profile",
+                   "level_db alone: the profile has frequencies and g");
+    }
+    run.profile = profile;
+    run.profile_place = row.place("profile");
+    take_level_db(run, level.value_or(0), row.place("level_db"));
+    return true;
+}
+
+PlannedRun from_csv(const PlanRow& row, const std::array<double, 3>& position_deg,
+                    const TransmissionAt& transmission) {
+    PlannedRun run;
+    run.position_deg = position_deg;
+    if (const std::string role = row.word("role"); !role.empty() && role != "identify") {
+        if (role != "verify")
+            refuse(row.place("role"), "'" + proto::printable(role) + "'", "identify or verify");
+        run.verify = true;
+    }
+    if (!take_profile(run, row)) {
+        if (const auto hz = row.number("frequency_hz"))
+            take_frequency(run, *hz, row.place("frequency_hz"));
+        join_levels(run, row.number("level_g"), row.number("table_g"), transmission, row.place());
+    }
+    if (const auto count = row.maybe("count")) {
+        if (!(*count >= 1 && *count <= kMostRuns && *count == std::floor(*count)))
+            refuse(row.place("count"), number(*count), "a whole number from 1");
+        run.count = static_cast<std::size_t>(*count);
+    }
+    return run;
+}
+
 std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string& path,
                                       const TransmissionAt& transmission) {
-    const NumberTable table = read_table(
-        text, path,
-        {"alpha_deg", "beta_deg", "gamma_deg", "level_g", "table_g", "count", "frequency_hz"});
+    // Which of the levels a row needs depends on whether it has a profile.
+    const NumberTable table = read_table(text, path,
+                                         {{"alpha_deg", "beta_deg", "gamma_deg", "count"},
+                                          {"level_g", "table_g", "frequency_hz", "level_db"},
+                                          {"profile", "role", "sweep"}});
     const auto positions = positions_of(table, path);
-    const auto level = table.find("level_g"), table_g = table.find("table_g"),
-               count = table.find("count"), frequency = table.find("frequency_hz");
-    std::vector<PlannedRun> result(positions.size());
-    for (std::size_t i = 0; i < result.size(); ++i) {
-        const std::string place = path + ":" + std::to_string(table.lines[i]);
-        const auto& row = table.rows[i];
-        result[i].position_deg = positions[i];
-        if (frequency) take_frequency(result[i], row[*frequency], place + ": column frequency_hz");
-        join_levels(result[i], level ? std::optional(row[*level]) : std::nullopt,
-                    table_g ? std::optional(row[*table_g]) : std::nullopt, transmission, place);
-        if (count) {
-            if (!(row[*count] >= 1 && row[*count] <= kMostRuns &&
-                  row[*count] == std::floor(row[*count])))
-                refuse(place + ": column count", number(row[*count]), "a whole number from 1");
-            result[i].count = static_cast<std::size_t>(row[*count]);
-        }
-    }
+    std::vector<PlannedRun> result;
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        result.push_back(from_csv(PlanRow(table, i, path), positions[i], transmission));
     return result;
 }
 
@@ -196,9 +266,9 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
 
 std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
     auto runs = read_plan(path, [transmission](auto) { return std::optional(transmission); });
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-        if (!runs[i].profile.empty())
-            refuse(path + ": runs[" + std::to_string(i) + "].profile", runs[i].profile,
+    for (const PlannedRun& run : runs) {
+        if (!run.profile.empty())
+            refuse(run.profile_place, run.profile,
                    "a sine: random vibration is for vibrigd's campaigns");
     }
     return runs;
@@ -219,8 +289,8 @@ std::vector<PlannedRun> read_plan(const std::string& path, const TransmissionAt&
 }
 
 std::vector<std::array<double, 3>> read_positions(const std::string& path) {
-    return positions_of(read_table(content_of(path), path, {"alpha_deg", "beta_deg", "gamma_deg"}),
-                        path);
+    return positions_of(
+        read_table(content_of(path), path, {{"alpha_deg", "beta_deg", "gamma_deg"}}), path);
 }
 
 }  // namespace vibrig::plan

@@ -3,6 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
+
+#include "estimator/filter/accelerometer_response.hpp"
 
 namespace vibrig::estimator {
 
@@ -35,6 +38,9 @@ struct DwellInfo {
     double frequency_hz = 0;  ///< of the vibration, commanded; 0: Settings::frequency_hz
     bool held_out = false;    ///< to try a result on: the coefficients take nothing of it
     RandomVibration random{};
+    /// Of this vibration by the accelerometers; none: as Settings has it of the frequency or the
+    /// profile.
+    std::optional<Seen> seen{};
 };
 
 enum class StepOutcome : std::uint8_t {

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
+#include "estimator/filter/accelerometer_response.hpp"
 #include "estimator/filter/coefficients.hpp"
 #include "estimator/filter/declared.hpp"
 
@@ -53,6 +55,10 @@ struct Settings {
     std::array<double, 3> accelerometer_zero_g{0, 0, 0};
     std::array<std::array<double, 3>, 3> accelerometer_matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     double accelerometer_range_g = 0;  ///< raw readings from here on are saturated; 0: not known
+    AccelerometerResponse accelerometer_response;
+    /// What they see of random vibrations, by the profile's number in the controller; of one that
+    /// is not here all.
+    std::vector<std::pair<std::uint16_t, Seen>> seen_profiles;
     // noise
     double resolver_arcsec = 5.0;
     int resolver_bits = 20;

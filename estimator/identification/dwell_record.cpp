@@ -76,12 +76,13 @@ void DwellRecord::note_interval(double periods) noexcept {
 /// In place of what a sine's level says.
 RandomLevel::Level take_random_level(const DwellRecord& r, const Settings& settings,
                                      DwellSummary& s) noexcept {
-    const auto level =
-        r.random_level.level(r.info.random, settings.accelerometer_g, r.period_s, r.span_s);
-    s.kappa = 1 + level.mean_square_g2;
-    s.relative_error = level.relative_error;
+    RandomVibration shown = r.info.random;
+    shown.mean_square_g2 *= r.seen.share;
+    const auto level = r.random_level.level(shown, settings.accelerometer_g, r.period_s, r.span_s);
+    s.kappa = r.kappa_of(1 + level.mean_square_g2);
+    s.relative_error = std::hypot(level.relative_error, r.seen.error);
     s.mean_force_g = level.mean_force_g;
-    s.amplitude_g = std::sqrt(2 * level.mean_square_g2);
+    s.amplitude_g = std::sqrt(2 * (s.kappa - 1));
     s.frequency_hz = 0;
     return level;
 }
@@ -118,6 +119,7 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
     }
     s.amplitude_g = std::sqrt(2.0 * std::max(0.0, s.kappa - 1.0));
     s.frequency_hz = r.frequency_samples > 0 ? r.frequency_sum / r.frequency_samples : 0.0;
+    if (s.kappa > 1) s.relative_error = r.seen.error;
     const bool random = r.info.random.mean_square_g2 > 0;
     const auto random_level = random ? take_random_level(r, settings, s) : RandomLevel::Level{};
     s.nis_per_dof = r.nis_count > 0 ? r.nis_sum / (3.0 * r.nis_count) : 0.0;

@@ -11,6 +11,7 @@ namespace vibrig::estimator {
 /// Counts of the dwell in progress; samples = used + rejected at any time nothing is buffered.
 struct DwellRecord {
     DwellInfo info;
+    Seen seen;  ///< of this vibration by the accelerometers
     std::uint32_t samples = 0, used = 0, rejected = 0, reinitialised = 0;
     double nis_sum = 0;
     std::uint32_t nis_count = 0;
@@ -33,6 +34,10 @@ struct DwellRecord {
     double slots = 0;
     std::uint32_t forces = 0, crowded = 0;
 
+    /// 1 + the mean square, from what the accelerometers show of it.
+    [[nodiscard]] double kappa_of(double shown) const noexcept {
+        return 1 + (shown - 1) / seen.share;
+    }
     void count(const StepResult& step) noexcept;
     void note_level(double kappa) noexcept;
     /// `periods` from the reading before to this one; not across a pause.

@@ -131,6 +131,7 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     random_ = dwell.random.mean_square_g2 > 0;
     apart_ = settings.method == Method::joint &&
              (dwell.held_out || random_ || !at_reference(settings, hz));
+    record_.seen = seen_of(dwell, hz);
     level_.nominal(hz);
     sync_.nominal(hz);
     active_ = filter_of(dwell.run);
@@ -142,6 +143,22 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     active_->batch.begin_dwell();
     active_->filter.begin_dwell();
     begin_paper_level();
+}
+
+Seen Identification::Impl::seen_of(const DwellInfo& dwell, double hz) const noexcept {
+    Seen seen;
+    if (dwell.seen) {
+        seen = *dwell.seen;
+    } else if (!random_) {
+        seen = {settings.accelerometer_response.power(hz),
+                settings.accelerometer_response.skew_error(hz)};
+    } else {
+        for (const auto& [profile, of] : settings.seen_profiles) {
+            if (profile == dwell.random.profile) seen = of;
+        }
+    }
+    if (!(seen.share > 0)) seen.share = 1;  // not known: refused where it is stated
+    return seen;
 }
 
 void Identification::Impl::begin_paper_level() noexcept {
@@ -258,7 +275,7 @@ StepResult Identification::Impl::replay() noexcept {
     StepResult step;
     if (primed_) {
         // A few samples tell no level that could be compared with another.
-        if (buffer_.full()) record_.note_level(level_.kappa());
+        if (buffer_.full()) record_.note_level(record_.kappa_of(level_.kappa()));
         if (!walked_) let_biases_walk();
         for (const Reading& reading : buffer_.readings()) step = through_filter(reading);
     } else {
@@ -307,7 +324,7 @@ void Identification::Impl::to_level(const Reading& reading) noexcept {
         tensor_.add_missing();
     }
     refresh_vibration();
-    record_.note_level(level_.kappa());
+    record_.note_level(record_.kappa_of(level_.kappa()));
 }
 
 /// The shape follows the level; the two-step route has none.
@@ -317,8 +334,9 @@ void Identification::Impl::refresh_vibration() noexcept {
         vibration_ = {1 + record_.info.random.mean_square_g2, kVertical};
         return;
     }
-    if (vibration_.kappa == level_.kappa()) return;
-    vibration_.kappa = level_.kappa();
+    const double kappa = record_.kappa_of(level_.kappa());
+    if (vibration_.kappa == kappa) return;
+    vibration_.kappa = kappa;
     if (settings.second_moment == SecondMoment::vertical || settings.method != Method::joint ||
         !(vibration_.kappa > 1.0) || !tensor_.due())
         return;
@@ -367,9 +385,10 @@ void Identification::Impl::end_stretch() noexcept {
         const auto weight = static_cast<double>(level_.count());
         const VibrationLevel::Whole whole = level_.whole();
         record_.level_samples += weight;
-        record_.kappa_sum += weight * whole.kappa;
+        const double kappa = record_.kappa_of(whole.kappa);
+        record_.kappa_sum += weight * kappa;
         record_.mean_force_sum += weight * whole.mean_force_g;
-        note_shape(weight * (whole.kappa - 1.0));
+        note_shape(weight * (kappa - 1.0));
         if (!random_ && level_.frequency_hz() > 0) {
             record_.frequency_samples += weight;
             record_.frequency_sum += weight * level_.frequency_hz();

@@ -75,6 +75,8 @@ struct Identification::Impl {
   private:
     [[nodiscard]] Reading prepare(const Measurement& measurement) const noexcept;
     [[nodiscard]] RunFilter* filter_of(int run) noexcept;
+    /// `hz`: of a sine.
+    [[nodiscard]] Seen seen_of(const DwellInfo& dwell, double hz) const noexcept;
     void begin_paper_level() noexcept;
     StepResult accept(const Reading& reading) noexcept;
     StepResult replay() noexcept;

@@ -62,8 +62,19 @@ class Likelihood {
           problem_(problem),
           factor_(problem.covariance),
           base_(factor_.matrixL().solve(table.base(gyro))),
-          rate_(factor_.matrixL().solve(problem.rate)),
-          base_normal_(base_.transpose() * base_) {}
+          rate_(factor_.matrixL().solve(problem.rate)) {
+        Index n = rate_.size();
+        for (const SweptRates& swept : problem.swept) n += swept.size();
+        base_.conservativeResize(n, Eigen::NoChange);
+        rate_.conservativeResize(n);
+        n = problem.rate.size();
+        for (const SweptRates& swept : problem.swept) {
+            base_.middleRows(n, swept.size()) = swept.base();
+            rate_.segment(n, swept.size()) = swept.rate();
+            n += swept.size();
+        }
+        base_normal_ = base_.transpose() * base_;
+    }
 
     struct Both {
         std::array<Solved, 2> by_size;
@@ -75,9 +86,7 @@ class Likelihood {
     };
     /// With the prior's density in ln hz and ln damping.
     [[nodiscard]] Both both(const Point& p) const {
-        const VectorXd weights = table_.elastic_weights(at(p));
-        const MatrixXd elastic =
-            factor_.matrixL().solve(MatrixXd(weights.asDiagonal() * table_.vibration(gyro_)));
+        const MatrixXd elastic = whitened_elastic(at(p));
         MatrixXd normal(kColumns, kColumns);
         normal.topLeftCorner(kBase, kBase) = base_normal_;
         normal.topRightCorner(kBase, kElastic).noalias() = base_.transpose() * elastic;
@@ -107,6 +116,18 @@ class Likelihood {
     }
 
   private:
+    [[nodiscard]] MatrixXd whitened_elastic(const Resonance& of) const {
+        MatrixXd out(rate_.size(), kElastic);
+        Index n = table_.dwells();
+        out.topRows(n) = factor_.matrixL().solve(
+            MatrixXd(table_.elastic_weights(of).asDiagonal() * table_.vibration(gyro_)));
+        for (const SweptRates& swept : problem_.swept) {
+            out.middleRows(n, swept.size()) = swept.elastic(of);
+            n += swept.size();
+        }
+        return out;
+    }
+
     static constexpr double kPi = 3.14159265358979323846;
     const SpectralTable& table_;
     std::size_t gyro_;
@@ -197,13 +218,18 @@ std::vector<Point> scan(const Likelihood& likelihood) {
     return out;
 }
 
-/// Along one direction: so far that the likelihood falls by about a half.
+constexpr double kOutside = -1e299;
+
+/// Along one direction: so far that the likelihood falls by about a half. A maximum at the edge of
+/// the prior falls to one side only.
 double drop(const Likelihood& likelihood, const Point& top, double height, const Point& along,
             double most) {
     double step = 1e-4;
     while (step < most) {
-        const double fall =
-            height - (likelihood(top + step * along) + likelihood(top - step * along)) / 2;
+        const double up = likelihood(top + step * along), down = likelihood(top - step * along);
+        const double fall = height - (up < kOutside     ? down
+                                      : down < kOutside ? up
+                                                        : (up + down) / 2);
         if (fall > 0.1) return step / std::sqrt(2 * fall);
         step *= 1.5;
     }
@@ -219,8 +245,11 @@ Eigen::Matrix2d axes(const Likelihood& likelihood, const Point& top) {
     const auto corner = [&](double a, double b) {
         return likelihood(top + Point(0.5 * a * of_hz, 0.5 * b * of_damping));
     };
+    const std::array<double, 4> corners{corner(1, 1), corner(-1, -1), corner(1, -1), corner(-1, 1)};
+    const bool inside =
+        std::ranges::all_of(corners, [](double height_there) { return height_there > kOutside; });
     const double mixed =
-        std::clamp(-(corner(1, 1) + corner(-1, -1) - corner(1, -1) - corner(-1, 1)), -0.98, 0.98);
+        inside ? std::clamp(-(corners[0] + corners[1] - corners[2] - corners[3]), -0.98, 0.98) : 0;
     Eigen::Matrix2d curvature;
     curvature << 1, mixed, mixed, 1;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(curvature);
@@ -240,13 +269,22 @@ void add_nodes(const Likelihood& likelihood, const Point& top, std::vector<Node>
     for (int a = -kReach; a <= kReach; ++a) {
         for (int b = -kReach; b <= kReach; ++b) {
             const Point p = top + axis * Point(a, b);
-            if (!(likelihood(p) > -1e299)) continue;
+            if (!(likelihood(p) > kOutside)) continue;
             const Likelihood::Both both = likelihood.both(p);
             for (const Solved& one : both.by_size)
                 nodes.push_back({both.log_prior + std::log(0.5) + one.log_evidence + log_area,
                                  {0, {at(p)}, one.x, one.covariance}});
         }
     }
+}
+
+MatrixXd swept_design(const SweptRates& swept, const std::vector<Resonance>& resonances) {
+    MatrixXd out(swept.size(), kBase + kElastic * static_cast<Index>(resonances.size()));
+    out.leftCols(kBase) = swept.base();
+    for (std::size_t r = 0; r < resonances.size(); ++r)
+        out.middleCols(kBase + kElastic * static_cast<Index>(r), kElastic) =
+            swept.elastic(resonances[r]);
+    return out;
 }
 
 void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
@@ -258,6 +296,11 @@ void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& pro
     out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
     out.degrees = static_cast<int>(problem.rate.size() - best.x.size()) -
                   2 * static_cast<int>(best.resonances.size());
+    if (problem.swept.empty()) return;
+    // What sweeps determine takes nothing from the dwells' rates.
+    const MatrixXd x = design(table, gyro, best.resonances);
+    out.degrees = static_cast<int>(std::lround(static_cast<double>(problem.rate.size()) -
+                                               (gain(table, gyro, problem, best) * x).trace()));
 }
 
 }  // namespace
@@ -280,6 +323,10 @@ MatrixXd gain(const SpectralTable& table, std::size_t gyro, const GyroProblem& p
         prior_of(problem.prior_sigma, of.resonances.size(), kElasticSizes.back());
     MatrixXd information = x.transpose() * factor.solve(x);
     information.diagonal().array() += sigma.array().square().inverse();
+    for (const SweptRates& swept : problem.swept) {
+        const MatrixXd columns = swept_design(swept, of.resonances);
+        information += columns.transpose() * columns;
+    }
     return Eigen::LLT<MatrixXd>(information).solve(MatrixXd(factor.solve(x).transpose()));
 }
 

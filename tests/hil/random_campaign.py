@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Random dwells among sine ones, unattended, over the seqpacket bus on the rig's clock: chosen at rest, read back, shown by the
-accelerometers, recorded and predicted. And controllers that lie about profile, level and abort bands.
+accelerometers, recorded and predicted. The same killed in the midst of it, and resumed. And controllers that lie about profile, level and
+abort bands.
 
 usage: random_campaign.py PROGRAMS [--soak]     soak: half an hour at level
 """
@@ -10,6 +11,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import restart_campaign as again  # noqa: E402
 import rig as r  # noqa: E402
 import survey_campaign  # noqa: E402
 
@@ -47,11 +49,26 @@ def plan_of(folder, sines):
     return path, len(runs)
 
 
-def start(rig, folder, sines, dwell_s, *plant):
-    plan, count = plan_of(folder, sines)
-    rig.start_plant("--seed", "3", "--truth", rig.truth_file(TRUTH), *plant)
+def csv_plan_of(folder, sines):
+    """The same as a table."""
+    path, count = plan_of(folder, sines)
+    with open(path, encoding="utf-8") as file:
+        runs = json.load(file)["runs"]
+    path = os.path.join(folder, "plan.csv")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("alpha_deg,beta_deg,gamma_deg,table_g,frequency_hz,profile,level_db,role\n")
+        for run in runs:
+            file.write(",".join(str(x) for x in run["position"] + [run.get(key, "") for key in (
+                "table_g", "frequency_hz", "profile", "level_db", "role")]) + "\n")
+    return path, count
+
+
+def start(rig, planned, dwell_s, *plant, truth=TRUTH, **tables):
+    plan, count = planned
+    rig.start_plant("--seed", "3", "--truth", rig.truth_file(truth), *plant)
     rig.configure({"name": "random", "plan": plan, "dwell_s": dwell_s, "temperature_window_s": 5.0, "identify": "what-it-can"},
-                  spectrum={"mount": "hard", "mode": "mixed"}, **{f"shaker.registers.{role}": keys for role, keys in REGISTERS.items()})
+                  spectrum={"mount": "hard", "mode": "mixed"}, **{f"shaker.registers.{role}": keys for role, keys in REGISTERS.items()},
+                  **tables)
     with open(rig.configuration, "a", encoding="utf-8") as file:
         file.write(CONFIGURATION)
     rig.start_daemon()
@@ -62,7 +79,7 @@ def start(rig, folder, sines, dwell_s, *plant):
 def honest(checks, programs, folder, dwell_s):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        count, commands = start(rig, folder, len(POSITIONS), dwell_s)
+        count, commands = start(rig, plan_of(folder, len(POSITIONS)), dwell_s)
         last = rig.wait_for_state(ENDS, WALL_S)
         path, text = rig.result()
         if not checks.check(last and last["campaign"]["state"] == "finished" and text, "random dwells run unattended to the end",
@@ -100,10 +117,53 @@ def honest(checks, programs, folder, dwell_s):
                  "the result has them beside what was foretold")
 
 
+def resumed(checks, programs, folder):
+    """Killed in the midst of a random dwell, twice; from a CSV plan, and with accelerometers that do not see all, as declared."""
+    sines, narrow = 2, 150.0
+    rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
+    try:
+        count, _ = start(rig, csv_plan_of(folder, sines), 40.0, "--speed", "20", truth={**TRUTH, "accelerometer": {"bandwidth_hz": narrow}},
+                         accelerometer={"bandwidth_hz": narrow})
+        for done in (sines + 1, sines + 3):
+            status = rig.wait_for(lambda s, n=done: len(s["campaign"]["dwells"]) >= n and s["campaign"]["state"] == "recording", 120)
+            if not checks.check(status is not None and status["campaign"]["state"] == "recording",
+                                f"killed after {done}: in a random dwell", f"{r.state_of(status)}\n{rig.logs()}"):
+                return
+            again.time.sleep(1)   # what is older than a second has to be on disk
+            again.kill(rig)
+            known = rig.positions_done()
+            status = again.restart(checks, rig, f"killed after {done}")
+            checks.check(f"{known} of {count} positions done" in status["campaign"]["resume_offer"], "it offers to go on from there",
+                         status["campaign"]["resume_offer"])
+            again.at_rest(checks, rig, f"killed after {done}")
+            again.clear(rig)
+            rig.tool("arm", "--by", "Grace")
+            on = rig.tool("resume", "--by", "Grace")
+            checks.check(on.returncode == 0 and f"{known} of {count}" in on.stdout, "armed, it resumes on command", on.stdout + on.stderr)
+        last = rig.wait_for_state(ENDS, 240)
+        path, text = rig.result()
+        if not checks.check(last and last["campaign"]["state"] == "finished" and text, "the random campaign finishes",
+                            f"{r.state_of(last)}\n{rig.logs()}"):
+            return
+        dwells = last["campaign"]["dwells"]
+    finally:
+        rig.stop()
+    checks.equal((len(dwells), [d for d in dwells if d.get("flagged")]), (count, []), "each dwell is there once, none is flagged")
+    result = json.loads(text)
+    under = [row for row in result.get("dwell_rates", []) if row.get("profile") == "broad"]
+    checks.equal(len(under), len(POSITIONS), "the fit has the random dwells of all three lives")
+    checks.check(all(0.004 < row["r_relative_error"] < 0.02 for row in under), "what is not known of their level survived, too",
+                 [row["r_relative_error"] for row in under])
+    held = [row for row in (result.get("spectrum") or {}).get("held_out", []) if row["profile"] == "broad"]
+    checks.equal(len(held), len(HELD_OUT), "and so did those held out")
+    # Six rates; four sigma once in 2600 such tests.
+    checks.check(all(abs(z) < 4 for row in held for z in row["z"]), "they are as foretold", [row["z"] for row in held])
+
+
 def lies(checks, programs, folder, fault, trips, says):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        start(rig, folder, 1, 20.0, "--fault", fault)
+        start(rig, plan_of(folder, 1), 20.0, "--fault", fault)
         last = rig.wait_for_state(ENDS, 180)
         taken = [d for d in last["campaign"]["dwells"] if d["used"] > 0] if last else []
         name = fault.split("=", maxsplit=1)[0].replace("-", "_")
@@ -121,6 +181,8 @@ def main():
     checks = r.Checks()
     with tempfile.TemporaryDirectory() as folder:
         honest(checks, programs, folder, 1800.0 if "--soak" in sys.argv else 60.0)
+    with tempfile.TemporaryDirectory() as folder:
+        resumed(checks, programs, folder)
     for fault, trips, says in (
             ("wrong-profile=5", ("read_back_mismatch",), "profile checksum reads back as"),
             ("profile-level-wrong=6", ("wrong_vibration", "amplitude_witness", "over_amplitude"), "g rms"),

@@ -3,12 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace vibrig::plant {
 namespace {
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr double kNowhereDeg = 0.02;  // two counts of the command
+
+/// What is more than a sum over the vibration's sines needs short steps.
+bool finely(const Truth& truth) noexcept {
+    return truth.elastic_share != Vec3{} || !truth.profiles.empty() ||
+           truth.accelerometer_bandwidth_hz > 0 || truth.accelerometer_skew_ms > 0;
+}
 
 }  // namespace
 
@@ -17,8 +24,7 @@ Rig::Rig(const Truth& truth)
       tick_us_(std::llround(1e6 / truth.sample_rate_hz)),
       tick_s_(1e-6 * static_cast<double>(tick_us_)),
       passing_s_(tick_s_ / (1 + truth.time_base)),
-      steps_((truth.elastic_share == Vec3{} && truth.profiles.empty() ? 2 : 8) *
-             static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
+      steps_((finely(truth) ? 8 : 2) * static_cast<std::size_t>(std::ceil(1e3 * tick_s_ - 1e-9))),
       platform_(truth),
       gimbals_(truth.slew_deg_per_s, truth.stuck_gimbal,
                {truth.encoder_zero_deg, truth.soft_stop_deg}),
@@ -33,7 +39,11 @@ Rig::Rig(const Truth& truth)
       gyro_noise_(truth.seed, 0),
       slew_noise_(truth.seed, 7),
       played_(steps_ + 1),
-      shakes_(steps_ + 1) {
+      shakes_(steps_ + 1),
+      felt_(steps_ + 1) {
+    if (truth.accelerometer_bandwidth_hz > 0)
+        band_.emplace(truth.accelerometer_bandwidth_hz, truth.accelerometer_order,
+                      passing_s_ / static_cast<double>(steps_));
     shaker_.lie(truth.shaker_lies);
     read();
 }
@@ -109,8 +119,10 @@ void Rig::vibrate() {
         return vibrate_at_random(*profile, begin, end);
     if (shaped_ != nullptr) frequency_hz_ = 0;  // a sine begins anew
     shaped_ = nullptr;
-    if (shaker_.table_hz() != frequency_hz_) {
-        frequency_hz_ = shaker_.table_hz();
+    const double before_hz = std::exchange(frequency_hz_, shaker_.table_hz());
+    if (shaker_.sweeps() && before_hz != 0) {
+        isolator_.retune((before_hz + frequency_hz_) / 2);
+    } else if (frequency_hz_ != before_hz) {
         isolator_.set_drive(frequency_hz_, {truth_.second_harmonic, truth_.third_harmonic,
                                             truth_.fourth_harmonic, truth_.fifth_harmonic});
     }
@@ -153,13 +165,26 @@ void Rig::vibrate_at_random(const ShakerProfile& profile, double begin_g, double
     isolator_.follow(played_, std::span(shakes_).subspan(1));
 }
 
-Shake Rig::shake_before(double seconds) const noexcept {
+void Rig::feel() noexcept {
+    if (!band_) {
+        const bool late = truth_.latency_s > 0 || truth_.accelerometer_skew_ms > 0;
+        if (late) felt_ = shakes_;
+        felt_.back() = isolator_.shake();  // with the kick of a slew that ended
+    } else if (still_) {
+        band_->rest();
+        std::ranges::fill(felt_, Shake{});
+    } else {
+        band_->follow(shakes_, felt_);
+    }
+}
+
+Shake Rig::felt_before(double seconds) const noexcept {
     const double back = seconds / passing_s_ * static_cast<double>(steps_);
-    const std::size_t last = shakes_.size() - 1;
+    const std::size_t last = felt_.size() - 1;
     const std::size_t whole = std::min(static_cast<std::size_t>(back), last - 1);
     const double part = back - static_cast<double>(whole);
-    const Shake& late = shakes_[last - whole];
-    const Shake& early = shakes_[last - whole - 1];
+    const Shake& late = felt_[last - whole];
+    const Shake& early = felt_[last - whole - 1];
     return {late.in_phase + part * (early.in_phase - late.in_phase),
             late.quadrature + part * (early.quadrature - late.quadrature)};
 }
@@ -193,11 +218,16 @@ void Rig::read() {
     const Vec3 rocking = platform_.rocking(now);
     for (std::size_t i = 0; i < 3; ++i)
         encoder[i] += truth_.encoder_sign[i] * rocking[i] * kDegPerRad;
-    const Shake felt = truth_.latency_s > 0 ? shake_before(truth_.latency_s) : now;
-    readings_ =
-        sensors_.read(encoder, platform_.force(felt, truth_.vibration_gain),
-                      shaped_ != nullptr ? played_.back().in_phase : isolator_.table_g(table_g()),
-                      tick_s_ * static_cast<double>(tick_));
+    feel();
+    Vec3 force = platform_.force(felt_before(truth_.latency_s), truth_.vibration_gain);
+    for (std::size_t i = 1; i < 3 && truth_.accelerometer_skew_ms > 0; ++i) {
+        const double late_s = 5e-4 * static_cast<double>(i) * truth_.accelerometer_skew_ms;
+        force[i] =
+            platform_.force(felt_before(truth_.latency_s + late_s), truth_.vibration_gain)[i];
+    }
+    readings_ = sensors_.read(
+        encoder, force, shaped_ != nullptr ? played_.back().in_phase : isolator_.table_g(table_g()),
+        tick_s_ * static_cast<double>(tick_));
     Vec3 shown = readings_.encoder_deg;
     for (std::size_t i = 0; i < 3; ++i)
         if (truth_.angle_unit[i] != AngleUnit::deg)

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "tests/plant/accelerometer_band.hpp"
 #include "tests/plant/drift.hpp"
 #include "tests/plant/gimbals.hpp"
 #include "tests/plant/increments.hpp"
@@ -57,7 +59,9 @@ class Rig {
     void move();
     void read();
     [[nodiscard]] double table_g() const noexcept;
-    [[nodiscard]] Shake shake_before(double seconds) const noexcept;
+    void feel() noexcept;
+    /// What the accelerometers show of the vibration, up to a tick ago.
+    [[nodiscard]] Shake felt_before(double seconds) const noexcept;
     [[nodiscard]] Vec3 encoder_deg() const noexcept;
 
     Truth truth_;
@@ -65,7 +69,8 @@ class Rig {
     double tick_s_;      ///< by the rig's clock
     double passing_s_;   ///< really, in a tick
     std::size_t steps_;  ///< of the vibration per tick, even, 0.5 ms or a little less; 0.125 ms
-                         ///< where a gyro is elastic or the table shakes at random
+                         ///< where a gyro is elastic, the table shakes at random or
+                         ///< accelerometers are narrow or not read at once
     PlatformModel platform_;
     Gimbals gimbals_;
     Isolator isolator_;
@@ -85,7 +90,9 @@ class Rig {
     const ShakerProfile* shaped_ = nullptr;  ///< that the drive has
     std::vector<Shake> played_;              ///< of the table, as shakes_; the last one is now
     std::vector<Shake> shakes_;
-    bool still_ = true;  ///< no vibration in this tick
+    std::optional<AccelerometerBand> band_;
+    std::vector<Shake> felt_;  ///< of the accelerometers, as shakes_
+    bool still_ = true;        ///< no vibration in this tick
     std::int64_t tick_ = 0;
     Readings readings_;
 };

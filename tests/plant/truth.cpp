@@ -254,6 +254,12 @@ void check(const Truth& truth, const std::string& file) {
                          std::to_string(truth.latency_s) +
                          ", expected at most the period of platform.sample_rate_hz");
     }
+    if ((truth.latency_s + 1e-3 * truth.accelerometer_skew_ms) * truth.sample_rate_hz > 1) {
+        throw PlantError(file + ": accelerometer.skew_ms: found " +
+                         std::to_string(truth.accelerometer_skew_ms) +
+                         ", expected with accelerometer.latency_s at most the period of "
+                         "platform.sample_rate_hz");
+    }
     if (std::abs(determinant(truth.matrix)) < 0.1) {
         throw PlantError(file +
                          ": accelerometer.matrix: singular, expected three independent axes");

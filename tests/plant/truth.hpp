@@ -104,6 +104,12 @@ struct Truth {
     double vibration_gain = 1;   ///< for what vibrates, over that for gravity
     double latency_s = 0;        ///< the force shown is this much older; a sample's period at most
 
+    double accelerometer_bandwidth_hz = 0;  ///< half of the power is seen there; 0: no limit
+    int accelerometer_order = 1;            ///< of that low-pass, Butterworth's
+    /// x is read now, y half of it and z all of it earlier; with latency_s a sample's period at
+    /// most.
+    double accelerometer_skew_ms = 0;
+
     // resolver: amplitudes and phases of errors per turn, outer, inner, azimuth:
     // error = amplitude cos(order * encoder angle + phase)
     Vec3 harmonic_1_arcsec{}, harmonic_1_phase_deg{};

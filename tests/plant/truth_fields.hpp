@@ -43,6 +43,9 @@ void for_each_field(T& t, Field&& field) {
     field("accelerometer", "dead", t.dead, 0, 0);
     field("accelerometer", "vibration_gain", t.vibration_gain, 0.0, 10.0);
     field("accelerometer", "latency_s", t.latency_s, 0.0, 0.025);
+    field("accelerometer", "bandwidth_hz", t.accelerometer_bandwidth_hz, 0.0, 1e5);
+    field("accelerometer", "order", t.accelerometer_order, 1, 8);
+    field("accelerometer", "skew_ms", t.accelerometer_skew_ms, 0.0, 25.0);
     field("resolver", "harmonic_1_arcsec", t.harmonic_1_arcsec, -36e3, 36e3);
     field("resolver", "harmonic_1_phase_deg", t.harmonic_1_phase_deg, -360.0, 360.0);
     field("resolver", "harmonic_2_arcsec", t.harmonic_2_arcsec, -36e3, 36e3);

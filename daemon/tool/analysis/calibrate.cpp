@@ -59,7 +59,7 @@ std::string format(const char* pattern, Values... values) {
 
 void read(const Options& options, Study& study) {
     const auto table = plan::read_table(plan::content_of(options.file), options.file,
-                                        {"x1", "x2", "x3", "y", "sigma", "count"});
+                                        {{"x1", "x2", "x3", "y", "sigma", "count"}});
     std::array<std::size_t, 4> column{};
     for (std::size_t k = 0; k < column.size(); ++k) {
         const auto* name = std::array{"x1", "x2", "x3", "y"}[k];

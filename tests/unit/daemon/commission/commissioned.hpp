@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -37,6 +38,12 @@ class Commissioned : public ::testing::Test {
             ++released;
             drift = rig->drift(turned_by(torque));
             drifting_since = now;
+            if (ends_ahead_deg) {
+                ends = drift.reading;
+                for (std::size_t i = 0; i < 3; ++i)
+                    (*ends)[static_cast<std::size_t>(rig->channel[i])] +=
+                        *ends_ahead_deg / rig->degrees[i];
+            }
         };
         p.gimbal = [this] {
             return now >= arrives ? drivers::GimbalState::in_position
@@ -102,9 +109,12 @@ class Commissioned : public ::testing::Test {
             look.angle[c] += noise_deg / rig->degrees[i] * rig->random.normal();
             look.force[i] += 1e-5 * rig->random.normal();
             if (sticks == static_cast<int>(i)) look.force[i] = 0.0031;
-            if (drifting_since > 0)
-                look.angle[c] = drift.reading[c] +
-                                drift.slope[c] * drivers::to_seconds(from - drifting_since) / 3600;
+            if (drifting_since == 0) continue;
+            look.angle[c] = drift.reading[c] +
+                            drift.slope[c] * drivers::to_seconds(from - drifting_since) / 3600;
+            // An encoder's whole turns are nothing that it reads.
+            const double turn = 360 / rig->degrees[i];
+            if (ends) look.angle[c] -= turn * std::ceil((look.angle[c] - (*ends)[c]) / turn);
         }
         return look;
     }
@@ -207,6 +217,8 @@ class Commissioned : public ::testing::Test {
     Vec3 base{}, travel{}, most_travel{}, by_hand_deg{};
     estimator::commissioning::FreeDrift drift;
     std::optional<Eigen::Matrix3d> torquers;  ///< truth's platform rate over the command
+    std::optional<double> ends_ahead_deg;     ///< each encoder's turn, of where it is let go
+    std::optional<Vec3> ends;                 ///< by channel
     Vec3 torque{};
     double most_torque = 0;
     int sticks = -1;  ///< accelerometer that shows the same all the time

@@ -61,6 +61,27 @@ TEST_F(Torqued, SignAndScaleAreFoundAndNoTorqueIsLeft) {
     EXPECT_GE(decided, 18);
 }
 
+TEST_F(Torqued, AnEncoderMayEndItsTurnWhileItIsTorquedOrDrifts) {
+    int decided = 0;
+    for (std::uint64_t seed = 1; seed <= kRigs; ++seed) {
+        // GIVEN encoders that wrap within what one torque, or the drift, turns
+        const double ahead_deg = seed % 2 == 0 ? 0.05 : -0.05;
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        torqued_rig(seed, {1, 1, 1});
+        ends_ahead_deg = ahead_deg;
+        answers["names"] = "torquers";
+        const Json result = run()["result"];
+        // THEN no torque is askew for it
+        if (most_torque == 0) continue;  // no parity
+        ASSERT_EQ(result["outcome"], "decided") << result["why"];
+        ++decided;
+        for (const double scale : result["evidence"]["torquers"]["scale"])
+            EXPECT_NEAR(scale, 1, 5e-3);
+        EXPECT_NEAR(result["found"]["site.elevation_deg"], 0, 2) << "not from a wrong rate";
+    }
+    EXPECT_GE(decided, 18);
+}
+
 TEST_F(Torqued, ADeadOneEndsItAndIsNamed) {
     for (const std::size_t dead : {0U, 1U, 2U}) {
         Eigen::Vector3d response(1, 1, 1);

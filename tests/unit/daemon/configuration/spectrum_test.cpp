@@ -149,6 +149,93 @@ measured_g_rms = { address = 7 }
 control_state = { address = 9 }
 )";
 
+TEST(AccelerometerKeys, AResponseIsTakenAsItIsStated) {
+    const auto c = accepted("[accelerometer]\nbandwidth_hz = 100\norder = 2\nskew_ms = 0.1\n");
+    const auto& response = c.estimator.accelerometer_response;
+    EXPECT_NEAR(response.power(60), 1 / (1 + std::pow(0.6, 4)), 1e-12);
+    EXPECT_NEAR(response.skew_error(60), 3.55e-4, 1e-5);
+    EXPECT_TRUE(accepted("").estimator.accelerometer_response.flat());
+    const auto table = accepted("accelerometer.response = [[10, 1], [40, 0.9], [200, 0.3]]\n");
+    EXPECT_NEAR(table.estimator.accelerometer_response.power(40), 0.81, 1e-12);
+    const std::string shown = format_effective(
+        parse("accelerometer.response = [[10, 1], [40, 0.9]]\n", "rig.toml", false));
+    EXPECT_THAT(shown, HasSubstr("accelerometer.response"));
+    EXPECT_THAT(shown, HasSubstr("[10.0, 1.0], [40.0, 0.9]"));
+    EXPECT_THAT(shown, HasSubstr("accelerometer.bandwidth_hz"));
+    EXPECT_THAT(shown, HasSubstr("accelerometer.skew_ms"));
+}
+
+TEST(AccelerometerKeys, BadOnesAreToldWithPlaceValueAndWhatWasExpected) {
+    const auto said = [](const std::string& lines) {
+        return complaint("[accelerometer]\n" + lines, false);
+    };
+    EXPECT_THAT(
+        said("bandwidth_hz = -1\n"),
+        AllOf(StartsWith("rig.toml:2:"), HasSubstr("accelerometer.bandwidth_hz: found -1")));
+    EXPECT_THAT(said("order = 0\n"), HasSubstr("found 0, expected an integer from 1 to 8"));
+    EXPECT_THAT(said("order = 2\n"),
+                HasSubstr("found 2 without a bandwidth, expected accelerometer.bandwidth_hz"));
+    EXPECT_THAT(said("skew_ms = 1000\n"), HasSubstr("accelerometer.skew_ms: found 1000"));
+    EXPECT_THAT(said("response = [[40, 1], [10, 0.5]]\n"),
+                HasSubstr("found 10 Hz after 40 Hz, expected growing frequencies"));
+    EXPECT_THAT(said("response = [[40, 0], [100, 0.5]]\n"),
+                HasSubstr("accelerometer.response[0][1]: found 0"));
+    EXPECT_THAT(said("response = 3\n"), HasSubstr("[[hz, ratio], ..]"));
+    EXPECT_THAT(said("bandwidth_hz = 100\nresponse = [[10, 1], [40, 0.9]]\n"),
+                HasSubstr("found a table beside accelerometer.bandwidth_hz, expected one of them"));
+    EXPECT_THAT(said("bandwidth_hz = 100\n[estimator]\nmethod = \"two-step\"\n"),
+                HasSubstr("expected estimator.method = \"joint\""));
+}
+
+/// Below half of a line's power, and where the table does not reach.
+TEST(AccelerometerKeys, WhatTheyHardlySeeIsRefused) {
+    EXPECT_THAT(complaint("accelerometer.bandwidth_hz = 14\n", false),
+                AllOf(HasSubstr("accelerometer.bandwidth_hz: found 15 Hz, of which the "
+                                "accelerometers see 0.465"),
+                      HasSubstr("half of the power at least")));
+    EXPECT_EQ(complaint("accelerometer.bandwidth_hz = 15\n", false), "");
+    const plant::TemporaryFolder folder;
+    const auto plan_with = [&](const std::string& run, const std::string& more) {
+        const std::string path = folder.file("plan.json");
+        std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3},{"position":[0,0,0],)"
+                            << run << "}]}";
+        return "spectrum.mount = \"hard\"\ncampaign.plan = \"" + path + "\"\n" + more;
+    };
+    const auto said = [&](const std::string& run, const std::string& more) {
+        return complaint(plan_with(run, more), true);
+    };
+    const std::string high = R"("table_g":3,"frequency_hz":125.1)";
+    EXPECT_THAT(said(high, "accelerometer.bandwidth_hz = 100\n"),
+                AllOf(HasSubstr("found dwell 2 at 125.1 Hz"),
+                      HasSubstr("of which the accelerometers see 0.389")));
+    EXPECT_THAT(said(high, "accelerometer.response = [[10, 1], [100, 0.9]]\n"),
+                HasSubstr("of which the accelerometers see 0"));
+    EXPECT_EQ(said(high, "accelerometer.bandwidth_hz = 130\n"), "");
+    // What the witnesses expect is what the accelerometers show.
+    const auto c = accepted(plan_with(high, "accelerometer.bandwidth_hz = 130\n"), true);
+    const double power = 1 / (1 + std::pow(125.1 / 130, 2));
+    EXPECT_NEAR(c.campaign.stops[1].transmission, std::sqrt(power), 1e-12);
+    EXPECT_NEAR(c.campaign.stops[0].transmission, 1 / std::sqrt(1 + std::pow(15.0 / 130, 2)),
+                1e-12);
+    // 20 to 120 Hz: 100 (atan 1.2 - atan 0.2) / 100 of it with 100 Hz, 0.68.
+    const std::string random = R"("profile":"p")";
+    const auto with = [&](const std::string& hz) {
+        return "spectrum.mode = \"mixed\"\naccelerometer.bandwidth_hz = " + hz + "\n" +
+               kRandomRegisters +
+               profile_with("number = 4\nat = \"table\"\npsd = [[20, 0.02], [120, 0.02]]\n");
+    };
+    EXPECT_THAT(said(random, with("40")),
+                AllOf(HasSubstr("profile[0] (p): found a vibration of which the accelerometers "
+                                "see 0.3"),
+                      HasSubstr("half of its power at least")));
+    const auto r = accepted(plan_with(random, with("100")), true);
+    const double share = std::atan(1.2) - std::atan(0.2);
+    ASSERT_EQ(r.estimator.seen_profiles.size(), 1U);
+    EXPECT_EQ(r.estimator.seen_profiles[0].first, 4);
+    EXPECT_NEAR(r.estimator.seen_profiles[0].second.share, share, 1e-4);
+    EXPECT_NEAR(r.campaign.stops[1].transmission, std::sqrt(share), 1e-4);
+}
+
 TEST(RandomRegisters, AreNoneUnlessStatedAndThenAsStated) {
     EXPECT_FALSE(accepted("", true).shaker.registers.random);
     const auto map = accepted("spectrum.mode = \"mixed\"\n" + kRandomRegisters, true)
@@ -228,6 +315,22 @@ TEST(RandomDwells, OfAPlanAreStopsWithChecksumLevelAndBands) {
     EXPECT_NEAR(stop.random->at_platform.mean_square_g2,
                 std::pow(stop.table_g * stop.transmission, 2), 1e-9);
     EXPECT_EQ(stop.random->at_platform.gain_error, 0.01);
+
+    // The same from a CSV file, its errors with line and column.
+    const std::string csv = folder.file("plan.csv");
+    const auto of_csv = [&](const std::string& row) {
+        std::ofstream(csv) << "alpha_deg,beta_deg,gamma_deg,table_g,profile,level_db\n0,0,0,3,,\n"
+                           << row << "\n";
+        return "campaign.plan = \"" + csv + "\"\nspectrum.mode = \"mixed\"\n" + kRandomRegisters +
+               profile_with(whole);
+    };
+    const auto same = accepted(of_csv("0,0,0,,p,-3"), true);
+    ASSERT_EQ(same.campaign.stops.size(), 2U);
+    ASSERT_TRUE(same.campaign.stops[1].random);
+    EXPECT_EQ(same.campaign.stops[1].random->set_point.checksum, 0xbb19bad6U);
+    EXPECT_EQ(same.campaign.stops[1].table_g, stop.table_g);
+    EXPECT_THAT(complaint(of_csv("0,0,0,,q,0"), true),
+                HasSubstr("plan.csv:3: column profile: found 'q', expected the name or number"));
 
     EXPECT_THAT(said(R"("profile":"q")", whole),
                 AllOf(HasSubstr("runs[1].profile: found 'q'"), HasSubstr("one of p")));

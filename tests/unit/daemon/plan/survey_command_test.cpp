@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -168,6 +169,89 @@ TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
     ASSERT_EQ(runs.size(), 2U);
     EXPECT_EQ(runs[0].frequency_hz, 35.1);
     EXPECT_EQ(runs[1].frequency_hz, 0);
+}
+
+TEST_F(SurveyCommand, ACsvPlanHasProfilesLevelsAndRoles) {
+    const auto read = [&](const std::string& text) {
+        write("plan.csv", text);
+        return vibrig::plan::read_plan(path("plan.csv"), [](auto) { return std::optional(0.5); });
+    };
+    // Columns in any order, others ignored; a profile by name, with spaces about it, or by number.
+    const auto runs = read(
+        "role,profile,level_db,alpha_deg,beta_deg,gamma_deg,table_g,frequency_hz,count,who\n"
+        ",,,0,0,0,6,15,2,anna\n"
+        "identify,broad,-1.5,10,20,30,,,1,\n"
+        "verify, 4 ,,10,20,30,0,0,3,\n"
+        "verify,0,0,0,0,0,0,0,1,\n");
+    ASSERT_EQ(runs.size(), 4U);
+    EXPECT_EQ(runs[0].profile, "");
+    EXPECT_EQ(runs[0].level_g, 3);
+    EXPECT_EQ(runs[0].count, 2U);
+    EXPECT_EQ(runs[1].profile, "broad");
+    EXPECT_EQ(runs[1].level_db, -1.5);
+    EXPECT_EQ(runs[1].table_g, 0);
+    EXPECT_FALSE(runs[1].verify);
+    EXPECT_EQ(runs[2].profile, "4");
+    EXPECT_EQ(runs[2].level_db, 0);
+    EXPECT_TRUE(runs[2].verify);
+    EXPECT_EQ(runs[3].profile, "");
+    EXPECT_TRUE(runs[3].verify);
+    // The same as JSON says it.
+    write(
+        "plan.json",
+        R"({"runs":[{"position":[10,20,30],"profile":"broad","level_db":-1.5,"role":"verify"}]})");
+    const auto json =
+        vibrig::plan::read_plan(path("plan.json"), [](auto) { return std::optional(0.5); });
+    EXPECT_EQ(json[0].profile, runs[1].profile);
+    EXPECT_EQ(json[0].level_db, runs[1].level_db);
+}
+
+TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsToldWithLineAndColumn) {
+    const std::string head =
+        "alpha_deg,beta_deg,gamma_deg,table_g,frequency_hz,profile,level_db,"
+        "role,sweep\n0,0,0,6,15,,,,\n";
+    const auto refusal = [&](const std::string& row) -> std::string {
+        write("plan.csv", head + row + "\n");
+        try {
+            static_cast<void>(
+                vibrig::plan::read_plan(path("plan.csv"), [](auto) { return std::optional(1.0); }));
+        } catch (const vibrig::plan::PlanFileError& refused) {
+            return std::string(refused.what()).substr(path("plan.csv").size());
+        }
+        return "";
+    };
+    EXPECT_EQ(refusal("0,0,0,6,15,broad,0,,"),
+              ":3: column frequency_hz: found 15.0 beside a profile, expected level_db alone: the "
+              "profile has frequencies and g");
+    EXPECT_EQ(
+        refusal("0,0,0,6,,broad,0,,"),
+        ":3: column table_g: found 6.0 beside a profile, expected level_db alone: the profile "
+        "has frequencies and g");
+    EXPECT_EQ(refusal("0,0,0,6,15,,-3,,"),
+              ":3: column level_db: found -3.0, expected a profile beside it");
+    EXPECT_EQ(refusal("0,0,0,,,broad,61,,"),
+              ":3: column level_db: found 61.0, expected -60 to 60 dB");
+    EXPECT_EQ(refusal("0,0,0,,,broad,loud,,"),
+              ":3: column level_db: found 'loud', expected a number");
+    EXPECT_EQ(refusal("0,0,0,,15,,,,"), ":3: column table_g: found nothing, expected a number");
+    EXPECT_EQ(refusal("0,0,0,6,,,,,"), ":3: column frequency_hz: found nothing, expected a number");
+    EXPECT_EQ(refusal("0,0,0,6,15,,,test,"),
+              ":3: column role: found 'test', expected identify or verify");
+    EXPECT_EQ(refusal("0,0,0,6,15,,,,20-120"),
+              ":3: column sweep: found '20-120', expected a sine with frequency_hz and level_g, or "
+              "a profile: sweeps are not run");
+    EXPECT_EQ(refusal("0,0,,,,broad,0,,"),
+              ":3: column gamma_deg: found nothing, expected a number");
+    EXPECT_EQ(refusal("0,0,0,,,broad,0,verify,"), "");
+    write("plan.csv", head + "0,0,0,,,broad,0,,\n");
+    try {
+        static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
+        ADD_FAILURE() << "taken";
+    } catch (const vibrig::plan::PlanFileError& refused) {
+        EXPECT_NE(std::string(refused.what()).find("plan.csv:3: column profile: found broad"),
+                  std::string::npos)
+            << refused.what();
+    }
 }
 
 }  // namespace
