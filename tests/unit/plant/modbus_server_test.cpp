@@ -72,10 +72,10 @@ TEST_F(ModbusServerTest, AnswersIllegalRequestsWithExceptions) {
     const std::array<std::uint16_t, 2> frequency{0, 20000};
     EXPECT_EQ(modbus_write_registers(client.get(), 0, 2, frequency.data()), -1);
     EXPECT_EQ(errno, EMBXILVAL);
-    EXPECT_EQ(modbus_write_register(client.get(), 11, 1), -1);
+    EXPECT_EQ(modbus_write_register(client.get(), 16, 1), -1);
     EXPECT_EQ(errno, EMBXILADD);
-    std::array<std::uint16_t, 12> words{};
-    EXPECT_EQ(modbus_read_registers(client.get(), 0, 12, words.data()), -1);
+    std::array<std::uint16_t, 17> words{};
+    EXPECT_EQ(modbus_read_registers(client.get(), 0, 17, words.data()), -1);
     EXPECT_EQ(errno, EMBXILADD);
     EXPECT_EQ(input(client.get())[0], 1);
 }

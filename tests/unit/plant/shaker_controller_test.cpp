@@ -77,12 +77,47 @@ TEST(ShakerController, RefusesAFrequencyWhileMoving) {
 
 TEST(ShakerController, RefusesAddressesAndValuesItDoesNotHave) {
     ShakerController shaker(20, 25);
-    EXPECT_EQ(write(shaker, 11, {0}), Answer::illegal_address);
-    EXPECT_EQ(write(shaker, 10, {0, 0}), Answer::illegal_address);
+    EXPECT_EQ(write(shaker, 16, {0}), Answer::illegal_address);
+    EXPECT_EQ(write(shaker, 15, {0, 0}), Answer::illegal_address);
     EXPECT_EQ(write(shaker, 0, {}), Answer::illegal_address);
     EXPECT_EQ(write(shaker, 2, {0xffff, 0xffff}), Answer::illegal_value);
     EXPECT_EQ(write(shaker, 0, {0, 0}), Answer::illegal_value);
     EXPECT_EQ(write(shaker, 5, {2}), Answer::illegal_value);
+}
+
+TEST(ShakerController, SweepsOnceItsLevelIsThere) {
+    // GIVEN a sweep from 20 to 80 Hz, two octaves at 2 a minute, and a ramp of 1 s to 1 g
+    ShakerController shaker(20, 25);
+    const auto hz = [&] {
+        const auto input = shaker.input();
+        return 1e-3 * (input[ShakerController::kActualFrequency] * 65536.0 +
+                       input[ShakerController::kActualFrequency + 1]);
+    };
+    EXPECT_EQ(write(shaker, ShakerController::kMode, {2}), Answer::illegal_value)
+        << "from and to are not there";
+    EXPECT_EQ(write(shaker, 11, {0, 20000, 1, 14464, 200}), Answer::accepted);
+    EXPECT_EQ(write(shaker, ShakerController::kMode, {2}), Answer::accepted);
+    EXPECT_EQ(write(shaker, 2, {0, 10000, 100, 1}), Answer::accepted);
+    // THEN it waits for its level and 5 s more
+    run_for(shaker, 1 + 5 - 0.1);
+    EXPECT_NEAR(hz(), 20, 1e-9);
+    // AND goes up exponentially, whatever else is written
+    run_for(shaker, 0.1 + 30);
+    EXPECT_NEAR(hz(), 40, 0.1);
+    EXPECT_EQ(write(shaker, 6, {1}), Answer::accepted);
+    EXPECT_NEAR(shaker.table_hz(), 40, 0.1);
+    EXPECT_EQ(write(shaker, 11, {0, 30000}), Answer::illegal_value) << "it moves";
+    // AND stays at its end
+    run_for(shaker, 40);
+    EXPECT_NEAR(hz(), 80, 1e-9);
+    EXPECT_EQ(shaker.amplitude_g(), 1);
+    // AND down again where from is above to
+    EXPECT_EQ(write(shaker, 5, {0}), Answer::accepted);
+    run_for(shaker, 2);
+    EXPECT_EQ(write(shaker, 11, {1, 14464, 0, 20000, 200}), Answer::accepted);
+    EXPECT_EQ(write(shaker, 5, {1}), Answer::accepted);
+    run_for(shaker, 1 + 5 + 30);
+    EXPECT_NEAR(hz(), 40, 0.1);
 }
 
 TEST(ShakerController, WatchdogStopsAShakerThatNobodyFeeds) {
