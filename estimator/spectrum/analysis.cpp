@@ -142,7 +142,8 @@ MatrixXd joint_covariance(const SpectralTable& table, const std::array<MatrixXd,
 void settle(const SpectralTable& table, std::size_t j, const GyroProblem& problem,
             const MatrixXd& declared, Form form, Analysis& out) {
     Mixture& mixture = out.gyros[j];
-    if (form == Form::flat || form == Form::groups || table.kinds().size() < 2) {
+    const bool at_one = table.kinds().size() < 2 && problem.swept.empty();
+    if (form == Form::flat || form == Form::groups || at_one) {
         mixture.list = {without_resonance(table, j, problem)};
         return;
     }
@@ -250,7 +251,8 @@ bool Analysis::resonant() const {
                        [](const Mixture& one) { return one.resonant(); });
 }
 
-Analysis analyse(const Settings& settings, const SpectralTable& table, Form form) {
+Analysis analyse(const Settings& settings, const SpectralTable& table, Form form,
+                 const std::vector<Sweep>& sweeps) {
     Analysis out;
     const uncertainty::DwellTable times = uncertainty::dwell_table(table.rows());
     const MatrixXd prior = prior_sigmas(settings);
@@ -275,6 +277,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
             out.groups.sigma.col(g) = average.covariance.diagonal().cwiseSqrt();
             scattered |= average.weights.scatter > 0.5;
             problems[j] = {gyro.rate, uncertainty::mean_covariance(gyro, average), prior.col(g)};
+            for (const Sweep& sweep : sweeps) problems[j].swept.emplace_back(settings, sweep, j);
             if (table.kinds().size() > 1)
                 if_flat[j] =
                     covariance_if_flat(gyro, average, table.base(j), prior.col(g), settings.drift);

@@ -34,7 +34,9 @@ struct Analysis {
     [[nodiscard]] bool resonant() const;
 };
 
-/// A pure function of its arguments; some tenths of a second. Needs two dwells or more.
-[[nodiscard]] Analysis analyse(const Settings& settings, const SpectralTable& table, Form form);
+/// A pure function of its arguments; some tenths of a second, some seconds with sweeps, which tell
+/// of a resonance and are no dwells of the table. Needs two dwells or more.
+[[nodiscard]] Analysis analyse(const Settings& settings, const SpectralTable& table, Form form,
+                               const std::vector<Sweep>& sweeps = {});
 
 }  // namespace vibrig::estimator::spectrum

@@ -62,8 +62,19 @@ class Likelihood {
           problem_(problem),
           factor_(problem.covariance),
           base_(factor_.matrixL().solve(table.base(gyro))),
-          rate_(factor_.matrixL().solve(problem.rate)),
-          base_normal_(base_.transpose() * base_) {}
+          rate_(factor_.matrixL().solve(problem.rate)) {
+        Index n = rate_.size();
+        for (const SweptRates& swept : problem.swept) n += swept.size();
+        base_.conservativeResize(n, Eigen::NoChange);
+        rate_.conservativeResize(n);
+        n = problem.rate.size();
+        for (const SweptRates& swept : problem.swept) {
+            base_.middleRows(n, swept.size()) = swept.base();
+            rate_.segment(n, swept.size()) = swept.rate();
+            n += swept.size();
+        }
+        base_normal_ = base_.transpose() * base_;
+    }
 
     struct Both {
         std::array<Solved, 2> by_size;
@@ -75,9 +86,7 @@ class Likelihood {
     };
     /// With the prior's density in ln hz and ln damping.
     [[nodiscard]] Both both(const Point& p) const {
-        const VectorXd weights = table_.elastic_weights(at(p));
-        const MatrixXd elastic =
-            factor_.matrixL().solve(MatrixXd(weights.asDiagonal() * table_.vibration(gyro_)));
+        const MatrixXd elastic = whitened_elastic(at(p));
         MatrixXd normal(kColumns, kColumns);
         normal.topLeftCorner(kBase, kBase) = base_normal_;
         normal.topRightCorner(kBase, kElastic).noalias() = base_.transpose() * elastic;
@@ -107,6 +116,18 @@ class Likelihood {
     }
 
   private:
+    [[nodiscard]] MatrixXd whitened_elastic(const Resonance& of) const {
+        MatrixXd out(rate_.size(), kElastic);
+        Index n = table_.dwells();
+        out.topRows(n) = factor_.matrixL().solve(
+            MatrixXd(table_.elastic_weights(of).asDiagonal() * table_.vibration(gyro_)));
+        for (const SweptRates& swept : problem_.swept) {
+            out.middleRows(n, swept.size()) = swept.elastic(of);
+            n += swept.size();
+        }
+        return out;
+    }
+
     static constexpr double kPi = 3.14159265358979323846;
     const SpectralTable& table_;
     std::size_t gyro_;
@@ -249,6 +270,15 @@ void add_nodes(const Likelihood& likelihood, const Point& top, std::vector<Node>
     }
 }
 
+MatrixXd swept_design(const SweptRates& swept, const std::vector<Resonance>& resonances) {
+    MatrixXd out(swept.size(), kBase + kElastic * static_cast<Index>(resonances.size()));
+    out.leftCols(kBase) = swept.base();
+    for (std::size_t r = 0; r < resonances.size(); ++r)
+        out.middleCols(kBase + kElastic * static_cast<Index>(r), kElastic) =
+            swept.elastic(resonances[r]);
+    return out;
+}
+
 void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
             Mixture& out) {
     std::stable_sort(out.list.begin(), out.list.end(),
@@ -258,6 +288,11 @@ void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& pro
     out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
     out.degrees = static_cast<int>(problem.rate.size() - best.x.size()) -
                   2 * static_cast<int>(best.resonances.size());
+    if (problem.swept.empty()) return;
+    // What sweeps determine takes nothing from the dwells' rates.
+    const MatrixXd x = design(table, gyro, best.resonances);
+    out.degrees = static_cast<int>(std::lround(static_cast<double>(problem.rate.size()) -
+                                               (gain(table, gyro, problem, best) * x).trace()));
 }
 
 }  // namespace
@@ -280,6 +315,10 @@ MatrixXd gain(const SpectralTable& table, std::size_t gyro, const GyroProblem& p
         prior_of(problem.prior_sigma, of.resonances.size(), kElasticSizes.back());
     MatrixXd information = x.transpose() * factor.solve(x);
     information.diagonal().array() += sigma.array().square().inverse();
+    for (const SweptRates& swept : problem.swept) {
+        const MatrixXd columns = swept_design(swept, of.resonances);
+        information += columns.transpose() * columns;
+    }
     return Eigen::LLT<MatrixXd>(information).solve(MatrixXd(factor.solve(x).transpose()));
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/spectrum/elastic.hpp"
+#include "estimator/spectrum/sweep.hpp"
 #include "estimator/spectrum/table.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -14,6 +15,7 @@ struct GyroProblem {
     Eigen::VectorXd rate;         ///< n
     Eigen::MatrixXd covariance;   ///< n x n
     Eigen::VectorXd prior_sigma;  ///< 10, filter order
+    std::vector<SweptRates> swept{};
 };
 
 /// Coefficients for given resonances: 10 static ones (filter order), then six elastic ones for
@@ -44,7 +46,8 @@ struct Mixture {
 /// None, or one: a mixture over its frequency and damping.
 [[nodiscard]] Mixture one_resonance(const SpectralTable& table, std::size_t gyro,
                                     const GyroProblem& problem);
-/// Two, by Gauss and Newton's method from several starts, `first` the frequency of one.
+/// Two, by Gauss and Newton's method from several starts, `first` the frequency of one. Of the
+/// rates of dwells alone: sweeps take no part.
 [[nodiscard]] Mixture two_resonances(const SpectralTable& table, std::size_t gyro,
                                      const GyroProblem& problem, double first_hz);
 

@@ -23,6 +23,7 @@ void add_record_command(CLI::App& app, int& exit_code) {
         std::string output;
         CampaignPlan plan;
         std::optional<std::uint64_t> seed;
+        std::vector<std::string> sweeps;
     };
     auto o = std::make_shared<Options>();
     CLI::App* command =
@@ -47,6 +48,11 @@ void add_record_command(CLI::App& app, int& exit_code) {
         ->add_option("--profile", o->plan.profile,
                      "random vibration: the number of one of the truth's shaker.profiles, for each "
                      "of --table-g, which is its rms (to 0.1 dB) then; 0 for a sine")
+        ->delimiter(',');
+    command
+        ->add_option("--sweep", o->sweeps,
+                     "FROM:TO in Hz for each of --table-g, - for none: an exponential sweep over "
+                     "the dwell, its frequency in the column frequency_hz")
         ->delimiter(',');
     command->add_option("--dwell", o->plan.dwell_s, "recorded at each position, s")
         ->check(proto::finite(0.025, 1e5))
@@ -79,6 +85,7 @@ void add_record_command(CLI::App& app, int& exit_code) {
         if (!o->write_truth.empty()) write_truth(truth, o->write_truth);
         o->plan.positions_deg = read_positions(o->positions);
         o->plan.order = parse_order(o->order);
+        for (const std::string& text : o->sweeps) o->plan.sweep.push_back(parse_sweep(text));
         std::ofstream file;
         if (o->output != "-") {
             file.open(o->output, std::ios::binary);

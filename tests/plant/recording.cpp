@@ -57,11 +57,29 @@ double level_db(const Truth& truth, const CampaignPlan& plan, std::size_t run) {
     return std::round(200 * std::log10(plan.table_g[run - 1] / profile->rms_g())) / 10;
 }
 
+/// It takes what a dwell lasts after the shaker has waited, less two seconds at its end.
+void choose_sweep(Rig& rig, const CampaignPlan& plan, const std::array<double, 2>& hz) {
+    using proto::RegisterType;
+    const double waits_s = ShakerController::kSweepRests_s - plan.settle_s;
+    const double seconds = plan.dwell_s - std::max(0.0, waits_s) - 2;
+    if (!(seconds > 0))
+        throw PlantError("--dwell: found " + std::to_string(plan.dwell_s) +
+                         " s, expected more for a sweep: it begins " + std::to_string(waits_s) +
+                         " s after the beginning and ends 2 s before the end");
+    const double rate = 60 * std::abs(std::log2(hz[1] / hz[0])) / seconds;
+    const auto hertz = [](std::size_t at) { return holding(at, RegisterType::u32, 1e-3); };
+    set_shaker(rig.shaker(), hertz(ShakerController::kSweepFrom), hz[0]);
+    set_shaker(rig.shaker(), hertz(ShakerController::kSweepTo), hz[1]);
+    set_shaker(rig.shaker(), holding(ShakerController::kSweepRate, RegisterType::u16, 0.01), rate);
+    set_shaker(rig.shaker(), holding(ShakerController::kMode, RegisterType::u16, 1), 2);
+}
+
 /// At rest: the kind of vibration of a run, and for random vibration its rms.
 void choose_vibration(Rig& rig, const CampaignPlan& plan, std::size_t run) {
-    if (plan.profile.empty()) return;
+    if (plan.profile.empty() && plan.sweep.empty()) return;
     using proto::RegisterType;
     const auto mode = holding(ShakerController::kMode, RegisterType::u16, 1);
+    if (const auto hz = plan.sweep_of(run); hz[0] > 0) return choose_sweep(rig, plan, hz);
     const auto number = holding(ShakerController::kProfileNumber, RegisterType::u16, 1);
     const auto level = holding(ShakerController::kProfileLevel, RegisterType::i16, 0.1);
     const std::uint16_t chosen = plan.profile_of(run);
@@ -170,6 +188,10 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
         throw PlantError("--profile: found " + std::to_string(plan.profile.size()) +
                          " numbers, expected one for each of " +
                          std::to_string(plan.table_g.size()) + " levels");
+    if (!plan.sweep.empty() && plan.sweep.size() != plan.table_g.size())
+        throw PlantError("--sweep: found " + std::to_string(plan.sweep.size()) +
+                         " sweeps, expected one for each of " +
+                         std::to_string(plan.table_g.size()) + " levels");
     Rig rig(truth);
     std::uint64_t samples = 0;
     std::size_t dwell = 0;
@@ -193,7 +215,7 @@ std::uint64_t simulate(const Truth& truth, const CampaignPlan& plan,
         for (std::int64_t i = 0; i < ticks; ++i) {
             rig.advance();
             sink({run, position, 1e-6 * static_cast<double>(rig.time_us()), rig.readings(),
-                  rig.drift().coefficients()});
+                  rig.shaker().sweeps() ? rig.shaker().table_hz() : 0, rig.drift().coefficients()});
             ++samples;
         }
         if (progress) progress(++dwell, order.size());
@@ -217,10 +239,24 @@ std::vector<std::pair<std::size_t, std::size_t>> parse_order(const std::string& 
     return order;
 }
 
+std::array<double, 2> parse_sweep(const std::string& text) {
+    if (text == "-") return {};
+    std::array<double, 2> hz{};
+    int used = 0;
+    const auto may_be = [](double f) { return f >= 1 && f <= 200; };
+    if (std::sscanf(text.c_str(), "%lf:%lf%n", &hz[0], &hz[1], &used) != 2 ||
+        static_cast<std::size_t>(used) != text.size() || !may_be(hz[0]) || !may_be(hz[1]) ||
+        hz[0] == hz[1])
+        throw PlantError("--sweep: found \"" + text +
+                         "\", expected two frequencies from 1 to 200 Hz, as in 20:120, or -");
+    return hz;
+}
+
 std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream& out,
                      std::array<GyroCoefficients, 3>* mean,
                      const std::function<void(std::size_t, std::size_t)>& progress) {
-    const bool random = !plan.profile.empty(), several = plan.frequency_hz.size() > 1 || random;
+    const bool random = !plan.profile.empty();
+    const bool several = plan.frequency_hz.size() > 1 || random || !plan.sweep.empty();
     out << "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g"
         << (several ? ",frequency_hz" : "") << (random ? ",profile,level_db\n" : "\n");
     std::array<GyroCoefficients, 3> sum{};
@@ -241,7 +277,8 @@ std::uint64_t record(const Truth& truth, const CampaignPlan& plan, std::ostream&
         for (std::size_t i = 0; i < 3; ++i)
             fixed(s.readings.raw_g[i], 7, i < 2 || several ? ',' : '\n');
         const bool sine = plan.table_g[s.run - 1] > 0 && plan.profile_of(s.run) == 0;
-        if (several) fixed(sine ? plan.hz_of(s.run) : 0, 4, random ? ',' : '\n');
+        if (several)
+            fixed(s.hz > 0 ? s.hz : (sine ? plan.hz_of(s.run) : 0), 4, random ? ',' : '\n');
         if (random) {
             at = std::to_chars(at, end, plan.profile_of(s.run)).ptr;
             *at++ = ',';

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <iosfwd>
@@ -20,6 +21,9 @@ struct CampaignPlan {
     /// Random vibration of this number in the truth, table_g its rms (to 0.1 dB); one each, 0 for
     /// sine. Empty: sines.
     std::vector<std::uint16_t> profile{};
+    /// A sweep from its first to its second frequency, Hz, over a dwell; one each, zeros for none.
+    /// Empty: none.
+    std::vector<std::array<double, 2>> sweep{};
     double dwell_s = 100;
     double ramp_s = 2;
     double settle_s = 3;  ///< after the ramp, not recorded
@@ -32,6 +36,10 @@ struct CampaignPlan {
     [[nodiscard]] std::uint16_t profile_of(std::size_t run) const {
         return profile.empty() ? std::uint16_t{0} : profile[run - 1];
     }
+    /// Zeros: none.
+    [[nodiscard]] std::array<double, 2> sweep_of(std::size_t run) const {
+        return sweep.empty() ? std::array<double, 2>{} : sweep[run - 1];
+    }
     /// Run from 1.
     [[nodiscard]] double hz_of(std::size_t run) const {
         return frequency_hz[frequency_hz.size() == 1 ? 0 : run - 1];
@@ -42,6 +50,9 @@ struct CampaignPlan {
 /// PlantError.
 [[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> parse_order(const std::string& text);
 
+/// "20:120", Hz; "-": none. Throws PlantError.
+[[nodiscard]] std::array<double, 2> parse_sweep(const std::string& text);
+
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg; "table1" is the built-in list. Throws
 /// PlantError naming the line.
 [[nodiscard]] std::vector<Vec3> read_positions(const std::string& name_or_path);
@@ -51,6 +62,7 @@ struct PlannedSample {
     std::size_t run = 1, position = 1;  ///< from 1
     double time_s = 0;
     const Readings& readings;
+    double hz = 0;  ///< of a sweep at this moment; 0: no sweep
     /// In truth and at this moment, with all drift.
     const std::array<GyroCoefficients, 3>& coefficients;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace vibrig::plant {
 namespace {
@@ -118,8 +119,10 @@ void Rig::vibrate() {
         return vibrate_at_random(*profile, begin, end);
     if (shaped_ != nullptr) frequency_hz_ = 0;  // a sine begins anew
     shaped_ = nullptr;
-    if (shaker_.table_hz() != frequency_hz_) {
-        frequency_hz_ = shaker_.table_hz();
+    const double before_hz = std::exchange(frequency_hz_, shaker_.table_hz());
+    if (shaker_.sweeps() && before_hz != 0) {
+        isolator_.retune((before_hz + frequency_hz_) / 2);
+    } else if (frequency_hz_ != before_hz) {
         isolator_.set_drive(frequency_hz_, {truth_.second_harmonic, truth_.third_harmonic,
                                             truth_.fourth_harmonic, truth_.fifth_harmonic});
     }

@@ -74,11 +74,18 @@ double ShakerController::commanded_g() const noexcept {
 bool ShakerController::may_be(const std::array<std::uint16_t, kHolding>& next) const noexcept {
     const bool moving = state_ != ShakerState::idle || drive_g_ > 0;
     const auto changed = [&](std::size_t at) { return next[at] != holding_[at]; };
-    if (moving && (changed(kMode) || changed(kProfileNumber) || changed(kProfileLevel)))
-        return false;
+    bool other = false;
+    for (std::size_t at = kMode; at < kHolding; ++at) other = other || changed(at);
+    if (moving && other) return false;
     const auto level = std::bit_cast<std::int16_t>(next[kProfileLevel]);
-    if (next[kMode] > 1 || level < kLeastLevel || level > kMostLevel) return false;
-    return (next[kProfileNumber] == 0 && next[kMode] == 0) ||
+    if (next[kMode] > 2 || level < kLeastLevel || level > kMostLevel) return false;
+    const auto may_sweep = [&](std::size_t at) {
+        const double hz = 1e-3 * joined(next, at);
+        return hz >= 1 && hz <= 200;
+    };
+    if (next[kMode] == 2 && !(may_sweep(kSweepFrom) && may_sweep(kSweepTo) && next[kSweepRate] > 0))
+        return false;
+    return (next[kProfileNumber] == 0 && next[kMode] != 1) ||
            of_number(next[kProfileNumber]) != nullptr;
 }
 
@@ -102,7 +109,9 @@ ShakerController::Answer ShakerController::write(std::size_t address,
         return Answer::illegal_value;
     }
 
-    if (!lies_.frequency_ignored) table_hz_ = frequency;
+    const bool will_sweep = next[kMode] == 2;
+    if (!lies_.frequency_ignored && !(will_sweep && moving))
+        table_hz_ = will_sweep ? 1e-3 * joined(next, kSweepFrom) : frequency;
     if (lies_.timeout_register) next[kMap.watchdog_timeout.address] = *lies_.timeout_register;
     if (next[kMap.watchdog->address] != holding_[kMap.watchdog->address]) since_feed_s_ = 0;
     const double old_amplitude = set_point_g();
@@ -111,6 +120,7 @@ ShakerController::Answer ShakerController::write(std::size_t address,
         since_feed_s_ = 0;
         state_ = ShakerState::ramping;
         outside_bands_s_ = at_level_s_ = aborted_ = 0;
+        swept_s_ = 0;
         ramp_to(commanded_g(), ramp_s());
     } else if (!run && was_running) {
         if (!lies_.ack_without_stop)
@@ -141,6 +151,7 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     words[kProfileChecksum + 1] = static_cast<std::uint16_t>(checksum);
     split(words, kMeasuredRms, std::sqrt(mean_square_) / 1e-4);
     words[kControlState] = control_state();
+    split(words, kActualFrequency, 1e3 * table_hz_);
     return words;
 }
 
@@ -168,6 +179,17 @@ void ShakerController::watch_bands(double dt_s) noexcept {
     if (outside_bands_s_ < kBands_s || lies_.no_abort_bands) return;
     aborted_ = over > 1 ? kAbortAbove : kAbortBelow;
     trip(kFaultLimit, kRandomStop);
+}
+
+/// Exponentially; a driver that ignores its frequency sweeps through nothing.
+void ShakerController::sweep(double dt_s) noexcept {
+    if (!sweeps() || state_ != ShakerState::running || lies_.frequency_ignored) return;
+    swept_s_ += dt_s;
+    if (swept_s_ < kSweepRests_s) return;
+    const double to_hz = 1e-3 * joined(holding_, kSweepTo);
+    const double octaves = 0.01 * holding_[kSweepRate] * dt_s / 60;
+    table_hz_ = to_hz > table_hz_ ? std::min(to_hz, table_hz_ * std::exp2(octaves))
+                                  : std::max(to_hz, table_hz_ / std::exp2(octaves));
 }
 
 void ShakerController::open_emergency_stop(bool open) noexcept {
@@ -233,6 +255,7 @@ void ShakerController::advance(double dt_s) noexcept {
     }
     highest_g_ = std::max(highest_g_, amplitude_g());
     watch_bands(dt_s);
+    sweep(dt_s);
     const double omega = 2 * std::numbers::pi * table_hz_;
     const ShakerProfile* profile = played();
     const double peak_mm = profile != nullptr

@@ -29,11 +29,17 @@ inline constexpr std::uint16_t kAbortAbove = 1, kAbortBelow = 2, kAbortStopped =
 /// proto::ShakerRegisters, and for random vibration kMode to kControlState.
 class ShakerController {
   public:
-    static constexpr std::size_t kHolding = 11;
-    static constexpr std::size_t kInput = 10;
-    /// Holding: 0 sine, 1 random; a number; i16, 0.1 dB. Input: u32; u32, 1e-4 g; u16.
+    static constexpr std::size_t kHolding = 16;
+    static constexpr std::size_t kInput = 12;
+    /// Holding: 0 sine, 1 random, 2 sweep; a number; i16, 0.1 dB. Input: u32; u32, 1e-4 g; u16.
     static constexpr std::size_t kMode = 8, kProfileNumber = 9, kProfileLevel = 10;
     static constexpr std::size_t kProfileChecksum = 5, kMeasuredRms = 7, kControlState = 9;
+    /// Of a sweep, holding: u32, mHz, where it begins and ends; u16, 0.01 octaves a minute. Input:
+    /// u32, mHz, where it is. It begins kSweepRests_s after the level is there, and stays at its
+    /// end.
+    static constexpr std::size_t kSweepFrom = 11, kSweepTo = 13, kSweepRate = 15;
+    static constexpr std::size_t kActualFrequency = 10;
+    static constexpr double kSweepRests_s = 5;
     enum class Answer : std::uint8_t { accepted, illegal_address, illegal_value };
 
     ShakerController(double limit_g, double limit_mm, std::vector<ShakerProfile> profiles = {})
@@ -69,6 +75,7 @@ class ShakerController {
     [[nodiscard]] double highest_g() const noexcept { return highest_g_; }
     [[nodiscard]] double frequency_hz() const noexcept;                   ///< as its register says
     [[nodiscard]] double table_hz() const noexcept { return table_hz_; }  ///< in truth
+    [[nodiscard]] bool sweeps() const noexcept { return holding_[kMode] == 2; }
     [[nodiscard]] double set_point_g() const noexcept;
     [[nodiscard]] double ramp_s() const noexcept;
     [[nodiscard]] bool at_rest() const noexcept { return amplitude_g() == 0; }
@@ -79,6 +86,7 @@ class ShakerController {
     [[nodiscard]] bool may_be(const std::array<std::uint16_t, kHolding>& next) const noexcept;
     [[nodiscard]] double commanded_g() const noexcept;
     void watch_bands(double dt_s) noexcept;
+    void sweep(double dt_s) noexcept;
     [[nodiscard]] std::uint16_t control_state() const noexcept;
     void ramp_to(double target_g, double time_s) noexcept;
     void trip(std::uint16_t fault, double stop_s) noexcept;
@@ -105,6 +113,7 @@ class ShakerController {
     double felt_ = 1;         ///< of the last tick
     double mean_square_ = 0;  ///< of the table as the controller's accelerometer has it, g^2
     double outside_bands_s_ = 0, at_level_s_ = 0;
+    double swept_s_ = 0;         ///< at the level of a sweep
     std::uint16_t aborted_ = 0;  ///< why
 };
 

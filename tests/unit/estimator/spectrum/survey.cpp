@@ -17,12 +17,6 @@ using estimator::testing::kTable2;
 constexpr double kRateVariance = 4.891201e-5, kDegree = kPi / 180;
 constexpr std::array<int, 7> kSeven{4, 5, 6, 7, 10, 13, 14};
 
-ParameterArray table2() {
-    ParameterArray truth{};
-    for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];
-    return truth;
-}
-
 Eigen::Matrix3d vertical(double mean_square) {
     Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
     moment(1, 1) = mean_square;
@@ -30,6 +24,12 @@ Eigen::Matrix3d vertical(double mean_square) {
 }
 
 }  // namespace
+
+ParameterArray table2() {
+    ParameterArray truth{};
+    for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];
+    return truth;
+}
 
 Truth Truth::common(double share, const Resonance& resonance) {
     Truth out;

@@ -20,6 +20,9 @@ struct ElasticPart {
     std::array<double, 6> coefficients{};
 };
 
+/// The static coefficients of Table 2, filter order.
+[[nodiscard]] ParameterArray table2();
+
 /// Gyros with the static coefficients of Table 2.
 struct Truth {
     std::array<std::vector<ElasticPart>, 3> elastic;

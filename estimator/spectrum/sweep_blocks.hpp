@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/measurement.hpp"
+#include "estimator/spectrum/sweep.hpp"
+
+namespace vibrig::estimator::spectrum {
+
+/// Makes the blocks of a sweep from its samples, one after the other.
+class SweepBlocks {
+  public:
+    static constexpr double kBlock_s = 1;
+    SweepBlocks(const Settings& settings, int run, int position);
+
+    /// Times rise; `hz`: of the vibration at this moment, as the controller says.
+    void add(const Measurement& measurement, double hz);
+    /// Of all samples so far; the last second is there if it is a whole one.
+    [[nodiscard]] Sweep finish();
+    /// Of the vibration's power what goes through the frequencies that were said, median of the
+    /// blocks that shook; 1: of none. A frequency that is wrong by half a hertz, or late by half a
+    /// second, leaves less than kShown.
+    [[nodiscard]] double shown() const;
+    static constexpr double kShown = 0.9;
+
+  private:
+    struct Sample {
+        double time_s = 0, hz = 0;
+        Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< platform axes, g
+        bool force_good = false;
+    };
+    void end_block();
+    [[nodiscard]] bool clear(const SweepBlock& block, double rate_hz) const;
+    void take_moment(SweepBlock& block);
+
+    const Settings settings_;
+    const Kinematics kinematics_;
+    Sweep sweep_;
+    std::vector<Sample> samples_;  ///< of the block
+    std::vector<double> shares_;
+    std::array<double, 3> first_{}, sum_{};  ///< of the angles
+    double begin_s_ = 0;                     ///< of the block
+    std::size_t angles_ = 0;
+    bool begun_ = false;
+};
+
+}  // namespace vibrig::estimator::spectrum
