@@ -190,7 +190,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("vibration.kind", "", [](auto& s) { return s.vibration.kind; })
         .shown("vibration", "{}", "").off_page(),
     row("vibration.frequency_hz", "Hz",
-        [](auto& s) { return only(s.vibration.kind == "sine", s.vibration.frequency_hz); })
+        [](auto& s) { return only(s.vibration.frequency_hz > 0, s.vibration.frequency_hz); })
         .shown("vibration", "{}", "").with_decimals(2).off_page(),
     row("vibration.profile", "", [](auto& s) { return s.vibration.profile; })
         .shown("vibration", "profile {}", "").off_page(),
