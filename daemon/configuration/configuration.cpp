@@ -231,7 +231,7 @@ void take_profiles(Configuration& c, const std::string& name, Place place, Probl
             estimator::spectrum::check(stated.profile, one.file + ": ");
             one.profile = stated.profile;
             if (!stated.at.empty()) one.at_table = stated.at == "table";
-        } catch (const std::runtime_error& error) {
+        } catch (const std::exception& error) {
             problems.add(place, "profile (" + one.profile.name + ").file", error.what(),
                          "a profile as vibrig predict takes it");
         }
@@ -264,7 +264,7 @@ void take_controller_psd(Configuration& c, const std::string& name,
             of->controller_psd = std::move(one.psd);
             ++i;
         }
-    } catch (const std::runtime_error& error) {
+    } catch (const std::exception& error) {
         problems.add(place->second, "spectrum.controller_psd", error.what(),
                      "what the controller played under each profile");
     }

@@ -188,18 +188,18 @@ const auto kValues = std::to_array<StatusValue>({
         [](auto& s) { return only(s.witness_g[1] >= 0, s.witness_g[1]); }),
 
     row("vibration.kind", "", [](auto& s) { return s.vibration.kind; })
-        .shown("vibration", "{}", "").off_page(),
+        .shown("excitation", "{}", "").off_page(),
     row("vibration.frequency_hz", "Hz",
         [](auto& s) { return only(s.vibration.frequency_hz > 0, s.vibration.frequency_hz); })
-        .shown("vibration", "{}", "").with_decimals(2).off_page(),
+        .shown("excitation", "{}", "").with_decimals(2).off_page(),
     row("vibration.profile", "", [](auto& s) { return s.vibration.profile; })
-        .shown("vibration", "profile {}", "").off_page(),
+        .shown("excitation", "profile {}", "").off_page(),
     row("vibration.number", "", [](auto& s) { return only(s.vibration.number > 0, s.vibration.number); }),
     row("vibration.level_db", "dB",
         [](auto& s) { return only(s.vibration.number > 0, s.vibration.level_db); })
-        .shown("vibration", "{}", "").with_decimals(1).off_page(),
+        .shown("excitation", "{}", "").with_decimals(1).off_page(),
     row("vibration.control", "", [](auto& s) { return s.vibration.control; })
-        .shown("vibration", "{}", "").off_page(),
+        .shown("excitation", "{}", "").off_page(),
     row("vibration.commanded_g", "g", [](auto& s) { return s.vibration.commanded_g; }),
     row("vibration.controller_g", "g",
         [](auto& s) { return only(s.vibration.controller_g >= 0, s.vibration.controller_g); }),

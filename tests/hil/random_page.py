@@ -38,6 +38,9 @@ def under_random(checks, page, rows):
     checks.check(all(abs(20 * math.log10(g[name] / COMMANDED)) < 3 for name in ("controller", "platform", "table")),
                  "controller, platform and table show it", str(rows))
     checks.check(all(text.endswith(" g rms") for name, text in rows.items() if name in g or name == "band"), "rms, and said so", str(rows))
+    said = page.ask("evaluate", script="[document.getElementById('command').textContent, document.getElementById('stops').textContent]").get("value")
+    checks.check("at random" in said[0] and "Hz" not in said[0], "beside the amplitude, too, there is no frequency", str(said))
+    checks.check("run 2, 1.19 g" in said[1], "levels are rounded for people", str(said))
     low, high = (float(x) for x in rows.get("band", "nan to nan").replace(" g rms", "").split(" to "))
     checks.check(abs(low / COMMANDED - 10 ** -0.15) < 0.002 and abs(high / COMMANDED - 10 ** 0.15) < 0.002, "with the bands of 3 dB", str(rows))
     checks.equal(page.ask("evaluate", script="document.querySelectorAll('#c-psd .u-over').length").get("value"), 1, "the profile's PSD is drawn")

@@ -101,7 +101,7 @@ const Draw = (() => {
   function resize() {
     for (const [name, plot] of charts) {
       const element = byId('c-' + name);
-      if (plot.width !== element.clientWidth || plot.height !== element.clientHeight)
+      if (element.clientWidth && (plot.width !== element.clientWidth || plot.height !== element.clientHeight))
         plot.setSize({width: element.clientWidth, height: element.clientHeight});
     }
   }

@@ -87,7 +87,7 @@
       if (stop.run !== run) {
         const li = document.createElement('li');
         li.className = 'run';
-        li.textContent = `run ${run = stop.run}, ${stop.table_g} g`;
+        li.textContent = `run ${run = stop.run}, ${+stop.table_g.toPrecision(4)} g`;
         e.append(li);
       }
       const li = document.createElement('li'), dwell = dwells.get(stop.run + '/' + stop.position);
@@ -222,7 +222,8 @@
     byId('c-residuals').setAttribute('aria-label', `Residual drift of ${left.length} dwells, ${words}`);
     const e = s.estimate, c = s.campaign;
     set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
-    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`);
+    const random = (s.vibration || {}).kind === 'random';
+    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}${random ? ' rms, at random' : `, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`}`);
     byId('c-amplitude').setAttribute('aria-label', `Table amplitude ${fixed(s.shaker.measured_g, 3, 'g')}, commanded ${fixed(c.command_table_g, 2, 'g')}, since ${duration(s.time_s - start)}`);
     set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)}`);
     byId('c-innovations').setAttribute('aria-label', `Innovations ${['x', 'y', 'z'].map(a => fixed((e.innovation || {})[a + '_arcsec'], 1, 'arc seconds')).join(', ')}`);

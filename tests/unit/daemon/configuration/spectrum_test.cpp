@@ -59,6 +59,22 @@ TEST(SpectrumKeys, EachBadProfileIsToldWithPlaceValueAndWhatWasExpected) {
                 HasSubstr("profile[1].number: found 4 a second time"));
 }
 
+TEST(SpectrumKeys, AProfilesFileIsHeldToTheSame) {
+    const plant::TemporaryFolder folder;
+    const std::string path = folder.file("profile.json");
+    const auto said = [&](const std::string& content) {
+        std::ofstream(path) << content;
+        return complaint(profile_with("file = \"" + path + "\"\n"), false);
+    };
+    EXPECT_EQ(said(R"({"psd":[[20,0.01],[120,0.01]]})"), "");
+    EXPECT_THAT(
+        said(R"({"psd":[[20,0.01],[10,0.01]]})"),
+        AllOf(StartsWith("rig.toml:"), HasSubstr("profile.json: psd[1]: found 10 Hz after")));
+    EXPECT_THAT(said(R"({"psd":[[20,0.01],[30,0]]})"),
+                HasSubstr("psd[1]: found 0 g^2/Hz, expected a density above 0"));
+    EXPECT_THAT(said(R"({"psd":[[20,0.04],[120,0.04]],"g_rms":3})"), HasSubstr("g_rms: found 3"));
+}
+
 TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemon) {
     // The truck type at a hard mount: 3 sigma are 3.1 g, 0.17 m/s and 1.66 mm.
     const std::string truck =
