@@ -83,6 +83,7 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
         !why.empty())
         return why;
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
+    if (auto why = device_not_known(); !why.empty()) return why;
     if (auto why = outside_.refuses(request); !why.empty()) return why;
     if (const Latch* changed = latches_.find(journal::kJournalLatch))
         return changed->cause + kJournalToDo;
@@ -112,6 +113,7 @@ bool ControlLoop::first_shaking() const {
 }
 
 void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
+    if (!arming_) take_attendance(waiting.request);
     campaign_.climb_next_proof(first_shaking());
     if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty()) {
         if (why == book_.refusal(utc_now(), waiting.request.kind == CommandRequest::Kind::arm))

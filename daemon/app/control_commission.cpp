@@ -10,6 +10,9 @@
 
 #include "daemon/app/control_loop.hpp"
 #include "daemon/commission/acceptance.hpp"
+#include "daemon/commission/bus_bits.hpp"
+#include "daemon/commission/trial_log.hpp"
+#include "daemon/record/digest.hpp"
 #include "daemon/version.hpp"
 
 namespace vibrig {
@@ -25,6 +28,18 @@ constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 commission::Vec3 in_degrees(const std::array<double, 3>& rad) {
     return {rad[0] * kDegPerRad, rad[1] * kDegPerRad, rad[2] * kDegPerRad};
+}
+
+constexpr int kFineBits = 12;
+
+/// Of "Message.Signal"; 0: there is none.
+int bits_of(const proto::Dbc& dbc, const std::string& name) {
+    const auto dot = name.find('.');
+    const auto* const message = dbc.find(std::string_view(name).substr(0, dot));
+    const auto* const signal = message == nullptr || dot == std::string::npos
+                                   ? nullptr
+                                   : message->find(std::string_view(name).substr(dot + 1));
+    return signal == nullptr ? 0 : static_cast<int>(signal->length);
 }
 
 /// A wire leaves this machine, whatever the configuration says of its rig: gimbals may be at its
@@ -56,6 +71,10 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
         (index < 3 ? names.angle[index] : names.force[index - 3]) =
             text.is_string() ? text.get<std::string>() : value.value;
     }
+    for (const auto* const all : {&names.angle, &names.force})
+        for (const auto& name : *all)
+            if (const int bits = bits_of(parts_.dbc, name); bits > 0 && bits < kFineBits)
+                names.coarse.push_back(fmt::format("{} has {} bits", name, bits));
     names.command = configuration_.gimbal.message;
     names.torque = configuration_.campaign.level.torquer.message;
     commission::Ports ports;
@@ -121,6 +140,27 @@ void ControlLoop::keep_commissioned(journal::Commissioned row) {
     journal_->commissioned(row);
 }
 
+/// At the start: what was written to the controller meanwhile, without a daemon.
+void ControlLoop::keep_trials() {
+    try {
+        const auto lines = commission::TrialLog::take(configuration_.commission.folder);
+        for (const Json& line : lines) {
+            const std::string by = line.value("by", ""), who = line.value("identity", "");
+            keep_commissioned({name_of(Part::registers), "4",
+                               who.empty() ? by : by + " (" + who + ")", "", line.value("what", ""),
+                               line.dump()});
+        }
+        if (!lines.empty())
+            log(Severity::info, "commissioning",
+                fmt::format("registers were tried without vibrigd: {} lines taken into the journal",
+                            lines.size()));
+    } catch (const std::exception& error) {
+        log(Severity::warning, "commissioning",
+            std::string("registers were tried without vibrigd, and it is not in the journal: ") +
+                error.what());
+    }
+}
+
 /// At the start: parts that were proven, and by what they no longer are.
 void ControlLoop::keep_voided() {
     for (const auto& part : book_.standing(utc_now()))
@@ -143,6 +183,19 @@ void ControlLoop::void_gyros(const std::string& why) {
     }
 }
 
+/// What was found stands on disk, whoever reads it.
+void ControlLoop::end_procedure(Time now) {
+    campaign_.end_commissioning(now);
+    const auto& finding = procedure_->finding();
+    if (finding.outcome != commission::Finding::Outcome::decided) return;
+    try {
+        progress().write_found(commission::to_toml(finding, configuration_.simulated()));
+    } catch (const std::exception& error) {
+        log(Severity::warning, "commissioning",
+            std::string("what was found is not kept: ") + error.what());
+    }
+}
+
 commission::Progress ControlLoop::progress() const {
     return {configuration_.commission.folder, Json(book_.keys(Part::bus))};
 }
@@ -156,7 +209,7 @@ Time ControlLoop::step_commissioning(Time now) {
         return drivers::kNever;
     }
     const Time next = procedure_->step(now, rt::wall_clock());
-    if (!procedure_->active()) campaign_.end_commissioning(now);
+    if (!procedure_->active()) end_procedure(now);
     return next;
 }
 
@@ -165,6 +218,11 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     const Json what = Json::parse(request.argument, nullptr, false);
     if (!what.is_object() || !what.contains("do") || !what["do"].is_string())
         return answer(waiting, {false, "commission: found no JSON object with \"do\""});
+    if (what["do"] == "attend") {
+        if (attendance_ && journal::same_person(request.by, attendance_->by))
+            attendance_->wall = rt::wall_clock();
+        return waiting.reply.set_value({true, "there"});
+    }
     if (what["do"] != "read") return answer(waiting, do_commission(request, what, now));
     // Several times a second: no row of the audit.
     if (procedure_) procedure_->attend(request.by, rt::wall_clock());
@@ -200,14 +258,16 @@ CommandReply ControlLoop::do_commission(const CommandRequest& request, const Jso
         return begin_commissioning(request, what, now);
     }
     if (word != "answer" && word != "answers" && word != "stop" && word != "end")
-        return {false, "commission: do: found \"" + word +
-                           "\", expected begin, read, answer, answers, stop, end, accept, state or "
-                           "sign"};
+        return {
+            false,
+            "commission: do: found \"" + word +
+                "\", expected begin, read, attend, answer, answers, stop, end, accept, state or "
+                "sign"};
     if (!active) return {false, "the rig is not being commissioned"};
     procedure_->attend(request.by, rt::wall_clock());
     if (word == "answer") {
         const auto why = procedure_->answer(request.by, text("id"), text("value"));
-        if (!procedure_->active()) campaign_.end_commissioning(now);
+        if (!procedure_->active()) end_procedure(now);
         return {why.empty(), why.empty() ? "answered" : why};
     }
     if (word == "answers") {
@@ -308,7 +368,7 @@ CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, con
         procedure_->begin_again(request.by, by_hand, kept, now);
     else
         procedure_->begin(request.by, by_hand, now);
-    if (!procedure_->active()) campaign_.end_commissioning(now);
+    if (!procedure_->active()) end_procedure(now);
     log(Severity::info, "commissioning",
         fmt::format("{} by {}", flag("resume") ? "taken up" : "begun", request.by));
     return {true, "begun"};
@@ -379,6 +439,19 @@ CommandReply ControlLoop::sign_record(const CommandRequest& request, const Json&
     return {true, text};
 }
 
+namespace {
+
+/// Valid bits and the like, as vibrig commission bus --bits has proven them.
+Json bits_of_the_bus(const configuration::Loaded& file) {
+    const auto& c = file.configuration;
+    const auto text = c.dbc.empty() ? record::sha256_of_text(std::string(proto::rig_dbc_text()))
+                                    : record::sha256_of_file(c.dbc);
+    const Json bits = commission::BitBook(c.commission.folder, text).bits();
+    return bits.empty() ? Json("none was proven: vibrig commission bus --bits") : bits;
+}
+
+}  // namespace
+
 CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
                                                const std::string& second,
                                                const configuration::Loaded& file) {
@@ -392,7 +465,9 @@ CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
     if (const auto why = commission::not_as_found(finding, file); !why.empty()) return {false, why};
     if (const auto why = commission::not_as_running(parts, finding, book_, file); !why.empty())
         return {false, why + ": it was not measured with that: commission anew"};
-    auto reply = record_parts(request, second, parts, finding.evidence, file);
+    Json evidence = finding.evidence;
+    evidence["bits"] = bits_of_the_bus(file);
+    auto reply = record_parts(request, second, parts, evidence, file);
     if (reply.accepted) progress().remove();
     return reply;
 }

@@ -37,7 +37,9 @@ void ControlLoop::run() {
         supervisor_.look();
         watch_outside();
         interlock_.filter(rig_.excitation() ? estimator_stage_.view().estimate.nis_per_dof : 0);
+        watch_device(now);
         take_commands(now);
+        watch_attendance(now);
         if (shut_down_.load()) campaign_.shut_down(now);
         dwells_.take_done(campaign_);
         // The journal's wake-ups come when the disk is done: polls that began with them would make
@@ -128,6 +130,7 @@ void ControlLoop::take_over() {
     proofs_taken_ = campaign_.proof().history().size();
     if (!book_.trouble().empty()) log(Severity::warning, "commissioning", book_.trouble());
     keep_voided();
+    keep_trials();
     take_over_latches();
     if (auto& campaign = journal_->recovery().campaign)
         dwells_.offer_unfinished(*campaign, campaign_);

@@ -99,6 +99,14 @@ class ControlLoop {
     /// Why there is nothing of the name it gives; empty: there is, or it gives none.
     [[nodiscard]] std::string unknown_to_acknowledge(const CommandRequest& request) const;
 
+    // control_attendance.cpp
+    void take_attendance(CommandRequest& request);
+    void watch_attendance(drivers::Time now);
+
+    // control_device.cpp
+    void watch_device(drivers::Time now);
+    [[nodiscard]] std::string device_not_known() const;
+
     // What commissioning asks, tells and records (control_commission.cpp).
     void commission(WaitingCommand waiting, drivers::Time now);
     [[nodiscard]] CommandReply do_commission(const CommandRequest& request,
@@ -110,6 +118,8 @@ class ControlLoop {
     [[nodiscard]] commission::Progress progress() const;
     void keep_commissioned(journal::Commissioned row);
     void keep_voided();
+    void keep_trials();
+    void end_procedure(drivers::Time now);
     void void_gyros(const std::string& why);
     [[nodiscard]] bool first_shaking() const;
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
@@ -157,7 +167,14 @@ class ControlLoop {
 
     commission::Book book_{loaded_};
     std::unique_ptr<commission::Procedure> procedure_;  ///< made when it is asked for
-    std::size_t proofs_taken_ = 0;                      ///< into the record, of the campaign's
+    /// Of a proof that a tool waits for: it ends with the tool.
+    struct Attendance {
+        std::string by;
+        drivers::Time wall = 0;  ///< when the tool was last there
+    };
+    std::optional<Attendance> attendance_;
+    std::string device_;            ///< who the shaker's controller says it is; empty: not known
+    std::size_t proofs_taken_ = 0;  ///< into the record, of the campaign's
     /// An arming that the journal is writing.
     struct Arming {
         WaitingCommand waiting;

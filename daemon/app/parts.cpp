@@ -30,10 +30,14 @@ rt::MemoryLock lock_memory(const Configuration& configuration) {
 
 drivers::ShakerSettings shaker_settings(const Configuration& configuration) {
     auto settings = configuration.shaker;
+    // Shorter than its watchdog waits.
+    if (configuration.record_demanded())
+        settings.identify = std::min(settings.response_timeout, settings.watchdog_period);
     if (rig_owns_time(configuration)) {
         // The rig's time stands still meanwhile: a busy machine is slower, not different.
         settings.response_timeout = std::max(settings.response_timeout, 10 * drivers::kSecond);
         settings.stop_ramp_timeout = settings.response_timeout;
+        if (settings.identify > 0) settings.identify = settings.response_timeout;
     }
     return settings;
 }

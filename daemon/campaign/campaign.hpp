@@ -88,6 +88,7 @@ class Campaign {
     /// an abort, a trip and a shaker that does not rest end it. Why not, else empty.
     [[nodiscard]] std::string begin_commissioning(const std::string& by, drivers::Time now);
     void end_commissioning(drivers::Time now);
+    [[nodiscard]] bool checking() const { return state_ == CampaignState::checking; }
     [[nodiscard]] bool commissioning() const { return state_ == CampaignState::commissioning; }
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
@@ -106,6 +107,8 @@ class Campaign {
     /// What has been proved of stopping, for the recording; JSON, empty: nothing.
     [[nodiscard]] std::string proofs_json() const { return proof_.recording_json(); }
     [[nodiscard]] const SafetyProof& proof() const { return proof_; }
+    /// Who the shaker's controller says it is.
+    void shaker_is(const std::string& device) { proof_.device_is(device); }
     /// Adds the zeros' share of the amplitudes' uncertainty.
     void qualify(estimator::Result& result) const;
     /// The verdict on the dwells so far has become "not valid"; run and position of the dwell that

@@ -71,10 +71,8 @@ CommandReply Campaign::begin_check(const CommandRequest& request, Time now) {
         return {false, "selftest: found the button \"" + button +
                            "\", expected one of commission.buttons"};
     if (auto why = not_fit_to_check(now); !why.empty()) return {false, why};
-    if (climbs_ && !at_zero && !proof_.ran_at_zero())
-        return {false,
-                "the controller has not run at 0 g yet: vibrig commission watchdog stop units "
-                "excitation"};
+    if (climbs_ && !at_zero)
+        if (auto why = proof_.lacks_at_zero(); !why.empty()) return {false, why};
     armed_by_ = request.by;
     armed_for_ = arming_text(request);
     excitation_.armed();

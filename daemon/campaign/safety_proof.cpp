@@ -126,7 +126,8 @@ std::string to_json(const ProofRecord& r) {
                 {"transmission", r.transmission},
                 {"transmissions", r.transmissions},
                 {"keys", r.keys},
-                {"keys_sha256", r.keys_sha256}}
+                {"keys_sha256", r.keys_sha256},
+                {"device", r.device}}
         .dump();
 }
 
@@ -153,6 +154,7 @@ std::optional<ProofRecord> proof_from_json(const std::string& text) {
             r.transmissions = further->get<decltype(r.transmissions)>();
         r.keys = json.at("keys");
         r.keys_sha256 = json.at("keys_sha256");
+        r.device = json.value("device", "");
         return r;
     } catch (const nlohmann::json::exception&) {
         return std::nullopt;
@@ -170,6 +172,7 @@ void SafetyProof::begin(const std::string& by, double table_g) {
     record_.table_g = table_g;
     record_.keys = settings_.keys;
     record_.keys_sha256 = keys_sha256_;
+    record_.device = device_;
 }
 
 void SafetyProof::row(std::string name, std::string unit, double value, double low, double high) {
@@ -192,17 +195,15 @@ const ProofRecord& SafetyProof::conclude(std::int64_t utc_ns, const std::string&
 
 std::vector<ProofRecord> SafetyProof::with_these_keys() const {
     std::vector<ProofRecord> some;
-    std::ranges::copy_if(history_, std::back_inserter(some), [this](const ProofRecord& one) {
-        return one.keys_sha256 == keys_sha256_;
-    });
+    std::ranges::copy_if(history_, std::back_inserter(some),
+                         [this](const ProofRecord& one) { return of_this_rig(one); });
     return some;
 }
 
 std::vector<std::string> SafetyProof::buttons_left() const {
     std::vector<std::string> left = settings_.buttons;
     for (const auto& one : history_)
-        if (one.passed && one.emergency_stop && one.keys_sha256 == keys_sha256_)
-            std::erase(left, one.button);
+        if (one.passed && one.emergency_stop && of_this_rig(one)) std::erase(left, one.button);
     return left;
 }
 
@@ -220,9 +221,22 @@ const ProofRecord* SafetyProof::newest_shaken() const {
 
 bool SafetyProof::ran_at_zero() const {
     return std::ranges::any_of(history_, [this](const ProofRecord& one) {
-        return one.passed && one.table_g == 0 && !one.emergency_stop &&
-               one.keys_sha256 == keys_sha256_;
+        return one.passed && one.table_g == 0 && !one.emergency_stop && of_this_rig(one);
     });
+}
+
+std::string SafetyProof::lacks_at_zero() const {
+    if (!ran_at_zero())
+        return "the controller has not run at 0 g yet: vibrig commission watchdog stop units "
+               "excitation";
+    std::string names;
+    for (const auto& button : buttons_left())
+        names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", button);
+    if (names.empty()) return {};
+    return fmt::format(
+        "the emergency stop was not pressed at 0 g yet ({}), which comes before it shakes for the "
+        "first time: vibrig commission stop",
+        names);
 }
 
 std::string SafetyProof::refusal(std::int64_t utc_ns) const {
@@ -246,6 +260,11 @@ std::string SafetyProof::refusal(std::int64_t utc_ns) const {
                kRemedy;
     if (newest.keys_sha256 != keys_sha256_)
         return what + "since then " + changes(newest.keys, settings_.keys) + kRemedy;
+    if (!of_this_device(newest))
+        return what +
+               fmt::format("the shaker's controller is \"{}\", was \"{}\"", device_,
+                           newest.device) +
+               kRemedy;
     return {};
 }
 
@@ -336,7 +355,7 @@ void SafetyProof::fill(ProofStatus& status, std::int64_t utc_ns) const {
 
 const ProofRecord* SafetyProof::newest_of_these_keys() const {
     const ProofRecord* newest = newest_shaken();
-    return newest == nullptr || newest->keys_sha256 != keys_sha256_ ? nullptr : newest;
+    return newest == nullptr || !of_this_rig(*newest) ? nullptr : newest;
 }
 
 std::optional<double> SafetyProof::transmission() const {

@@ -46,6 +46,7 @@ struct ProofRecord {
     /// The same at further frequencies of the plan, Hz first.
     std::vector<std::pair<double, double>> transmissions;
     std::string keys, keys_sha256;  ///< as in ProofSettings
+    std::string device;             ///< who the shaker's controller says it is; empty: not asked
 };
 
 /// As the journal and people's tools keep it.
@@ -79,6 +80,9 @@ class SafetyProof {
 
     /// Oldest first, of earlier lives.
     void take_over(std::vector<ProofRecord> history);
+    /// Who the shaker's controller says it is: a proof of another one counts for nothing. Until it
+    /// is known each counts.
+    void device_is(std::string device) { device_ = std::move(device); }
     void begin(const std::string& by, double table_g);
     void row(std::string name, std::string unit, double value, double low, double high);
     /// A step that either is so or is not.
@@ -109,6 +113,9 @@ class SafetyProof {
     [[nodiscard]] std::vector<ProofRecord> with_these_keys() const;
     /// With these keys the controller has run at 0 g, and its watchdog has stopped it there.
     [[nodiscard]] bool ran_at_zero() const;
+    /// Why a shaker whose numbers nobody understands yet does not shake: what comes before it, at
+    /// 0 g, was not proved with these keys. Empty: it was.
+    [[nodiscard]] std::string lacks_at_zero() const;
     /// Of the emergency stop's buttons: none of those proofs that passed had them pressed.
     [[nodiscard]] std::vector<std::string> buttons_left() const;
     /// As the newest loop check in band has measured it with the configuration as it is; nothing
@@ -120,6 +127,12 @@ class SafetyProof {
     [[nodiscard]] PadRingDown pads() const;
 
   private:
+    [[nodiscard]] bool of_this_rig(const ProofRecord& one) const {
+        return one.keys_sha256 == keys_sha256_ && of_this_device(one);
+    }
+    [[nodiscard]] bool of_this_device(const ProofRecord& one) const {
+        return device_.empty() || one.device == device_;
+    }
     [[nodiscard]] const ProofRecord* newest_passed() const;
     /// Not of a run at 0 g.
     [[nodiscard]] const ProofRecord* newest_shaken() const;
@@ -127,7 +140,7 @@ class SafetyProof {
     [[nodiscard]] const ProofRecord* newest_of_these_keys() const;
 
     ProofSettings settings_;
-    std::string keys_sha256_;
+    std::string keys_sha256_, device_;
     std::vector<ProofRecord> history_;
     ProofRecord record_;
 };

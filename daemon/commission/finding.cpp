@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <exception>
+#include <map>
 
 namespace vibrig::commission {
 
@@ -138,13 +139,29 @@ void fill_keys(Finding& f, const room::Description& d, const room::EarthRate& ra
             travel += fmt::format("{}[{:.1f}, {:.1f}]", g == 0 ? "" : ", ", low, high);
         }
         if (limited)
-            f.keys.push_back({"gimbal.travel_deg", "[" + travel + "]", "as stated at the start"});
+            f.keys.push_back({"gimbal.travel_deg", "[" + travel + "]",
+                              commanded.met_a_stop
+                                  ? "as stated at the start, less where a gimbal met a stop"
+                                  : "as stated at the start"});
     }
     f.sigma = {{"site.azimuth_deg", 57.3 * std::max(rate.sigma[0], rate.sigma[1]) /
                                         std::max(rate.neu.head<2>().norm(), 1e-3)},
                {"site.latitude_deg", rate.latitude_sigma_deg()},
                {"site.elevation_deg", 0.02},
                {"platform.encoder_zero_deg", {0.03, 0.03, 0.17}}};
+}
+
+std::string to_toml(const Finding& f, bool simulated) {
+    const std::string mark = simulated ? "SIMULATED: " : "";
+    std::map<std::string, std::string> tables;
+    for (const auto& key : f.keys) {
+        const auto dot = key.key.rfind('.');
+        tables[key.key.substr(0, dot)] += fmt::format("# {}{}\n{} = {}\n", mark, key.evidence,
+                                                      key.key.substr(dot + 1), key.value);
+    }
+    std::string text = fmt::format("# {}as vibrig commission found it; not accepted yet\n", mark);
+    for (const auto& [name, rows] : tables) text += fmt::format("\n[{}]\n{}", name, rows);
+    return text;
 }
 
 Json to_json(const Finding& f) {

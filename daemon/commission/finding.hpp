@@ -20,6 +20,7 @@ struct Names {
     std::array<std::string, 3> angle;  ///< "Resolvers.Outer"
     std::array<std::string, 3> force;  ///< "AccelerometersXY.X"
     std::string command = "GimbalCommand", torque = "TorqueCommand";
+    std::vector<std::string> coarse{};  ///< of fewer than 12 bits by the DBC, with how many
 };
 
 /// What the configuration says that cannot be measured.
@@ -50,6 +51,8 @@ struct Finding {
 [[nodiscard]] bool number_in(const std::string& text, double low, double high, double& value);
 [[nodiscard]] const char* name_of(Finding::Outcome outcome) noexcept;
 [[nodiscard]] Json to_json(const Finding& finding);
+/// The keys of a decided finding as a configuration file has them, each with its evidence.
+[[nodiscard]] std::string to_toml(const Finding& finding, bool simulated);
 
 /// Of the classes that gravity leaves, best first, five at most.
 [[nodiscard]] Json hypotheses_of(const estimator::commissioning::GravityFinding& gravity);
@@ -61,7 +64,7 @@ struct Commanded {
     std::array<std::array<double, 2>, 3> travel{};
     std::array<bool, 3> free{};         ///< turns as far as it likes, by channel
     std::array<std::size_t, 3> slot{};  ///< of the command, by channel
-    bool known = false;
+    bool known = false, met_a_stop = false;
 };
 /// The keys of a decided description.
 void fill_keys(Finding& finding, const estimator::commissioning::Description& description,

@@ -333,9 +333,18 @@ void Procedure::decide() {
     ask_torques();
 }
 
+/// For the record.
+std::string Procedure::why_not_torqued() const {
+    if (!ports_.torque) return "the DBC has no torques";
+    if (!by_hand_) return "no torque was permitted";
+    // A torque is ended by commanding the gimbals to stand; here nothing stops what it turns.
+    return "moved by hand: motors off, nothing holds a platform that a torque turns the wrong way";
+}
+
 void Procedure::name_rig() {
     Commanded commanded;
     commanded.known = !by_hand_;
+    commanded.met_a_stop = met_a_stop_;
     commanded.ratio = ratio_;
     for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t c = channel_of_[k];
@@ -344,6 +353,12 @@ void Procedure::name_rig() {
         commanded.travel[c] = {std::min(a, b), std::max(a, b)};
         commanded.slot[c] = k;
         commanded.free[c] = free_[k];
+    }
+    if (!finding_.evidence.contains("torquers")) {
+        finding_.evidence["torquers"] = {{"not_measured", why_not_torqued()}};
+        if (by_hand_ && ports_.torque)
+            tell("G  not torqued, " + why_not_torqued() +
+                 ": levelling.torque_sign stays as stated, unproven");
     }
     fill_keys(finding_, earth_.description, earth_.rate, names_, said_of_rig_, commanded);
     conclude(Verdict::decided, {});

@@ -328,7 +328,11 @@ void Procedure::keep_within(const std::string& why) {
         if (asked[k] > 0 && travel_[k] < asked[k] - kHolds_deg) most = std::max(travel_[k], 0.0);
         if (asked[k] < 0 && travel_[k] > asked[k] + kHolds_deg) least = std::min(travel_[k], 0.0);
     }
+    met_a_stop_ = true;
+    for (Vec3& leg : legs_) leg = within_travel(leg);
     tell("   " + why);
+    note("reading", {{"soft_stop", why}, {"travel_deg", limits_deg_}});
+    keep({{"short", travel_}, {"limits", limits_deg_}});
 }
 
 void Procedure::arrive(Time now) {

@@ -143,6 +143,7 @@ class Procedure {
     void keep_mean();
     void replay(const Json& log);
     [[nodiscard]] bool replay_mean(const Json& entry);
+    void replay_stop(const Json& entry);
     void leave_answers(const Json& log, std::size_t from);
     void permit_again();
     void measure_again();
@@ -154,6 +155,7 @@ class Procedure {
     void ask_stop_means();
     void look();
     void looked();
+    [[nodiscard]] std::vector<std::string> stuck_channels() const;
     void hold_still();
     void held_still();
     void try_gimbal();
@@ -187,6 +189,7 @@ class Procedure {
     void ask_drawing();
     void decide();
     void name_rig();
+    [[nodiscard]] std::string why_not_torqued() const;
     [[nodiscard]] Vec3 drift_slope() const;
     /// Travel that brings a gimbal of the description to an angle, the shorter way.
     [[nodiscard]] double travel_to(std::size_t gimbal, double angle_deg) const;
@@ -254,6 +257,7 @@ class Procedure {
 
     // what is known
     std::array<std::array<double, 2>, 3> limits_deg_{{{-130, 130}, {-30, 30}, {-175, 175}}};
+    bool met_a_stop_ = false;     ///< a travel ends where a gimbal did
     std::array<bool, 3> free_{};  ///< cables limit nothing
     bool hold_ = true;            ///< what "stop" is on this rig
     bool holds_ = false;          ///< commanded where they are, the gimbals stay

@@ -39,6 +39,11 @@ void Progress::write(const std::string& by, bool by_hand, const Json& log,
     proto::write_durably(path_, all.dump() + "\n", 0640);
 }
 
+void Progress::write_found(const std::string& toml) const {
+    proto::write_durably((std::filesystem::path(path_).parent_path() / "found.toml").string(), toml,
+                         0644);
+}
+
 void Progress::remove() const {
     std::error_code error;
     std::filesystem::remove(path_, error);
@@ -118,6 +123,7 @@ void Procedure::replay(const Json& log) {
     for (std::size_t at = 0; active();) {
         if (doing_ == Doing::moving || doing_ == Doing::settling) {
             travel_ = asked_;
+            for (; at < log.size() && log.at(at).contains("short"); ++at) replay_stop(log.at(at));
             legs_.clear();
             doing_ = Doing::averaging;
             auto then = std::move(then_);
@@ -144,6 +150,14 @@ void Procedure::replay(const Json& log) {
         ++at;
         take_answer(value);
     }
+}
+
+/// It stood short of where it was sent, and is sent no further.
+void Procedure::replay_stop(const Json& entry) {
+    met_a_stop_ = true;
+    travel_ = entry.at("short").get<Vec3>();
+    limits_deg_ = entry.at("limits").get<decltype(limits_deg_)>();
+    keep(entry);
 }
 
 bool Procedure::replay_mean(const Json& entry) {

@@ -18,6 +18,8 @@ class Progress {
     /// 24 h old at most, of the same person, way and rig.
     [[nodiscard]] Kept read(const std::string& by, bool by_hand, std::int64_t utc_ns) const;
     void remove() const;
+    /// The keys found, beside it: found.toml. Throws as write().
+    void write_found(const std::string& toml) const;
 
   private:
     std::string path_;

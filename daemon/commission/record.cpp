@@ -26,6 +26,7 @@ constexpr std::int64_t kDay_ns = 86'400'000'000'000;
 constexpr int kMeaning = 1;
 constexpr double kZeroMoved_g = 10e-3;  // `vibrig zero` may find so much anew
 constexpr const char* kDbc = "contents of can.dbc";
+constexpr const char* kDevice = "identity of the shaker's controller";
 constexpr const char* kLimits = "shaker.limits.";  // of the excitation alone
 constexpr const char* kZero = "accelerometer.zero_g";
 constexpr const char* kAlgorithm = "Ed25519";
@@ -365,7 +366,9 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
             s.record = r;
             const auto age_days = static_cast<double>(utc_ns - r.utc_ns) / kDay_ns;
             const double valid = loaded_.configuration.commission.valid_days;
-            s.why = change(r.keys, keys_.at(part), s.told);
+            Keys proven = r.keys;
+            if (device_.empty()) proven.erase(kDevice);
+            s.why = change(proven, keys_.at(part), s.told);
             if (!s.why.empty())
                 s.why += fmt::format(" by {} on {}", joined(r.by), date_of(r.utc_ns));
             else if (r.meaning != kMeaning)
@@ -394,6 +397,11 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
         all.push_back(std::move(s));
     }
     return all;
+}
+
+void Book::shaker_is(const std::string& device) {
+    device_ = device;
+    for (const Part part : kShakerParts) keys_[part][kDevice] = Json(device).dump();
 }
 
 Json Book::evidence(Part part) const {
@@ -427,6 +435,7 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
     for (const Part part : parts) {
         PartRecord one = what;
         one.keys = keys_of(part, as);
+        if (of_the_shaker(part) && !device_.empty()) one.keys[kDevice] = Json(device_).dump();
         one.meaning = kMeaning;
         fresh.parts[part] = std::move(one);
     }

@@ -113,6 +113,9 @@ class Book {
     /// A part below the shaker's that does not stand: without it nothing of the shaker is
     /// witnessed. Empty: all of them stand.
     [[nodiscard]] std::string not_proven_below_shaker(std::int64_t utc_ns) const;
+    /// Who the shaker's controller says it is, which its parts stand on. Until it is known they are
+    /// not held against it.
+    void shaker_is(const std::string& device);
     /// What the file says that is not a record; empty: nothing.
     [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
     /// What the daemon runs with, as it was when it started.
@@ -143,6 +146,7 @@ class Book {
 
     const configuration::Loaded& loaded_;
     std::map<Part, Keys> keys_;  ///< now
+    std::string device_;         ///< of the shaker; empty: not known
     std::optional<Record> record_;
     std::string text_;  ///< of the file
     std::string trouble_;

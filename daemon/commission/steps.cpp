@@ -104,10 +104,34 @@ void Procedure::looked() {
                                     size, unit));
     tell(fmt::format("A  |f| = {:.3f} g{}", size,
                      std::abs(size - 1) < 0.05 ? "" : ": not 1, an accelerometer may be dead"));
+    for (const auto& name : stuck_channels())
+        tell(fmt::format("   {} has not changed while its neighbours did: not connected?", name));
+    for (const auto& name : names_.coarse) tell(fmt::format("   {}, 12 at least expected", name));
     slot_ = 0;
     if (by_hand_) return try_gimbal();
     ask_yes("permit.hold", "I will command the present readings: nothing should move. May I?",
             "nothing may be commanded: by hand (--by-hand)", [this] { hold_still(); });
+}
+
+/// Through 50 samples at rest, where others of its kind show their noise.
+std::vector<std::string> Procedure::stuck_channels() const {
+    constexpr std::size_t kSamples = 50;
+    std::vector<std::string> names;
+    if (samples_.size() < kSamples) return names;
+    const auto sticks = [this](Vec3 Look::*of) {
+        std::array<bool, 3> stuck{true, true, true};
+        for (const Look& one : samples_)
+            for (std::size_t i = 0; i < 3; ++i)
+                stuck[i] = stuck[i] && (one.*of)[i] == (samples_.front().*of)[i];
+        return stuck;
+    };
+    for (const auto& [of, called] :
+         {std::pair{&Look::angle, &names_.angle}, std::pair{&Look::force, &names_.force}}) {
+        const auto stuck = sticks(of);
+        for (std::size_t i = 0; i < 3; ++i)
+            if (stuck[i] && std::ranges::count(stuck, true) < 3) names.push_back((*called)[i]);
+    }
+    return names;
 }
 
 void Procedure::hold_still() {

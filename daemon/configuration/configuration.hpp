@@ -42,6 +42,7 @@ struct Configuration {
     drivers::GimbalSettings gimbal;        ///< [gimbal]
     drivers::ShakerSettings
         shaker;  ///< [shaker], [shaker.registers]; scales in g peak, amplitude_unit folded in
+    std::string shaker_plate;  ///< for the record
     /// [shaker] amplitude_unit: what the controller's amplitude registers count in.
     enum class AmplitudeUnit : std::uint8_t {
         g_peak,

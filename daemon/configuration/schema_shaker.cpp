@@ -51,6 +51,11 @@ void add_link_keys(std::vector<Key>& keys) {
     keys.push_back(milliseconds(
         "shaker.backoff_max_ms", {10, 600'000}, "longest wait before a reconnect",
         [](C & c) -> auto& { return c.shaker.backoff_max; }));
+    keys.push_back(text(
+        "shaker.plate", "at most 120 bytes",
+        "maker, type and serial number on the controller's plate, of one that does not say them by "
+        "function 17; the commissioning record stands on it",
+        short_text_rule, [](C & c) -> auto& { return c.shaker_plate; }));
     using Unit = C::AmplitudeUnit;
     keys.push_back(choice<Unit>(
         "shaker.amplitude_unit",

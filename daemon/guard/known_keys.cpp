@@ -65,6 +65,7 @@ const std::set<std::string>& keys_of_the_daemon() {
         "shaker.device",
         "shaker.limits.displacement_mm",
         "shaker.limits.velocity_mps",
+        "shaker.plate",
         "shaker.poll_period_ms",
         "shaker.response_timeout_ms",
         "shaker.watchdog_period_ms",

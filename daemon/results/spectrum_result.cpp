@@ -26,6 +26,8 @@ namespace uncertainty = estimator::uncertainty;
 using Json = nlohmann::ordered_json;
 
 constexpr std::array<const char*, 3> kGyros{"x", "y", "z"};
+// Rates that tell nothing weigh about 0; one to seven says no.
+constexpr double kExcluded = -2;
 
 Json numbers_of(const VectorXd& values) {
     Json list = Json::array();
@@ -74,6 +76,18 @@ Json groups_json(const SpectrumResult& of) {
                         {"coefficients", std::move(value)},
                         {"sigma", std::move(sigma)}});
     }
+    return list;
+}
+
+Json sweeps_json(const std::vector<Sweep>& sweeps) {
+    Json list = Json::array();
+    for (const Sweep& sweep : sweeps)
+        list.push_back({{"run", sweep.run},
+                        {"position", sweep.position},
+                        {"from_hz", sweep.blocks.front().from_hz},
+                        {"to_hz", sweep.blocks.back().to_hz},
+                        {"seconds", sweep.blocks.size()},
+                        {"used", sweep.known()}});
     return list;
 }
 
@@ -303,11 +317,11 @@ Form form_of(const std::string& name) {
 }
 
 SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<SpectralDwell> dwells,
-                           std::vector<Kind> kinds, Form form) {
+                           std::vector<Kind> kinds, Form form, std::vector<Sweep> sweeps) {
     SpectralTable table(settings, std::move(dwells), std::move(kinds));
-    Analysis analysis = analyse(settings, table, form);
+    Analysis analysis = analyse(settings, table, form, sweeps);
     const double hz = table.kinds().empty() ? 0 : table.kinds().front().hz();
-    return {std::move(analysis), std::move(table), hz};
+    return {std::move(analysis), std::move(table), hz, {}, std::move(sweeps)};
 }
 
 namespace {
@@ -406,7 +420,8 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
     root["spectrum"] = {
         {"model", name_of(a.form)},
         {"frequencies", groups_json(of)},
-        {"flat", of.several() ? flat_json(a.flat) : Json(nullptr)},
+        {"sweeps", sweeps_json(of.sweeps)},
+        {"flat", of.table.kinds().size() > 1 ? flat_json(a.flat) : Json(nullptr)},
         {"log_odds", std::move(odds)},
         {"resonance", std::move(resonance)},
         {"mixture", std::move(mixture)},
@@ -451,7 +466,13 @@ std::string spectrum_text(const SpectrumResult& of) {
     }
     std::erase(text, '\n');
     text = "\n" + text + "\n";
-    text += line("flat: chi-square %.1f of %d, p = %.2g%s", a.flat.chi_square, a.flat.degrees,
+    for (const Sweep& sweep : of.sweeps)
+        text += line("run %d position %d: sweep from %.4g to %.4g Hz, %zu of %zu seconds used",
+                     sweep.run, sweep.position, sweep.blocks.front().from_hz,
+                     sweep.blocks.back().to_hz, sweep.known(), sweep.blocks.size());
+    if (of.table.kinds().size() > 1)
+        text +=
+            line("flat: chi-square %.1f of %d, p = %.2g%s", a.flat.chi_square, a.flat.degrees,
                  a.flat.p, a.flat.alarm ? ": quadratic coefficients depend on the frequency" : "");
     for (std::size_t j = 0; j < 3; ++j) {
         if (a.form == Form::groups ||
@@ -459,7 +480,12 @@ std::string spectrum_text(const SpectrumResult& of) {
             continue;
         const Mixture& gyro = a.gyros[j];
         if (!gyro.resonant()) {
-            text += line("gyro %s: no elastic part (log odds %.1f)", kGyros[j], gyro.log_odds);
+            text += gyro.log_odds < kExcluded
+                        ? line("gyro %s: no elastic part (log odds %.1f)", kGyros[j], gyro.log_odds)
+                        : line(
+                              "gyro %s: an elastic part is neither shown nor excluded (log odds "
+                              "%.1f)",
+                              kGyros[j], gyro.log_odds);
             continue;
         }
         for (const Told& told : tell(gyro))
@@ -470,10 +496,14 @@ std::string spectrum_text(const SpectrumResult& of) {
                 told.hz.high, told.damping.mean, told.damping.low, told.damping.high);
     }
     if (!a.model.refusal.empty()) text += "no prediction: " + a.model.refusal + "\n";
-    text += line(
-        "An elastic part of 20 %% would have been seen up to %.4g Hz; beyond it nothing "
-        "is known.",
-        a.flat.highest_hz);
+    text += of.table.kinds().size() > 1
+                ? line(
+                      "An elastic part of 20 %% would have been seen up to %.4g Hz; beyond it "
+                      "nothing is known.",
+                      a.flat.highest_hz)
+                : line(
+                      "Whether they are flat was not tested: dwells at one frequency, and what "
+                      "the sweeps tell of a resonance.");
     text += "Not told either:";
     for (const char* one : not_told()) text += std::string("\n  ") + one;
     return text + "\n";

@@ -23,8 +23,9 @@ struct SpectrumResult {
         estimator::spectrum::Kind kind;  ///< no bands: at rest
     };
     std::vector<HeldOut> held_out = {};
+    std::vector<estimator::spectrum::Sweep> sweeps = {};
 
-    [[nodiscard]] bool several() const { return table.kinds().size() > 1; }
+    [[nodiscard]] bool several() const { return table.kinds().size() > 1 || !sweeps.empty(); }
 };
 
 /// Beyond it the covariances of all rates take too long.
@@ -36,7 +37,8 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
 [[nodiscard]] SpectrumResult spectrum_of(const estimator::Settings& settings,
                                          std::vector<estimator::spectrum::SpectralDwell> dwells,
                                          std::vector<estimator::spectrum::Kind> kinds,
-                                         estimator::spectrum::Form form);
+                                         estimator::spectrum::Form form,
+                                         std::vector<estimator::spectrum::Sweep> sweeps = {});
 
 /// The kinds of random vibration by their numbers in the controller.
 using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>>;

@@ -158,6 +158,7 @@ void ModbusShaker::work(Time now) {
     if (!stop && now < silent_until) {
         if (link_.connected()) {
             close_link();
+            closed_by_us_ = true;
             set_state(LinkState::connecting, "closed by order");
         }
         next_attempt_ = silent_until;
@@ -173,6 +174,7 @@ void ModbusShaker::work(Time now) {
     // Before the poll, which a slow line may have due all the time; it ends with one of its own.
     if (!stop && orders_.waiting() && now >= stop_alone_until_) return write_set_point();
     if (now >= next_poll_) return poll(now);
+    if (!stop && identity_due()) return ask_identity();
     Time next = std::min(next_poll_, stop ? next_stop_ : next_feed_);
     if (!timeout_due_) next = std::min(next, next_look_);
     sleep_until(next);
@@ -192,6 +194,7 @@ void ModbusShaker::try_connect(Time now) {
             why + "; trying again");
         return;
     }
+    link_is_new();
     const bool again = std::exchange(was_connected_, true);
     if (again) ++counts_.reconnects;
     polled_ = poll_refused_ = feed_refused_ = false;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -40,6 +41,7 @@ class ModbusShaker final : public Shaker {
         on_stop_written_ = std::move(told);
     }
     [[nodiscard]] std::uint64_t beats() const noexcept override { return beats_; }
+    [[nodiscard]] ShakerIdentity identity() const override;
     void shut_down() noexcept override;
 
   private:
@@ -100,6 +102,10 @@ class ModbusShaker final : public Shaker {
     /// After so long without a feed the device stops.
     [[nodiscard]] Time watchdog_timeout() const noexcept { return 3 * settings_.watchdog_period; }
     void poll(Time now);
+    // shaker_identity.cpp
+    void link_is_new();
+    [[nodiscard]] bool identity_due() const noexcept;
+    void ask_identity();
     /// Registers that no longer hold what the table was told; empty: they do.
     [[nodiscard]] std::string changed_by_others(const ShakerReading& reading);
 
@@ -127,6 +133,8 @@ class ModbusShaker final : public Shaker {
     std::atomic<bool> in_flight_{false};
     std::atomic<Time> hung_up_until_{0};
     std::thread thread_;
+    mutable std::mutex identity_mutex_;
+    ShakerIdentity identity_;
 
     // The rest belongs to the shaker's thread.
     bool was_connected_ = false;
@@ -141,6 +149,8 @@ class ModbusShaker final : public Shaker {
     bool timeout_due_ = false;    ///< the watchdog's timeout is to be written
     WatchdogTimeout timeout_seen_ = WatchdogTimeout::unread;
     double timeout_read_s_ = 0;
+    int asks_left_ = 0;                   ///< who it is
+    bool closed_by_us_ = false;           ///< the link, or by asking: the device is the same
     std::optional<ShakerSetPoint> told_;  ///< what the table does by our word; none: at rest
     std::uint16_t feed_ = 0;
     Time backoff_ = 0;

@@ -32,6 +32,8 @@ struct ShakerSettings {
     Time backoff_max = 5 * kSecond;
     /// Of a stop, where ramp time and run are not written in one request: what the ramp may cost.
     Time stop_ramp_timeout = 100 * kMillisecond;
+    /// Each new link is asked who it is, at rest (function 17): how long for; 0: it is not.
+    Time identify = 0;
     proto::ShakerRegisters registers;  ///< the register map of the configuration
 };
 
@@ -87,6 +89,12 @@ struct RandomReading {
     State state = State::idle;
     bool bands_armed = false;  ///< it stops by itself where the level is not right
     std::uint8_t abort_reason = 0;
+};
+
+/// Who the controller at the newest link says it is.
+struct ShakerIdentity {
+    bool known = false;  ///< it was asked, and has answered or not
+    std::string text{};  ///< empty: it says nothing
 };
 
 /// The newest read-back. Nothing of it is valid while `valid` is false.
@@ -158,6 +166,8 @@ class Shaker {
     [[nodiscard]] virtual ShakerReading reading() const noexcept = 0;
     [[nodiscard]] virtual ShakerCounters counters() const noexcept = 0;
     [[nodiscard]] virtual LinkState state() const noexcept = 0;
+    /// Not known where settings do not ask. Any thread.
+    [[nodiscard]] virtual ShakerIdentity identity() const { return {}; }
     /// Called in the shaker's thread after every completed read-back, to wake whoever waits for
     /// one. Before start().
     virtual void on_reading(std::function<void()> wake) = 0;

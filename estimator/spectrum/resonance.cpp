@@ -218,13 +218,18 @@ std::vector<Point> scan(const Likelihood& likelihood) {
     return out;
 }
 
-/// Along one direction: so far that the likelihood falls by about a half.
+constexpr double kOutside = -1e299;
+
+/// Along one direction: so far that the likelihood falls by about a half. A maximum at the edge of
+/// the prior falls to one side only.
 double drop(const Likelihood& likelihood, const Point& top, double height, const Point& along,
             double most) {
     double step = 1e-4;
     while (step < most) {
-        const double fall =
-            height - (likelihood(top + step * along) + likelihood(top - step * along)) / 2;
+        const double up = likelihood(top + step * along), down = likelihood(top - step * along);
+        const double fall = height - (up < kOutside     ? down
+                                      : down < kOutside ? up
+                                                        : (up + down) / 2);
         if (fall > 0.1) return step / std::sqrt(2 * fall);
         step *= 1.5;
     }
@@ -240,8 +245,11 @@ Eigen::Matrix2d axes(const Likelihood& likelihood, const Point& top) {
     const auto corner = [&](double a, double b) {
         return likelihood(top + Point(0.5 * a * of_hz, 0.5 * b * of_damping));
     };
+    const std::array<double, 4> corners{corner(1, 1), corner(-1, -1), corner(1, -1), corner(-1, 1)};
+    const bool inside =
+        std::ranges::all_of(corners, [](double height_there) { return height_there > kOutside; });
     const double mixed =
-        std::clamp(-(corner(1, 1) + corner(-1, -1) - corner(1, -1) - corner(-1, 1)), -0.98, 0.98);
+        inside ? std::clamp(-(corners[0] + corners[1] - corners[2] - corners[3]), -0.98, 0.98) : 0;
     Eigen::Matrix2d curvature;
     curvature << 1, mixed, mixed, 1;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(curvature);
@@ -261,7 +269,7 @@ void add_nodes(const Likelihood& likelihood, const Point& top, std::vector<Node>
     for (int a = -kReach; a <= kReach; ++a) {
         for (int b = -kReach; b <= kReach; ++b) {
             const Point p = top + axis * Point(a, b);
-            if (!(likelihood(p) > -1e299)) continue;
+            if (!(likelihood(p) > kOutside)) continue;
             const Likelihood::Both both = likelihood.both(p);
             for (const Solved& one : both.by_size)
                 nodes.push_back({both.log_prior + std::log(0.5) + one.log_evidence + log_area,

@@ -133,6 +133,10 @@ void SweepBlocks::take_moment(SweepBlock& block) {
         shares_.push_back(1 - std::max(0.0, left.squaredNorm() / sum - 3 * noise) / power);
     }
     moment -= noise * Eigen::Matrix3d::Identity();
+    const double seen =
+        settings_.accelerometer_response.power(std::sqrt(block.from_hz * block.to_hz));
+    if (seen < kLeastSeen) return;
+    moment /= seen;
     const Pose pose = kinematics_.pose(kinematics_.gimbal_angles(block.angle_rad));
     block.moment = pose.level.transpose() * moment * pose.level;
 }

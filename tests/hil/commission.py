@@ -159,6 +159,10 @@ def whole(checks, programs, folder, seed):
             checks.note(run.stderr + u.rig.logs())
             return
         keys, truth = found["found"], u.truth
+        with open(os.path.join(os.path.dirname(u.record), "found.toml"), encoding="utf-8") as file:
+            kept = file.read()
+        checks.check(kept.startswith("# SIMULATED: ") and f'encoder_sign = {json.dumps(keys["platform.encoder_sign"])}' in kept and "# SIMULATED: ln LR" in kept,
+                     "what was found is in found.toml, each key with its evidence", kept)
         checks.equal(run.returncode, 0, "exit code 0")
         checks.check(found["simulated"] and "SIMULATED: DECIDED" in run.stderr, "that it is simulated is said", run.stderr)
         # Of two ends of the outer axis the one with encoder_sign[0] = 1; the other one is a turn of everything.
@@ -214,6 +218,7 @@ def whole(checks, programs, folder, seed):
         signed = tool("commission", "status").stdout.replace("\n   ", " ")
         checks.check(re.search("^gyros .*Bo, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
         shaker_is_proven(checks, u)
+        another_controller(checks, u)
         proven = tool("commission", "status")
         checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
                      proven.stdout)
@@ -240,10 +245,12 @@ def journal_has_it(checks, u):
         rows = database.execute("SELECT part, step, by, identity, what, data_json FROM commissioning ORDER BY id").fetchall()
     whats = {row[4] for row in rows}
     checks.equal(sorted(whats - {"answer"}), ["accept", "begin", "hypothesis", "move", "permission", "question", "reading", "refused arm",
-                                              "sign", "torque", "verdict", "void"], "the journal has each kind of step")
+                                              "sign", "torque", "verdict", "void", "write"], "the journal has each kind of step")
     checks.check(all(row[2] == "Ada" for row in rows if row[4] != "void") and
                  any(row[3].startswith("uid ") for row in rows if row[4] == "permission") and all(json.loads(row[5]) for row in rows),
                  "with the person and who the socket says it was", rows[:3])
+    writes = [(row[0], row[2], row[3], json.loads(row[5])["old"]) for row in rows if row[4] == "write"]
+    checks.equal(writes, [("registers", "Ada", "uid 0, root", {"value": 15})], "what was written to the controller without a daemon is in it, once")
     signed = [json.loads(row[5]).get("signed_with") for row in rows if row[4] == "accept" and row[0] == "gimbals"]
     with open(u.record, encoding="utf-8") as file:
         checks.equal(signed, [json.load(file)["signature"]["public_key"]], "and the key of the record's signature")
@@ -298,10 +305,13 @@ def with_swapped_words(checks, u):
         with open(rig.configuration, "w", encoding="utf-8") as file:
             file.write(wrong)
         u.restart()
-        refused = rig.tool("commission", "units", "--by", "Ada", "--yes", timeout=120)
-        checks.check(wrong != right and refused.returncode == 1 and "REFUSED" in refused.stdout and "ladder" not in refused.stdout and
-                     "a register was refused" in unwrapped(refused.stdout) and rig.daemon.says("amplitude refused: exception 3") and highest_g(rig) == 0, "words the wrong way round: refused before the first rung, and nothing has moved",
-                     refused.stdout + refused.stderr + rig.logs())
+        refused = in_background(rig, "units")
+        checks.check(press(rig, "rack") and press(rig, "door"), "each button comes before it shakes, whatever was asked for", refused.text())
+        ended(refused)
+        said = unwrapped(refused.text())
+        checks.check(wrong != right and refused.process.poll() == 1 and "REFUSED" in said and "ladder" not in said and
+                     "a register was refused" in said and rig.daemon.says("amplitude refused: exception 3") and highest_g(rig) == 0, "words the wrong way round: refused before the first rung, and nothing has moved",
+                     refused.text() + rig.logs())
     finally:
         with open(rig.configuration, "w", encoding="utf-8") as file:
             file.write(right)
@@ -326,6 +336,23 @@ def shaker_is_proven(checks, u):
         checks.check(refused.returncode == 1 and "REFUSED: at 0 g: not completed: " + word in unwrapped(refused.stdout) and
                      highest_g(rig) == 0, f"it ends at 0 g, and nothing has moved: {lie}", refused.stdout + refused.stderr + rig.logs())
         at_rest_again(rig)
+    checks.equal(tool("selftest", "--by", "Ada", "--at-zero", timeout=120).returncode != 2, True, "the run at 0 g")
+    early = tool("selftest", "--by", "Ada", timeout=120)
+    checks.check('the emergency stop was not pressed at 0 g yet ("rack", "door")' in unwrapped(early.stderr) and highest_g(rig) == 0,
+                 "nor before each button was pressed there", early.stdout + early.stderr)
+    for lie, word in BUTTON:
+        rig.order("fault " + lie)
+        with_button = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
+        rig.wait_for(lambda s: "press" in s.get("proof", {}).get("asks", ""), 60)
+        rig.order("estop open")
+        rig.wait_for(lambda s: "press" not in s.get("proof", {}).get("asks", ""), 60)
+        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 2)
+        rig.order("estop close")
+        ended(with_button)
+        checks.check(with_button.process.poll() == 1 and word in unwrapped(with_button.text()),
+                     f"a button is found out at 0 g: {lie}", with_button.text() + rig.logs())
+        at_rest_again(rig)
+    killed_in_steps(checks, u)
     for lie, word in (("unit-rms", "g rms for g peak?"), ("unit-mps2", "m/s2 for g?"), ("dead-table readback-echo", "the platform does")):
         for one in lie.split():
             rig.order("fault " + one)
@@ -354,30 +381,95 @@ def shaker_is_proven(checks, u):
                  0.75 < found["parts"]["registers"]["evidence"]["f + 1 Hz over f, transmission"] < 0.97 and
                  found["parts"]["registers"]["proven"] and found["parts"]["units"]["evidence"]["hypotheses"][0]["unit"] == "g peak",
                  "a proof shows registers, watchdog, units and excitation", plain.stdout + plain.stderr + rig.logs())
-    lacks = tool("arm", "--by", "Ada")
-    checks.check("no record of stop: vibrig commission watchdog stop" in lacks.stderr, "but no button", lacks.stderr)
-    for lie, word in BUTTON:
-        rig.order("fault " + lie)
-        with_button = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
-        rig.wait_for(lambda s: "press" in s.get("proof", {}).get("asks", ""), 60)
-        rig.order("estop open")
-        rig.wait_for(lambda s: "press" not in s.get("proof", {}).get("asks", ""), 60)
-        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 2)
-        rig.order("estop close")
-        ended(with_button)
-        checks.check(with_button.process.poll() == 1 and word in unwrapped(with_button.text()),
-                     f"a button is found out at 0 g: {lie}", with_button.text() + rig.logs())
-        at_rest_again(rig)
-    stop = r.Child("stop", [rig.program("vibrig"), "commission", "stop", "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
-    for button in ("rack", "door"):
-        asked = rig.wait_for(lambda s, b=button: f'press the emergency stop "{b}" now' in s.get("proof", {}).get("asks", ""), 60)
-        checks.check(asked and button in asked["proof"].get("asks", ""), f'the button "{button}" is asked for', stop.text())
-        rig.order("estop open")
-        rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
-        rig.order("estop close")
-    ended(stop)
     checks.check(0.49 < highest_g(rig) < 0.51, "the table has never done more than 0.5 g", highest_g(rig))
-    checks.check(stop.process.poll() == 0 and "stop: proven" in stop.text(), "each was pressed and seen", stop.text() + rig.logs())
+    checks.check(found["parts"]["stop"]["proven"] and sorted(found["parts"]["stop"]["evidence"]["buttons"]) == ["door", "rack"] and
+                 all(button["table_g"] == 0 for button in found["parts"]["stop"]["evidence"]["buttons"].values()),
+                 "each button was pressed at 0 g and seen", found["parts"]["stop"])
+
+
+def in_background(rig, *parts):
+    return r.Child("vibrig", [rig.program("vibrig"), "commission", *parts, "--by", "Ada", "--yes", "--socket", rig.socket], rig.folder)
+
+
+def press(rig, button):
+    asked = rig.wait_for(lambda s: f'press the emergency stop "{button}" now' in s.get("proof", {}).get("asks", ""), 60)
+    rig.order("estop open")
+    rig.wait_for(lambda s: "close" in s.get("proof", {}).get("asks", ""), 60)
+    rig.order("estop close")
+    return asked and button in asked["proof"].get("asks", "")
+
+
+def stays_at_rest(rig):
+    """Nobody has asked for anything: for seconds of the rig's time nothing runs."""
+    still = rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest" and s["shaker"].get("state") in (0, None), 60)
+    begin = still["sample"]["time_s"]
+    moves = []
+    rig.wait_for(lambda s: moves.append(s["shaker"].get("state")) or s["sample"]["time_s"] > begin + 20, 60)
+    return still["shaker"].get("rest") == "at rest" and set(moves) <= {0, None}
+
+
+def asks_first(rig, word):
+    """With --resume, and nobody who answers: the question comes before anything moves."""
+    resumed = rig.tool("commission", "stop", "units", "excitation", "--by", "Ada", "--resume")
+    return resumed.returncode == 1 and word in unwrapped(resumed.stdout) and "nobody answers" in resumed.stderr and stays_at_rest(rig)
+
+
+def killed_in_steps(checks, u):
+    """Terminal and daemon are killed in each of the shaker's steps: all stops, nothing goes on by itself, and that step begins anew."""
+    rig = u.rig
+    steps = (("a button", "Stand at the button \"rack\"", lambda s: "press" in s.get("proof", {}).get("asks", "")),
+             ("the ladder", "Now the table will shake", lambda s: s["shaker"].get("state") == 2 and s["shaker"].get("measured_g", 0) > 0.02))
+    rig.order("speed 4")   # time enough to see who is gone
+    for step, word, there in steps:
+        for who in ("terminal", "daemon"):
+            tool = in_background(rig, "stop", "units", "excitation")
+            if not checks.check(rig.wait_for(there, 60) and tool.running(), f"{step} is begun", tool.text() + rig.logs()):
+                return
+            if who == "terminal":
+                tool.process.send_signal(signal.SIGKILL)
+                ended(tool)
+                ends = rig.wait_for(lambda s: s["campaign"]["state"] != "checking", 30)
+                checks.check("nobody has been at the tool of Ada" in r.state_of(ends), f"{step}: without its terminal it ends", r.state_of(ends))
+            else:
+                rig.daemon.process.send_signal(signal.SIGKILL)
+                ended(tool)
+                checks.equal(tool.process.poll(), 2, f"{step}: without a daemon the tool ends")
+                u.start()
+            checks.check(stays_at_rest(rig), f"{step}: nothing goes on by itself without its {who}", rig.logs())
+            for what in ("trip", "stop_disobeyed"):
+                rig.tool("ack", what, "--by", "Ada")
+            checks.check(asks_first(rig, word), f"{step}: it is begun anew, by a question", rig.logs())
+        if step == "a button":
+            tool = in_background(rig, "stop", "units", "excitation")
+            checks.check(press(rig, "rack") and press(rig, "door"), "both buttons are pressed when they are asked for", tool.text())
+            rig.wait_for(steps[1][2], 60)
+            tool.process.send_signal(signal.SIGTERM)
+            ended(tool)
+            rig.wait_for(lambda s: s["campaign"]["state"] != "checking", 30)
+            stays_at_rest(rig)
+    rig.order("speed max")
+
+
+def another_controller(checks, u):
+    """At the same address: what was proven is that of the one before."""
+    rig = u.rig
+    rig.order("fault other-device")
+    tried = {"utc": "2026-11-23T10:00:00Z", "by": "Ada", "identity": "uid 0, root", "what": "write", "register": "frequency", "address": 100,
+             "old": {"value": 15}, "new": {"value": 16}}
+    with open(os.path.join(os.path.dirname(u.record), "registers.jsonl"), "w", encoding="utf-8") as file:
+        file.write(json.dumps(tried) + "\n")   # as vibrig commission registers --write leaves it
+    u.restart()
+    refused = rig.tool("arm", "--by", "Ada")
+    checks.check("identity of the shaker's controller is \"another controller\", was proven as \"LMB" in refused.stderr and "(registers)" in refused.stderr,
+                 "another controller voids the shaker's parts", refused.stderr)
+    status = json.loads(rig.tool("commission", "status", "--json").stdout or "{}").get("parts", {})
+    checks.equal(sorted(name for name, part in status.items() if not part["proven"]), ["excitation", "registers", "stop", "units", "watchdog"],
+                 "and none of the platform's")
+    lacking = rig.tool("commission", "units", "--by", "Ada")   # nobody answers
+    checks.check("will run at 0 g, and its watchdog will stop it" in unwrapped(lacking.stdout), "it has to run at 0 g first, as any other", lacking.stdout + lacking.stderr)
+    checks.check(rig.daemon.says("registers is void: identity of the shaker's controller is"), "and it is told", rig.logs())
+    rig.order("clear other-device")
+    u.restart()
 
 
 def turned(value, by):
@@ -674,6 +766,45 @@ def dialogue(checks, programs, folder):
         u.rig.stop()
 
 
+def bits(checks, rig, dbc, folder):
+    """Bits that never change: one is changed by hand, one confirmed by two persons, the others are left out."""
+    asked, text = [], ""
+    with subprocess.Popen([rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "3", "--dbc", dbc, "--bits", "--by", "Ada", "--folder", folder],
+                          stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=r.die_with_parent) as tool:
+        def type_in(line):
+            tool.stdin.write(line + "\n")
+            tool.stdin.flush()
+        while True:
+            one = tool.stderr.read(1)
+            text += one
+            if not one:
+                break
+            if not text.endswith("\n> "):
+                continue
+            name = re.findall(r"\? (\S+) reads [01]", text)[-1]
+            asked.append(name)
+            if name.endswith(".LoopClosed"):
+                type_in("")
+                if asked.count(name) == 2:   # the first time nobody does it
+                    time.sleep(0.7)
+                    rig.order("fault loop-open")
+                    time.sleep(0.7)
+                    rig.order("clear loop-open")
+            elif name.endswith(".Fault"):
+                type_in("Ada" if asked.count(name) == 1 else "Ada, ada" if asked.count(name) == 2 else "Ada, Bo")
+            else:
+                type_in("-")
+        code = tool.wait()
+    with open(os.path.join(folder, "bus_bits.json"), encoding="utf-8") as file:
+        kept = json.load(file)["bits"]
+    loop, fault = (next((v for k, v in kept.items() if k.endswith(word)), {}) for word in (".LoopClosed", ".Fault"))
+    checks.check("it did not change and come back" in unwrapped(text) and (loop.get("proven"), loop.get("by"), loop.get("rests_at")) == ("changed once and back", ["Ada"], 1),
+                 "a bit is proven by changing it once, and back", text)
+    checks.check('found "Ada", expected nothing, two names or -' in unwrapped(text) and 'found "Ada, ada"' in unwrapped(text) and (fault.get("proven"), fault.get("by")) == ("confirmed", ["Ada", "Bo"]),
+                 "or confirmed by two persons", text)
+    checks.check(code == 1 and len(kept) == 2 and any(name.endswith(".OuterValid") for name in asked), "what is left out is not proven", kept)
+
+
 def real(checks, programs, folder):
     """A configuration that does not say that its rig is simulated: persons answer, and its gimbals are moved with their permission."""
     rig = r.Rig(programs, "seqpacket", "real", folder)
@@ -691,6 +822,7 @@ def real(checks, programs, folder):
         checks.check(bus.returncode == 1 and signals["outcome"] == "undecided" and signals["answers"] == [] and
                      "Sync.SyncCount" in signals["counters"] and "Resolvers.OuterValid" in signals["unproven"] and signals["unknown"] == [],
                      "with a DBC its signals are, and nobody has turned any", bus.stdout + bus.stderr)
+        bits(checks, rig, dbc, os.path.join(folder, "bits"))
         rig.configure(CAMPAIGN, **r.PATIENT)
         check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
         stated = {}

@@ -249,6 +249,16 @@ def tried(checks, programs, line):
     before = list(controller.holding.values)
     with tempfile.TemporaryDirectory() as folder:
         code, found, text = Tried(programs, folder, controller, line, ["rack"]).all()
+        log = os.path.join(folder, "commission", "registers.jsonl")
+        with open(log, encoding="utf-8") as file:
+            lines = [json.loads(one) for one in file]
+    writes = [one for one in lines if one["what"] == "write"]
+    first = writes[1] if len(writes) > 1 else {}
+    checks.check(len(writes) == sum(one["what"] == "answer" for one in lines) and all(one["by"] == "Ada" and one["identity"].startswith("uid ") and one["utc_ns"] > 0 for one in lines) and
+                 {one["address"] for one in writes} == {FREQUENCY, AMPLITUDE, RAMP, RUN, FEED, TIMEOUT}, f"{name}: each write is kept with who and when", lines)
+    checks.check(first.get("register") == "frequency" and first["old"]["value"] == 15 and first["new"]["value"] == 16,
+                 f"{name}: with old and new value", first)
+    checks.check(lines[0]["what"] == "begin" and lines[-1]["what"] == "verdict" and lines[-1]["outcome"] == "decided", f"{name}: and what came of it", lines[-1])
     rows = {row["name"]: row for row in found.get("rows", [])}
     checks.check(code == 0 and found["outcome"] == "decided" and not found["simulated"] and
                  list(rows)[:8] == ["stop chain, rack", "closing after rack", "frequency", "amplitude", "ramp_time", "watchdog_timeout", "watchdog", "run"],

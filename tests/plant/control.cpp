@@ -12,8 +12,8 @@ namespace vibrig::plant {
 namespace {
 
 constexpr const char* kHelp =
-    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, hold S, go, status, "
-    "help";
+    "fault SPEC, clear [NAME], estop open, estop close, table G, table own, hold S, go, speed F, "
+    "speed max, status, help";
 
 std::string_view trimmed(std::string_view text) {
     const auto begin = text.find_first_not_of(" \t\r");
@@ -41,6 +41,18 @@ double hold_s(std::string_view text) {
                          "\", expected a time of the rig from 0 to 1e9 s");
     }
     return s;
+}
+
+/// 0: no limit.
+double speed_of(std::string_view text) {
+    if (text == "max") return 0;
+    double speed = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), speed);
+    if (error != std::errc{} || end != text.data() + text.size() || !(speed > 0 && speed <= 1e6)) {
+        throw PlantError("speed: found \"" + std::string(text) +
+                         "\", expected max or a factor above 0");
+    }
+    return speed;
 }
 
 }  // namespace
@@ -79,6 +91,10 @@ std::string Control::execute(std::string_view line) {
         if (word == "go") {
             rig_.hold_at_s.reset();
             return "ok go";
+        }
+        if (word == "speed") {  // of a rig that owns the time
+            rig_.speed = speed_of(rest);
+            return "ok speed " + std::string(rest);
         }
         if (word == "status") {
             std::array<char, 160> status{};

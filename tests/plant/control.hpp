@@ -9,7 +9,7 @@ namespace vibrig::plant {
 
 /// Lines by which a person or a test works the rig while it runs:
 ///   fault SPEC | clear [NAME] | estop open | estop close | table G | table own | hold S |
-///   go |
+///   go | speed F | speed max |
 ///   status | help
 class Control {
   public:

@@ -29,7 +29,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 37> kDescriptions{{
+constexpr std::array<Description, 38> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -77,6 +77,8 @@ constexpr std::array<Description, 37> kDescriptions{{
      "estop-unseen          the open chain cuts the power, its register shows it closed"},
     {FaultKind::estop_restarts, "estop-restarts", Value::none, false,
      "estop-restarts        once the chain is closed again the controller runs as before"},
+    {FaultKind::other_device, "other-device", Value::none, false,
+     "other-device          asked who it is (function 17) it names another controller"},
     {FaultKind::amplitude_scaled, "amplitude-scaled", Value::factor, false,
      "amplitude-scaled=FACTOR  the table does FACTOR times the set-point, read back as ordered"},
     {FaultKind::readback_echo, "readback-echo", Value::none, false,

@@ -41,6 +41,7 @@ enum class FaultKind : std::uint8_t {
     estop_contact_only,
     estop_unseen,
     estop_restarts,
+    other_device,
     amplitude_scaled,
     readback_echo,
     stuck_contactor,

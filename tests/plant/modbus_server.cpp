@@ -14,6 +14,7 @@
 #include <charconv>
 #include <cstring>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace vibrig::plant {
@@ -23,7 +24,8 @@ using Query = std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH>;
 using Answer = ShakerController::Answer;
 
 constexpr int kConnections = 16;
-constexpr int kWriteSingle = 0x06, kWriteMultiple = 0x10, kMaskWrite = 0x16, kWriteAndRead = 0x17;
+constexpr int kWriteSingle = 0x06, kServerId = 0x11, kWriteMultiple = 0x10, kMaskWrite = 0x16,
+              kWriteAndRead = 0x17;
 
 std::uint16_t word(const std::uint8_t* bytes) {
     return static_cast<std::uint16_t>(bytes[0] << 8 | bytes[1]);
@@ -196,7 +198,7 @@ void ModbusServer::serve_rtu() {
 
 struct ModbusServer::Outcome {
     Answer answer = Answer::accepted;
-    bool failure = false, silent = false;
+    bool failure = false, silent = false, other_device = false;
 };
 
 /// What a request does to the controller, and what its registers read after it.
@@ -206,6 +208,8 @@ ModbusServer::Outcome ModbusServer::apply(const std::uint8_t* pdu, std::size_t l
     Outcome outcome;
     outcome.silent = rig_.faults.active(FaultKind::modbus_silent, now) != nullptr;
     if (outcome.silent) return outcome;
+    outcome.other_device =
+        pdu[0] == kServerId && rig_.faults.active(FaultKind::other_device, now) != nullptr;
     ShakerController& shaker = rig_.rig.shaker();
     const Fault* wrong = rig_.faults.active(FaultKind::modbus_wrong, now);
     const bool wrong_value = wrong != nullptr && wrong->value != 0;
@@ -228,6 +232,21 @@ ModbusServer::Outcome ModbusServer::apply(const std::uint8_t* pdu, std::size_t l
     return outcome;
 }
 
+/// libmodbus names itself, whatever it plays.
+int ModbusServer::reply_other(const std::uint8_t* query, std::size_t header) {
+    constexpr std::string_view kName = "another controller";
+    std::vector<std::uint8_t> reply(query, query + header + 1);
+    reply.push_back(static_cast<std::uint8_t>(kName.size() + 1));
+    reply.insert(reply.end(), kName.begin(), kName.end());
+    reply.push_back(0xff);  // it runs
+    if (listener_ < 0)      // with its checksum
+        return modbus_send_raw_request(link_->context, reply.data(),
+                                       static_cast<int>(reply.size()));
+    reply[5] = static_cast<std::uint8_t>(reply.size() - 6);
+    return static_cast<int>(
+        ::send(modbus_get_socket(link_->context), reply.data(), reply.size(), MSG_NOSIGNAL));
+}
+
 bool ModbusServer::answer() {
     Query query{};
     const int received = modbus_receive(link_->context, query.data());
@@ -241,7 +260,9 @@ bool ModbusServer::answer() {
     const Outcome outcome = apply(pdu, length - header);
     if (outcome.silent) return true;
     int sent = 0;
-    if (outcome.failure) {
+    if (outcome.other_device) {
+        sent = reply_other(query.data(), header);
+    } else if (outcome.failure) {
         sent = modbus_reply_exception(link_->context, query.data(),
                                       MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE);
     } else if (outcome.answer == Answer::illegal_address) {

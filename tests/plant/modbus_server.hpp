@@ -32,6 +32,7 @@ class ModbusServer {
     void serve_rtu();
     /// One request of the current socket; false when the connection is over.
     bool answer();
+    [[nodiscard]] int reply_other(const std::uint8_t* query, std::size_t header);
 
     std::string address_;
     SharedRig& rig_;

@@ -33,6 +33,8 @@ struct SharedRig {
     bool emergency_stop_by_hand = false;
     /// In lockstep the rig's time stands there until it is released.
     std::optional<double> hold_at_s;
+    /// In lockstep: at most so many times real time from now on; 0: no limit. None: as begun.
+    std::optional<double> speed;
 };
 
 }  // namespace vibrig::plant

@@ -39,18 +39,20 @@ Simulation::Simulation(SharedRig& shared, Bus& bus, const proto::Dbc& dbc,
 Simulation::~Simulation() { close(timer_); }
 
 void Simulation::run() {
-    const std::int64_t start = monotonic_ns();
-    const double speed = settings_.lockstep ? settings_.speed.value_or(0) : 1;
+    std::int64_t start = monotonic_ns(), from_tick = 0;
+    double speed = settings_.lockstep ? settings_.speed.value_or(0) : 1;
     // In lockstep nothing happens before somebody is there to see it.
     while (settings_.lockstep && !bus_.somebody_there()) {
         if (wait(std::nullopt) == Wake::stop) return;
     }
     for (std::int64_t tick = 0;; ++tick) {
-        if (speed > 0 &&
-            !wait_until(
-                start +
-                std::llround(1e3 * static_cast<double>(tick * shared_.rig.tick_us()) / speed)))
-            return;
+        if (const double asked = asked_speed(speed); asked != speed) {
+            speed = asked;
+            start = monotonic_ns();
+            from_tick = tick;
+        }
+        const auto rig_us = static_cast<double>((tick - from_tick) * shared_.rig.tick_us());
+        if (speed > 0 && !wait_until(start + std::llround(1e3 * rig_us / speed))) return;
         if (settings_.duration_s &&
             1e-6 * static_cast<double>(tick * shared_.rig.tick_us()) > *settings_.duration_s)
             return;
@@ -64,6 +66,12 @@ void Simulation::run() {
         ++counters_.ticks;
         if (settings_.lockstep && !wait_for_acknowledgement()) return;
     }
+}
+
+/// By whoever works the rig while it runs.
+double Simulation::asked_speed(double now) {
+    const std::scoped_lock lock(shared_.mutex);
+    return settings_.lockstep ? shared_.speed.value_or(now) : now;
 }
 
 void Simulation::make_tick() {

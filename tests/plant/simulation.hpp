@@ -41,6 +41,7 @@ class Simulation {
   private:
     enum class Wake : std::uint8_t { event, deadline, stop };
 
+    [[nodiscard]] double asked_speed(double now);
     void make_tick();
     void send_tick();
     [[nodiscard]] bool wait_while_held();

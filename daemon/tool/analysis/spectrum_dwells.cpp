@@ -160,7 +160,7 @@ void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows,
             throw std::runtime_error(line(*row) + "column frequency_hz: found " +
                                      std::to_string(row->frequency_hz) + " after " +
                                      std::to_string(first.frequency_hz) +
-                                     ", expected one frequency in a dwell: a sweep is not read");
+                                     ", expected one frequency in a dwell, or a sweep through 10 % at least");
         if (row->profile != first.profile || row->level_db != first.level_db)
             throw std::runtime_error(line(*row) +
                                      "column profile: found another profile or level than in the "

@@ -4,16 +4,22 @@
 #include <CLI/Formatter.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "daemon/commission/bus_bits.hpp"
 #include "daemon/commission/bus_list.hpp"
 #include "daemon/commission/bus_signals.hpp"
+#include "daemon/record/digest.hpp"
 #include "daemon/tool/commands.hpp"
+#include "daemon/tool/live/commission_client.hpp"
+#include "daemon/tool/live/commission_registers.hpp"
 #include "drivers/can/can_port.hpp"
 #include "proto/candump.hpp"
 
@@ -24,7 +30,8 @@ namespace {
 struct BusOptions {
     std::string interface, seqpacket, candump, dbc;
     double seconds = 10, turn_at = 0;
-    bool turn = false, json = false;
+    bool turn = false, json = false, bits = false;
+    std::string by, folder;
 };
 
 /// Listens for so long. Throws CanError.
@@ -53,8 +60,8 @@ struct Heard {
     }
 };
 
-void listen_live(const BusOptions& options, Heard& bus) {
-    boost::asio::io_context io;
+std::unique_ptr<drivers::CanPort> make_port(const BusOptions& options,
+                                            boost::asio::io_context& io) {
     drivers::CanPortSettings settings;
     if (options.interface.empty()) {
         settings.kind = drivers::CanPortSettings::Kind::seqpacket;
@@ -62,8 +69,13 @@ void listen_live(const BusOptions& options, Heard& bus) {
     } else {
         settings.interface = options.interface;
     }
-    const auto port = drivers::make_can_port(io, settings);
-    port->start(
+    return drivers::make_can_port(io, settings);
+}
+
+/// Frames to whoever has `add`, until the port stops.
+template <typename Ear>
+void start(drivers::CanPort& port, Ear& bus) {
+    port.start(
         [&bus](std::span<const drivers::ReceivedFrame> frames) {
             for (const auto& one : frames) {
                 const bool extended = (one.frame.can_id & CAN_EFF_FLAG) != 0;
@@ -74,6 +86,12 @@ void listen_live(const BusOptions& options, Heard& bus) {
         },
         [](drivers::PortState, const char* text) { std::cerr << text << '\n'; },
         [](const drivers::ReceivedFrame&) {});
+}
+
+void listen_live(const BusOptions& options, Heard& bus) {
+    boost::asio::io_context io;
+    const auto port = make_port(options, io);
+    start(*port, bus);
     std::cerr << "Nobody touches the gimbals: listening for " << options.seconds << " s\n";
     listen_for(*port, io, options.seconds);
     if (options.turn) {
@@ -83,6 +101,72 @@ void listen_live(const BusOptions& options, Heard& bus) {
         listen_for(*port, io, options.seconds);
     }
     port->stop();
+}
+
+/// Frames to the watch of one bit.
+struct OneBit {
+    commission::BitWatch watch;
+    void add(std::uint32_t id, bool extended, std::span<const std::uint8_t> data,
+             drivers::Time /*time*/) {
+        watch.add(id, extended, data);
+    }
+};
+
+/// By hand: listens until it has changed and come back. Nothing: it has not.
+bool changed_by_hand(const BusOptions& options, OneBit& bit) {
+    constexpr double kLook_s = 0.2;
+    boost::asio::io_context io;
+    const auto port = make_port(options, io);
+    start(*port, bit);
+    for (double s = 0; s < options.seconds && !bit.watch.came_back(); s += kLook_s)
+        listen_for(*port, io, kLook_s);
+    port->stop();
+    return bit.watch.came_back();
+}
+
+/// Each bit that has never changed: changed once and back by hand, or confirmed by two persons.
+/// How many are left.
+std::size_t prove_bits(const BusOptions& options, const proto::Dbc& dbc,
+                       const commission::BusSignals& heard) {
+    std::vector<commission::BitProof> proven;
+    std::size_t left = 0;
+    for (const auto& signal : heard.signals()) {
+        if (signal.kind != commission::BusSignals::Kind::bit || signal.changed) continue;
+        for (bool over = false; !over;) {
+            print_wrapped(std::cerr,
+                          "? " + signal.name + " reads " + (signal.low != 0 ? "1" : "0") +
+                              ". Change it once (power of a gimbal off, loop opened) and back, "
+                              "within " +
+                              std::to_string(std::lround(options.seconds)) +
+                              " s. [Enter: now; two names, A. Person, B. Person: they confirm it; "
+                              "-: leave it out]");
+            const std::string text = typed_line(std::cerr);
+            OneBit bit{commission::BitWatch(dbc, signal.name)};
+            const int rests_at = signal.low != 0 ? 1 : 0;
+            over = true;
+            if (text == "-") {
+                ++left;
+            } else if (text.empty() && changed_by_hand(options, bit)) {
+                proven.push_back({signal.name, true, {options.by}, rests_at});
+                std::cerr << "  " << signal.name << ": changed once and back\n";
+            } else if (const auto names = commission::two_names(text); !names.empty()) {
+                proven.push_back({signal.name, false, names, rests_at});
+                std::cerr << "  " << signal.name << ": confirmed by " << names[0] << " and "
+                          << names[1] << '\n';
+            } else {
+                over = false;
+                print_wrapped(std::cerr, text.empty() ? "  it did not change and come back"
+                                                      : "  found \"" + text +
+                                                            "\", expected nothing, two names or -");
+            }
+        }
+    }
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    commission::BitBook(options.folder, record::sha256_of_file(options.dbc))
+        .keep(proven, std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+    std::cerr << proven.size() << " bits proven, " << left << " left out; kept in "
+              << options.folder << '\n';
+    return left;
 }
 
 void read_log(const BusOptions& options, Heard& bus) {
@@ -106,6 +190,9 @@ int list_bus(const BusOptions& options) {
         throw std::runtime_error("--turn: found a log, expected a bus to listen to, or --turn-at");
     if (options.turn_at > 0 && options.candump.empty())
         throw std::runtime_error("--turn-at: found a bus, expected a log (--candump)");
+    if (options.bits && (!options.candump.empty() || options.dbc.empty() || options.by.empty() ||
+                         options.folder.empty()))
+        throw std::runtime_error("--bits: expected a bus, --dbc, --by and --folder");
     Heard bus;
     if (!options.dbc.empty()) bus.signals.emplace(proto::read_dbc(options.dbc));
     const bool turned = options.turn || options.turn_at > 0;
@@ -125,6 +212,8 @@ int list_bus(const BusOptions& options) {
         std::cerr << "vibrig commission bus: no frame was heard\n";
         return kNo;
     }
+    if (options.bits && prove_bits(options, proto::read_dbc(options.dbc), *bus.signals) > 0)
+        return kNo;
     return turned && bus.signals && !bus.signals->winner() ? kNo : 0;
 }
 
@@ -153,6 +242,12 @@ void add_commission_bus(CLI::App& commissioning, int& exit_code) {
         "--dbc", options->dbc,
         "Its signals, too: range and noise, and which one follows the gimbal that is "
         "turned");
+    command.add_flag("--bits", options->bits,
+                     "Then have each bit that never changed (valid bits, loop closed, ready, "
+                     "fault) changed once by hand, or confirmed by two persons");
+    command.add_option("--by", options->by, "Who changes them");
+    command.add_option("--folder", options->folder,
+                       "commission.folder, where what is proven of them is kept");
     command.add_flag("--json", options->json, "As JSON");
     command.footer(
         "Example: vibrig commission bus --interface can0 --turn --dbc rig.dbc\n"

@@ -71,10 +71,13 @@ std::string prove_all(serve::Client& client, const ShakerCommission& options,
         if (auto why = prove_safe_state(client, options.by, "at_zero", out); !why.empty())
             return "at 0 g: " + why;
     }
-    if (asked_for(options, "stop"))
+    const auto& parts = record["parts"];
+    // Before it shakes for the first time whoever asked for what: else the daemon refuses it.
+    const bool understood =
+        parts["units"]["proven"] == true && parts["registers"]["proven"] == true;
+    if (asked_for(options, "stop") || !understood)
         if (auto why = press_buttons(client, options, record["buttons_left"], out); !why.empty())
             return why;
-    const auto& parts = record["parts"];
     const bool stop_alone = options.parts == std::vector<std::string>{"stop"};
     if (stop_alone && parts["units"]["proven"] == true && parts["excitation"]["proven"] == true)
         return {};

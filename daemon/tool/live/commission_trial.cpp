@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "daemon/commission/register_trial.hpp"
+#include "daemon/commission/trial_log.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/lock/rig_lock.hpp"
 #include "daemon/tool/commands.hpp"
@@ -146,7 +147,10 @@ int try_registers(const RegisterOptions& options) {
                            "open and the controller at rest.");
     end_in_order();
     std::string why;
-    commission::RegisterTrial trial(rig.shaker.registers, port, person);
+    commission::TrialLog log(rig.commission.folder, options.by);
+    log.add("begin", {{"device", device}, {"controller", port.name()}});
+    commission::LoggedPort logged(port, log, rig.shaker.registers);
+    commission::RegisterTrial trial(rig.shaker.registers, logged, person);
     try {
         power_is_off(person);
         trial.stop_chain(rig.campaign.proof.buttons, rig.campaign.proof.seen_s);
@@ -156,10 +160,11 @@ int try_registers(const RegisterOptions& options) {
         why = ended.what();
     }
     const char* outcome = !why.empty() ? "refused" : trial.passed() ? "decided" : "undecided";
+    CommissionJson rows = CommissionJson::array();
+    for (const auto& row : trial.rows())
+        rows.push_back({{"name", row.name}, {"passed", row.passed}, {"found", row.found}});
+    log.add("verdict", {{"outcome", outcome}, {"why", why}, {"rows", rows}});
     if (options.json) {
-        CommissionJson rows = CommissionJson::array();
-        for (const auto& row : trial.rows())
-            rows.push_back({{"name", row.name}, {"passed", row.passed}, {"found", row.found}});
         std::cout << CommissionJson{{"outcome", outcome},
                                     {"why", why},
                                     {"simulated", rig.simulated()},
@@ -174,8 +179,10 @@ int try_registers(const RegisterOptions& options) {
     } else {
         print_wrapped(out, trial.passed()
                                ? "DECIDED: the controller does what its registers are stated to "
-                                 "do. Nothing is recorded: that is for vibrig commission watchdog "
-                                 "stop units excitation, with the daemon."
+                                 "do. What was written is in " +
+                                     log.path() +
+                                     ", and in the journal once vibrigd has started; the record is "
+                                     "for vibrig commission watchdog stop units excitation."
                                : "UNDECIDED: what was left out is not known to be written rightly");
     }
     return why.empty() && trial.passed() ? 0 : kNo;

@@ -9,6 +9,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <cstdlib>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <thread>
@@ -128,8 +129,9 @@ void show_signed_record(std::ostream& out, serve::Client& client, const std::str
 }
 
 /// Waits for the end of loop check and safe-state proof; their rows. `then`: the status before.
-/// Returns the proof.
-v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::Status& then) {
+/// `attend`: tells the daemon that somebody is there. Returns the proof.
+v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::Status& then,
+                          const std::function<void()>& attend = {}) {
     const std::int64_t before = then.proof().utc_ns();
     constexpr auto kLook = std::chrono::milliseconds(300);
     constexpr int kLooks = 100;  // after the check, for the proof's last rows
@@ -138,6 +140,7 @@ v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::St
     int looks = 0;
     do {
         std::this_thread::sleep_for(kLook);
+        if (attend) attend();
         status = ask_status(client);
         if (status.proof().asks() != asked) {
             asked = status.proof().asks();
@@ -405,11 +408,17 @@ std::string prove_safe_state(serve::Client& client, const std::string& by,
     v1::Command command;
     command.set_kind(v1::Command::selftest);
     command.set_by(by);
-    command.set_argument(argument);
+    command.set_argument("attended " + argument);
     wait_for_rest(client);
     const auto before = ask_status(client);
     if (auto why = refusal_of(client, command); !why.empty()) return why;
-    const auto proof = show_loop_check(out, client, before);
+    v1::Command attending;
+    attending.set_kind(v1::Command::commission);
+    attending.set_by(by);
+    attending.set_argument(R"({"do":"attend"})");
+    const auto proof = show_loop_check(out, client, before, [&] {
+        static_cast<void>(client.post("/api/v1/commands", json_of(attending)));
+    });
     if (proof.utc_ns() == before.proof().utc_ns()) return "no proof was made";
     return proof.passed() ? "" : proof.message();
 }

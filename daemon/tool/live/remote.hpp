@@ -26,7 +26,8 @@ void parse_answer(const serve::Reply& reply, google::protobuf::Message& message)
 /// Why the daemon does not take it; empty: it has. After an acknowledgement the controller has
 /// forgotten its fault.
 [[nodiscard]] std::string refusal_of(serve::Client& client, const v1::Command& command);
-/// Loop check and safe-state proof, with what they find to `out`; `argument` as the selftest's.
+/// Loop check and safe-state proof, with what they find to `out`; `argument` as the selftest's. The
+/// daemon ends it where this process is gone, or stopped, for 2 s.
 /// Why it has not passed; empty: it has.
 [[nodiscard]] std::string prove_safe_state(serve::Client& client, const std::string& by,
                                            const std::string& argument, std::ostream& out);

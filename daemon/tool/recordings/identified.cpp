@@ -25,6 +25,7 @@
 #include "daemon/tool/analysis/rig_doubts.hpp"
 #include "daemon/tool/analysis/seen_plan.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
+#include "daemon/tool/analysis/swept_dwells.hpp"
 #include "daemon/tool/recordings/campaign_argument.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/level/vibration_level.hpp"
@@ -38,22 +39,13 @@ namespace {
 
 using proto::RecordingRow;
 
-estimator::Measurement measurement_of(const RecordingRow& row) {
-    estimator::Measurement measurement;
-    measurement.time_s = row.time_s;
-    for (std::size_t i = 0; i < 3; ++i) {
-        measurement.angle_rad[i] = row.angle_deg[i] * (std::numbers::pi / 180);
-        measurement.force_g[i] = row.force_g[i];
-    }
-    return measurement;
-}
-
 /// A result, and what of the recording contradicts the configuration.
 struct Found {
     estimator::Result result;
     std::string contradiction;  ///< the first; empty: none
     std::vector<estimator::spectrum::SpectralDwell> spectral;
     std::vector<estimator::spectrum::Kind> kinds;
+    std::vector<estimator::spectrum::Sweep> sweeps;
     NumberedKinds profiles;                 ///< of a campaign's random dwells
     std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
 };
@@ -179,6 +171,21 @@ std::vector<Dwell> dwells_of(const std::vector<RecordingRow>& rows) {
     return dwells;
 }
 
+/// Out of the dwells.
+std::vector<estimator::spectrum::Sweep> take_sweeps(std::vector<Dwell>& dwells,
+                                                    const estimator::Settings& settings,
+                                                    const std::string& file) {
+    std::vector<estimator::spectrum::Sweep> sweeps;
+    for (const Dwell& dwell : dwells)
+        if (is_sweep(dwell.rows)) sweeps.push_back(sweep_of(settings, dwell.rows, file));
+    std::erase_if(dwells, [](const Dwell& dwell) { return is_sweep(dwell.rows); });
+    if (dwells.empty())
+        throw std::runtime_error(file +
+                                 ": found sweeps alone, expected dwells at one frequency as well, "
+                                 "which the 30 coefficients are of");
+    return sweeps;
+}
+
 /// The times of the file go on from dwell to dwell.
 bool has_common_clock(const std::vector<Dwell>& dwells) {
     for (std::size_t d = 1; d < dwells.size(); ++d) {
@@ -246,7 +253,9 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
                const configuration::Configuration& rig, const SpectrumRequest& request,
                const std::string& file) {
     estimator::Settings settings = rig.estimator;
-    const std::vector<Dwell> dwells = dwells_of(rows);
+    std::vector<Dwell> dwells = dwells_of(rows);
+    Found found;
+    found.sweeps = take_sweeps(dwells, settings, file);
     const DwellKinds kinds = kinds_of(dwells, profiles, rig, request, file);
     const auto reference = kinds.reference();
     if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
@@ -258,7 +267,6 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
     SeenPlan plan(settings);
     Progress progress("identifying");
     std::size_t done = 0;
-    Found found;
     found.kinds = kinds.kinds();
     for (std::size_t d = 0; d < dwells.size(); ++d) {
         const Dwell& dwell = dwells[d];
@@ -421,8 +429,9 @@ Identified identify_recording(const std::string& file, const std::string& config
             " for coefficients over frequency: those at the reference frequency stand");
     } else if (identified.assessed.done && found.spectral.size() >= 2 &&
                found.spectral.size() <= kMostSpectralDwells) {
-        identified.spectrum = spectrum_of(identified.settings, std::move(found.spectral),
-                                          std::move(found.kinds), request.form);
+        identified.spectrum =
+            spectrum_of(identified.settings, std::move(found.spectral), std::move(found.kinds),
+                        request.form, std::move(found.sweeps));
         adopt(*identified.spectrum, identified.settings, identified.assessed);
     } else if (identified.assessed.done) {
         identified.spectrum =

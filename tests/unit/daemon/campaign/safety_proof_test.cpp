@@ -95,6 +95,27 @@ TEST(SafetyProof, SaysWhatHasChangedSince) {
     EXPECT_THAT(less.refusal(kNow), HasSubstr("shaker.port is gone, was 502"));
 }
 
+TEST(SafetyProof, OfAnotherControllerItCountsForNothing) {
+    SafetyProof proof(demanded());
+    proof.device_is("ACME VC-3");
+    proof.begin("Ada", 0);
+    proof.conclude(kNow, "");
+    proved(proof, kNow);
+    EXPECT_TRUE(proof.ran_at_zero());
+    EXPECT_EQ(proof.refusal(kNow), "");
+    proof.device_is("OTHER 7");
+    EXPECT_FALSE(proof.ran_at_zero());
+    EXPECT_TRUE(proof.with_these_keys().empty());
+    EXPECT_THAT(proof.refusal(kNow),
+                HasSubstr("the shaker's controller is \"OTHER 7\", was \"ACME VC-3\""));
+    // AND until it has said who it is each counts, of an earlier life, too
+    SafetyProof again(demanded());
+    again.take_over({*proof_from_json(to_json(proof.history().back()))});
+    EXPECT_EQ(again.refusal(kNow), "");
+    again.device_is("OTHER 7");
+    EXPECT_THAT(again.refusal(kNow), HasSubstr("was \"ACME VC-3\""));
+}
+
 TEST(SafetyProof, ARecordSurvivesTheJournal) {
     SafetyProof proof(demanded());
     ProofRecord record = proved(proof, kNow);

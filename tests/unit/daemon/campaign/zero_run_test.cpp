@@ -101,9 +101,11 @@ struct ZeroRunTest : CampaignTest {
         });
     }
     /// At 0 g, the button is pressed when it is asked for, and released 2 s after it is seen.
-    const ProofRecord& pressed() {
-        order("at_zero emergency_stop rack");
-        for (int i = 0; i < 600 && proofs.empty(); ++i) {
+    const ProofRecord& pressed(const std::string& button = "rack") {
+        const auto before = proofs.size();
+        open_for = 0;
+        order("at_zero emergency_stop " + button);
+        for (int i = 0; i < 600 && proofs.size() == before; ++i) {
             live();
             const auto asks = status().proof.asks;
             if (asks.starts_with("press")) open = true;
@@ -231,6 +233,29 @@ TEST_F(ZeroRunTest, NothingShakesBeforeItWasMade) {
     EXPECT_FALSE(reply.accepted);
     EXPECT_THAT(reply.message, HasSubstr("has not run at 0 g yet"));
     EXPECT_FALSE(campaign->command({Kind::selftest, "Ada", "at_zero somewhat"}, now).accepted);
+}
+
+TEST_F(ZeroRunTest, NothingShakesBeforeEachButtonWasPressedAtZero) {
+    const auto shaking = [this] {
+        campaign->climb_next_proof(true);
+        return campaign->command({Kind::selftest, "Ada", ""}, now);
+    };
+    order("at_zero");
+    ASSERT_TRUE(over().passed);
+    for (const char* left : {"(\"rack\", \"door\")", "(\"door\")"}) {
+        const auto reply = shaking();
+        EXPECT_FALSE(reply.accepted);
+        EXPECT_THAT(reply.message, AllOf(HasSubstr("was not pressed at 0 g yet"), HasSubstr(left),
+                                         HasSubstr("vibrig commission stop")));
+        EXPECT_FALSE(ever_asked_for_more());
+        const std::string button = std::string(left) == "(\"door\")" ? "door" : "rack";
+        ASSERT_TRUE(pressed(button).passed) << proofs.back().message;
+        ASSERT_TRUE(campaign->command({Kind::acknowledge, "Ada", "trip"}, now).accepted);
+        for (int i = 0; i < 20; ++i) live();
+    }
+    EXPECT_TRUE(shaking().accepted);
+    // AND of a shaker that is understood no button is asked for
+    campaign->command({Kind::abort, "Ada", ""}, now);
 }
 
 }  // namespace

@@ -94,6 +94,7 @@ class Commissioned : public ::testing::Test {
             EXPECT_LT(std::abs(to - travel[i]), 170) << "there are two ways round";
             travel[i] = to;
             most_travel[i] = std::max(most_travel[i], std::abs(to));
+            if (std::abs(to) > rig->travel_deg[i] + 1) ++beyond[to > 0 ? 1 : 0];
         }
         rig->go(travel);
         arrives = now + drivers::from_seconds(farthest / 5);
@@ -107,6 +108,7 @@ class Commissioned : public ::testing::Test {
             const auto c = static_cast<std::size_t>(rig->channel[i]);
             look.angle[c] += noise_deg / rig->degrees[i] * rig->random.normal();
             look.force[i] += 1e-5 * rig->random.normal();
+            if (sticks == static_cast<int>(i)) look.force[i] = 0.0031;
             if (drifting_since == 0) continue;
             look.angle[c] = drift.reading[c] +
                             drift.slope[c] * drivers::to_seconds(from - drifting_since) / 3600;
@@ -219,8 +221,10 @@ class Commissioned : public ::testing::Test {
     std::optional<Vec3> ends;                 ///< by channel
     Vec3 torque{};
     double most_torque = 0;
+    int sticks = -1;  ///< accelerometer that shows the same all the time
     int slews = 0, released = 0, torques = 0;
-    Json kept;  ///< what is on disk
+    std::array<int, 2> beyond{};  ///< commands into a stop, to lower and to higher angles
+    Json kept;                    ///< what is on disk
 };
 
 }  // namespace vibrig::commission

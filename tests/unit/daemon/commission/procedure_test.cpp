@@ -126,6 +126,7 @@ TEST_F(Commissioned, RandomRigsAreNamedRightOrNotAtAll) {
 }
 
 TEST_F(Commissioned, ByHandNothingIsCommanded) {
+    torquers = Eigen::Matrix3d::Identity();
     for (const std::uint64_t seed : {3U, 5U, 8U}) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         rig_of(seed);
@@ -135,9 +136,35 @@ TEST_F(Commissioned, ByHandNothingIsCommanded) {
         const Json state = run(true);
         ASSERT_EQ(state["result"]["outcome"], "decided") << state["result"].dump(1);
         expect_right(*rig, state["result"], false);
+        EXPECT_THAT(state["lines"].dump(), HasSubstr("G  not torqued, moved by hand"));
+        EXPECT_THAT(state["result"]["evidence"]["torquers"].dump(), HasSubstr("moved by hand"));
     }
+    EXPECT_EQ(torques, 0);
     EXPECT_EQ(slews, 0);
     EXPECT_EQ(released, 0);
+}
+
+TEST_F(Commissioned, AChannelThatDoesNotChangeIsToldAtTheFirstLook) {
+    for (const int one : {-1, 2}) {
+        rig_of(4);
+        based = false;
+        travel = {};
+        sticks = one;
+        const std::string lines = run(false, "permit.hold")["lines"].dump();
+        EXPECT_EQ(lines.find("Z has not changed while its neighbours did") != std::string::npos,
+                  one == 2)
+            << lines;
+        EXPECT_EQ(lines.find("X has not changed"), std::string::npos);
+    }
+}
+
+TEST_F(Commissioned, WhatWasFoundIsAConfigurationWithItsEvidence) {
+    rig_of(3);
+    ASSERT_EQ(run()["result"]["outcome"], "decided");
+    const std::string toml = to_toml(procedure->finding(), true);
+    EXPECT_THAT(toml, HasSubstr("[platform]\n# SIMULATED: convention"));
+    EXPECT_THAT(toml, HasSubstr("\nencoder_sign = ["));
+    EXPECT_THAT(toml, HasSubstr("# SIMULATED: ln LR "));
 }
 
 TEST_F(Commissioned, WhatIsStuckOrDeadIsNamed) {

@@ -113,6 +113,36 @@ TEST_F(Books, AKeyOfTheShakerVoidsItsPartsAndNoneOfThePlatform) {
     EXPECT_EQ(void_parts(configuration::parse(other, "/rig.toml", false)), "stop ");
 }
 
+TEST_F(Books, AnotherControllerVoidsThePartsOfTheShakerByName) {
+    const auto as = loaded();
+    PartRecord what;
+    what.by = {"A. Person", "B. Person"};
+    what.utc_ns = kNow;
+    Book first(as);
+    first.shaker_is("ACME VC-3 2.11");
+    first.prove({kParts.begin(), kParts.end()}, what, as);
+    EXPECT_EQ(first.refusal(kNow), "");
+
+    Book again(as);
+    EXPECT_EQ(again.refusal(kNow), "") << "nobody knows yet";
+    again.shaker_is("ACME VC-3 2.11");
+    EXPECT_EQ(again.refusal(kNow), "");
+    again.shaker_is("OTHER 7");
+    EXPECT_EQ(again.refusal(kNow),
+              "not commissioned: identity of the shaker's controller is \"OTHER 7\", was proven as "
+              "\"ACME VC-3 2.11\" by A. Person, B. Person on 2026-11-18 (registers): vibrig "
+              "commission watchdog stop units excitation");
+    std::string names;
+    for (const auto& s : again.standing(kNow))
+        if (!s.proven) names += std::string(name_of(s.part)) + " ";
+    EXPECT_EQ(names, "registers watchdog stop units excitation ");
+    // A record from before it was asked.
+    prove_all(as);
+    Book old(as);
+    old.shaker_is("OTHER 7");
+    EXPECT_THAT(old.refusal(kNow), HasSubstr("is \"OTHER 7\", was not known then"));
+}
+
 TEST_F(Books, OfTheShakerOnePersonIsEnoughWhoHasArmedIt) {
     const auto as = loaded();
     PartRecord what;

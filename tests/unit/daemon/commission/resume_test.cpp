@@ -46,6 +46,7 @@ class Resumed : public Commissioned {
         drifting_since = 0;
         kept = Json::array();
         asked.clear();
+        beyond = {};
     }
 
     Kept what_is_kept(const std::string& again = {}) { return {kept, {}, again}; }
@@ -105,6 +106,48 @@ TEST_F(Resumed, AtEveryStepNothingMovesWithoutAPermissionAndTheResultIsTheSame) 
                                           360.0)),
                   0.6);
     }
+}
+
+/// A gimbal that stands at its stop says that it is in position: what was found of it outlives the
+/// daemon, so that nothing is sent into the stop a second time.
+TEST_F(Resumed, ASoftStopThatWasMetIsKept) {
+    const std::vector<double> at_stop{140, 18, 178};
+    const auto with_a_stop = [&] {
+        rig_again(2);
+        rig->travel_deg = {at_stop[0], at_stop[1], at_stop[2]};
+        answers["travel"] = "-130 130 -30 30 -175 175";
+    };
+    with_a_stop();
+    const Json whole = run();
+    ASSERT_EQ(whole["result"]["outcome"], "decided") << whole.dump(1);
+    ASSERT_THAT(whole["lines"].dump(), HasSubstr("a soft stop?"));
+    const std::size_t entries = kept.size();
+    int with_it = 0;
+    for (std::size_t at = 20; at < entries; at += 3) {
+        SCOPED_TRACE("dies after " + std::to_string(at) + " of " + std::to_string(entries));
+        with_a_stop();
+        run_to(at);
+        // Each side of it; the second is met later.
+        std::array<bool, 2> met{};
+        for (const Json& entry : kept)
+            if (entry.contains("short")) met[entry["short"][1].get<double>() > 0 ? 1 : 0] = true;
+        die();
+        procedure->begin_again("Ada", false, what_is_kept(), now);
+        if (procedure->state(0)["lines"].dump().find("anew") != std::string::npos) continue;
+        beyond = {};
+        const Json result = run()["result"];
+        ASSERT_EQ(result["outcome"], "decided") << result.dump(1);
+        for (std::size_t side = 0; side < 2; ++side)
+            EXPECT_TRUE(!met[side] || beyond[side] == 0) << "into the stop again, side " << side;
+        for (std::size_t g = 0; g < 3; ++g)
+            for (std::size_t end = 0; end < 2; ++end)
+                EXPECT_NEAR(result["found"]["gimbal.travel_deg"][g][end].get<double>(),
+                            whole["result"]["found"]["gimbal.travel_deg"][g][end].get<double>(),
+                            0.15)  // written to 0.1
+                    << g;
+        with_it += met[0] || met[1] ? 1 : 0;
+    }
+    EXPECT_GT(with_it, 5);
 }
 
 TEST_F(Resumed, WhatWasMeasuredAllIsDecidedWithoutAMove) {

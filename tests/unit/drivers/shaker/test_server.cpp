@@ -21,6 +21,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
+constexpr int kReportServerId = 17;
+
 int checked(int result, const char* what) {
     if (result < 0) throw std::runtime_error(std::string("test server: ") + what);
     return result;
@@ -138,6 +140,11 @@ void TestServer::set_input(int address, std::uint16_t value) {
     mapping_->tab_input_registers[address] = value;
 }
 
+void TestServer::identify_as(std::string name) {
+    const std::lock_guard lock(mutex_);
+    identity_ = std::move(name);
+}
+
 bool TestServer::saw(const std::function<bool(const Request&)>& wanted) const {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::seconds(10),
@@ -196,9 +203,10 @@ Request TestServer::decode(std::span<const std::uint8_t> query, int client) cons
     };
     Request request;
     request.function = query[header];
+    request.connection = connection_of_[static_cast<std::size_t>(client)];
+    if (request.function == kReportServerId) return request;  // that is all of it
     request.address = word(1);
     request.count = request.function == 6 ? 1 : word(3);
-    request.connection = connection_of_[static_cast<std::size_t>(client)];
     const std::size_t first = request.function == 6 ? 3 : 6;
     for (std::size_t i = 0; request.is_write() && i < static_cast<std::size_t>(request.count);
          ++i) {
@@ -209,6 +217,15 @@ Request TestServer::decode(std::span<const std::uint8_t> query, int client) cons
 
 std::vector<std::uint8_t> TestServer::reply_to(std::span<const std::uint8_t> query,
                                                const Answer& answer) {
+    if (query[7] == kReportServerId && !identity_.empty() &&
+        answer.kind != Answer::Kind::exception) {
+        std::vector<std::uint8_t> bytes(query.begin(), query.begin() + 8);
+        bytes.push_back(static_cast<std::uint8_t>(identity_.size() + 1));
+        bytes.insert(bytes.end(), identity_.begin(), identity_.end());
+        bytes.push_back(0xff);  // it runs
+        bytes[5] = static_cast<std::uint8_t>(bytes.size() - 6);
+        return bytes;
+    }
     modbus_set_socket(context_, pipe_[0]);
     if (answer.kind == Answer::Kind::exception) {
         modbus_reply_exception(context_, query.data(), static_cast<unsigned>(answer.code));

@@ -88,6 +88,8 @@ class TestServer {
     [[nodiscard]] std::uint16_t holding(int address) const;
     void set_holding(int address, std::uint16_t value);
     void set_input(int address, std::uint16_t value);
+    /// What it answers to function 17 from now on (TCP); before, what libmodbus says.
+    void identify_as(std::string name);
     /// Waits until a request satisfies `wanted`; false after ten seconds.
     [[nodiscard]] bool saw(const std::function<bool(const Request&)>& wanted) const;
 
@@ -122,6 +124,7 @@ class TestServer {
     mutable std::condition_variable changed_;
     _modbus_mapping_t* mapping_ = nullptr;
     Script script_;
+    std::string identity_;
     std::vector<Request> requests_;
     std::atomic<bool> quit_{false};
     std::thread thread_;

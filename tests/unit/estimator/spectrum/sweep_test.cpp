@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/spectrum/resonance.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
 #include "tests/plant/recording.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"
@@ -224,6 +225,72 @@ TEST(SweepOfThePlant, AgreesWithTheModel) {
                 std::sqrt(rigid.squaredNorm() / static_cast<double>(left.size())));
             EXPECT_LT(left.squaredNorm() / static_cast<double>(left.size()), 0.2 * 0.2);
         }
+    }
+}
+
+/// Rates of the dwells at 15 Hz and at rest, which tell nothing of a resonance, and sweeps.
+struct Campaign {
+    Campaign(double share, unsigned seed) : random(seed) {
+        auto dwells = testing::dwells_of(settings, testing::Truth::common(share, testing::kSixty),
+                                         testing::today());
+        testing::add_noise(dwells, random);
+        table.emplace(settings, dwells.list, dwells.kinds);
+    }
+    [[nodiscard]] Mixture mixture(std::size_t j, const std::vector<Sweep>& sweeps) const {
+        const Eigen::Index n = table->dwells();
+        GyroProblem problem{
+            Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Ones(10), {}};
+        problem.prior_sigma.head(4).setConstant(10);
+        for (Eigen::Index k = 0; k < n; ++k) {
+            const DwellRow& row = table->rows()[static_cast<std::size_t>(k)];
+            problem.rate[k] = row.rate[static_cast<Eigen::Index>(j)];
+            problem.covariance(k, k) =
+                row.variance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j));
+        }
+        for (const Sweep& sweep : sweeps) problem.swept.emplace_back(settings, sweep, j);
+        return one_resonance(*table, j, problem);
+    }
+    Settings settings;
+    std::mt19937_64 random;
+    std::optional<SpectralTable> table;
+};
+
+TEST(Sweep, OneFrequencyNeitherShowsNorExcludesAResonance) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+        const Campaign campaign(seed % 2 == 0 ? 0.5 : 0, seed);
+        for (std::size_t j = 0; j < 3; ++j)
+            EXPECT_LT(std::abs(campaign.mixture(j, {}).log_odds), 2) << "seed " << seed;
+    }
+}
+
+/// One sweep of the simulated rig over 100 s, up or down, beside what 15 Hz and rest tell: its
+/// frequency within the theory's table (0.27 and 0.21 Hz from samples), and as well as it says.
+TEST(SweepOfThePlant, TellsTheFrequencyAsWellAsItSays) {
+    constexpr unsigned kSeeds = 20;
+    for (const bool up : {true, false}) {
+        double sum = 0, square = 0, z = 0;
+        for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+            plant::Truth truth = elastic_rig();
+            truth.seed = seed;
+            plant::CampaignPlan plan = swept(104, {{0, 0, 0}});
+            plan.table_g = {6};
+            plan.sweep = {plan.sweep[up ? 0 : 1]};
+            const Campaign campaign(0.5, seed);
+            const auto sweeps = swept_by_plant(truth, plan, campaign.settings);
+            // Gyro y has its input axis along the vibration.
+            const Mixture mixture = campaign.mixture(1, sweeps);
+            EXPECT_TRUE(mixture.named()) << "seed " << seed;
+            ASSERT_TRUE(mixture.resonant()) << "seed " << seed;
+            const Told told = tell(mixture).front();
+            sum += told.hz.mean - 60;
+            square += (told.hz.mean - 60) * (told.hz.mean - 60);
+            z += std::pow((told.hz.mean - 60) / told.hz.sigma, 2);
+        }
+        const double rms = std::sqrt(square / kSeeds), mean = sum / kSeeds;
+        std::printf("# %s: %.3f Hz off, rms %.3f, %.2f of its sigma\n", up ? "up" : "down", mean,
+                    rms, std::sqrt(z / kSeeds));
+        EXPECT_LT(rms, 0.27 * std::sqrt(1 + 3 * std::sqrt(2.0 / kSeeds)));
+        EXPECT_NEAR(z / kSeeds, 1, 3 * std::sqrt(2.0 / kSeeds));
     }
 }
 

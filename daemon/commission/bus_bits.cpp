@@ -1,0 +1,75 @@
+// Valid bits, loop_closed, ready, fault: a bit that never changes proves nothing.
+#include "daemon/commission/bus_bits.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <utility>
+
+#include "daemon/commission/record.hpp"
+#include "daemon/journal/latches.hpp"
+#include "proto/durable_file.hpp"
+
+namespace vibrig::commission {
+
+BitWatch::BitWatch(const proto::Dbc& dbc, const std::string& name) {
+    for (const auto& message : dbc.messages)
+        for (const auto& signal : message.signals)
+            if (message.name + "." + signal.name == name) {
+                message_ = &message;
+                signal_ = &signal;
+            }
+    if (signal_ == nullptr) throw std::invalid_argument("the DBC has no signal " + name);
+}
+
+void BitWatch::add(std::uint32_t id, bool extended, std::span<const std::uint8_t> data) {
+    if (id != message_->id || extended != message_->extended ||
+        !proto::present(*message_, *signal_, data))
+        return;
+    const auto raw = proto::decode_raw(*signal_, data);
+    if (!raw) return;
+    const int value = *raw != 0 ? 1 : 0;
+    if (!heard_) before_ = value;
+    heard_ = true;
+    came_back_ = changed_ && (came_back_ || value == before_);
+    changed_ = changed_ || value != before_;
+}
+
+std::vector<std::string> two_names(const std::string& text) {
+    const auto comma = text.find(',');
+    if (comma == std::string::npos) return {};
+    const auto trimmed = [](std::string name) {
+        const auto first = name.find_first_not_of(" \t"), last = name.find_last_not_of(" \t");
+        return first == std::string::npos ? std::string() : name.substr(first, last - first + 1);
+    };
+    std::vector<std::string> names{trimmed(text.substr(0, comma)), trimmed(text.substr(comma + 1))};
+    if (names[0].empty() || names[1].empty() || journal::same_person(names[0], names[1])) return {};
+    return names;
+}
+
+BitBook::BitBook(const std::string& folder, std::string dbc_sha256)
+    : path_((std::filesystem::path(folder) / "bus_bits.json").string()),
+      dbc_sha256_(std::move(dbc_sha256)) {}
+
+BitBook::Json BitBook::bits() const {
+    std::ifstream file(path_);
+    const Json all = file ? Json::parse(file, nullptr, false) : Json();
+    if (!all.is_object() || all.value("dbc_sha256", "") != dbc_sha256_) return Json::object();
+    return all.value("bits", Json::object());
+}
+
+void BitBook::keep(const std::vector<BitProof>& bits, std::int64_t utc_ns) {
+    Json all = this->bits();
+    for (const auto& bit : bits)
+        all[bit.name] = {{"proven", bit.by_hand ? "changed once and back" : "confirmed"},
+                         {"by", bit.by},
+                         {"rests_at", bit.rests_at},
+                         {"utc", instant_of(utc_ns)}};
+    std::error_code error;  // whatever it is, the file then says it
+    std::filesystem::create_directories(std::filesystem::path(path_).parent_path(), error);
+    proto::write_durably(
+        path_, Json{{"version", 1}, {"dbc_sha256", dbc_sha256_}, {"bits", all}}.dump(1) + "\n",
+        0644);
+}
+
+}  // namespace vibrig::commission

@@ -1,0 +1,141 @@
+#include "daemon/commission/trial_log.hpp"
+
+#include <fcntl.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <utility>
+
+#include "daemon/commission/record.hpp"
+#include "proto/durable_file.hpp"
+
+namespace vibrig::commission {
+
+namespace {
+
+constexpr const char* kName = "registers.jsonl";
+
+std::int64_t wall_ns() {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+}
+
+[[noreturn]] void cannot(const std::string& path, const char* what) {
+    throw std::runtime_error(path + ": cannot " + what + ": " + std::strerror(errno));
+}
+
+std::string in(const std::string& folder) {
+    return (std::filesystem::path(folder) / kName).string();
+}
+
+std::string identity() {
+    std::string text = "uid " + std::to_string(::getuid());
+    if (const passwd* const user = ::getpwuid(::getuid()))
+        text += ", " + std::string(user->pw_name);
+    return text;
+}
+
+/// The stated register that begins there; empty: none.
+std::string role_at(const proto::ShakerRegisters& map, std::uint16_t address) {
+    const auto is = [&](const proto::Register& reg) {
+        return reg.table == proto::RegisterTable::holding && reg.address == address;
+    };
+    const std::array<std::pair<const char*, const proto::Register*>, 6> roles{
+        {{"frequency", &map.frequency},
+         {"amplitude", &map.amplitude},
+         {"ramp_time", &map.ramp_time},
+         {"watchdog_timeout", &map.watchdog_timeout},
+         {"watchdog", map.watchdog ? &*map.watchdog : nullptr},
+         {"run", &map.run}}};
+    for (const auto& [name, reg] : roles)
+        if (reg != nullptr && is(*reg)) return name;
+    return {};
+}
+
+/// As it counts; nothing: of no stated register.
+TrialLog::Json value_of(const proto::ShakerRegisters& map, const std::string& role,
+                        std::span<const std::uint16_t> words) {
+    const auto* const reg = role == "frequency"          ? &map.frequency
+                            : role == "amplitude"        ? &map.amplitude
+                            : role == "ramp_time"        ? &map.ramp_time
+                            : role == "watchdog_timeout" ? &map.watchdog_timeout
+                            : role == "watchdog"         ? &*map.watchdog
+                            : role == "run"              ? &map.run
+                                                         : nullptr;
+    if (reg == nullptr || reg->words() != words.size()) return nullptr;
+    return proto::decode(*reg, words);
+}
+
+}  // namespace
+
+TrialLog::TrialLog(const std::string& folder, std::string by)
+    : path_(in(folder)), by_(std::move(by)) {
+    std::error_code error;  // whatever it is, the file then says it
+    std::filesystem::create_directories(folder, error);
+    file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0644);
+    if (file_ < 0) cannot(path_, "be written");
+    ::fchmod(file_, 0644);  // the daemon is another user
+    proto::sync_folder_of(path_);
+}
+
+TrialLog::~TrialLog() { ::close(file_); }
+
+void TrialLog::add(const char* what, Json data) {
+    const std::int64_t now = wall_ns();
+    Json line{{"utc", instant_of(now)},
+              {"utc_ns", now},
+              {"by", by_},
+              {"identity", identity()},
+              {"what", what}};
+    line.update(std::move(data));
+    const std::string text = line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    if (::write(file_, text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
+        ::fdatasync(file_) != 0)
+        cannot(path_, "be written");
+}
+
+std::vector<TrialLog::Json> TrialLog::take(const std::string& folder) {
+    const std::string path = in(folder);
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return {};
+    std::vector<Json> lines;
+    std::ifstream file(path);
+    if (!file) cannot(path, "be read");
+    for (std::string text; std::getline(file, text);) {
+        Json line = Json::parse(text, nullptr, false);
+        // One that a power cut has halved stands as it is.
+        lines.push_back(line.is_object() ? std::move(line)
+                                         : Json{{"what", "line"}, {"text", text}});
+    }
+    std::string kept;
+    for (int n = 1; kept.empty() || std::filesystem::exists(kept, error); ++n)
+        kept = path + "." + std::to_string(n);
+    if (::rename(path.c_str(), kept.c_str()) != 0) cannot(path, "be renamed");
+    return lines;
+}
+
+TrialPort::Answer LoggedPort::write(std::uint16_t address, std::span<const std::uint16_t> words) {
+    std::vector<std::uint16_t> held(words.size());
+    const bool read =
+        port_.read(proto::RegisterTable::holding, address, held) == TrialPort::Answer::done;
+    const auto role = role_at(map_, address);
+    const std::vector<std::uint16_t> wanted(words.begin(), words.end());
+    Json data{{"register", role}, {"table", "holding"}, {"address", address}};
+    data["old"] = read ? Json{{"words", held}, {"value", value_of(map_, role, held)}} : Json();
+    data["new"] = {{"words", wanted}, {"value", value_of(map_, role, words)}};
+    log_.add("write", data);
+    const auto answer = port_.write(address, words);
+    log_.add("answer",
+             {{"address", address}, {"answer", answer == Answer::done ? "done" : "refused"}});
+    return answer;
+}
+
+}  // namespace vibrig::commission
