@@ -1,5 +1,8 @@
 #include "daemon/app/status_assembler.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "daemon/version.hpp"
@@ -77,7 +80,45 @@ StatusData StatusAssembler::status() const {
         status.log = {lines.taken, lines.written, lines.dropped, lines.waiting, lines.blocked};
     }
     outside_.fill(status);
+    status.vibration = vibration(status);
     return status;
+}
+
+VibrationStatus StatusAssembler::vibration(const StatusData& status) const {
+    const auto& rig = parts_.configuration;
+    VibrationStatus out;
+    if (!rig.spectrum.mixed && !rig.spectrum.mount_stated) return out;
+    const drivers::ShakerReading& reading = status.shaker;
+    const bool moves = status.command_table_g > 0 || (reading.valid && reading.running);
+    out.kind = "rest";
+    if (!moves) return out;
+    out.commanded_g = status.command_table_g;
+    out.platform_g = status.witness_g[0];
+    out.table_g = status.witness_g[1];
+    const bool random = reading.valid && reading.random && reading.random->random;
+    out.kind = random ? "random" : "sine";
+    if (!random) {
+        out.frequency_hz = reading.valid ? reading.frequency_hz : status.command_frequency_hz;
+        if (reading.valid) out.controller_g = reading.measured_g;
+        return out;
+    }
+    const drivers::RandomReading& now = *reading.random;
+    out.number = now.profile;
+    out.level_db = now.level_db;
+    out.controller_g = now.measured_g_rms;
+    constexpr std::array<const char*, 4> kWords{"idle", "levelling", "at level", "aborted"};
+    out.control = kWords[static_cast<std::size_t>(now.state)];
+    // The rules of rt::RandomBands.
+    out.low_g = out.commanded_g * std::pow(10, -3.0 / 20);
+    out.high_g = out.commanded_g * std::pow(10, 3.0 / 20);
+    const auto profile = std::ranges::find_if(
+        rig.profiles, [&now](const auto& one) { return one.number == now.profile; });
+    if (profile == rig.profiles.end()) return out;
+    out.profile = profile->profile.name;
+    out.psd_at = profile->at_table ? "table" : "platform";
+    for (const auto& [hz, density] : profile->profile.psd)
+        out.psd.emplace_back(hz, density * std::pow(10, now.level_db / 10));
+    return out;
 }
 
 RealTimeStatus StatusAssembler::real_time_status(const rt::AcquisitionView& acquired,

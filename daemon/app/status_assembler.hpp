@@ -22,6 +22,8 @@ class StatusAssembler {
   private:
     [[nodiscard]] RealTimeStatus real_time_status(const rt::AcquisitionView& acquired,
                                                   const rt::EstimatorView& estimated) const;
+    /// Of what the status has already.
+    [[nodiscard]] VibrationStatus vibration(const StatusData& status) const;
     [[nodiscard]] InterlockStatus interlock_status(std::vector<Latch> latches) const;
 
     const Parts& parts_;

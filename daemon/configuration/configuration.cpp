@@ -231,10 +231,42 @@ void take_profiles(Configuration& c, const std::string& name, Place place, Probl
             estimator::spectrum::check(stated.profile, one.file + ": ");
             one.profile = stated.profile;
             if (!stated.at.empty()) one.at_table = stated.at == "table";
-        } catch (const std::runtime_error& error) {
+        } catch (const std::exception& error) {
             problems.add(place, "profile (" + one.profile.name + ").file", error.what(),
                          "a profile as vibrig predict takes it");
         }
+    }
+}
+
+/// What the controller says that it played becomes the profiles' own: a recording is read without
+/// the file.
+void take_controller_psd(Configuration& c, const std::string& name,
+                         const std::map<std::string, Place>& places, Problems& problems) {
+    auto& said = c.spectrum.controller_psd;
+    const auto place = places.find("spectrum.controller_psd");
+    if (said == "nominal" || place == places.end()) {
+        for (auto& one : c.profiles) one.controller_psd.clear();
+        return;
+    }
+    if (said == "profile") return;
+    std::string path = std::exchange(said, "profile");
+    resolve(path, std::filesystem::path(name).parent_path());
+    try {
+        std::size_t i = 0;
+        for (auto& one : plan::read_controller_psd(path)) {
+            const auto of = std::ranges::find_if(c.profiles, [&one](const auto& profile) {
+                return profile.profile.name == one.name;
+            });
+            if (of == c.profiles.end())
+                throw std::runtime_error(path + ": [" + std::to_string(i) + "].profile: found " +
+                                         write_text(one.name) +
+                                         ", expected the name of a [[profile]]");
+            of->controller_psd = std::move(one.psd);
+            ++i;
+        }
+    } catch (const std::exception& error) {
+        problems.add(place->second, "spectrum.controller_psd", error.what(),
+                     "what the controller played under each profile");
     }
 }
 
@@ -359,6 +391,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         take_the_ways_of_zeroing(c, reader.places().contains("zeroing.second_axis"));
     take_mount(c, reader.places());
     if (!c.profiles.empty()) take_profiles(c, name, reader.places().at("profile"), problems);
+    take_controller_psd(c, name, reader.places(), problems);
     // With what the profiles' files say: a recording is read without them.
     loaded.effective = effective_of(c, name, reader.places());
 

@@ -82,6 +82,8 @@ struct Configuration {
         double pads_damping = 0.2;
         /// Of the mean square that a controller plays about its profile, 1 sigma.
         double controller_gain = 0.01;
+        /// controller_psd: "nominal", "profile", or a file that becomes the profiles' when loaded.
+        std::string controller_psd = "nominal";
         double highest_hz = 500;           ///< of what a survey plans
         double elastic_beyond = 1;         ///< see estimator::spectrum::PredictionOptions
         double tolerance_deg_h = 0;        ///< of a verification; 0: any
@@ -93,6 +95,8 @@ struct Configuration {
         std::string file;  ///< instead of psd; relative to the configuration's folder
         int number = 0;    ///< in the controller; 0: not stated
         bool at_table = false;
+        /// At the table, as the controller says that it played it; empty: as `profile` has it.
+        std::vector<std::pair<double, double>> controller_psd{};
     };
     std::vector<NamedProfile> profiles;
     /// Of the profiles that the plan plays: numbers, and abort bands; places as RandomStop::place

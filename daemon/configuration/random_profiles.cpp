@@ -71,13 +71,22 @@ std::optional<PlayedProfile> played(const Configuration& rig, const Named& of) {
     if (!(kept > 0)) return std::nullopt;
     PlayedProfile out;
     const auto& table = of.at_table ? stated : other;
-    const auto& platform = of.at_table ? other : stated;
     out.table_g = std::sqrt(of.at_table ? power : power * kept);
-    out.platform_g = std::sqrt(of.at_table ? power * kept : power);
     out.table_bandwidth_hz = spectrum::bandwidth_hz(table);
-    out.platform_bandwidth_hz = spectrum::bandwidth_hz(platform);
+    out.at_platform = of.at_table ? other : stated;
+    out.platform_g = std::sqrt(of.at_table ? power * kept : power);
+    if (!of.controller_psd.empty()) {
+        // What was played, not what was to be.
+        const spectrum::Profile seen{of.profile.name, of.controller_psd, {}, {0, 1, 0}, 0};
+        out.at_platform = spectrum::bands_of(seen);
+        const double through = weigh(rig, out.at_platform, true);
+        if (!(through > 0)) return std::nullopt;
+        out.platform_g = std::sqrt(spectrum::mean_square(seen) * through);
+    }
+    out.platform_bandwidth_hz = spectrum::bandwidth_hz(out.at_platform);
     out.highest_hz = of.profile.psd.back().first;
-    out.at_platform = platform;
+    if (!of.controller_psd.empty())
+        out.highest_hz = std::max(out.highest_hz, of.controller_psd.back().first);
     out.checksum = checksum_of(of.profile.psd);
     return out;
 }

@@ -20,7 +20,7 @@ constexpr const char* kProfileSchema =
     R"({"type":"array","maxItems":50,"items":{"type":"object","required":["name"],)"
     R"("additionalProperties":false,"properties":{"name":{"type":"string"},)"
     R"("number":{"type":"integer"},"psd":{"type":"array"},"file":{"type":"string"},)"
-    R"("g_rms":{"type":"number"},"direction":{"type":"array"},)"
+    R"("controller_psd":{"type":"array"},"g_rms":{"type":"number"},"direction":{"type":"array"},)"
     R"("at":{"enum":["platform","table"]}}}})";
 constexpr const char* kPairsSchema = R"({"type":"array","items":{"type":"array",)"
                                      R"("minItems":2,"maxItems":2,"items":{"type":"number"}}})";
@@ -103,6 +103,9 @@ class ProfileReader {
                 // Zero and negative densities get their own words below.
                 good_ &= read_pairs(node, key_ + ".psd", "[hz, g2_hz]", kAny, kAny, to.profile.psd,
                                     problems_);
+            } else if (part == "controller_psd") {
+                good_ &= read_pairs(node, key_ + ".controller_psd", "[hz, g2_hz]", kAny, kAny,
+                                    to.controller_psd, problems_);
             } else if (part == "g_rms") {
                 const auto rms = read_number(node, key_ + ".g_rms", {1e-6, 1e4}, "g", problems_);
                 good_ &= rms.has_value();
@@ -113,14 +116,15 @@ class ProfileReader {
                 at(node, to.at_table);
             } else {
                 refuse(node, part, "an unknown key",
-                       "name, number, psd, file, g_rms, direction or at");
+                       "name, number, psd, file, controller_psd, g_rms, direction or at");
             }
         }
         if (good_ && to.profile.name.empty()) refuse(table_, "name", "nothing", "a name");
         if (good_ && to.profile.psd.empty() == to.file.empty())
             refuse(table_, "psd", to.file.empty() ? "neither psd nor file" : "psd and file",
                    "one of them");
-        return good_ && checked(to.profile);
+        return good_ && checked(to.profile, "") &&
+               checked({to.profile.name, to.controller_psd, {}, {0, 1, 0}, 0}, "controller_");
     }
 
   private:
@@ -160,7 +164,8 @@ class ProfileReader {
             return refuse(node, "direction", describe(node), "a direction (north, up, east)");
         to.direction.normalize();
     }
-    bool checked(const Profile& profile) {
+    /// `as`: before "psd".
+    bool checked(const Profile& profile, const std::string& as) {
         if (profile.psd.empty()) return true;
         try {
             estimator::spectrum::check(profile, "");
@@ -168,7 +173,7 @@ class ProfileReader {
         } catch (const estimator::SettingsError& error) {
             const std::string what = error.what();
             const auto colon = what.find(": found "), expected = what.find(", expected ");
-            const std::string part = what.substr(0, colon);
+            const std::string part = as + what.substr(0, colon);
             const toml::node* node = table_.get(part.substr(0, part.find('[')));
             refuse(node != nullptr ? *node : table_, part,
                    what.substr(colon + 8, expected - colon - 8), what.substr(expected + 11));
@@ -217,14 +222,17 @@ std::string write_profiles(C& c) {
     std::string text;
     for (const auto& one : c.profiles) {
         const auto& d = one.profile.direction;
-        text += (text.empty() ? "{ name = " : ", { name = ") + write_text(one.profile.name) +
-                (one.number > 0 ? ", number = " + std::to_string(one.number) : "") +
-                (one.file.empty() || !one.profile.psd.empty()
-                     ? ", psd = " + write_pairs(one.profile.psd)
-                     : ", file = " + write_text(one.file)) +
-                (one.profile.g_rms > 0 ? ", g_rms = " + write_number(one.profile.g_rms) : "") +
-                ", direction = " + write_triple({d[0], d[1], d[2]}) +
-                ", at = " + (one.at_table ? "\"table\"" : "\"platform\"") + " }";
+        text +=
+            (text.empty() ? "{ name = " : ", { name = ") + write_text(one.profile.name) +
+            (one.number > 0 ? ", number = " + std::to_string(one.number) : "") +
+            (one.file.empty() || !one.profile.psd.empty()
+                 ? ", psd = " + write_pairs(one.profile.psd)
+                 : ", file = " + write_text(one.file)) +
+            (one.controller_psd.empty() ? ""
+                                        : ", controller_psd = " + write_pairs(one.controller_psd)) +
+            (one.profile.g_rms > 0 ? ", g_rms = " + write_number(one.profile.g_rms) : "") +
+            ", direction = " + write_triple({d[0], d[1], d[2]}) +
+            ", at = " + (one.at_table ? "\"table\"" : "\"platform\"") + " }";
     }
     return "[" + text + "]";
 }
@@ -280,6 +288,17 @@ void add_spectrum_keys(std::vector<Key>& keys) {
                           "of the mean square that the controller plays about a profile, relative, "
                           "1 sigma",
                           [](C& c) -> double& { return c.spectrum.controller_gain; }));
+    keys.push_back(text(
+        "spectrum.controller_psd", "\"nominal\", \"profile\" or a file",
+        "how a random profile lies over frequency at the table: as stated; as "
+        "profile.controller_psd "
+        "says, where it does; or as a file does (JSON: [{profile, psd}, ..])",
+        [](const std::string& value) -> std::string {
+            if (value == "registers")
+                return "\"nominal\", \"profile\" or a file: PSDs are not read from the controller";
+            return value.empty() ? "\"nominal\", \"profile\" or a file" : "";
+        },
+        [](C & c) -> auto& { return c.spectrum.controller_psd; }));
     keys.push_back(number("spectrum.highest_hz", "Hz", {1, 20'000},
                           "up to which a survey is planned for a profile",
                           [](C& c) -> double& { return c.spectrum.highest_hz; }));
@@ -290,12 +309,14 @@ void add_spectrum_keys(std::vector<Key>& keys) {
     keys.push_back(number("spectrum.tolerance_deg_h", "deg/h", {0, 1000},
                           "that two standard deviations of a verification stay below; 0: any",
                           [](C& c) -> double& { return c.spectrum.tolerance_deg_h; }));
-    keys.push_back({"profile", "tables", "",
-                    "rows: name, number (in the controller), psd ([[hz, g2_hz], ..]) or file, "
-                    "g_rms, direction (north, up, east), at (platform or table)",
-                    "random vibrations that predictions and surveys are made for; g_rms has to be "
-                    "that of psd within 1 %",
-                    read_profiles, write_profiles, kProfileSchema});
+    keys.push_back(
+        {"profile", "tables", "",
+         "rows: name, number (in the controller), psd ([[hz, g2_hz], ..]) or file, "
+         "controller_psd (in place of psd, as it was played at the table), g_rms, direction "
+         "(north, up, east), at (platform or table)",
+         "random vibrations that predictions and surveys are made for; g_rms has to be "
+         "that of psd within 1 %",
+         read_profiles, write_profiles, kProfileSchema});
 }
 
 }  // namespace vibrig::configuration

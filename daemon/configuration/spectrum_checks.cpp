@@ -17,6 +17,8 @@ namespace {
 
 /// A peak that a random vibration reaches 1 time in 400, and one that it hardly ever does.
 constexpr double kPeaks = 3, kHardlyEver = 5;
+/// Beyond it the interlock stops a random vibration.
+constexpr double kBands_db = 3;
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
 double rate_of(const Configuration& c) {
@@ -90,6 +92,14 @@ void CrossCheck::profiles() {
             problems_.add(places_.contains("profile") ? places_.at("profile") : Place{},
                           key + " (" + profile.profile.name + ")", found, expected);
         };
+        if (!profile.controller_psd.empty()) {
+            const double stated = std::sqrt(spectrum::mean_square(profile.profile));
+            const double played =
+                std::sqrt(spectrum::mean_square({"", profile.controller_psd, {}, {0, 1, 0}, 0}));
+            if (profile.at_table && !(std::abs(20 * std::log10(played / stated)) < kBands_db))
+                blame("controller_psd of " + rounded(played) + " g rms",
+                      "that of the profile within 3 dB: " + rounded(stated));
+        }
         // Where a plan plays it, as loud as it does at most.
         std::optional<double> highest_db;
         for (const auto& stop : c_.campaign.stops) {

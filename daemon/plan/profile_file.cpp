@@ -90,4 +90,32 @@ StatedProfile read_profile(const std::string& path) {
     return stated;
 }
 
+std::vector<Profile> read_controller_psd(const std::string& path) {
+    const nlohmann::json root = read_json(path);
+    constexpr const char* kForm = "[{\"profile\": NAME, \"psd\": [[hz, g2_hz], ..]}, ..]";
+    if (!root.is_array())
+        throw std::runtime_error(path + ": found " + root.dump().substr(0, 60) +
+                                 ", expected a JSON list " + kForm);
+    std::vector<Profile> out;
+    for (const auto& one : root) {
+        const std::string place = path + ": [" + std::to_string(out.size()) + "]";
+        const auto name = one.is_object() ? one.find("profile") : one.end();
+        if (!one.is_object() || name == one.end() || !name->is_string())
+            throw std::runtime_error(place + ": found " + one.dump().substr(0, 60) +
+                                     ", expected an entry of " + kForm);
+        Profile profile;
+        profile.name = name->get<std::string>();
+        profile.psd = read_pairs(one, "psd", "[hz, g2_hz]", place);
+        if (profile.psd.empty())
+            throw std::runtime_error(place + ".psd: found nothing, expected [[hz, g2_hz], ..]");
+        check(profile, place + ".");
+        if (std::any_of(out.begin(), out.end(),
+                        [&](const Profile& other) { return other.name == profile.name; }))
+            throw std::runtime_error(place + ".profile: found " + name->dump() +
+                                     " a second time, expected each once");
+        out.push_back(std::move(profile));
+    }
+    return out;
+}
+
 }  // namespace vibrig::plan

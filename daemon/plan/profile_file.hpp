@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "estimator/spectrum/profile.hpp"
 
@@ -15,5 +16,10 @@ struct StatedProfile {
 /// JSON: psd [[hz, g2_hz], ..], sines [[hz, g_peak], ..], and optionally name, direction, g_rms,
 /// at. Throws std::runtime_error with file, key, value and what was expected.
 [[nodiscard]] StatedProfile read_profile(const std::string& path);
+
+/// What a controller played under profiles: JSON [{"profile": NAME, "psd": [[hz, g2_hz], ..]}, ..],
+/// each name once. Throws as read_profile().
+[[nodiscard]] std::vector<estimator::spectrum::Profile> read_controller_psd(
+    const std::string& path);
 
 }  // namespace vibrig::plan

@@ -63,7 +63,8 @@ bool always_there(const pb::FieldDescriptor& field) {
     // A status has all its parts, whatever the rig does, but for those that are not configured.
     if (field.containing_type() == v1::Status::descriptor())
         return field.name() != "guard" && field.name() != "archive" &&
-               field.name() != "annunciator" && field.name() != "verdict";
+               field.name() != "vibration" && field.name() != "annunciator" &&
+               field.name() != "verdict";
     return !field.has_presence();
 }
 

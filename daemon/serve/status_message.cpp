@@ -371,6 +371,15 @@ void fill(v1::Status& out, const StatusData& status) {
     fill_values(*out.mutable_log(), "log.", status);
     fill(*out.mutable_server(), status.server, status.utc_ns);
     fill_outside(out, status);
+    if (!status.vibration.kind.empty()) {
+        v1::Vibration& vibration = *out.mutable_vibration();
+        fill_values(vibration, "vibration.", status);
+        for (const auto& [hz, density] : status.vibration.psd) {
+            v1::Vibration::Point& point = *vibration.add_psd();
+            point.set_hz(hz);
+            point.set_g2_hz(density);
+        }
+    }
     fill(*out.mutable_frame(), status.frame);
     fill(*out.mutable_real_time(), status);
     v1::Latency& latency = *out.mutable_acquisition_latency();

@@ -12,6 +12,7 @@
 #include "daemon/noise/noise_status.hpp"
 #include "daemon/rt/frame_latency.hpp"
 #include "daemon/status/campaign_status.hpp"
+#include "daemon/status/vibration_status.hpp"
 #include "drivers/annunciator/annunciator.hpp"
 #include "drivers/can/can_port.hpp"
 #include "drivers/sample/assembler.hpp"
@@ -93,6 +94,7 @@ struct StatusData {
     /// Of the accelerometers against the command: platform and table, g peak at the table;
     /// negative: not known.
     std::array<double, 2> witness_g{-1, -1};
+    VibrationStatus vibration;
 
     [[nodiscard]] ChannelState channel(std::size_t c) const noexcept;
     /// good, silent or never.

@@ -187,6 +187,31 @@ const auto kValues = std::to_array<StatusValue>({
     row("shaker.table_witness_g", "g",
         [](auto& s) { return only(s.witness_g[1] >= 0, s.witness_g[1]); }),
 
+    row("vibration.kind", "", [](auto& s) { return s.vibration.kind; })
+        .shown("excitation", "{}", "").off_page(),
+    row("vibration.frequency_hz", "Hz",
+        [](auto& s) { return only(s.vibration.frequency_hz > 0, s.vibration.frequency_hz); })
+        .shown("excitation", "{}", "").with_decimals(2).off_page(),
+    row("vibration.profile", "", [](auto& s) { return s.vibration.profile; })
+        .shown("excitation", "profile {}", "").off_page(),
+    row("vibration.number", "", [](auto& s) { return only(s.vibration.number > 0, s.vibration.number); }),
+    row("vibration.level_db", "dB",
+        [](auto& s) { return only(s.vibration.number > 0, s.vibration.level_db); })
+        .shown("excitation", "{}", "").with_decimals(1).off_page(),
+    row("vibration.control", "", [](auto& s) { return s.vibration.control; })
+        .shown("excitation", "{}", "").off_page(),
+    row("vibration.commanded_g", "g", [](auto& s) { return s.vibration.commanded_g; }),
+    row("vibration.controller_g", "g",
+        [](auto& s) { return only(s.vibration.controller_g >= 0, s.vibration.controller_g); }),
+    row("vibration.table_g", "g",
+        [](auto& s) { return only(s.vibration.table_g >= 0, s.vibration.table_g); }),
+    row("vibration.platform_g", "g",
+        [](auto& s) { return only(s.vibration.platform_g >= 0, s.vibration.platform_g); }),
+    row("vibration.low_g", "g", [](auto& s) { return only(s.vibration.low_g >= 0, s.vibration.low_g); }),
+    row("vibration.high_g", "g",
+        [](auto& s) { return only(s.vibration.high_g >= 0, s.vibration.high_g); }),
+    row("vibration.psd_at", "", [](auto& s) { return s.vibration.psd_at; }),
+
     row("interlock.tripped", "", [](auto& s) { return s.interlock.tripped; })
         .mqtt("Interlock/Tripped"),
     row("", "", [](auto& s) { return !s.interlock.tripped.empty(); })

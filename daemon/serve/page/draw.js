@@ -9,7 +9,7 @@ const Draw = (() => {
   function options(element, name) {
     const axis = {space: 20, stroke: css('--soft'), grid: {stroke: css('--line'), width: 1}, ticks: {stroke: css('--line')}, font: '12px system-ui'};
     const line = (k, extra) => ({stroke: css('--c' + k), width: 2, points: {show: false}, ...extra});
-    const cursor = {y: false, points: {size: 6}, drag: {x: true, y: false}, ...(name === 'allan' ? {} : {sync: {key: 'min', filters: {pub: hovers, sub: hovers}}})};
+    const cursor = {y: false, points: {size: 6}, drag: {x: true, y: false}, ...(name === 'allan' || name === 'psd' ? {} : {sync: {key: 'min', filters: {pub: hovers, sub: hovers}}})};
     const sized = {width: element.clientWidth || 300, height: element.clientHeight || 200, cursor, legend: {show: false},
       hooks: {setScale: [(u, key) => { if (key === 'x') element.dataset.from = u.scales.x.min; }], setCursor: [read], setSelect: [u => { u.zoomed = u.select.width > 0; }]}};
     const minutes = {...axis, space: 50, size: 24, values: (u, v) => v.map((x, i) => (i + 1 < v.length ? String(x) : x + ' min'))};
@@ -35,6 +35,8 @@ const Draw = (() => {
         series: [{label: 'min'}, ...['x', 'y', 'z'].map((a, k) => line(k, {width: 1, label: a + ', arcsec'}))]};
       case 'sigma': return {...sized, scales: {x: {time: false}, y: {distr: 3, range: (u, lo, hi) => [Math.min(lo || 1, .5), Math.max(hi || 10, 2)]}},
         axes: [minutes, log], series: [{label: 'min'}, ...['bias', 'linear', 'quadratic'].map((kind, k) => line(k, {label: kind})), {stroke: css('--soft'), dash: [3, 4], points: {show: false}}]};
+      case 'psd': return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3, range: (u, lo, hi) => [(lo || 1e-3) / 2, (hi || 1e-3) * 2]}},
+        axes: [{...axis, grid, ticks, size: 24, filter: (u, v) => v, values: (u, v) => marked(u.scales.x, v).map(x => x && x + ' Hz')}, log], series: [{label: 'Hz'}, line(0, {label: 'PSD, g²/Hz'})]};
       default: return {...sized, scales: {x: {time: false, distr: 3}, y: {distr: 3}},
         axes: [{...axis, grid, ticks, size: 24, filter: (u, v) => v, values: (u, v) => marked(u.scales.x, v).map(x => x && x + ' s')}, log],
         series: [{label: 's'}, ...['x', 'y', 'z'].map((g, k) => line(k, {label: g + ' expected, deg/h'})), ...['x', 'y', 'z'].map((g, k) => ({...dots(k), label: g + ' measured'})), ...['x', 'y', 'z'].map((g, k) => line(k, {width: 1, dash: [2, 4], label: g + ' classical, deg/h'}))]};
@@ -99,7 +101,7 @@ const Draw = (() => {
   function resize() {
     for (const [name, plot] of charts) {
       const element = byId('c-' + name);
-      if (plot.width !== element.clientWidth || plot.height !== element.clientHeight)
+      if (element.clientWidth && (plot.width !== element.clientWidth || plot.height !== element.clientHeight))
         plot.setSize({width: element.clientWidth, height: element.clientHeight});
     }
   }

@@ -87,7 +87,7 @@
       if (stop.run !== run) {
         const li = document.createElement('li');
         li.className = 'run';
-        li.textContent = `run ${run = stop.run}, ${stop.table_g} g`;
+        li.textContent = `run ${run = stop.run}, ${+stop.table_g.toPrecision(4)} g`;
         e.append(li);
       }
       const li = document.createElement('li'), dwell = dwells.get(stop.run + '/' + stop.position);
@@ -222,7 +222,8 @@
     byId('c-residuals').setAttribute('aria-label', `Residual drift of ${left.length} dwells, ${words}`);
     const e = s.estimate, c = s.campaign;
     set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
-    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`);
+    const random = (s.vibration || {}).kind === 'random';
+    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}${random ? ' rms, at random' : `, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`}`);
     byId('c-amplitude').setAttribute('aria-label', `Table amplitude ${fixed(s.shaker.measured_g, 3, 'g')}, commanded ${fixed(c.command_table_g, 2, 'g')}, since ${duration(s.time_s - start)}`);
     set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)}`);
     byId('c-innovations').setAttribute('aria-label', `Innovations ${['x', 'y', 'z'].map(a => fixed((e.innovation || {})[a + '_arcsec'], 1, 'arc seconds')).join(', ')}`);
@@ -288,6 +289,32 @@
     set('footer', `${about}; you are ${/^[ao]/.test(role) ? "an" : "a"} ${role}`);
   }
 
+  // What shakes: kind, frequency or profile, and how much of it by command, controller and accelerometers.
+  function vibration(s) {
+    const v = s.vibration, card = byId('vibration-card');
+    card.hidden = !v;
+    if (!v) return;
+    const random = v.kind === 'random', unit = random ? ' g rms' : ' g peak', rows = s.interlock.rows || [];
+    const off = rows.find(r => r.condition === 'amplitude_off_command' && r.reaction === 'abort' && r.limit !== undefined);
+    const low = random ? v.low_g : off && v.commanded_g * 10 ** (-off.limit / 20), high = random ? v.high_g : off && v.commanded_g * 10 ** (off.limit / 20);
+    const steady = s.campaign.state === 'recording';
+    const seen = (name, x) => (x === undefined ? [name, 'not known', false]
+      : [name, x.toFixed(3) + unit, steady && low !== undefined && (x < low || x > high)]);
+    table('vibration', [['kind', v.kind], ...(v.kind === 'rest' ? [] : [
+      ...(random ? [['profile', `${v.profile || 'unknown'} (number ${v.number}), ${v.level_db.toFixed(1)} dB`], ['controller says', v.control, v.control === 'aborted']]
+        : [['frequency', v.frequency_hz.toFixed(2) + ' Hz']]),
+      ['commanded', v.commanded_g.toFixed(3) + unit], seen('controller', v.controller_g), seen('platform', v.platform_g), seen('table', v.table_g),
+      ...(low === undefined ? [] : [['band', `${low.toFixed(3)} to ${high.toFixed(3)}${unit}`]])])]);
+    const psd = v.psd || [], chart = byId('c-psd');
+    chart.hidden = psd.length < 2;
+    byId('psd-note').hidden = chart.hidden;
+    if (chart.hidden) return;
+    const words = `PSD of the profile at the ${v.psd_at} at this level, g²/Hz, ${psd[0].hz} to ${psd[psd.length - 1].hz} Hz; the controller gives none`;
+    chart.setAttribute('aria-label', words);
+    set('psd-note', words);
+    Draw.chart('psd', [psd.map(p => p.hz), psd.map(p => p.g2_hz)]);
+  }
+
   function show() {
     if (!status) return;
     head(status);
@@ -297,6 +324,7 @@
     getEarlier(status);
     Draw.coefficients(status.estimate.parameters || [], targets, earlier);
     health(status);
+    vibration(status);
     Watch.show(status);
   }
 

@@ -91,7 +91,11 @@ plan::StatedProfile profile_of(const StatedSpectrum& of, const configuration::Co
     for (const auto& one : rig.profiles) {
         if (one.profile.name == of.profile ||
             (one.number > 0 && std::to_string(one.number) == of.profile))
-            return {one.profile, one.at_table ? "table" : "platform"};
+            return one.controller_psd.empty()
+                       ? plan::StatedProfile{one.profile, one.at_table ? "table" : "platform"}
+                       : plan::StatedProfile{
+                             {one.profile.name, one.controller_psd, {}, one.profile.direction, 0},
+                             "table"};
     }
     for (const auto& one : estimator::spectrum::built_in_profiles()) {
         if (one.name == of.profile) return {one, "platform"};

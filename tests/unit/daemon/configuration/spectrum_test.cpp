@@ -59,6 +59,22 @@ TEST(SpectrumKeys, EachBadProfileIsToldWithPlaceValueAndWhatWasExpected) {
                 HasSubstr("profile[1].number: found 4 a second time"));
 }
 
+TEST(SpectrumKeys, AProfilesFileIsHeldToTheSame) {
+    const plant::TemporaryFolder folder;
+    const std::string path = folder.file("profile.json");
+    const auto said = [&](const std::string& content) {
+        std::ofstream(path) << content;
+        return complaint(profile_with("file = \"" + path + "\"\n"), false);
+    };
+    EXPECT_EQ(said(R"({"psd":[[20,0.01],[120,0.01]]})"), "");
+    EXPECT_THAT(
+        said(R"({"psd":[[20,0.01],[10,0.01]]})"),
+        AllOf(StartsWith("rig.toml:"), HasSubstr("profile.json: psd[1]: found 10 Hz after")));
+    EXPECT_THAT(said(R"({"psd":[[20,0.01],[30,0]]})"),
+                HasSubstr("psd[1]: found 0 g^2/Hz, expected a density above 0"));
+    EXPECT_THAT(said(R"({"psd":[[20,0.04],[120,0.04]],"g_rms":3})"), HasSubstr("g_rms: found 3"));
+}
+
 TEST(SpectrumKeys, AProfileBeyondTheShakerOrTheAccelerometersIsRefusedByTheDaemon) {
     // The truck type at a hard mount: 3 sigma are 3.1 g, 0.17 m/s and 1.66 mm.
     const std::string truck =
@@ -279,6 +295,64 @@ TEST(RandomRegisters, EachMissingOrUnfitRoleIsNamed) {
                 HasSubstr("expected written registers that do not"));
     EXPECT_THAT(with("control_state = { address = 9, type = \"bits\" }"),
                 HasSubstr("control_state.type: found bits"));
+}
+
+/// What a controller says that it played, at the table, in place of what was to be played.
+TEST(ControllerPsd, OfAFileOrAProfileIsWhatReachesThePlatform) {
+    const plant::TemporaryFolder folder;
+    const std::string path = folder.file("plan.json"), psd = folder.file("psd.json");
+    std::ofstream(path) << R"({"runs":[{"position":[0,0,0],"table_g":3},)"
+                        << R"({"position":[0,0,0],"profile":"p","level_db":-3}]})";
+    const auto text = [&](const std::string& spectrum, const std::string& profile = "") {
+        return "campaign.plan = \"" + path + "\"\nspectrum.mode = \"mixed\"\n" +
+               "spectrum.mount = \"hard\"\n" + spectrum + kRandomRegisters +
+               profile_with("number = 4\nat = \"table\"\npsd = [[20, 0.02], [120, 0.02]]\n" +
+                            profile);
+    };
+    const std::string of_file = "spectrum.controller_psd = \"" + psd + "\"\n";
+    const auto write = [&](const std::string& content) { std::ofstream(psd) << content; };
+    const auto nominal = accepted(text(""), true);
+    write(R"([{"profile":"p","psd":[[20,0.018],[70,0.018],[70.1,0.024],[120,0.024]]}])");
+    const auto c = accepted(text(of_file), true);
+    // 50 * 0.018 + 50 * 0.024 in place of 2 g^2; the command, its bands and the checksum stay.
+    const auto &stop = c.campaign.stops[1], &was = nominal.campaign.stops[1];
+    EXPECT_NEAR(stop.random->at_platform.mean_square_g2 / was.random->at_platform.mean_square_g2,
+                2.1 / 2, 1e-3);
+    EXPECT_EQ(stop.table_g, was.table_g);
+    EXPECT_NEAR(stop.transmission, std::sqrt(2.1 / 2), 1e-3);
+    EXPECT_EQ(stop.random->set_point.checksum, was.random->set_point.checksum);
+    // A recording has no file: the profile says it, and reads back.
+    const auto shown = format_effective(parse(as_simulated(text(of_file), true), "rig.toml", true));
+    EXPECT_THAT(shown, HasSubstr("controller_psd = [[20.0, 0.018], [70.0, 0.018]"));
+    const auto again =
+        accepted(text("spectrum.controller_psd = \"profile\"\n",
+                      "controller_psd = [[20, 0.018], [70, 0.018], [70.1, 0.024], [120, 0.024]]\n"),
+                 true);
+    EXPECT_EQ(again.campaign.stops[1].random->at_platform.mean_square_g2,
+              stop.random->at_platform.mean_square_g2);
+
+    const auto said = [&](const std::string& content) {
+        write(content);
+        return complaint(text(of_file), true);
+    };
+    EXPECT_THAT(complaint(text("spectrum.controller_psd = \"registers\"\n"), true),
+                AllOf(HasSubstr("spectrum.controller_psd: found \"registers\""),
+                      HasSubstr("PSDs are not read from the controller")));
+    EXPECT_THAT(complaint(text("spectrum.controller_psd = \"nowhere.json\"\n"), true),
+                HasSubstr("nowhere.json: cannot be read"));
+    EXPECT_THAT(said("{}"), HasSubstr("psd.json: found {}, expected a JSON list"));
+    EXPECT_THAT(
+        said(R"([{"profile":"q","psd":[[20,0.02],[120,0.02]]}])"),
+        HasSubstr("psd.json: [0].profile: found \"q\", expected the name of a [[profile]]"));
+    EXPECT_THAT(said(R"([{"profile":"p","psd":[[20,0.02],[10,0.02]]}])"),
+                AllOf(HasSubstr("psd[1]: found 10 Hz after 20 Hz"), HasSubstr("growing")));
+    EXPECT_THAT(said(R"([{"profile":"p","psd":[[20,0.02],[120,0]]}])"),
+                HasSubstr("psd[1]: found 0 g^2/Hz, expected a density above 0"));
+    EXPECT_THAT(
+        said(R"([{"profile":"p","psd":[[20,0.05],[120,0.05]]}])"),
+        HasSubstr("found controller_psd of 2.2361 g rms, expected that of the profile within "
+                  "3 dB: 1.4142"));
+    EXPECT_THAT(said(R"([{"profile":"p"}])"), HasSubstr("[0].psd: found nothing"));
 }
 
 TEST(RandomDwells, OfAPlanAreStopsWithChecksumLevelAndBands) {

@@ -57,6 +57,20 @@ StatusData full_status() {
     s.zeros.change_sigma_mg = {0.006, 0.007, 0.008};
     s.zeros.mark = "zero of accelerometer x moved";
     s.zeros.message = "y has not converged";
+    s.vibration = {"random",
+                   65.1,
+                   "broad",
+                   4,
+                   -1.5,
+                   "at level",
+                   1.19,
+                   1.2,
+                   1.21,
+                   1.18,
+                   0.84,
+                   1.68,
+                   {{20, 0.01}, {120, 0.02}},
+                   "table"};
     s.stop_pending = true;
     s.rest = {"stopping",
               {{rt::RestVerdict::moving, 0.25, 1, 2}, {rt::RestVerdict::moving, 0.375, 1, 2}},
