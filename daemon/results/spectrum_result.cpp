@@ -501,9 +501,9 @@ std::string spectrum_text(const SpectrumResult& of) {
                       "An elastic part of 20 %% would have been seen up to %.4g Hz; beyond it "
                       "nothing is known.",
                       a.flat.highest_hz)
-                : line(
-                      "Whether they are flat was not tested: dwells at one frequency, and what "
-                      "the sweeps tell of a resonance.");
+                : std::string(
+                      "Whether they are flat was not tested: dwells at one frequency, and "
+                      "what the sweeps tell of a resonance.\n");
     text += "Not told either:";
     for (const char* one : not_told()) text += std::string("\n  ") + one;
     return text + "\n";
