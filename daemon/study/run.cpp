@@ -126,16 +126,23 @@ Trouble work(Queue& queue, const std::function<std::unique_ptr<Worker>()>& make)
     }
 }
 
-/// The threads; they are gone when it is.
+/// The threads; they are gone when it is. None begins before all are there: where the memory ends
+/// with one that cannot be made, nobody else is in want of it.
 class Crew {
   public:
     Crew(Queue& queue, const std::function<std::unique_ptr<Worker>()>& make, unsigned count)
         : queue_(queue) {
         try {
+            threads_.reserve(count);
             while (threads_.size() < count)
-                threads_.emplace_back([&queue, &make] { queue.left(work(queue, make)); });
+                threads_.emplace_back([this, &queue, &make] {
+                    starts_.wait(Starts::not_yet);
+                    queue.left(starts_.load() == Starts::all ? work(queue, make) : Trouble{});
+                });
+            start(Starts::all);
         } catch (const std::exception& error) {
             const std::string made = std::to_string(threads_.size());
+            start(Starts::none);
             end();
             throw StudyError("thread " + made + " of " + std::to_string(count) +
                              " cannot be made: " + error.what());
@@ -146,6 +153,11 @@ class Crew {
     Crew& operator=(const Crew&) = delete;
 
   private:
+    enum class Starts : std::uint8_t { not_yet, all, none };
+    void start(Starts how) noexcept {
+        starts_.store(how);
+        starts_.notify_all();
+    }
     void end() {
         queue_.stop();
         for (std::thread& thread : threads_) thread.join();
@@ -153,6 +165,7 @@ class Crew {
     }
 
     Queue& queue_;
+    std::atomic<Starts> starts_{Starts::not_yet};
     std::vector<std::thread> threads_;
 };
 
