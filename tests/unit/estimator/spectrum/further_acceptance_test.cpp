@@ -26,14 +26,6 @@ namespace {
 using Eigen::Index;
 using namespace testing;
 
-Settings undeclared() {
-    Settings settings;
-    settings.uncertainty.gain_between_frequencies.u = 0;
-    settings.uncertainty.accelerometer_gain.u = 0;
-    settings.uncertainty.resolver_harmonics = {};
-    return settings;
-}
-
 /// On flat rigs the resonance that might be costs nothing: u against that of the flat fit.
 void expect_no_price(unsigned campaigns) {
     double mixed = 0, flat = 0;

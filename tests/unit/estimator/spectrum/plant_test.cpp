@@ -8,6 +8,7 @@
 
 #include "estimator/spectrum/table.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/estimator/spectrum/from_samples.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -39,22 +40,10 @@ std::map<std::size_t, std::vector<DwellRow>> rows_of(const plant::Truth& truth,
             settings.frequency_hz = plan.hz_of(sample.run);
             dwell.emplace(settings, 1);
             DwellInfo info{static_cast<int>(sample.run), static_cast<int>(sample.position)};
-            for (const auto& played : truth.profiles) {
-                if (played.number != plan.profile_of(sample.run)) continue;
-                const Profile profile{"", played.psd, {}, {0, 1, 0}, 0};
-                const auto bands = bands_of(profile);
-                info.random = {stated * mean_square(profile), bandwidth_hz(bands), 0.01,
-                               played.psd.back().first};
-            }
+            info.random = played_in(truth, plan, sample.run, stated);
             dwell->begin_dwell(info);
         }
-        Measurement measurement;
-        measurement.time_s = sample.time_s;
-        for (std::size_t i = 0; i < 3; ++i) {
-            measurement.angle_rad[i] = sample.readings.encoder_deg[i] * std::numbers::pi / 180;
-            measurement.force_g[i] = sample.readings.raw_g[i];
-        }
-        static_cast<void>(dwell->add(measurement));
+        static_cast<void>(dwell->add(measurement_of(sample)));
     });
     close();
     return rows;

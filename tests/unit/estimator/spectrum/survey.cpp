@@ -25,6 +25,14 @@ Eigen::Matrix3d vertical(double mean_square) {
 
 }  // namespace
 
+Settings undeclared() {
+    Settings settings;
+    settings.uncertainty.gain_between_frequencies.u = 0;
+    settings.uncertainty.accelerometer_gain.u = 0;
+    settings.uncertainty.resolver_harmonics = {};
+    return settings;
+}
+
 ParameterArray table2() {
     ParameterArray truth{};
     for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];

@@ -20,6 +20,9 @@ struct ElasticPart {
     std::array<double, 6> coefficients{};
 };
 
+/// Nothing declared that rows drawn here do not have.
+[[nodiscard]] Settings undeclared();
+
 /// The static coefficients of Table 2, filter order.
 [[nodiscard]] ParameterArray table2();
 

@@ -14,6 +14,7 @@
 #include "estimator/spectrum/resonance.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
 #include "tests/plant/recording.hpp"
+#include "tests/unit/estimator/spectrum/from_samples.hpp"
 #include "tests/unit/estimator/spectrum/survey.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -167,13 +168,7 @@ std::vector<Sweep> swept_by_plant(const plant::Truth& truth, const plant::Campai
             blocks.emplace(settings, static_cast<int>(sample.run),
                            static_cast<int>(sample.position));
         }
-        Measurement measurement;
-        measurement.time_s = sample.time_s;
-        for (std::size_t i = 0; i < 3; ++i) {
-            measurement.angle_rad[i] = sample.readings.encoder_deg[i] / kPerRadian;
-            measurement.force_g[i] = sample.readings.raw_g[i];
-        }
-        blocks->add(measurement, sample.hz);
+        blocks->add(testing::measurement_of(sample), sample.hz);
     });
     close();
     return out;
