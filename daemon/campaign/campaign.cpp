@@ -85,6 +85,7 @@ bool Campaign::done(Time now) const { return shutting_down_ && !active() && !sto
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
+    ports_.rig.shaker.read_only(state == State::commissioning);
     if (state == State::paused) ports_.rig.gimbal.forget_position();
     excitation_.for_whom(highest_level(), state != State::checking);
     if (state == State::ramping) excitation_.place(here().stop.position_deg);
@@ -163,7 +164,10 @@ Time Campaign::stand_by(Time now) {
 }
 
 Time Campaign::give_way(Time now) {
-    if (!ports_.rig.shaker.reading().at_rest()) {
+    // Its watchdog, which nobody feeds meanwhile, may count at rest, too, and be the fault.
+    const auto shaker = ports_.rig.shaker.reading();
+    if (!shaker.still() || shaker.running ||
+        (shaker.state != drivers::kShakerIdle && shaker.state != drivers::kShakerFault)) {
         abort("the shaker is not at rest, or cannot be read", now);
         return now;
     }
