@@ -15,14 +15,19 @@ constexpr std::string_view kAttended = "attended";
 
 }  // namespace
 
-/// Of a self-test's argument, which the campaign does not know of.
+/// Of a self-test's argument, which the campaign does not know of. One that is under way keeps its
+/// person, whoever asks for another.
 void ControlLoop::take_attendance(CommandRequest& request) {
     if (request.kind != CommandRequest::Kind::selftest) return;
-    attendance_.reset();
     std::string& asked = request.argument;
-    if (!asked.starts_with(kAttended)) return;
-    asked.erase(0, kAttended.size());
-    asked.erase(0, asked.find_first_not_of(' '));
+    const bool attended = asked.starts_with(kAttended);
+    if (attended) {
+        asked.erase(0, kAttended.size());
+        asked.erase(0, asked.find_first_not_of(' '));
+    }
+    if (arming_ || campaign_.checking()) return;
+    attendance_.reset();
+    if (!attended) return;
     attendance_ = Attendance{request.by, rt::wall_clock()};
 }
 
@@ -43,6 +48,18 @@ void ControlLoop::watch_attendance(Time now) {
                      drivers::to_seconds(kAbsent)),
          ""},
         now));
+}
+
+/// Nothing is armed by it, and nothing shakes: gimbals move, while somebody stands beside them.
+void ControlLoop::begin_rest_check(WaitingCommand& waiting, Time now) {
+    const CommandRequest& request = waiting.request;
+    std::string why;
+    if (!attendance_)
+        why = "opening check: found nobody at its tool, expected vibrig selftest --rest at the rig";
+    // Before it is known which way they turn only commissioning moves gimbals.
+    if (why.empty()) why = book_.refusal(utc_now(), commission::Part::gimbals);
+    if (why.empty()) why = outside_.refuses(request);
+    answer(waiting, why.empty() ? campaign_.command(request, now) : CommandReply{false, why});
 }
 
 }  // namespace vibrig

@@ -18,6 +18,12 @@ namespace {
 // for 5 s.
 constexpr Time kDiskPatience = 2 * drivers::kSecond;
 
+/// A proof of the safe state is what proves the shaker's parts.
+commission::Part last_part_for(const CommandRequest& request) {
+    return request.kind == CommandRequest::Kind::arm ? commission::Part::excitation
+                                                     : commission::Part::gyros;
+}
+
 }  // namespace
 
 void ControlLoop::take_commands(Time now) {
@@ -79,9 +85,7 @@ std::string ControlLoop::not_fit_to_arm(const CommandRequest& request, Time now)
         return fmt::format("commission.simulated is true, and the CAN interface {} is a device",
                            can.interface);
     // First: what is proved of a rig that is not the one described says little.
-    if (auto why = book_.refusal(utc_now(), request.kind == CommandRequest::Kind::arm);
-        !why.empty())
-        return why;
+    if (auto why = book_.refusal(utc_now(), last_part_for(request)); !why.empty()) return why;
     if (auto why = campaign_.refusal(request, now); !why.empty()) return why;
     if (auto why = device_not_known(); !why.empty()) return why;
     if (auto why = outside_.refuses(request); !why.empty()) return why;
@@ -113,10 +117,13 @@ bool ControlLoop::first_shaking() const {
 }
 
 void ControlLoop::begin_arming(WaitingCommand waiting, Time now) {
-    if (!arming_) take_attendance(waiting.request);
+    take_attendance(waiting.request);
+    if (waiting.request.kind == CommandRequest::Kind::selftest &&
+        waiting.request.argument == campaign::kRestCheck)
+        return begin_rest_check(waiting, now);
     campaign_.climb_next_proof(first_shaking());
     if (const auto why = not_fit_to_arm(waiting.request, now); !why.empty()) {
-        if (why == book_.refusal(utc_now(), waiting.request.kind == CommandRequest::Kind::arm))
+        if (why == book_.refusal(utc_now(), last_part_for(waiting.request)))
             keep_commissioned({"", "", waiting.request.by, "", "refused arm",
                                commission::Json{{"why", why}}.dump()});
         return answer(waiting, {false, why});

@@ -76,6 +76,7 @@ class ControlLoop {
     void answer(WaitingCommand& waiting, const CommandReply& reply);
     /// An arming is accepted once the journal has it on disk; nobody waits for that but who asked.
     void begin_arming(WaitingCommand waiting, drivers::Time now);
+    void begin_rest_check(WaitingCommand& waiting, drivers::Time now);
     void finish_arming(drivers::Time now);
     void give_up_arming(const std::string& why);
     /// Answers who acknowledged, once that is on disk; at the end of the daemon, all of them.

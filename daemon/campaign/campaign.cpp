@@ -85,6 +85,7 @@ bool Campaign::done(Time now) const { return shutting_down_ && !active() && !sto
 
 void Campaign::enter(State state, Time now) {
     state_ = state;
+    ports_.rig.shaker.read_only(state == State::commissioning);
     if (state == State::paused) ports_.rig.gimbal.forget_position();
     excitation_.for_whom(highest_level(), state != State::checking);
     if (state == State::ramping) excitation_.place(here().stop.position_deg);
@@ -163,7 +164,10 @@ Time Campaign::stand_by(Time now) {
 }
 
 Time Campaign::give_way(Time now) {
-    if (!ports_.rig.shaker.reading().at_rest()) {
+    // Its watchdog, which nobody feeds meanwhile, may count at rest, too, and be the fault.
+    const auto shaker = ports_.rig.shaker.reading();
+    if (!shaker.still() || shaker.running ||
+        (shaker.state != drivers::kShakerIdle && shaker.state != drivers::kShakerFault)) {
         abort("the shaker is not at rest, or cannot be read", now);
         return now;
     }
@@ -182,7 +186,7 @@ void Campaign::start_position(Time now) {
         return;
     }
     if (zero_ && !zeroed_) return begin_zeroing(false, now);
-    if (opening_ && !opened_) return begin_opening(now);
+    if (opening_ && settings_.open_first && !opened_) return begin_opening(now);
     if (too_many_rejected(now) || vibration_was_off(now) || not_valid_so_far(now)) return;
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);
@@ -229,6 +233,11 @@ void Campaign::end(State state, const std::string& why, Time now) {
     const bool had_campaign = active();
     const bool checking = state_ == State::checking;
     const bool commissioning = state_ == State::commissioning;
+    const char* const what = opens_alone()      ? "opening check aborted: "
+                             : commissioning    ? "commissioning aborted: "
+                             : !checking        ? "campaign aborted: "
+                             : checks_at_zero() ? "run at 0 g aborted: "
+                                                : "loop check aborted: ";
     if (checking) end_check(state, why, now);
     const bool slewing = state_ == State::slewing || state_ == State::zeroing || opening();
     leave_stage();
@@ -240,11 +249,7 @@ void Campaign::end(State state, const std::string& why, Time now) {
     if (state == State::tripped) {
         ports_.log.event(Severity::trip, "stop of the shaker ordered: " + why);
     } else {
-        ports_.log.event(Severity::alarm, (checking ? checks_at_zero() ? "run at 0 g aborted: "
-                                                                       : "loop check aborted: "
-                                           : commissioning ? "commissioning aborted: "
-                                                           : "campaign aborted: ") +
-                                              why);
+        ports_.log.event(Severity::alarm, what + why);
     }
     if (had_campaign) ports_.dwells.end(false);
 }

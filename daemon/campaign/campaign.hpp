@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -39,6 +40,9 @@ class Waiting;
 class ZeroCalibration;
 class Zeroing;
 class ZeroRun;
+
+/// A self-test's argument: the opening check alone.
+inline constexpr std::string_view kRestCheck = "rest";
 
 /// Why the stages of these settings cannot work; empty: they can. Throws drivers::BindingError.
 [[nodiscard]] std::string check_stages(const Settings& settings, const proto::Dbc& dbc,
@@ -160,7 +164,14 @@ class Campaign {
     void conclude_check(drivers::Time now);
     [[nodiscard]] std::int64_t utc_ns() const { return ports_.log.utc_ns(); }
     void make_stages();
-    [[nodiscard]] bool opening() const;  ///< it is being held against the rig at rest
+    [[nodiscard]] bool opening() const;      ///< it is being held against the rig at rest
+    [[nodiscard]] bool opens_alone() const;  ///< likewise, without a campaign
+    [[nodiscard]] std::string check_under_way() const;
+    [[nodiscard]] std::string not_fit_to_move(drivers::Time now) const;
+    [[nodiscard]] std::string not_fit_to_open(drivers::Time now) const;
+    CommandReply begin_rest_check(const CommandRequest& request, drivers::Time now);
+    void conclude_rest_check(const std::string& refused, const std::string& told,
+                             const std::vector<std::string>& suspects, drivers::Time now);
     void begin_opening(drivers::Time now);
     drivers::Time open(drivers::Time now);
     void conclude_opening(drivers::Time now);
@@ -296,6 +307,7 @@ class Campaign {
     ZeroingAt zeroing_ = ZeroingAt::none;
     bool zeroed_ = false;  ///< in this campaign, before the first dwell
     bool opened_ = false;  ///< likewise, the opening check
+    RestCheckStatus rest_check_;
     drivers::Time torque_sent_ = 0;
     std::string mark_;  ///< why the campaign is marked
     /// Of each dwell in which zeros were in force: run, and variance of the relative level.

@@ -57,7 +57,7 @@ void Campaign::take_over_trip(const std::string& causes, double table_g) {
 
 std::string Campaign::not_fit_to_arm(Time now) const {
     if (active()) return "a campaign is running";
-    if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::checking) return check_under_way();
     if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (auto why = loop_->refusal(); !why.empty()) return why;
@@ -68,7 +68,7 @@ std::string Campaign::not_fit_to_arm(Time now) const {
 std::string Campaign::begin_commissioning(const std::string& by, Time now) {
     if (shutting_down_) return "the daemon is shutting down";
     if (active()) return "a campaign is running";
-    if (state_ == State::checking) return "a loop check is running";
+    if (state_ == State::checking) return check_under_way();
     if (state_ == State::armed) return "armed for a campaign: abort that first";
     if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
     if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) return why;
@@ -103,7 +103,8 @@ std::string Campaign::refusal(const CommandRequest& request, Time now) const {
     if (request.by.empty()) return "by: found nothing, expected the name of a person";
     if (shutting_down_) return "the daemon is shutting down";
     if (request.kind == Kind::arm) return not_fit_to_arm(now);
-    if (request.kind == Kind::selftest) return not_fit_to_check(now);
+    if (request.kind == Kind::selftest)
+        return request.argument == kRestCheck ? not_fit_to_open(now) : not_fit_to_check(now);
     if (request.kind == Kind::acknowledge) return not_fit_to_acknowledge(now);
     return {};
 }

@@ -43,20 +43,14 @@ void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
 }
 
 std::string Campaign::not_fit_to_check(Time now) const {
-    if (active()) return "a campaign is running";
-    if (state_ == State::checking) return "a loop check is running";
-    if (state_ == State::commissioning) return "the rig is being commissioned by " + reason_;
-    if (state_ == State::tripped) return "tripped (" + reason_ + "): acknowledge it first";
-    if (state_ == State::armed) return "armed for a campaign: abort that first";
+    if (auto why = not_fit_to_move(now); !why.empty()) return why;
     if (ports_.rig.feed == nullptr) return "no samples to look at";
-    if (auto why = not_fit_to_excite(now); !why.empty()) return why;
-    if (auto why = platform_lacks(ports_.rig.platform(), now); !why.empty()) return why;
-    if (torquing(ports_.rig)) return "the platform is torqued, expected free drift";
     return LoopCheck::beyond_limits(settings_);
 }
 
 CommandReply Campaign::begin_check(const CommandRequest& request, Time now) {
     constexpr std::string_view kPress = "emergency_stop";
+    if (request.argument == kRestCheck) return begin_rest_check(request, now);
     std::string_view asked = request.argument;
     const bool at_zero = asked.starts_with(kAtZero);
     if (at_zero) asked.remove_prefix(std::min(asked.size(), kAtZero.size() + 1));
@@ -66,7 +60,7 @@ CommandReply Campaign::begin_check(const CommandRequest& request, Time now) {
     const auto& buttons = settings_.proof.buttons;
     if (!press && !asked.empty())
         return {false, "selftest: found \"" + request.argument +
-                           "\", expected nothing, emergency_stop, at_zero or both"};
+                           "\", expected nothing, rest, emergency_stop, at_zero or both"};
     if (!button.empty() && std::ranges::find(buttons, button) == buttons.end())
         return {false, "selftest: found the button \"" + button +
                            "\", expected one of commission.buttons"};
@@ -94,6 +88,7 @@ CommandReply Campaign::begin_check(const CommandRequest& request, Time now) {
 }
 
 Time Campaign::check(Time now) {
+    if (opening()) return open(now);
     const StageStep step = stage_->step(now);
     switch (step.kind) {
         case Came::going_on:
@@ -130,6 +125,12 @@ bool Campaign::checks_at_zero() const { return small_level_->level_g == 0; }
 
 /// It ends before it is done, in this state.
 void Campaign::end_check(State state, const std::string& why, Time now) {
+    if (opening()) {
+        rest_check_.verdict = "not completed";
+        rest_check_.message = why;
+        rest_check_.utc_ns = utc_ns();
+        return;
+    }
     if (!checks_at_zero()) loop_->not_completed(why);
     if (proving_->waits_for_press() &&
         (state == State::tripped || ports_.rig.shaker.reading().emergency_stop_open)) {

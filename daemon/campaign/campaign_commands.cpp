@@ -31,7 +31,7 @@ CommandReply Campaign::command(const CommandRequest& request, Time now) {
             return accept("armed for " + armed_for_);
         case Kind::start:
             if (active()) return refuse("a campaign is running, started by " + started_by_);
-            if (state_ == State::checking) return refuse("a loop check is running");
+            if (state_ == State::checking) return refuse(check_under_way());
             if (state_ != State::armed) return refuse("not armed: a named person arms it first");
             if (const auto why = not_fit_to_excite(now); !why.empty()) return refuse(why);
             if (!ports_.dwells.free()) return refuse("the last dwell is still being closed");

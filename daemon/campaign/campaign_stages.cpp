@@ -37,7 +37,7 @@ void Campaign::make_stages() {
         zero_ = std::make_shared<Zeroing>(settings_, ports_.rig, ports_.log, level_ != nullptr);
     if (!settings_.opening.empty() && ports_.rig.second()) {
         opening_ = std::make_shared<Opening>(settings_, ports_.rig, stop_);
-        times_.opening_s = opening_->check().expected_s();
+        if (settings_.open_first) times_.opening_s = opening_->check().expected_s();
     }
 }
 
@@ -73,44 +73,6 @@ Time Campaign::wait_for_platform(Time now) {
         start_position(now);
     }
     return now;
-}
-
-bool Campaign::opening() const { return stage_ != nullptr && stage_ == opening_.get(); }
-
-void Campaign::begin_opening(Time now) {
-    ports_.log.event(Severity::info, "opening check: free drift and gravity at rest");
-    begin(*opening_, State::waiting, now);
-}
-
-Time Campaign::open(Time now) {
-    if (!ports_.rig.shaker.reading().at_rest()) {
-        abort("opening check: the shaker left rest", now);
-        return now;
-    }
-    reason_ = opening_->check().words();
-    const StageStep step = opening_->step(now);
-    if (step.kind == Came::going_on) return step.next;
-    if (step.kind == Came::failed) {
-        abort("opening check: " + step.why, now);
-    } else {
-        conclude_opening(now);
-    }
-    return now;
-}
-
-void Campaign::conclude_opening(Time now) {
-    Vector zero_g{};
-    if (zeros() != nullptr && zeros()->status().known) zero_g = zeros()->raw_zero_g();
-    const auto verdict = opening_->check().judge(zero_g);
-    leave_stage();
-    opened_ = true;
-    if (!verdict.told.empty()) ports_.log.event(Severity::alarm, "opening check: " + verdict.told);
-    if (!verdict.refused.empty()) {
-        ports_.rig.gimbal.release(now);
-        return abort("opening check: " + verdict.refused + "; " + verdict.suspects, now);
-    }
-    ports_.log.event(Severity::info, "opening check: the rig is what its configuration says");
-    start_position(now);
 }
 
 const ZeroCalibration* Campaign::zeros() const { return zero_ ? &zero_->calibration() : nullptr; }

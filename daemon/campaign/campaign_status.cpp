@@ -96,6 +96,7 @@ void Campaign::fill_stages(StatusData& status) const {
     if (level_) level_->leveller().fill(status.levelling);
     if (zero_) zeros()->fill(status.zeros);
     status.loop_check = loop_->status();
+    status.rest_check = rest_check_;
     if (!mark_.empty()) status.zeros.mark = mark_;
 }
 

@@ -112,15 +112,23 @@ OpeningCheck::Verdict OpeningCheck::judge(const Vector& zero_g) const {
     for (const Stood& stood : stops_) means.push_back(mean_of(stood.seconds, stood.stop.drifts));
     const auto found = room::hold_at_rest(rig, means, limits);
     Verdict verdict{in_one(found.refused), in_one(found.told), {}};
+    if (found.refused.empty()) {  // what would do away with what is told
+        limits.refused_deg = limits.told_deg;
+        limits.refused_deg_h = limits.told_deg_h;
+        limits.refused_vertical_deg_h = limits.told_vertical_deg_h;
+    }
+    if (!found.refused.empty() || !found.told.empty())
+        for (const auto& suspect : room::suspects_at_rest(rig, means, limits))
+            verdict.suspects.push_back(suspect.words);
     if (!found.earth_known)
         verdict.told += std::string(verdict.told.empty() ? "" : "; ") +
                         "the travel leaves fewer than three free drifts: nothing is said of north "
                         "and latitude";
-    if (verdict.refused.empty()) return verdict;
-    for (const auto& suspect : room::suspects_at_rest(rig, means, limits))
-        verdict.suspects += (verdict.suspects.empty() ? "suspects: " : "; ") + suspect.words;
-    if (verdict.suspects.empty()) verdict.suspects = "no single key explains it";
     return verdict;
+}
+
+std::string OpeningCheck::Verdict::suspects_text() const {
+    return suspects.empty() ? "no single key explains it" : "suspects: " + in_one(suspects);
 }
 
 }  // namespace vibrig::campaign

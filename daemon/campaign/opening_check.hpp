@@ -36,7 +36,11 @@ class OpeningCheck {
 
     struct Verdict {
         std::string refused, told;  ///< empty: nothing is
-        std::string suspects;       ///< of what is refused: "suspects: ..."
+        /// Of what is refused, or else told: keys that alone, changed, would explain it, best
+        /// first.
+        std::vector<std::string> suspects;
+        /// "suspects: a; b"; "no single key explains it".
+        [[nodiscard]] std::string suspects_text() const;
     };
     /// `zero_g`: of the accelerometers, raw, on top of the configuration's.
     [[nodiscard]] Verdict judge(const Vector& zero_g) const;

@@ -142,8 +142,9 @@ struct Settings {
     bool type_prior = false;      ///< it starts from what the archive knows of the unit's type
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
-    /// Before the first position; empty: no opening check.
+    /// Where the opening check looks; empty: there is none.
     std::vector<OpeningStop> opening;
+    bool open_first = true;  ///< with it each campaign begins
     LevellingSettings level;
     ZeroingSettings zero;
     LoopCheckSettings loop;

@@ -410,12 +410,12 @@ Json Book::evidence(Part part) const {
     return all.is_object() ? all : Json::object();
 }
 
-std::string Book::refusal(std::int64_t utc_ns, bool the_shaker) const {
+std::string Book::refusal(std::int64_t utc_ns, Part last) const {
     if (!loaded_.configuration.record_demanded()) return {};
     if (!trouble_.empty()) return "not commissioned: " + trouble_ + ": vibrig commission";
     std::string missing, command;
     for (const auto& s : standing(utc_ns)) {
-        if (s.proven || (!the_shaker && of_the_shaker(s.part))) continue;
+        if (s.proven || s.part > last) continue;
         if (s.record)  // the first that somebody has changed says most
             return fmt::format("not commissioned: {} ({}): {}", s.why, name_of(s.part),
                                remedy_of(s.part));

@@ -107,9 +107,9 @@ class Book {
     explicit Book(const configuration::Loaded& loaded);
 
     [[nodiscard]] std::vector<Standing> standing(std::int64_t utc_ns) const;
-    /// Why nothing is armed; empty: all parts are proven, or none is demanded. Without
-    /// `the_shaker` why no proof of the safe state is made, which is what proves its parts.
-    [[nodiscard]] std::string refusal(std::int64_t utc_ns, bool the_shaker = true) const;
+    /// Why nothing is armed; empty: all parts are proven, or none is demanded. Those after `last`
+    /// are not asked for: no gyros to move gimbals, none of the shaker's to prove them.
+    [[nodiscard]] std::string refusal(std::int64_t utc_ns, Part last = Part::excitation) const;
     /// A part below the shaker's that does not stand: without it nothing of the shaker is
     /// witnessed. Empty: all of them stand.
     [[nodiscard]] std::string not_proven_below_shaker(std::int64_t utc_ns) const;

@@ -430,7 +430,8 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         throw ConfigurationError(problems.text(name));
     }
 
-    if (c.record_demanded() && c.commission.opening_check) c.campaign.opening = opening_stops(c);
+    c.campaign.opening = opening_stops(c);
+    c.campaign.open_first = c.record_demanded() && c.commission.opening_check;
     // A simulated rig is not commissioned.
     if (c.simulated()) c.campaign.gravity_refused_deg = 2;
     if (c.campaign.resonance_hz <= 0) {

@@ -421,6 +421,10 @@ std::variant<ApiAnswer, CommandRequest> Api::command_of(const ApiRequest& reques
     // Whoever lets gimbals move stands beside them.
     if (parsed.kind == CommandRequest::Kind::commission && (caller.encrypted || caller.browser))
         return refuse(403, caller, what, "a rig is commissioned at the local socket only");
+    if (parsed.kind == CommandRequest::Kind::selftest && parsed.argument.starts_with("attended") &&
+        (caller.encrypted || caller.browser))
+        return refuse(403, caller, what,
+                      "who attends stands at the rig: it is ordered at the local socket only");
     // A stop is never one too many.
     const auto now = std::chrono::steady_clock::now();
     if (parsed.kind != CommandRequest::Kind::abort &&

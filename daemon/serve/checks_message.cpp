@@ -23,6 +23,14 @@ void fill_loop_check(v1::LoopCheck& out, const LoopCheckStatus& check) {
     }
 }
 
+void fill_rest_check(v1::RestCheck& out, const RestCheckStatus& check) {
+    out.set_verdict(*check.verdict == '\0' ? "none" : check.verdict);
+    out.set_by(mend_utf8(check.by));
+    out.set_utc_ns(check.utc_ns);
+    out.set_message(mend_utf8(check.message));
+    for (const auto& suspect : check.suspects) out.add_suspects(mend_utf8(suspect));
+}
+
 void fill_proof(v1::Proof& out, const ProofStatus& proof) {
     out.set_demanded(proof.demanded);
     out.set_refusal(mend_utf8(proof.refusal));
@@ -75,6 +83,7 @@ void fill(v1::Verdict& out, const StatusData& status) {
 
 void fill_checks(v1::Status& out, const StatusData& status) {
     fill_loop_check(*out.mutable_loop_check(), status.loop_check);
+    fill_rest_check(*out.mutable_rest_check(), status.rest_check);
     fill_proof(*out.mutable_proof(), status.proof);
 }
 

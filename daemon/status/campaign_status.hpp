@@ -95,6 +95,15 @@ struct LoopCheckStatus {
     std::vector<Row> rows;
 };
 
+/// The newest opening check that was made alone.
+struct RestCheckStatus {
+    const char* verdict = "";  ///< none, running, right, told, refused, not completed
+    std::string by;
+    std::int64_t utc_ns = 0;            ///< of its end
+    std::string message;                ///< what is off, or why it was not completed
+    std::vector<std::string> suspects;  ///< keys that alone, changed, would explain it; best first
+};
+
 /// The newest proof of the safe state, and whether it lets a campaign be armed.
 struct ProofStatus {
     struct Row {

@@ -108,6 +108,7 @@ struct StatusData {
     LevellingStatus levelling;
     ZeroStatus zeros;
     LoopCheckStatus loop_check;
+    RestCheckStatus rest_check;
     ProofStatus proof;
     bool simulated = false;  ///< the rig is a program
 };

@@ -77,6 +77,7 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops)
     if (set_point.amplitude_g > 0 && now.valid && (now.running || !now.still()) &&
         !same_kind(set_point, now))
         return false;
+    if (read_only_) return false;
     const auto ticket = orders_.ticket();
     if (ticket.stop_pending() || ticket.stops() != stops || state() != LinkState::running)
         return false;
@@ -456,6 +457,7 @@ bool ModbusShaker::watchdog_due(Time now) const noexcept {
 
 void ModbusShaker::serve_watchdog(Time now) {
     next_feed_ = following(next_feed_, settings_.watchdog_period, now);
+    if (read_only_) return;
     if (timeout_due_) write_timeout();
     if (timeout_due_ || !link_.connected()) return;
     const proto::ShakerRegisters& map = settings_.registers;

@@ -30,6 +30,7 @@ class ModbusShaker final : public Shaker {
                                std::uint64_t stops) noexcept override;
     void stop_now() noexcept override;
     void hang_up_until(Time time) noexcept override;
+    void read_only(bool on) noexcept override { read_only_ = on; }
     [[nodiscard]] std::uint64_t stops() const noexcept override { return orders_.ticket().stops(); }
     [[nodiscard]] bool stop_pending() const noexcept override { return orders_.stop_pending(); }
     [[nodiscard]] bool busy() const noexcept override { return orders_.busy(); }
@@ -132,6 +133,7 @@ class ModbusShaker final : public Shaker {
     std::atomic<bool> quit_{false};
     std::atomic<bool> in_flight_{false};
     std::atomic<Time> hung_up_until_{0};
+    std::atomic<bool> read_only_{false};
     std::thread thread_;
     mutable std::mutex identity_mutex_;
     ShakerIdentity identity_;

@@ -158,6 +158,9 @@ class Shaker {
     /// Nobody talks to the device until then; its watchdog is on its own. A stop ends that at once:
     /// it connects again and is written first. Any thread; never blocks.
     virtual void hang_up_until(Time /*time*/) noexcept {}
+    /// From now on, or no longer, nothing is written but a stop: no set-point is taken, the
+    /// watchdog is neither fed nor told its timeout. Any thread; never blocks.
+    virtual void read_only(bool /*on*/) noexcept {}
     /// How often stop_now() was called.
     [[nodiscard]] virtual std::uint64_t stops() const noexcept = 0;
     [[nodiscard]] virtual bool stop_pending() const noexcept = 0;

@@ -43,7 +43,7 @@ struct CommandOptions {
 struct TestOptions {
     serve::Address at;
     std::string by;
-    bool json = false, emergency_stop = false, at_zero = false;
+    bool json = false, emergency_stop = false, at_zero = false, rest = false;
 };
 
 std::string json_of(const v1::Command& command) {
@@ -158,15 +158,10 @@ v1::Proof show_loop_check(std::ostream& out, serve::Client& client, const v1::St
     return status.proof();
 }
 
-/// Before arming: a stop that was just ordered, such as the one of the daemon's start, is done when
-/// rest is measured, which takes a window. What lasts longer is the daemon's to explain.
-void wait_for_rest(serve::Client& client) {
-    constexpr auto kLook = std::chrono::milliseconds(100);
-    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
-        std::this_thread::sleep_for(kLook);
-}
-
 int self_test(const TestOptions& options) {
+    if (options.rest)
+        return check_at_rest(options.at, options.by.empty() ? login_name() : options.by,
+                             options.json);
     serve::Client client(options.at);
     if (!options.by.empty()) {
         v1::Command command;
@@ -264,6 +259,12 @@ void add_command(CLI::App& app, int& exit_code, v1::Command::Kind kind, const ch
 
 }  // namespace
 
+void wait_for_rest(serve::Client& client) {
+    constexpr auto kLook = std::chrono::milliseconds(100);
+    for (int looks = 0; looks < 30 && ask_status(client).shaker().stop_pending(); ++looks)
+        std::this_thread::sleep_for(kLook);
+}
+
 bool is_no(int status) { return status == 403 || status == 409 || status == 429; }
 
 std::string problem_of(const serve::Reply& reply) {
@@ -348,6 +349,13 @@ void add_remote(CLI::App& app, int& exit_code) {
             "Instead: the controller runs at 0 g, and its watchdog stops it twice, the second "
             "time with the link closed; half a minute, and nothing moves")
         ->needs("--by");
+    testing
+        .add_flag(
+            "--rest", test_options->rest,
+            "Instead: the opening check of a campaign alone, 4 minutes. Gimbals move, nothing "
+            "shakes; it ends with this tool. Exit code 1: something is off, with the keys "
+            "that would explain it")
+        ->excludes("--at-zero", "--emergency-stop");
     add_socket(testing, test_options->at);
     testing.add_flag("--json", test_options->json, "As JSON (vibrig.v1.Readiness)");
     testing.footer(

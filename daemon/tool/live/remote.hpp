@@ -26,6 +26,12 @@ void parse_answer(const serve::Reply& reply, google::protobuf::Message& message)
 /// Why the daemon does not take it; empty: it has. After an acknowledgement the controller has
 /// forgotten its fault.
 [[nodiscard]] std::string refusal_of(serve::Client& client, const v1::Command& command);
+/// Before arming, or before gimbals move: a stop that was just ordered, such as the one of the
+/// daemon's start, is done when rest is measured, which takes a window. What lasts longer is the
+/// daemon's to explain.
+void wait_for_rest(serve::Client& client);
+/// The opening check alone; exit code.
+[[nodiscard]] int check_at_rest(const serve::Address& at, const std::string& by, bool json);
 /// Loop check and safe-state proof, with what they find to `out`; `argument` as the selftest's. The
 /// daemon ends it where this process is gone, or stopped, for 2 s.
 /// Why it has not passed; empty: it has.

@@ -85,5 +85,24 @@ TEST_F(CampaignTest, ArmsOnlyWithAWatchdogTimeoutThatIsAsWritten) {
     EXPECT_TRUE(command(Kind::arm).accepted);
 }
 
+/// Nothing is written to a controller that nobody knows yet, and it may say so.
+TEST_F(CampaignTest, WhileItIsCommissionedTheShakersLinkIsReadOnly) {
+    run_for(1);
+    ASSERT_EQ(campaign->begin_commissioning("Ada", now), "");
+    EXPECT_TRUE(shaker.only_read);
+    shaker_obeys = false;
+    shaker.now.state = drivers::kShakerFault;  // its watchdog counts at rest, too
+    shaker.now.fault = 1;
+    run_for(5);
+    EXPECT_TRUE(campaign->commissioning());
+    EXPECT_TRUE(shaker.requests.empty());
+    EXPECT_EQ(shaker.stops(), 0U);
+    shaker.now.state = drivers::kShakerRunning;
+    run_for(1);
+    EXPECT_FALSE(campaign->commissioning()) << "what runs is stopped, whoever may write";
+    EXPECT_EQ(shaker.stops(), 1U);
+    EXPECT_FALSE(shaker.only_read);
+}
+
 }  // namespace
 }  // namespace vibrig::campaign

@@ -161,10 +161,10 @@ TEST_F(Books, AProofIsMadeWithoutThePartsThatItProves) {
     what.by = {"A. Person", "B. Person"};
     what.utc_ns = kNow;
     Book book(as);
-    EXPECT_THAT(book.refusal(kNow, false), HasSubstr("no record of bus, gimbals"));
+    EXPECT_THAT(book.refusal(kNow, Part::gyros), HasSubstr("no record of bus, gimbals"));
     book.prove({Part::bus, Part::gimbals, Part::accelerometers, Part::earth, Part::gyros}, what,
                as);
-    EXPECT_EQ(book.refusal(kNow, false), "");
+    EXPECT_EQ(book.refusal(kNow, Part::gyros), "");
     EXPECT_THAT(book.refusal(kNow), HasSubstr("no record of registers, watchdog, stop, units, "
                                               "excitation: vibrig commission watchdog stop"));
 }

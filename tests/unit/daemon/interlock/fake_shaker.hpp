@@ -24,6 +24,7 @@ class FakeShaker final : public drivers::Shaker {
         stop_waits = true;
     }
     void hang_up_until(drivers::Time time) noexcept override { hung_up_until = time; }
+    void read_only(bool on) noexcept override { only_read = on; }
     [[nodiscard]] std::uint64_t stops() const noexcept override { return stops_asked; }
     [[nodiscard]] bool stop_pending() const noexcept override { return stop_waits; }
     [[nodiscard]] bool busy() const noexcept override { return writing; }
@@ -66,6 +67,7 @@ class FakeShaker final : public drivers::Shaker {
     std::atomic<std::uint64_t> stops_asked{0};
     std::atomic<bool> stop_waits{false};
     drivers::Time hung_up_until = 0;
+    bool only_read = false;
     bool refuse = false, writing = false;
     /// Of random vibration, once it runs.
     drivers::RandomReading::State levelled = drivers::RandomReading::State::at_level;
