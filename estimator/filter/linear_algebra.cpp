@@ -28,23 +28,35 @@ std::optional<Cholesky> Cholesky::of(MatrixIn a) {
     return Cholesky(factor.matrixL());
 }
 
+Cholesky Cholesky::or_nan(MatrixIn a) {
+    auto factor = of(a);
+    return factor ? std::move(*factor)
+                  : Cholesky(Matrix::Constant(a.rows(), a.cols(),
+                                              std::numeric_limits<double>::quiet_NaN()));
+}
+
 double Cholesky::log_det() const { return 2 * lower_.diagonal().array().log().sum(); }
 
 double Cholesky::least_pivot() const { return lower_.diagonal().minCoeff(); }
 
-Matrix Cholesky::solve(MatrixIn b) const {
+Matrix Cholesky::whiten(MatrixIn b) const {
     Matrix x = b;
     lower_.triangularView<Eigen::Lower>().solveInPlace(x);
+    return x;
+}
+
+Matrix Cholesky::solve(MatrixIn b) const {
+    Matrix x = whiten(b);
     lower_.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
     return x;
 }
 
 Matrix Cholesky::inverse() const { return solve(Matrix::Identity(lower_.rows(), lower_.cols())); }
 
-Matrix positive_inverse(MatrixIn a) {
-    const auto factor = Cholesky::of(a);
-    return factor ? factor->inverse()
-                  : Matrix::Constant(a.rows(), a.cols(), std::numeric_limits<double>::quiet_NaN());
+Matrix positive_inverse(MatrixIn a) { return Cholesky::or_nan(a).inverse(); }
+
+double squared_distance(MatrixIn covariance, const Vector& d) {
+    return Cholesky::or_nan(covariance).whiten(d).squaredNorm();
 }
 
 struct PivotedCholesky::Factor {
@@ -61,6 +73,10 @@ Matrix orthogonal_factor(MatrixIn a) {
 
 Matrix least_squares(MatrixIn a, MatrixIn b) {
     return Eigen::ColPivHouseholderQR<Matrix>(a).solve(b);
+}
+
+Eigen::Index rank(MatrixIn a, double least) {
+    return Eigen::ColPivHouseholderQR<Matrix>(a).setThreshold(least).rank();
 }
 
 Matrix product(MatrixIn a, MatrixIn b) { return a * b; }

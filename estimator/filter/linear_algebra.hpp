@@ -41,10 +41,14 @@ class Cholesky {
   public:
     /// Empty if `a` is not positive definite.
     [[nodiscard]] static std::optional<Cholesky> of(MatrixIn a);
+    /// NaN, and all that follows from it, if `a` is not positive definite.
+    [[nodiscard]] static Cholesky or_nan(MatrixIn a);
     [[nodiscard]] double log_det() const;
     /// Smallest element on L's diagonal.
     [[nodiscard]] double least_pivot() const;
     [[nodiscard]] const Matrix& lower() const { return lower_; }
+    /// L^-1 b.
+    [[nodiscard]] Matrix whiten(MatrixIn b) const;
     [[nodiscard]] Matrix solve(MatrixIn b) const;
     [[nodiscard]] Matrix inverse() const;
 
@@ -55,6 +59,8 @@ class Cholesky {
 
 /// Of a symmetric positive definite matrix; NaN if it is none.
 [[nodiscard]] Matrix positive_inverse(MatrixIn a);
+/// d' covariance^-1 d; likewise.
+[[nodiscard]] double squared_distance(MatrixIn covariance, const Vector& d);
 
 /// Of a symmetric matrix that rounding may have made indefinite: A = P' L D L' P, pivoted.
 class PivotedCholesky {
@@ -75,6 +81,8 @@ class PivotedCholesky {
 [[nodiscard]] Matrix orthogonal_factor(MatrixIn a);
 /// X that minimises |A X - B|; columns pivoted by size, so that nearly dependent ones do no harm.
 [[nodiscard]] Matrix least_squares(MatrixIn a, MatrixIn b);
+/// Columns that are independent: pivots above `least` of the largest one.
+[[nodiscard]] Eigen::Index rank(MatrixIn a, double least);
 [[nodiscard]] Matrix product(MatrixIn a, MatrixIn b);
 /// A' A.
 [[nodiscard]] Matrix gram(MatrixIn a);

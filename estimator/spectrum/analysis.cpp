@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/uncertainty/budget.hpp"
 #include "estimator/uncertainty/distributions.hpp"
@@ -155,11 +156,11 @@ void settle(const SpectralTable& table, std::size_t j, const GyroProblem& proble
     for (Hypothesis& one : mixture.list) one.weight /= all;
     // What is declared is no lack of fit.
     const MatrixXd null = problem.covariance + declared * declared.transpose();
-    const Eigen::LLT<MatrixXd> factor(null);
     const auto tail = [&](const Mixture& of) {
         const Hypothesis& best = of.list.front();
         const VectorXd left = problem.rate - design(table, j, best.resonances) * best.x;
-        return uncertainty::chi_square_tail(left.dot(factor.solve(left)), std::max(1, of.degrees));
+        return uncertainty::chi_square_tail(linear_algebra::squared_distance(null, left),
+                                            std::max(1, of.degrees));
     };
     out.lack_of_fit[j] = tail(mixture);
     if (out.lack_of_fit[j] >= kAlarm || table.dwells() < kFewestForTwo || !mixture.resonant())

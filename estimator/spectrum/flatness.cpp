@@ -1,9 +1,10 @@
 #include "estimator/spectrum/flatness.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -36,20 +37,20 @@ class Fitted {
     Fitted(MatrixXd white, const VectorXd& sigma) : white_(std::move(white)) {
         MatrixXd normal = white_.transpose() * white_;
         normal.diagonal().array() += sigma.array().square().inverse();
-        factor_.compute(normal);
+        factor_ = linear_algebra::Cholesky::or_nan(normal);
     }
     /// z' Q z of a whitened column.
     [[nodiscard]] double left(const VectorXd& z) const {
         const VectorXd seen = white_.transpose() * z;
-        return z.squaredNorm() - seen.dot(factor_.solve(seen));
+        return z.squaredNorm() - factor_->whiten(seen).squaredNorm();
     }
     [[nodiscard]] VectorXd value(const VectorXd& z) const {
-        return factor_.solve(white_.transpose() * z);
+        return factor_->solve(white_.transpose() * z);
     }
 
   private:
     MatrixXd white_;
-    Eigen::LLT<MatrixXd> factor_;
+    std::optional<linear_algebra::Cholesky> factor_;
 };
 
 VectorXd stacked(const MatrixXd& per_gyro) {
@@ -113,10 +114,10 @@ MatrixXd covariance_if_flat(const uncertainty::GyroRates& gyro,
         alone.likeliest = {{one.first, 1.0}};
         const MatrixXd covariance =
             uncertainty::mean_covariance(flat, alone) + scatter * gyro.variance.mean() * unit;
-        precision += one.second * Eigen::LLT<MatrixXd>(covariance).solve(unit);
+        precision += one.second * linear_algebra::positive_inverse(covariance);
         all += one.second;
     }
-    return Eigen::LLT<MatrixXd>(MatrixXd(precision / all)).solve(unit);
+    return linear_algebra::positive_inverse(precision / all);
 }
 
 VectorXd grouped_prior(const VectorXd& base, Index columns) {
@@ -129,8 +130,8 @@ VectorXd grouped_prior(const VectorXd& base, Index columns) {
 
 Flatness test_flatness(const SpectralTable& table, const VectorXd& rates,
                        const MatrixXd& covariance, const MatrixXd& prior_sigma, bool scattered) {
-    const Eigen::LLT<MatrixXd> root(covariance);
-    const auto whitened = [&](const MatrixXd& x) { return MatrixXd(root.matrixL().solve(x)); };
+    const auto root = linear_algebra::Cholesky::or_nan(covariance);
+    const auto whitened = [&](const MatrixXd& x) { return root.whiten(x); };
     std::array<MatrixXd, 3> base, groups;
     for (std::size_t j = 0; j < 3; ++j) {
         base[j] = table.base(j);

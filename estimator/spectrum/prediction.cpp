@@ -1,9 +1,9 @@
 #include "estimator/spectrum/prediction.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -238,16 +238,15 @@ Verification verify(const Prediction& prediction, const MatrixXd& measured,
         d.segment<3>(3 * k) = (measured.row(k) - prediction.drift.row(k)).transpose();
     }
     Verification out;
-    out.chi_square = d.dot(Eigen::LLT<MatrixXd>(s).solve(d));
+    out.chi_square = linear_algebra::squared_distance(s, d);
     out.degrees = static_cast<int>(3 * m);
     out.p = uncertainty::chi_square_tail(out.chi_square, out.degrees);
     out.z.resize(m, 3);
     for (Index k = 0; k < m; ++k) {
         const Eigen::Vector3d own = d.segment<3>(3 * k);
         const Eigen::Matrix3d block = s.block<3, 3>(3 * k, 3 * k);
-        out.least_p =
-            std::min(out.least_p, uncertainty::chi_square_tail(
-                                      own.dot(Eigen::LLT<Eigen::Matrix3d>(block).solve(own)), 3));
+        out.least_p = std::min(out.least_p, uncertainty::chi_square_tail(
+                                                linear_algebra::squared_distance(block, own), 3));
         for (Index j = 0; j < 3; ++j) {
             const double z = out.z(k, j) = own[j] / std::sqrt(block(j, j));
             out.tight &= !(tolerance > 0) || 2 * std::sqrt(block(j, j)) <= tolerance;

@@ -1,13 +1,12 @@
 #include "estimator/spectrum/survey.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <numeric>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/spectrum/sampling.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -40,9 +39,8 @@ MatrixXd direction_rows(const std::vector<plan::Vec3>& ups) {
 }
 
 double log_det(const MatrixXd& information) {
-    const Eigen::LLT<MatrixXd> factor(information);
-    if (factor.info() != Eigen::Success) return -1e300;
-    return 2 * factor.matrixLLT().diagonal().array().log().sum();
+    const auto factor = linear_algebra::Cholesky::of(information);
+    return factor ? factor->log_det() : -1e300;
 }
 
 MatrixXd information_of(const MatrixXd& of, const Places& places, const MatrixXd& before) {
@@ -149,7 +147,7 @@ Places choose_rows(const MatrixXd& of, std::size_t count, const MatrixXd& before
         }
     }
     const MatrixXd information = information_of(of, chosen, before);
-    const auto rank = Eigen::ColPivHouseholderQR<MatrixXd>(information).setThreshold(1e-9).rank();
+    const auto rank = linear_algebra::rank(information, 1e-9);
     if (rank < of.cols())
         throw PlanError(what + ": found positions of rank " + std::to_string(rank) + ", expected " +
                         std::to_string(of.cols()) + ": more, or other, positions");

@@ -1,10 +1,9 @@
 // What a planned survey will know: the drift under a profile, averaged over resonances that may be.
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <array>
 #include <cmath>
 
 #include "estimator/filter/drift_model.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/spectrum/survey.hpp"
 #include "estimator/spectrum/table.hpp"
 
@@ -82,7 +81,7 @@ class Design {
         add_all(0, places.first);
         for (std::size_t k = 0; k < places.further.size(); ++k) add_all(k + 1, places.further[k]);
         add_all(rows_.size() - 1, places.rest);
-        covariance_ = information.llt().solve(MatrixXd::Identity(kColumns, kColumns));
+        covariance_ = linear_algebra::positive_inverse(information);
     }
     /// Mean variance in the situations.
     [[nodiscard]] double value() const {
@@ -148,7 +147,7 @@ bool determined(const SurveyTask& task, const Places& places) {
                      along_the_vertical(1));
         rows.row(i) = at.vibration[0];
     }
-    return Eigen::ColPivHouseholderQR<MatrixXd>(rows).setThreshold(1e-3).rank() == kElastic;
+    return linear_algebra::rank(rows, 1e-3) == kElastic;
 }
 
 }  // namespace

@@ -174,14 +174,12 @@ struct Fit {
         const MatrixXd square = rates.square(columns);
         MatrixXd information = square.topLeftCorner(terms, terms);
         information.diagonal() += gyro.prior_information;
-        const auto normal = linear_algebra::Cholesky::of(information);
+        const auto normal = linear_algebra::Cholesky::or_nan(information);
         const VectorXd right = square.col(terms).head(terms);
-        covariance_of = linear_algebra::positive_inverse(information);
+        covariance_of = normal.inverse();
         value = covariance_of * right;
-        log_likelihood =
-            -0.5 * rates.log_determinant() -
-            (normal ? 0.5 * normal->log_det() : std::numeric_limits<double>::quiet_NaN()) -
-            0.5 * (square(terms, terms) - right.dot(value));
+        log_likelihood = -0.5 * (rates.log_determinant() + normal.log_det() + square(terms, terms) -
+                                 right.dot(value));
     }
     [[nodiscard]] MatrixXd gain(const GyroRates& gyro) const {
         return covariance_of * rates.solve(gyro.regressors).transpose();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -18,10 +17,7 @@ constexpr auto kCoefficients = static_cast<Index>(kParameters);
 
 /// W with W variance W' = 1: triangular. NaN if the variance is none.
 Eigen::Matrix3d whitening_of(const Eigen::Matrix3d& variance) {
-    const auto factor = linear_algebra::Cholesky::of(variance);
-    if (!factor) return Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
-    const Eigen::Matrix3d root = factor->lower();
-    return root.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity());
+    return linear_algebra::Cholesky::or_nan(variance).whiten(Eigen::Matrix3d::Identity());
 }
 
 }  // namespace
@@ -56,7 +52,7 @@ NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
     MatrixXd normal = white_.transpose() * white_;
     const MatrixXd of_data = normal.topLeftCorner(kCoefficients, kCoefficients);
     normal.diagonal() += information;
-    normal_ = linear_algebra::Cholesky::of(normal);
+    normal_ = linear_algebra::Cholesky::or_nan(normal);
 
     const MatrixXd y = whitened(all_rates(table));
     y_left_ = left(y);
@@ -82,9 +78,6 @@ MatrixXd NullFit::whitened(const MatrixXd& x) const {
 }
 
 MatrixXd NullFit::left(const MatrixXd& white) const {
-    if (!normal_)
-        return MatrixXd::Constant(white.rows(), white.cols(),
-                                  std::numeric_limits<double>::quiet_NaN());
     return white - white_ * normal_->solve(white_.transpose() * white);
 }
 

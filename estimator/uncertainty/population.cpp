@@ -139,10 +139,8 @@ Population population_of(const std::vector<std::vector<Found>>& units) {
 
 Distance distance(const Population& type, const Found& unit) {
     const VectorXd off = unit.value - type.mean;
-    const auto root = linear_algebra::Cholesky::of(type.predicted + unit.covariance);
     Distance out;
-    out.squared =
-        root ? off.dot(root->solve(off).col(0)) : std::numeric_limits<double>::quiet_NaN();
+    out.squared = linear_algebra::squared_distance(type.predicted + unit.covariance, off);
     const auto size = static_cast<double>(off.size());
     const double nu = static_cast<double>(type.units) - 1;
     // A square of Student's t over its mean scatters more than one of the normal distribution.
