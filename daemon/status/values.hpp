@@ -41,6 +41,7 @@ struct StatusValue {
     int decimals = -1;      ///< -1: as many as it has
     bool duration = false;  ///< s, as "1 h 02 min"
     bool alarming = false;  ///< beyond 0 the page marks it
+    const char* silenced_by = nullptr;  ///< a text: where it is not empty this is not said
     bool on_page = true;    ///< else in a terminal alone: the page shows it somewhere else
 
     [[nodiscard]] constexpr StatusValue mqtt(const char* name, double factor = 1) const {
@@ -73,6 +74,9 @@ struct StatusValue {
     }
     [[nodiscard]] constexpr StatusValue alarms() const {
         return with(&StatusValue::alarming, true);
+    }
+    [[nodiscard]] constexpr StatusValue unless(const char* other) const {
+        return with(&StatusValue::silenced_by, other);
     }
     [[nodiscard]] constexpr StatusValue off_page() const {
         return with(&StatusValue::on_page, false);

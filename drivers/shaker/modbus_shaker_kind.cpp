@@ -21,35 +21,49 @@ bool ModbusShaker::same_kind(const ShakerSetPoint& set_point,
         return set_point.random && now.random && now.random->random &&
                now.random->profile == set_point.random->profile &&
                std::abs(now.random->level_db - set_point.random->level_db) < kSameLevel_db;
+    if (set_point.sweep || (now.sweep && now.sweep->on))
+        return set_point.sweep && now.sweep && now.sweep->is(*set_point.sweep);
     return std::abs(set_point.frequency_hz - now.frequency_hz) <= kSameFrequency_hz;
 }
 
-bool ModbusShaker::choose(const std::optional<RandomSetPoint>& random) {
-    const proto::RandomRegisters& map = *settings_.registers.random;
-    const proto::Register& amplitude = settings_.registers.amplitude;
-    if (!random && image_.value_of(map.mode) == 0) return true;
+bool ModbusShaker::choose(const ShakerSetPoint& set_point) {
+    const proto::ShakerRegisters& map = settings_.registers;
+    const proto::Register& amplitude = map.amplitude;
+    if (!set_point.random && !set_point.sweep && image_.value_of(map.mode) == kModeSine)
+        return true;
     // As the frequency: at zero amplitude, where the register may still hold the last one.
     if (image_.value_of(amplitude) != 0 && !write_each(std::array{Step{"amplitude", amplitude, 0}}))
         return false;
-    if (!random) return write_each(std::array{Step{"mode", map.mode, 0}});
+    if (set_point.random) return choose_random(*set_point.random);
+    if (!set_point.sweep) return write_each(std::array{Step{"mode", map.mode, kModeSine}});
+    // Likewise without ends between which it may go.
+    const SweepSetPoint& sweep = *set_point.sweep;
+    return write_each(std::array{Step{"sweep from", map.sweep->from, sweep.from_hz},
+                                 Step{"sweep to", map.sweep->to, sweep.to_hz},
+                                 Step{"sweep rate", map.sweep->rate, sweep.octaves_per_minute},
+                                 Step{"mode", map.mode, kModeSweep}});
+}
+
+bool ModbusShaker::choose_random(const RandomSetPoint& random) {
+    const proto::RandomRegisters& map = *settings_.registers.random;
     // A controller refuses the mode without a profile that it knows.
-    const double number = random->profile;
+    const double number = random.profile;
     if (!write_each(std::array{Step{"profile number", map.profile_number, number},
-                               Step{"profile level", map.profile_level_db, random->level_db},
-                               Step{"mode", map.mode, 1}}))
+                               Step{"profile level", map.profile_level_db, random.level_db},
+                               Step{"mode", settings_.registers.mode, kModeRandom}}))
         return false;
     Words words{};
     const auto raw = std::span(words).first(map.profile_checksum.words());
     const Reply reply = read(map.profile_checksum, raw);
-    if (reply.ok() && proto::decode(map.profile_checksum, raw) == random->checksum) return true;
+    if (reply.ok() && proto::decode(map.profile_checksum, raw) == random.checksum) return true;
     if (!reply.ok() && reply.kind != ReplyKind::exception) return false;
     write_failed_ = true;
     if (reply.ok()) ++counts_.read_back_mismatches;
     settle(reply.ok() ? "profile checksum reads back as " +
                             std::to_string(static_cast<std::uint32_t>(
                                 proto::decode(map.profile_checksum, raw))) +
-                            ", expected " + std::to_string(random->checksum) + " of profile " +
-                            std::to_string(random->profile)
+                            ", expected " + std::to_string(random.checksum) + " of profile " +
+                            std::to_string(random.profile)
                       : "profile checksum cannot be read back: " + reply.text());
     return false;
 }
