@@ -148,6 +148,32 @@ TEST_F(SurveyCommand, BadInputIsNamed) {
     }
 }
 
+/// First order, 100 Hz: of 100 Hz they see half. --check would refuse more; a plan has none of it.
+TEST_F(SurveyCommand, APlanAvoidsWhatTheAccelerometersDoNotSee) {
+    write("rig.toml", "[accelerometer]\nbandwidth_hz = 100.0\n[spectrum]\nmount = \"hard\"\n");
+    ASSERT_EQ(vibrig("plan --config rig.toml --frequencies 15,25,35,180 --highest 200 --json"), 0)
+        << error;
+    double highest = 0;
+    std::set<double> all;
+    for (const auto& run : json().at("runs")) {
+        const double hz = run.value("frequency_hz", 0.0);
+        highest = std::max(highest, hz);
+        if (hz > 0) all.insert(hz);
+    }
+    EXPECT_LE(highest, 100);
+    EXPECT_GT(highest, 90);
+    EXPECT_GE(all.size(), 5U);
+    EXPECT_NE(error.find("180 Hz is left out: the accelerometers see 0.236"), std::string::npos)
+        << error;
+    EXPECT_NE(error.find("and not to 200 Hz: beyond it the accelerometers see less than half"),
+              std::string::npos)
+        << error;
+    EXPECT_EQ(vibrig("plan --config rig.toml --frequencies 150,180 --json"), 2);
+    EXPECT_NE(error.find("--frequencies: found none of which the accelerometers see half"),
+              std::string::npos)
+        << error;
+}
+
 TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
     const std::string at = R"({"runs":[{"position":[0,0,0],"level_g":6)";
     const std::string bare = R"({"runs":[{"position":[0,0,0])";
