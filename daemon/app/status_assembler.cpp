@@ -1,5 +1,7 @@
 #include "daemon/app/status_assembler.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -11,7 +11,7 @@ constexpr estimator::SweptSine kUp{20, 80, 40}, kDown{80, 20, 40};
 constexpr double kRate_hz = 400;
 
 /// What is said of a sweep, and what is shaken, second by second.
-struct Ride {
+struct SweptRide {
     std::function<double(double)> said, shaken;  ///< Hz at a time since the dwell began
     estimator::SweptSine of = kUp;
     double poll_s = 0.2;
@@ -23,7 +23,7 @@ double law(const estimator::SweptSine& of, double begins_s, double t) {
 }
 
 /// The level is there 3 s before the dwell. What it is told, and when in s; empty: nothing.
-std::pair<std::string, double> watched(const Ride& ride) {
+std::pair<std::string, double> watched(const SweptRide& ride) {
     rt::DwellOrder order;
     order.from = 100 * kSecond;
     order.dwell.sweep = ride.of;
@@ -44,7 +44,7 @@ std::pair<std::string, double> watched(const Ride& ride) {
     return {"", end_s};
 }
 
-Ride honest(const estimator::SweptSine& of, double begins_s) {
+SweptRide honest(const estimator::SweptSine& of, double begins_s) {
     const auto at = [of, begins_s](double t) { return law(of, begins_s, t); };
     return {at, at, of};
 }
@@ -59,7 +59,7 @@ TEST(SweepWatch, UpAndDownWheneverTheControllerBegins) {
 }
 
 TEST(SweepWatch, OneThatGoesTheOtherWayIsFoundAtOnce) {
-    Ride ride = honest(kUp, 2);
+    SweptRide ride = honest(kUp, 2);
     ride.said = ride.shaken = [](double t) { return law({20, 5, 40}, 2, t); };
     const auto [why, when] = watched(ride);
     EXPECT_NE(why.find("it goes the other way"), std::string::npos) << why;
@@ -67,7 +67,7 @@ TEST(SweepWatch, OneThatGoesTheOtherWayIsFoundAtOnce) {
 }
 
 TEST(SweepWatch, OneThatStandsStillIsFoundWithinItsTime) {
-    Ride ride = honest(kUp, 2);
+    SweptRide ride = honest(kUp, 2);
     ride.said = ride.shaken = [](double) { return 20.0; };
     const auto [why, when] = watched(ride);
     EXPECT_NE(why.find("stands still at 20.000 Hz"), std::string::npos) << why;
@@ -81,7 +81,7 @@ TEST(SweepWatch, OneThatStandsStillIsFoundWithinItsTime) {
 
 TEST(SweepWatch, ARateThatLiesIsFound) {
     for (const double scaled : {0.5, 0.8, 1.3, 2.0}) {
-        Ride ride = honest(kUp, 2);
+        SweptRide ride = honest(kUp, 2);
         ride.said = ride.shaken = [scaled](double t) {
             return law(kUp, 2, 2 + scaled * std::max(0.0, t - 2));
         };
@@ -101,7 +101,7 @@ TEST(SweepWatch, AFrequencyThatOnlyIsSaidIsContradictedByTheAccelerometers) {
         [](double t) { return law(kUp, 2, std::min(t, 12.0)); },  // stands still
         [](double t) { return law(kUp, 2, 2 + 1.2 * std::max(0.0, t - 2)); }};
     for (std::size_t i = 0; i < lies.size(); ++i) {
-        Ride ride = honest(kUp, 2);
+        SweptRide ride = honest(kUp, 2);
         ride.shaken = lies[i];
         const auto [why, when] = watched(ride);
         EXPECT_NE(why.find("they vibrate at another"), std::string::npos) << i << ": " << why;
@@ -112,7 +112,7 @@ TEST(SweepWatch, AFrequencyThatOnlyIsSaidIsContradictedByTheAccelerometers) {
 
 TEST(SweepWatch, WhatIsNoFrequencyIsNone) {
     for (const double hz : {0.0, -20.0, std::nan(""), 1e9}) {
-        Ride ride = honest(kUp, 2);
+        SweptRide ride = honest(kUp, 2);
         ride.said = [hz](double t) { return t > 5 ? hz : law(kUp, 2, t); };
         const auto [why, when] = watched(ride);
         EXPECT_NE(why, "") << hz;

@@ -6,7 +6,7 @@ namespace vibrig::drivers::test {
 namespace {
 
 // Addresses of the default register map.
-constexpr int kMode = 8, kFrom = 11, kTo = 13, kRate = 15, kActual = 10;
+constexpr int kSweepMode = 8, kFrom = 11, kTo = 13, kRate = 15, kActual = 10;
 
 ShakerSettings with_sweeps(const TestServer& server) {
     ShakerSettings settings = settings_for(server);
@@ -28,11 +28,11 @@ TEST(ShakerSweep, EndsRateAndModeBeforeAnythingMoves) {
     Bench bench(with_sweeps(server));
     ASSERT_TRUE(bench.apply(sweep(20, 120)));
     EXPECT_EQ(addresses_written(server),
-              (std::vector{kFrom, kTo, kRate, kMode, kRampTime, kAmplitude, kRun}));
+              (std::vector{kFrom, kTo, kRate, kSweepMode, kRampTime, kAmplitude, kRun}));
     EXPECT_EQ(joined(server, kFrom), 20000U);
     EXPECT_EQ(joined(server, kTo), 120000U);
     EXPECT_EQ(server.holding(kRate), 125);
-    EXPECT_EQ(server.holding(kMode), 2);
+    EXPECT_EQ(server.holding(kSweepMode), 2);
     const auto reading = bench.shaker->reading();
     ASSERT_TRUE(reading.sweep);
     EXPECT_TRUE(reading.sweep->is({20, 120, 1.25}));
@@ -48,7 +48,7 @@ TEST(ShakerSweep, AnEndThatIsNotTakenMovesNothing) {
     Bench bench(with_sweeps(server));
     ASSERT_TRUE(bench.apply(sweep(20, 120)));
     EXPECT_EQ(server.holding(kRun), 0);
-    EXPECT_EQ(server.holding(kMode), 0);
+    EXPECT_EQ(server.holding(kSweepMode), 0);
     ASSERT_TRUE(bench.reaches(LinkState::degraded));
 }
 
@@ -66,8 +66,8 @@ TEST(ShakerSweep, ChangesAtRestOnly) {
     server.forget();
     ASSERT_TRUE(bench.apply({15, 1, 1}));
     EXPECT_EQ(addresses_written(server),
-              (std::vector{kMode, kFrequency, kRampTime, kAmplitude, kRun}));
-    EXPECT_EQ(server.holding(kMode), 0);
+              (std::vector{kSweepMode, kFrequency, kRampTime, kAmplitude, kRun}));
+    EXPECT_EQ(server.holding(kSweepMode), 0);
 }
 
 TEST(ShakerSweep, WhereItIs) {
