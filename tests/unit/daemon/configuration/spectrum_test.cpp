@@ -468,7 +468,7 @@ TEST(SpectrumKeys, APlanWithASweepNeedsRegistersRateAndLimits) {
                          "spectrum.mode = \"mixed\"\nspectrum.mount = \"hard\"\n"),
                 HasSubstr("at 40 samples/s, expected 100 at least"));
     EXPECT_THAT(said(R"("from_hz":8,"to_hz":120,"s":300)", 6, whole),
-                HasSubstr("at 6 g, expected 3.09 g at most, at 8 Hz"));
+                HasSubstr("at 6 g, expected 3.0917 g at most, at 8 Hz"));
     EXPECT_THAT(said(R"("from_hz":120,"to_hz":5,"s":300)", 2, whole), HasSubstr("g at most, at"));
     EXPECT_THAT(said(up, 0, whole), HasSubstr("at 0 g, expected a level"));
     EXPECT_THAT(said(up, 6, whole + "accelerometer.bandwidth_hz = 60\n"),
