@@ -11,10 +11,10 @@ namespace vibrig {
 struct VibrationStatus {
     std::string kind;         ///< "rest", "sine", "sweep", "random"; empty: a rig with one sine
     double frequency_hz = 0;  ///< of a sine, and where a sweep is
-    std::string profile;            ///< of random vibration
-    int number = 0;                 ///< of the profile in the controller
-    double level_db = 0;            ///< about it
-    std::string control;            ///< what the controller says of random vibration
+    std::string profile;      ///< of random vibration
+    int number = 0;           ///< of the profile in the controller
+    double level_db = 0;      ///< about it
+    std::string control;      ///< what the controller says of random vibration
     double commanded_g = 0, controller_g = -1;
     double table_g = -1,
            platform_g = -1;  ///< by the accelerometers, the platform's as at the table
