@@ -231,7 +231,8 @@ limits = 5
           "rig.toml:7:6: can.signal: found an unknown table, expected one of dbc, fd, ",
           "rig.toml:10:1: can.signals.table_acel: found an unknown key, expected one of accel_x, ",
           "rig.toml:11:1: can.signals.\"accel_x.valid\": found an unknown key",
-          "rig.toml:13:1: shaker.registers.runs: found an unknown table, expected one of amplitude",
+          "rig.toml:13:1: shaker.registers.runs: found an unknown table, expected one of "
+          "actual_frequency, amplitude",
           "rig.toml:14:9: shaker.registers.run.adress: found an unknown key, expected one of "
           "access, address, mask, scale, table, type, word_order\n",
           "rig.toml:16:10: shaker.limits: found 5, expected a table\n",

@@ -415,8 +415,9 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers, (4 + 7 + 5) * sizeof(double) + sizeof(std::int32_t) +
-                             sizeof(std::int64_t) + 2 + sizeof(std::uint16_t));
+    bytes.erase(numbers, (4 + 7 + 5 + 3) * sizeof(double) + sizeof(std::int32_t) +
+                             sizeof(std::int64_t) + 2 + sizeof(std::uint16_t) +
+                             sizeof(std::uint32_t));
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(
