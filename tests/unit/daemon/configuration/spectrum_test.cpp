@@ -496,8 +496,8 @@ TEST(SpectrumKeys, RegistersOfSweepsAreAllThereOrNone) {
     // What is written is no input register.
     std::string input = kSweepRegisters;
     input.replace(input.find("type = \"u32\""), 0, "table = \"input\", ");
-    EXPECT_THAT(complaint(input, true),
-                AllOf(HasSubstr("shaker.registers.sweep_from.table"), HasSubstr("it is written")));
+    EXPECT_THAT(complaint(input, true), AllOf(HasSubstr("shaker.registers.sweep_from.table"),
+                                              HasSubstr("this register is written")));
 }
 
 }  // namespace
