@@ -31,7 +31,8 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
     std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "wb"));
     if (!file) fail("cannot be opened for writing: ");
     std::string text = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g";
-    text += simulated ? ",simulated\n" : "\n";
+    const bool frequency = !rows.empty() && rows.front().frequency_hz >= 0;
+    text += std::string(frequency ? ",frequency_hz" : "") + (simulated ? ",simulated\n" : "\n");
     const auto flush = [&] {
         if (std::fwrite(text.data(), 1, text.size(), file.get()) != text.size()) {
             fail("cannot be written: ");
@@ -46,7 +47,8 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
         for (const double angle : row.angle_deg) append(text, angle, ',');
         append(text, row.force_g[0], ',');
         append(text, row.force_g[1], ',');
-        append(text, row.force_g[2], simulated ? ',' : '\n');
+        append(text, row.force_g[2], simulated || frequency ? ',' : '\n');
+        if (frequency) append(text, row.frequency_hz, simulated ? ',' : '\n');
         if (simulated) text += "1\n";
         if (text.size() > kChunk) flush();
     }

@@ -27,8 +27,6 @@ struct Register {
 
 /// Of a controller that plays random vibration by profiles of its own.
 struct RandomRegisters {
-    Register mode{8, RegisterType::u16, WordOrder::big, RegisterTable::holding, Access::read_write,
-                  1};  ///< 0 sine, 1 random
     Register profile_number{
         9, RegisterType::u16, WordOrder::big, RegisterTable::holding, Access::read_write, 1};
     Register profile_level_db{
@@ -43,6 +41,22 @@ struct RandomRegisters {
     /// armed; the high byte: why it aborted.
     Register control_state{9, RegisterType::u16, WordOrder::big, RegisterTable::input, Access::read,
                            1};
+};
+
+/// Of a controller that goes from one frequency to another by itself, exponentially, and stays
+/// there. It begins once the level is reached.
+struct SweepRegisters {
+    Register from{
+        11,  RegisterType::u32, WordOrder::big, RegisterTable::holding, Access::read_write,
+        1e-3};  ///< Hz
+    Register to{13,  RegisterType::u32, WordOrder::big, RegisterTable::holding, Access::read_write,
+                1e-3};  ///< Hz
+    Register rate{
+        15,  RegisterType::u16, WordOrder::big, RegisterTable::holding, Access::read_write,
+        1e-2};  ///< octaves per minute, either way
+    Register actual_frequency{
+        10,  RegisterType::u32, WordOrder::big, RegisterTable::input, Access::read,
+        1e-3};  ///< Hz, where it is
 };
 
 /// The roles Vibrig knows. The configuration's [shaker.registers] table gives each its Register.
@@ -70,8 +84,12 @@ struct ShakerRegisters {
         0x0001};  ///< 1: chain open
     Register measured_amplitude{
         3,   RegisterType::u32, WordOrder::big, RegisterTable::input, Access::read,
-        1e-4};                              ///< g peak at the table
-    std::optional<RandomRegisters> random;  ///< none: sines alone
+        1e-4};  ///< g peak at the table
+    /// 0 sine, 1 random, 2 sweep; of a controller that has one of the two.
+    Register mode{8, RegisterType::u16, WordOrder::big, RegisterTable::holding, Access::read_write,
+                  1};
+    std::optional<RandomRegisters> random;  ///< none: no random vibration
+    std::optional<SweepRegisters> sweep;    ///< none: no sweeps
 };
 
 [[nodiscard]] double decode(const Register& reg, std::span<const std::uint16_t> words) noexcept;

@@ -13,6 +13,7 @@
 #include "daemon/commission/acceptance.hpp"
 #include "daemon/configuration/random_profiles.hpp"
 #include "daemon/results/result_json.hpp"
+#include "estimator/spectrum/read_sweep.hpp"
 
 namespace vibrig {
 
@@ -47,6 +48,7 @@ void CampaignDwells::begin() {
     with_.identification = estimator::Identification(configuration_.estimator);
     with_.identification.reserve(planned_dwells());
     noise_monitor_.reset();
+    sweeps_.clear();
     verdict_told_.clear();
     take_type_prior();
     const std::lock_guard lock(mutex_);
@@ -65,9 +67,21 @@ std::size_t CampaignDwells::planned_dwells() const {
 bool CampaignDwells::order(const rt::DwellOrder& order) {
     const bool taken = with_.stage.order(order);
     if (taken && !order.cancel) ++with_estimator_;
+    if (taken && !order.cancel) ordered_ = order;
     if (taken && with_.recorder)
         with_.recorder->ordered(order, with_.clock.now(), with_.identification.noise());
     return taken;
+}
+
+void CampaignDwells::swept(const estimator::spectrum::Sweep& sweep,
+                           const std::vector<std::array<double, 2>>& readings) {
+    sweeps_.push_back(sweep);
+    if (!with_.recorder) return;
+    record::Swept rows;
+    for (const auto& [time_s, hz] : readings)
+        rows.rows.push_back(
+            {ordered_.from + drivers::from_seconds(time_s), sweep.run, sweep.position, hz});
+    with_.recorder->swept(std::move(rows));
 }
 
 std::optional<campaign::Next> CampaignDwells::next(const std::array<double, 3>& here_deg,
@@ -134,6 +148,7 @@ void CampaignDwells::resume(const std::string& by) {
     with_.identification = std::move(interrupted_->identification);
     with_.identification.reserve(planned_dwells());
     noise_monitor_.continue_from(std::move(interrupted_->noise));
+    sweeps_ = std::move(interrupted_->sweeps);
     if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
     interrupted_.reset();
     auto result = with_.identification.result();
@@ -145,6 +160,19 @@ void CampaignDwells::end(bool complete) {
     to_write_ = complete ? ToWrite::complete : ToWrite::partial;
     noise_monitor_.report();
 }
+
+namespace {
+
+/// As its stage made it while it was measured.
+estimator::spectrum::Sweep sweep_again(const estimator::Settings& settings,
+                                       const journal::DwellCheckpoint& dwell) {
+    estimator::spectrum::ReadSweep sweep(settings, dwell.info.run, dwell.info.position);
+    for (const auto& [time_s, hz] : dwell.stop.swept_hz) sweep.frequency(time_s, hz);
+    for (const auto& measurement : dwell.measurements) sweep.add(measurement);
+    return sweep.finish();
+}
+
+}  // namespace
 
 void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
                                       campaign::Campaign& campaign) {
@@ -160,6 +188,8 @@ void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
     for (const auto& dwell : unfinished.dwells) {
         done.push_back(dwell.summary);
         if (dwell.stop_known) stops.push_back(dwell.stop);
+        if (dwell.info.sweep.any() && !dwell.summary.left_out)
+            fresh.sweeps.push_back(sweep_again(configuration_.estimator, dwell));
     }
     const std::size_t count = done.size();
     if (why.empty() && !campaign.offer(std::move(done), std::move(stops)))
@@ -225,7 +255,7 @@ void CampaignDwells::write_out(campaign::Campaign& campaign) {
     assessing_.abandon();
     write_result(judge(configuration_.estimator, whole_result(), again(),
                        estimator::uncertainty::Stage::ended, with_.identification.rows(),
-                       configuration::numbered_kinds(configuration_)),
+                       configuration::numbered_kinds(configuration_), sweeps_),
                  campaign);
 }
 

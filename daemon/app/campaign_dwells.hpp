@@ -51,6 +51,8 @@ class CampaignDwells final : public campaign::Dwells {
 
     void begin() override;
     [[nodiscard]] bool order(const rt::DwellOrder& order) override;
+    void swept(const estimator::spectrum::Sweep& sweep,
+               const std::vector<std::array<double, 2>>& readings) override;
     [[nodiscard]] bool free() const override { return with_estimator_ == 0 && written(); }
     void levelled(const LevelDrift& drift) override { noise_monitor_.levelled(drift); }
     [[nodiscard]] std::optional<campaign::Next> next(const std::array<double, 3>& here_deg,
@@ -104,7 +106,8 @@ class CampaignDwells final : public campaign::Dwells {
                                       const std::optional<Again>& again,
                                       estimator::uncertainty::Stage stage,
                                       const std::vector<estimator::DwellRow>& all_rows,
-                                      const tool::NumberedKinds& profiles);
+                                      const tool::NumberedKinds& profiles,
+                                      std::vector<estimator::spectrum::Sweep> sweeps);
     [[nodiscard]] static std::vector<estimator::DwellRow> assess(
         Judged& out, const estimator::Settings& settings, const estimator::Result& result,
         const std::optional<Again>& again, estimator::uncertainty::Stage stage);
@@ -133,8 +136,11 @@ class CampaignDwells final : public campaign::Dwells {
         estimator::Identification identification;
         noise::NoiseMonitor noise;
         std::int64_t id = 0;
+        std::vector<estimator::spectrum::Sweep> sweeps{};
     };
     std::optional<Interrupted> interrupted_;
+    std::vector<estimator::spectrum::Sweep> sweeps_;  ///< of the campaign so far
+    rt::DwellOrder ordered_;                          ///< the newest
     std::optional<std::size_t> resumed_;
     std::optional<plan::AdaptivePlan> adaptive_;
     std::shared_ptr<const plan::TypePrior> type_prior_;  ///< null: it is planned without

@@ -21,7 +21,7 @@ std::vector<plan::PlannedRun> runs_of(const campaign::Settings& campaign, double
         runs.push_back({position, table_g * transmission, table_g, 1});
     };
     for (const auto& stop : campaign.stops) {
-        const bool apart = stop.verify || stop.random ||
+        const bool apart = stop.verify || stop.random || stop.sweep.any() ||
                            (stop.frequency_hz > 0 && stop.table_g > 0 &&
                             !estimator::at_reference(campaign.rig, stop.frequency_hz));
         if (!apart) add(stop.position_deg, stop.table_g);

@@ -105,13 +105,15 @@ CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings
                                              const std::optional<Again>& again,
                                              uncertainty::Stage stage,
                                              const std::vector<estimator::DwellRow>& all_rows,
-                                             const tool::NumberedKinds& profiles) {
+                                             const tool::NumberedKinds& profiles,
+                                             std::vector<estimator::spectrum::Sweep> sweeps) {
     Judged out;
     const auto anew = assess(out, settings, result, again, stage);
     if (stage != uncertainty::Stage::ended || !out.assessed.done) return out;
     const auto in_force = out.anew ? dwells::Anew::settings_of(settings, again->found) : settings;
-    out.spectrum = tool::spectrum_of(in_force, out.anew ? anew : all_rows,
-                                     estimator::spectrum::Form::automatic, profiles);
+    out.spectrum =
+        tool::spectrum_of(in_force, out.anew ? anew : all_rows,
+                          estimator::spectrum::Form::automatic, profiles, std::move(sweeps));
     if (out.spectrum) tool::adopt(*out.spectrum, in_force, out.assessed);
     return out;
 }
@@ -157,11 +159,12 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
         const auto work = [settings = configuration_.estimator, result = whole_result(),
                            rows = with_.identification.rows(),
                            profiles = configuration::numbered_kinds(configuration_),
+                           sweeps = concluding_ ? sweeps_ : decltype(sweeps_){},
                            anew = concluding_ ? again() : std::nullopt,
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,
                            trim = !with_.memory_locked] {
-            auto found = judge(settings, result, anew, stage, rows, profiles);
+            auto found = judge(settings, result, anew, stage, rows, profiles, sweeps);
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;

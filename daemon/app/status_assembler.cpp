@@ -1,5 +1,7 @@
 #include "daemon/app/status_assembler.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -96,9 +98,18 @@ VibrationStatus StatusAssembler::vibration(const StatusData& status) const {
     out.platform_g = status.witness_g[0];
     out.table_g = status.witness_g[1];
     const bool random = reading.valid && reading.random && reading.random->random;
-    out.kind = random ? "random" : "sine";
+    const bool sweeps = reading.valid && reading.sweep && reading.sweep->on;
+    out.kind = random ? "random" : sweeps ? "sweep" : "sine";
     if (!random) {
-        out.frequency_hz = reading.valid ? reading.frequency_hz : status.command_frequency_hz;
+        out.frequency_hz = sweeps          ? reading.sweep->actual_hz
+                           : reading.valid ? reading.frequency_hz
+                                           : status.command_frequency_hz;
+        if (sweeps) {
+            out.from_hz = reading.sweep->from_hz;
+            out.to_hz = reading.sweep->to_hz;
+            out.words = fmt::format("sweep {:g} to {:g} Hz, now {:.2f} Hz", out.from_hz, out.to_hz,
+                                    out.frequency_hz);
+        }
         if (reading.valid) out.controller_g = reading.measured_g;
         return out;
     }
@@ -111,10 +122,12 @@ VibrationStatus StatusAssembler::vibration(const StatusData& status) const {
     // The rules of rt::RandomBands.
     out.low_g = out.commanded_g * std::pow(10, -3.0 / 20);
     out.high_g = out.commanded_g * std::pow(10, 3.0 / 20);
+    out.words = fmt::format("random, profile number {} at {:.1f} dB", now.profile, now.level_db);
     const auto profile = std::ranges::find_if(
         rig.profiles, [&now](const auto& one) { return one.number == now.profile; });
     if (profile == rig.profiles.end()) return out;
     out.profile = profile->profile.name;
+    out.words = fmt::format("random, profile {} at {:.1f} dB", out.profile, now.level_db);
     out.psd_at = profile->at_table ? "table" : "platform";
     for (const auto& [hz, density] : profile->profile.psd)
         out.psd.emplace_back(hz, density * std::pow(10, now.level_db / 10));

@@ -46,6 +46,19 @@ std::string profiles_text(const Stops& stops) {
     return profiles;
 }
 
+/// Likewise the sweeps.
+template <typename Stops>
+std::string sweeps_text(const Stops& stops) {
+    std::string text;
+    for (const auto& [stop, run, position] : stops) {
+        if (!stop.sweep.any()) continue;
+        const auto one = fmt::format(", sweep from {:g} to {:g} Hz in {:g} s", stop.sweep.from_hz,
+                                     stop.sweep.to_hz, stop.sweep.seconds);
+        if (text.find(one) == std::string::npos) text += one;
+    }
+    return text;
+}
+
 }  // namespace
 
 void Campaign::take_over_trip(const std::string& causes, double table_g) {
@@ -127,7 +140,7 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
                            : "about " + duration_text(left_s + times_.opening_s + times_.closing_s);
     return fmt::format(
         "{}, plan \"{}\" ({}), up to {:g} g at the table{}, {}; to be started within {}", unit,
-        settings_.name, plan, highest_level(), profiles_text(stops_), lasts,
+        settings_.name, plan, highest_level(), profiles_text(stops_) + sweeps_text(stops_), lasts,
         duration_text(settings_.arming_valid_s));
 }
 

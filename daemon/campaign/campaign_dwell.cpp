@@ -86,7 +86,8 @@ void Campaign::next_position(Time now) {
     ports_.log.position_done(
         info, dwells_.back(),
         {here().stop.position_deg, table_g(), repeats_, used_s(now), info.begin_s,
-         dwelling_->utc_ns(), here().stop.frequency_hz, here().stop.verify, info.random.profile});
+         dwelling_->utc_ns(), here().stop.frequency_hz, here().stop.verify, info.random.profile,
+         here().stop.sweep.from_hz, here().stop.sweep.to_hz, dwelling_->swept_hz()});
     ++at_;
     enter(State::resting, now);
 }

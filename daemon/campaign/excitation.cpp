@@ -12,8 +12,33 @@ namespace vibrig::campaign {
 using drivers::from_seconds;
 using drivers::Time;
 
+namespace {
+
+drivers::SweepSetPoint set_point_of(const estimator::SweptSine& sweep) {
+    return {sweep.from_hz, sweep.to_hz,
+            60 * std::abs(std::log2(sweep.to_hz / sweep.from_hz)) / sweep.seconds};
+}
+
+}  // namespace
+
+void Excitation::follow(Time begun, double octaves_per_s, Time now) {
+    // What a lock-in over its window does not tell.
+    constexpr double kAlike_hz = 0.2;
+    rt::Sweep next = follows_;
+    next.begin = begun;
+    next.octaves_per_s = octaves_per_s;
+    if (std::abs(next.hz(now) - follows_.hz(now)) <= kAlike_hz) return;
+    follows_ = next;
+    tell_ramp(asked_g_, now);
+}
+
 void Excitation::from_rest(const Stop& stop, Time now) {
-    frequency_hz_ = stop.frequency_hz > 0 ? stop.frequency_hz : settings_.frequency_hz;
+    sweep_ = stop.sweep;
+    frequency_hz_ = sweep_.any()            ? sweep_.from_hz
+                    : stop.frequency_hz > 0 ? stop.frequency_hz
+                                            : settings_.frequency_hz;
+    follows_ = {};
+    if (sweep_.any()) follows_ = {sweep_.from_hz, sweep_.to_hz, 0, now, stop.along};
     const auto measured = measured_.find(stop.frequency_hz);
     random_ = stop.random;
     transmission_ = measured != measured_.end() && !random_ ? measured->second : stop.transmission;
@@ -25,6 +50,7 @@ drivers::ShakerSetPoint Excitation::set_point(double table_g, bool run_at_zero) 
     drivers::ShakerSetPoint point{
         frequency_hz_, table_g, settings_.ramp_s, {}, run_at_zero && !random_};
     if (random_) point.random = random_->set_point;
+    if (sweep_.any()) point.sweep = set_point_of(sweep_);
     return point;
 }
 
@@ -55,7 +81,7 @@ void Excitation::tell_ramp(double table_g, Time now) {
     const RigFrame frame(settings_.rig);
     rig_.ramping({start_g, table_g, now, from_seconds(settings_.ramp_s), highest_g_, campaign_,
                   frame.to_raw(frame.up_at_deg(position_deg_)), frequency_hz_, transmission_,
-                  random_ ? random_->place : std::uint16_t{0}});
+                  random_ ? random_->place : std::uint16_t{0}, follows_});
 }
 
 Excitation::Rests Excitation::come_to_rest(Time now) {
@@ -110,6 +136,9 @@ bool Excitation::chosen() const {
     const auto reading = rig_.shaker.reading();
     if (!reading.valid) return false;
     const bool plays = reading.random && reading.random->random;
+    const bool sweeps = reading.sweep && reading.sweep->on;
+    if (sweep_.any()) return !plays && sweeps && reading.sweep->is(set_point_of(sweep_));
+    if (sweeps) return false;
     if (!random_) return !plays && std::abs(reading.frequency_hz - frequency_hz_) <= kWritten_hz;
     const auto& wanted = random_->set_point;
     return plays && reading.random->profile == wanted.profile &&
@@ -123,12 +152,16 @@ bool Excitation::as_commanded(double table_g) const {
     const bool running =
         reading.valid && reading.running && reading.state == drivers::kShakerRunning;
     if (random_) return running && reading.random && plays_as_commanded(reading);
-    if (reading.random && reading.random->random) return false;
+    if ((reading.random && reading.random->random) ||
+        (reading.sweep && reading.sweep->on != sweep_.any()))
+        return false;
     const bool there = reading.state == drivers::kShakerRunning ||
                        (table_g == 0 && reading.state == drivers::kShakerRamping);
     const double tolerance_g = table_g > 0 ? settings_.amplitude_tolerance * table_g : kAtZero_g;
     return reading.valid && reading.running && there &&
-           std::abs(reading.frequency_hz - frequency_hz_) <= kFrequencyToleranceHz &&
+           (sweep_.any()
+                ? chosen()
+                : std::abs(reading.frequency_hz - frequency_hz_) <= kFrequencyToleranceHz) &&
            std::abs(reading.measured_g - table_g) <= tolerance_g;
 }
 

@@ -40,6 +40,9 @@ class Excitation {
     [[nodiscard]] double frequency_hz() const { return frequency_hz_; }
     /// In place of a sine; none: a sine.
     [[nodiscard]] const std::optional<RandomStop>& random() const { return random_; }
+    [[nodiscard]] const estimator::SweptSine& sweep() const { return sweep_; }
+    /// It has begun then, and goes so fast: the witnesses go with it.
+    void follow(drivers::Time begun, double octaves_per_s, drivers::Time now);
     /// The controller has been told this kind of vibration already, by what it reads back.
     [[nodiscard]] bool chosen() const;
 
@@ -95,6 +98,8 @@ class Excitation {
     std::array<double, 3> position_deg_{};
     double frequency_hz_;
     std::optional<RandomStop> random_;
+    estimator::SweptSine sweep_{};
+    rt::Sweep follows_{};                ///< as the witnesses were told of it
     double transmission_ = 0;            ///< see Stop
     std::map<double, double> measured_;  ///< transmissions by frequency
     double highest_g_ = 0;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/campaign/safety_proof.hpp"
 #include "daemon/campaign/settings.hpp"
@@ -16,6 +17,7 @@
 #include "drivers/gimbal/gimbal.hpp"
 #include "drivers/gimbal/torquer.hpp"
 #include "drivers/shaker/shaker.hpp"
+#include "estimator/spectrum/sweep.hpp"
 
 namespace vibrig::campaign {
 
@@ -84,6 +86,9 @@ class Dwells {
     virtual void begin() {}
     /// False: it cannot be taken.
     [[nodiscard]] virtual bool order(const rt::DwellOrder& order) = 0;
+    /// What a sweep has left, before its dwell is done.
+    virtual void swept(const estimator::spectrum::Sweep&,
+                       const std::vector<std::array<double, 2>>& /*readings*/) {}
     /// No dwell is with the estimator.
     [[nodiscard]] virtual bool free() const { return true; }
     /// A position was levelled, and this is what was torqued out.

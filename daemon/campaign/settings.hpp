@@ -8,6 +8,8 @@
 
 #include "daemon/campaign/safety_proof.hpp"
 #include "daemon/campaign/stop_monitor.hpp"
+#include "daemon/domain/positions.hpp"
+#include "daemon/interlock/amplitude_witness.hpp"
 #include "daemon/interlock/rest_monitor.hpp"
 #include "drivers/gimbal/torquer.hpp"
 #include "drivers/shaker/shaker.hpp"
@@ -38,10 +40,16 @@ struct Stop {
     double transmission = 0;  ///< platform over table at that frequency; 0: as configured
     /// Then table_g and transmission are of the rms, and the frequency is 0.
     std::optional<RandomStop> random = {};
+    /// In place of a frequency, which is 0 then.
+    estimator::SweptSine sweep{};
+    /// Platform over table, as the accelerometers show it, along the sweep:
+    /// rt::Sweep::transmission.
+    rt::Sweep::Along along{};
 
-    /// What tells one kind of vibration from another: its frequency, or a profile's number, which
-    /// is below 0.
+    /// What tells one kind of vibration from another: its frequency, its sweep, or a profile's
+    /// number, which is below 0.
     [[nodiscard]] double kind() const {
+        if (sweep.any()) return kind_of_sweep(sweep.from_hz, sweep.to_hz);
         return random ? -static_cast<double>(random->set_point.profile) : frequency_hz;
     }
 };

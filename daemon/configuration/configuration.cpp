@@ -168,6 +168,19 @@ void see(const estimator::Settings& rig, campaign::Stop& stop) {
     stop.transmission *= std::sqrt(rig.accelerometer_response.power(hz));
 }
 
+/// The witnesses follow it.
+void take_sweep(const Configuration& c, const plan::PlannedRun& run, campaign::Stop& stop) {
+    stop.sweep = {run.sweep_from_hz, run.sweep_to_hz, run.sweep_s};
+    for (std::size_t i = 0; i < stop.along.size(); ++i) {
+        const double share = static_cast<double>(i) / static_cast<double>(stop.along.size() - 1);
+        const double hz =
+            stop.sweep.from_hz * std::pow(stop.sweep.to_hz / stop.sweep.from_hz, share);
+        stop.along[i] = c.spectrum.mount.transmission(hz).value_or(0) *
+                        std::sqrt(c.estimator.accelerometer_response.power(hz));
+    }
+    stop.transmission = stop.along.front();
+}
+
 /// The plan's dwells, one by one; its levels stand in for table_g and are checked like them.
 void take_plan(Configuration& c) {
     c.campaign.table_g.clear();
@@ -185,6 +198,7 @@ void take_plan(Configuration& c) {
         if (stop.frequency_hz > 0 && !estimator::at_reference(c.estimator, stop.frequency_hz))
             stop.transmission = *transmission(stop.frequency_hz);
         see(c.estimator, stop);
+        if (run.sweep_to_hz > 0) take_sweep(c, run, stop);
         c.campaign.stops.insert(c.campaign.stops.end(), run.count, stop);
         auto& levels = c.campaign.table_g;
         if (std::find(levels.begin(), levels.end(), run.table_g) == levels.end())

@@ -43,6 +43,8 @@ class CrossCheck {
     void registers_stated();
     void registers();
     void random_registers();
+    void sweep_registers();
+    void sweeps_of_plan();
     void writable_registers_apart();
     void set_points_fit();
     void limits();

@@ -50,12 +50,17 @@ void CrossCheck::registers_stated() {
                             {"emergency_stop", &r.emergency_stop, false},
                             {"measured_amplitude", &r.measured_amplitude, true}};
     if (const auto& random = r.random)
-        roles.insert(roles.end(), {{"mode", &random->mode, false},
-                                   {"profile_number", &random->profile_number, false},
+        roles.insert(roles.end(), {{"profile_number", &random->profile_number, false},
                                    {"profile_level_db", &random->profile_level_db, true},
                                    {"profile_checksum", &random->profile_checksum, false},
                                    {"measured_g_rms", &random->measured_g_rms, true},
                                    {"control_state", &random->control_state, false}});
+    if (const auto& sweep = r.sweep)
+        roles.insert(roles.end(), {{"sweep_from", &sweep->from, true},
+                                   {"sweep_to", &sweep->to, true},
+                                   {"sweep_rate", &sweep->rate, true},
+                                   {"actual_frequency", &sweep->actual_frequency, true}});
+    if (r.random || r.sweep) roles.push_back({"mode", &r.mode, false});
     for (const Role& role : roles) {
         const std::string key = std::string("shaker.registers.") + role.name;
         const auto stated = [&](const char* part) { return places_.contains(key + "." + part); };

@@ -36,12 +36,17 @@ std::vector<Role> roles_of(const proto::ShakerRegisters& r) {
         roles.push_back({"watchdog", &*r.watchdog, true});
     }
     if (const auto& random = r.random)
-        roles.insert(roles.end(), {{"mode", &random->mode, true},
-                                   {"profile_number", &random->profile_number, true},
+        roles.insert(roles.end(), {{"profile_number", &random->profile_number, true},
                                    {"profile_level_db", &random->profile_level_db, true},
                                    {"profile_checksum", &random->profile_checksum, false},
                                    {"measured_g_rms", &random->measured_g_rms, false},
                                    {"control_state", &random->control_state, false}});
+    if (const auto& sweep = r.sweep)
+        roles.insert(roles.end(), {{"sweep_from", &sweep->from, true},
+                                   {"sweep_to", &sweep->to, true},
+                                   {"sweep_rate", &sweep->rate, true},
+                                   {"actual_frequency", &sweep->actual_frequency, false}});
+    if (r.random || r.sweep) roles.push_back({"mode", &r.mode, true});
     return roles;
 }
 
@@ -121,6 +126,7 @@ void CrossCheck::registers() {
     }
     writable_registers_apart();
     random_registers();
+    sweep_registers();
 }
 
 /// All of them or none: what is not read back cannot be played.
@@ -148,12 +154,33 @@ void CrossCheck::random_registers() {
             "i16, i32 or f32: levels are below 0 too");
     type_of("profile_checksum", random->profile_checksum, random->profile_checksum.type == u32,
             "u32");
-    for (const auto& [role, reg] :
-         {std::pair{"mode", &random->mode}, std::pair{"profile_number", &random->profile_number},
-          std::pair{"control_state", &random->control_state}})
+    for (const auto& [role, reg] : {std::pair{"mode", &c_.shaker.registers.mode},
+                                    std::pair{"profile_number", &random->profile_number},
+                                    std::pair{"control_state", &random->control_state}})
         type_of(role, *reg, reg->type == u16 || reg->type == u32, "u16 or u32");
     type_of("measured_g_rms", random->measured_g_rms, random->measured_g_rms.type != bits,
             "a number");
+}
+
+/// Likewise.
+void CrossCheck::sweep_registers() {
+    const auto& sweep = c_.shaker.registers.sweep;
+    if (!sweep) return;
+    for (const char* role : {"mode", "sweep_from", "sweep_to", "sweep_rate", "actual_frequency"}) {
+        const std::string key = std::string("shaker.registers.") + role + ".address";
+        if (!places_.contains(key))
+            problems_.add({}, key, "nothing",
+                          "an address: sweeps need mode, sweep_from, sweep_to, sweep_rate and "
+                          "actual_frequency");
+    }
+    for (const auto& [role, reg] :
+         {std::pair{"mode", &c_.shaker.registers.mode}, std::pair{"sweep_from", &sweep->from},
+          std::pair{"sweep_to", &sweep->to}, std::pair{"sweep_rate", &sweep->rate},
+          std::pair{"actual_frequency", &sweep->actual_frequency}}) {
+        const std::string key = std::string("shaker.registers.") + role;
+        if (reg->type == RegisterType::bits)
+            refuse({key + ".type", key + ".address"}, name_of(*reg), "a number");
+    }
 }
 
 void CrossCheck::writable_registers_apart() {

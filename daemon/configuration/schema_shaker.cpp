@@ -168,8 +168,6 @@ void add_random_keys(std::vector<Key>& keys) {
             return (*random).*member;
         });
     };
-    add("mode", "", "0 sine, 1 random; with spectrum.mode \"mixed\", as the five that follow",
-        &RandomRegisters::mode);
     add("profile_number", "", "of the profile that the controller is to play",
         &RandomRegisters::profile_number);
     add("profile_level_db", "dB", "level about the profile; a type with a sign",
@@ -185,6 +183,42 @@ void add_random_keys(std::vector<Key>& keys) {
     for (std::size_t i = first; i < keys.size(); ++i)
         keys[i].write = [write = std::move(keys[i].write)](C& c) {
             return c.shaker.registers.random ? write(c) : std::string();
+        };
+}
+
+/// Of a controller that sweeps: likewise.
+void add_sweep_keys(std::vector<Key>& keys) {
+    using proto::SweepRegisters;
+    const std::size_t first = keys.size();
+    const auto add = [&keys](const char* role, const char* unit, const char* doc,
+                             Register SweepRegisters::*member) {
+        add_register_keys(keys, role, unit, doc, [member](C& c) -> Register& {
+            auto& sweep = c.shaker.registers.sweep;
+            if (!sweep) sweep.emplace();
+            return (*sweep).*member;
+        });
+    };
+    add("sweep_from", "Hz", "where a sweep begins; for plans with sweeps, as the three that follow",
+        &SweepRegisters::from);
+    add("sweep_to", "Hz", "where it ends, and stays", &SweepRegisters::to);
+    add("sweep_rate", "octaves/min", "how fast it goes, either way", &SweepRegisters::rate);
+    add("actual_frequency", "Hz", "where it is; read", &SweepRegisters::actual_frequency);
+    for (std::size_t i = first; i < keys.size(); ++i)
+        keys[i].write = [write = std::move(keys[i].write)](C& c) {
+            return c.shaker.registers.sweep ? write(c) : std::string();
+        };
+}
+
+/// Which of the two, or neither.
+void add_mode_keys(std::vector<Key>& keys) {
+    const std::size_t first = keys.size();
+    add_register_keys(keys, "mode", "",
+                      "0 sine, 1 random, 2 sweep; with registers of profiles or sweeps",
+                      [](C& c) -> Register& { return c.shaker.registers.mode; });
+    for (std::size_t i = first; i < keys.size(); ++i)
+        keys[i].write = [write = std::move(keys[i].write)](C& c) {
+            const auto& map = c.shaker.registers;
+            return map.random || map.sweep ? write(c) : std::string();
         };
 }
 
@@ -213,7 +247,9 @@ void add_shaker_keys(std::vector<Key>& keys) {
     add_register_keys(keys, "measured_amplitude", "amplitude_unit",
                       "measured amplitude at the table",
                       [](C& c) -> Register& { return c.shaker.registers.measured_amplitude; });
+    add_mode_keys(keys);
     add_random_keys(keys);
+    add_sweep_keys(keys);
 }
 
 }  // namespace vibrig::configuration

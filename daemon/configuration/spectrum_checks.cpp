@@ -143,13 +143,17 @@ void CrossCheck::profiles() {
 
 void CrossCheck::mode() {
     if (!sound({"spectrum.mode", "shaker.registers"})) return;
-    if (c_.spectrum.mixed && !c_.shaker.registers.random)
+    if (c_.spectrum.mixed && !c_.shaker.registers.random && !c_.shaker.registers.sweep)
         refuse({"spectrum.mode"}, "\"mixed\" without registers of mode and profile",
                "shaker.registers.mode and its five companions, or \"sine\"");
     if (!sound({"campaign.plan"})) return;
+    sweeps_of_plan();
     const auto random = std::ranges::find_if(
         c_.campaign.stops, [](const auto& one) { return one.random.has_value(); });
     if (random == c_.campaign.stops.end()) return;
+    if (!c_.shaker.registers.random)
+        refuse({"campaign.plan", "shaker.registers"}, "a dwell under a profile without registers",
+               "shaker.registers.mode and its five companions");
     const std::string found = "a dwell under profile '" + random->random->name + "'";
     if (!c_.spectrum.mixed)
         refuse({"campaign.plan", "spectrum.mode"}, found,
@@ -160,6 +164,65 @@ void CrossCheck::mode() {
                "frequency only");
 }
 
+/// Registers, and limits, isolators and accelerometers all along them.
+void CrossCheck::sweeps_of_plan() {
+    constexpr double kLeastRate_hz = 100;  // slower samples have too few seconds of them
+    constexpr int kSteps = 64;
+    for (std::size_t i = 0; i < c_.campaign.stops.size(); ++i) {
+        const auto& stop = c_.campaign.stops[i];
+        if (!stop.sweep.any()) continue;
+        const auto& sweep = stop.sweep;
+        const std::string found = "dwell " + std::to_string(i + 1) + ", a sweep from " +
+                                  plain(sweep.from_hz) + " to " + plain(sweep.to_hz) + " Hz";
+        const auto blame = [&](const char* other, const std::string& what,
+                               const std::string& expected) {
+            refuse({"campaign.plan", other}, found + what, expected);
+        };
+        if (!c_.shaker.registers.sweep)
+            return blame("shaker.registers", " without registers for it",
+                         "shaker.registers.mode, sweep_from, sweep_to, sweep_rate and "
+                         "actual_frequency");
+        if (!c_.spectrum.mixed)
+            return blame("spectrum.mode", "", "spectrum.mode \"mixed\" for sweeps");
+        if (!(stop.table_g > 0)) return blame("campaign.plan", " at 0 g", "a level");
+        if (stop.verify)
+            return blame("campaign.plan", " with role \"verify\"",
+                         "\"identify\": a sweep is no row to be foretold");
+        if (c_.estimator.method != estimator::Method::joint)
+            return blame("estimator.method", "",
+                         "estimator.method = \"joint\": the two-step route has coefficients at one "
+                         "frequency only");
+        if (sound({"can.sample_rate_hz"}) && rate_of(c_) < kLeastRate_hz)
+            return blame("can.sample_rate_hz", " at " + rounded(rate_of(c_)) + " samples/s",
+                         plain(kLeastRate_hz) +
+                             " at least: slower ones have too few seconds that can be used");
+        const double slowest = std::min(sweep.from_hz, sweep.to_hz);
+        if (slowest < c_.spectrum.mount.lowest_hz())
+            return blame("vibration.transmission", "",
+                         rounded(c_.spectrum.mount.lowest_hz()) +
+                             " Hz at least: below it the isolators amplify");
+        const spectrum::TableLimits limits{
+            c_.campaign.max_acceleration_g, c_.campaign.max_velocity_mps,
+            c_.campaign.max_displacement_mm, c_.estimator.gravity_mps2};
+        for (int k = 0; k <= kSteps; ++k) {
+            const double hz = sweep.from_hz * std::pow(sweep.to_hz / sweep.from_hz,
+                                                       static_cast<double>(k) / kSteps);
+            if (!c_.spectrum.mount.transmission(hz))
+                return blame("spectrum.transmission", "",
+                             "frequencies that spectrum.transmission reaches");
+            if (stop.table_g > limits.table_g(hz))
+                return blame("shaker.limits", " at " + plain(stop.table_g) + " g",
+                             rounded(limits.table_g(hz)) + " g at most, at " + rounded(hz) + " Hz");
+            if (c_.estimator.accelerometer_response.power(hz) < estimator::kLeastSeen)
+                return blame("accelerometer.bandwidth_hz",
+                             ", of which the accelerometers see " +
+                                 rounded(c_.estimator.accelerometer_response.power(hz)) + " at " +
+                                 rounded(hz) + " Hz",
+                             "frequencies of which they see half of the power at least");
+        }
+    }
+}
+
 void CrossCheck::frequencies_of_plan() {
     if (!sound({"campaign.plan", "can.sample_rate_hz", "vibration.level_window_s",
                 "vibration.frequency_hz", "spectrum.transmission"}))
@@ -168,8 +231,9 @@ void CrossCheck::frequencies_of_plan() {
     bool told = false, reference = false;
     for (std::size_t i = 0; i < c_.campaign.stops.size(); ++i) {
         const auto& stop = c_.campaign.stops[i];
-        told = told || stop.random;
-        if (!stop.random && stop.frequency_hz <= 0 && stop.table_g > 0) reference = true;
+        told = told || stop.random || stop.sweep.any();
+        if (!stop.random && !stop.sweep.any() && stop.frequency_hz <= 0 && stop.table_g > 0)
+            reference = true;
         if (stop.frequency_hz <= 0 || stop.table_g <= 0) continue;
         const auto blame = [&](const char* other, const std::string& expected) {
             refuse({"campaign.plan", other},

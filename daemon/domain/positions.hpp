@@ -3,8 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 namespace vibrig {
+
+/// Of a sweep, beside frequencies, which are small numbers: what tells one from another.
+[[nodiscard]] constexpr double kind_of_sweep(double from_hz, double to_hz) noexcept {
+    return 1e9 + 1e5 * from_hz + to_hz;
+}
 
 /// Of a position that is done, what an adaptive campaign needs to go on after a restart.
 struct StopDone {
@@ -18,8 +24,13 @@ struct StopDone {
     double frequency_hz = 0;  ///< 0: the configuration's
     bool held_out = false;
     std::uint16_t profile = 0;  ///< of random vibration, its number in the controller; 0: none
+    /// Of a sweep: its ends, 0: none; and what the controller said of its frequency meanwhile, s
+    /// since the dwell began and Hz.
+    double sweep_from_hz = 0, sweep_to_hz = 0;
+    std::vector<std::array<double, 2>> swept_hz{};
     /// As campaign::Stop::kind().
     [[nodiscard]] double kind() const {
+        if (sweep_to_hz > 0) return kind_of_sweep(sweep_from_hz, sweep_to_hz);
         return profile > 0 ? -static_cast<double>(profile) : frequency_hz;
     }
 };

@@ -227,4 +227,33 @@ void Keys::numbers(const std::string& key, double* values, std::size_t count) {
     if (key.back() != ']') believe(key, "[" + list + "]");
 }
 
+std::vector<std::array<double, 2>> Keys::pairs(const std::string& key) {
+    std::vector<std::array<double, 2>> out;
+    const auto* node = at(key).node();
+    if (node == nullptr) return out;
+    const auto* rows = node->as_array();
+    bool good = rows != nullptr;
+    for (std::size_t i = 0; good && i < rows->size(); ++i) {
+        const auto* row = (*rows)[i].as_array();
+        good = row != nullptr && row->size() == 2;
+        std::array<double, 2> pair{};
+        for (std::size_t k = 0; good && k < 2; ++k) {
+            const auto value = (*row)[k].is_number() ? (*row)[k].value<double>() : std::nullopt;
+            good = value && std::isfinite(*value) && *value > 0;
+            if (good) pair[k] = *value;
+        }
+        good = good && (out.empty() || pair[0] > out.back()[0]);
+        if (good) out.push_back(pair);
+    }
+    if (!good) {
+        wrong(key, node, described(*node), "pairs [[hz, ratio], ..], growing frequencies");
+        return {};
+    }
+    std::string list;
+    for (const auto& [first, second] : out)
+        list += (list.empty() ? "[" : ", [") + written(first) + ", " + written(second) + "]";
+    believe(key, "[" + list + "]");
+    return out;
+}
+
 }  // namespace vibrig::guard

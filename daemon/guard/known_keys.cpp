@@ -9,7 +9,8 @@ std::set<std::string> registers(std::set<std::string> names) {
     for (const char* role :
          {"frequency", "amplitude", "watchdog", "watchdog_timeout", "state", "fault",
           "emergency_stop", "mode", "profile_number", "profile_level_db", "profile_checksum",
-          "measured_g_rms", "control_state"})
+          "measured_g_rms", "control_state", "sweep_from", "sweep_to", "sweep_rate",
+          "actual_frequency"})
         for (const char* field :
              {"address", "type", "word_order", "table", "access", "scale", "mask"})
             names.insert(table + role + "." + field);

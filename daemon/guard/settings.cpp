@@ -1,6 +1,7 @@
 #include "daemon/guard/settings.hpp"
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -82,6 +83,26 @@ void read_shaker(Keys& keys, Settings& s) {
     s.witness.window_s = keys.number("shaker.rest_window_s", s.witness.window_s, 0.1, 10);
 }
 
+/// |A| at the reference frequency. Of a plan's other frequencies it is at least 0.7 (a plan beyond
+/// that is refused), so that a platform 3 dB louder than it shows is the most that can be.
+double read_seen(Keys& keys) {
+    const double hz = keys.number("vibration.frequency_hz", 15, 0.1, 2000);
+    const double bandwidth = keys.number("accelerometer.bandwidth_hz", 0, 0, 100'000);
+    const int order = keys.integer("accelerometer.order", 1, 1, 8);
+    const auto table = keys.pairs("accelerometer.response");
+    if (bandwidth > 0) return 1 / std::sqrt(1 + std::pow(hz / bandwidth, 2 * order));
+    if (table.empty()) return 1;
+    // Straight on logarithmic scales; beyond the last the daemon refuses.
+    if (hz <= table.front()[0]) return table.front()[1];
+    for (std::size_t i = 1; i < table.size(); ++i) {
+        if (hz > table[i][0]) continue;
+        const double share =
+            std::log(hz / table[i - 1][0]) / std::log(table[i][0] / table[i - 1][0]);
+        return table[i - 1][1] * std::pow(table[i][1] / table[i - 1][1], share);
+    }
+    return table.back()[1];
+}
+
 void read_witness(Keys& keys, WitnessSettings& w) {
     const auto keep_place = [&keys, &w](const std::string& key) {
         if (keys.stated(key)) w.places[key] = keys.place(key);
@@ -100,6 +121,7 @@ void read_witness(Keys& keys, WitnessSettings& w) {
     w.table = keys.text("can.signals.table_accel", w.table);
     keep_place("can.signals.table_accel");
     w.transmission = keys.number("vibration.transmission", w.transmission, 0.001, 10);
+    w.seen = read_seen(keys);
     keys.numbers("accelerometer.zero_g", w.zero_g.data(), 3);
     for (std::size_t i = 0; i < 3; ++i)
         keys.numbers("accelerometer.matrix[" + std::to_string(i) + "]", w.matrix[i].data(), 3);

@@ -34,6 +34,7 @@ struct WitnessSettings {
     std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     double sample_rate_hz = 40;
     double transmission = 0.6667;  ///< platform over table
+    double seen = 1;               ///< by the platform's accelerometers, of a vibration's amplitude
     double window_s = safety::kRestWindow_s;
     bool rig_time = false;                        ///< the simulated rig owns the time and sends it
     std::string file{};                           ///< of the keys

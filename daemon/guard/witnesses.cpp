@@ -157,7 +157,7 @@ Sight Witnesses::sight(drivers::Time now) const {
     if (sight.has_platform) sight.platform = platform_motion_.at(now_s);
     sight.table_stuck = sight.has_table && table_watch_.doubted();
     sight.platform_stuck = sight.has_platform && platform_watch_.doubted();
-    sight.table_g = std::max(sight.table.peak_g, sight.platform.peak_g / settings_.transmission);
+    sight.table_g = std::max(sight.table.peak_g, sight.platform.peak_g / shown());
     return sight;
 }
 
@@ -166,12 +166,11 @@ void Witnesses::doubt(drivers::Time now, double shaker_g) noexcept {
     const Sight seen = sight(now);
     // Less is no vibration: hands, noise, a slew.
     const auto over = [](double g) { return g >= safety::kMoving_g ? g : 0; };
-    const double by_platform = seen.platform.rest_g >= safety::kMoving_g
-                                   ? seen.platform.peak_g / settings_.transmission
-                                   : 0;
+    const double by_platform =
+        seen.platform.rest_g >= safety::kMoving_g ? seen.platform.peak_g / shown() : 0;
     const double by_table = seen.table.rest_g >= safety::kMoving_g ? seen.table.peak_g : 0;
     table_watch_.expect(moment, std::max(over(shaker_g), by_platform));
-    platform_watch_.expect(moment, settings_.transmission * std::max(over(shaker_g), by_table));
+    platform_watch_.expect(moment, shown() * std::max(over(shaker_g), by_table));
 }
 
 }  // namespace vibrig::guard

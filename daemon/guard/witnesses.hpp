@@ -64,6 +64,8 @@ class Witnesses {
         const proto::Signal* valid = nullptr;
         explicit operator bool() const noexcept { return value != nullptr; }
     };
+    /// What the platform's accelerometers show, over the table.
+    [[nodiscard]] double shown() const noexcept { return settings_.transmission * settings_.seen; }
     [[nodiscard]] Place find(const std::string& key, const std::string& name,
                              std::string& problems) const;
     void take(const drivers::ReceivedFrame& frame);

@@ -55,6 +55,30 @@ bool lasting(bool wrong, Time& since, Time now) noexcept {
 
 }  // namespace
 
+double Sweep::hz(Time at) const noexcept {
+    if (!(octaves_per_s > 0) || at <= begin) return from_hz;
+    const double octaves = octaves_per_s * drivers::to_seconds(at - begin);
+    return to_hz > from_hz ? std::min(to_hz, from_hz * std::exp2(octaves))
+                           : std::max(to_hz, from_hz * std::exp2(-octaves));
+}
+
+double Sweep::turns(Time at) const noexcept {
+    const double since = drivers::to_seconds(at - begin);
+    if (!(octaves_per_s > 0) || since <= 0) return from_hz * since;
+    const double rate = (to_hz > from_hz ? 1 : -1) * octaves_per_s * std::numbers::ln2;
+    const double lasts = std::log(to_hz / from_hz) / rate;
+    const double swept = from_hz * std::expm1(rate * std::min(since, lasts)) / rate;
+    return swept + to_hz * std::max(0.0, since - lasts);
+}
+
+double Sweep::transmission_at(Time at) const noexcept {
+    const double way = std::log(hz(at) / from_hz) / std::log(to_hz / from_hz);
+    const double place = std::clamp(way, 0.0, 1.0) * static_cast<double>(kAlong - 1);
+    const std::size_t before = std::min(static_cast<std::size_t>(place), kAlong - 2);
+    const double share = place - static_cast<double>(before);
+    return (1 - share) * transmission[before] + share * transmission[before + 1];
+}
+
 double Ramp::at(Time time, Time from) const noexcept {
     if (time <= from) return start_g;
     if (time - from >= duration) return target_g;
@@ -74,10 +98,39 @@ void AmplitudeWitness::set_windows() noexcept {
 }
 
 void AmplitudeWitness::retune(double frequency_hz) noexcept {
-    if (frequency_hz == settings_.frequency_hz) return;
+    if (frequency_hz == settings_.frequency_hz && !sweep_.any()) return;
     settings_.frequency_hz = frequency_hz;
+    sweep_ = {};
     set_windows();
     begin();
+}
+
+void AmplitudeWitness::follow(const Sweep& sweep) noexcept {
+    if (!sweep_.any()) {
+        settings_.frequency_hz = sweep.from_hz;
+        set_windows();
+        window_ = std::min(
+            window_,
+            drivers::from_seconds(std::max(
+                kWindow_s, kFewestSamples * drivers::to_seconds(settings_.sample_period))));
+        block_ = window_ / static_cast<Time>(LockIn<1>::kBlocks);
+        fewest_ = std::max(
+            6.0, 0.5 * static_cast<double>(window_) / static_cast<double>(settings_.sample_period));
+        begin();
+    } else {
+        // Another phase: what is in the windows is of the one before.
+        force_.clear();
+        table_.clear();
+    }
+    sweep_ = sweep;
+}
+
+bool AmplitudeWitness::blind() const noexcept {
+    if (!sweep_.any()) return false;
+    const double half_rate = 0.5 / drivers::to_seconds(settings_.sample_period);
+    const double least = kFewestTurns / drivers::to_seconds(window_);
+    const auto off = [&](Time at) { return std::abs(std::remainder(sweep_.hz(at), half_rate)); };
+    return off(newest_) < least || off(newest_ - window_) < least;
 }
 
 void AmplitudeWitness::begin() noexcept {
@@ -109,7 +162,9 @@ bool AmplitudeWitness::add(const Sample& sample) noexcept {
         }
         block_number_ = number;
     }
-    const double turns = settings_.frequency_hz * drivers::to_seconds(sample.time - origin_);
+    const double turns = sweep_.any()
+                             ? sweep_.turns(sample.time)
+                             : settings_.frequency_hz * drivers::to_seconds(sample.time - origin_);
     const double angle = 2 * std::numbers::pi * (turns - std::floor(turns));
     const double c = std::cos(angle), s = std::sin(angle);
     if (sample.force_good()) force_.add(c, s, sample.force);
@@ -119,7 +174,7 @@ bool AmplitudeWitness::add(const Sample& sample) noexcept {
 
 double AmplitudeWitness::platform_g() const noexcept {
     LockIn<3>::Fit fit;
-    if (!force_.fit(fit, fewest_)) return -1;
+    if (blind() || !force_.fit(fit, fewest_)) return -1;
     Vector mean = fit.mean;
     for (std::size_t i = 0; i < 3; ++i) mean[i] -= settings_.zero_g[i];
     mean = times(settings_.matrix, mean);
@@ -132,7 +187,7 @@ double AmplitudeWitness::platform_g() const noexcept {
 
 double AmplitudeWitness::table_g() const noexcept {
     LockIn<1>::Fit fit;
-    if (!table_.fit(fit, fewest_)) return -1;
+    if (blind() || !table_.fit(fit, fewest_)) return -1;
     return std::hypot(fit.cosine[0], fit.sine[0]);
 }
 

@@ -8,6 +8,23 @@
 
 namespace vibrig::rt {
 
+/// A frequency that goes from one end to the other, exponentially, and stays there.
+struct Sweep {
+    static constexpr std::size_t kAlong = 9;
+    using Along = std::array<double, kAlong>;
+
+    double from_hz = 0, to_hz = 0;  ///< 0: there is none
+    double octaves_per_s = 0;       ///< towards to_hz; 0: it has not begun
+    drivers::Time begin = 0;
+    Along transmission{};  ///< platform over table at equal steps of the logarithm; 0: not known
+
+    [[nodiscard]] bool any() const noexcept { return to_hz > 0; }
+    [[nodiscard]] double hz(drivers::Time at) const noexcept;
+    /// Turns since `begin`, negative before.
+    [[nodiscard]] double turns(drivers::Time at) const noexcept;
+    [[nodiscard]] double transmission_at(drivers::Time at) const noexcept;
+};
+
 /// What the table was told; amplitudes are peak at the table.
 struct Ramp {
     double start_g = 0, target_g = 0;
@@ -23,6 +40,8 @@ struct Ramp {
     /// Random vibration: its place in Interlock::Limits::random, from 1; amplitudes are rms then,
     /// and so is the transmission. 0: a sine.
     std::uint16_t random = 0;
+
+    Sweep sweep{};  ///< in place of a frequency
 
     std::uint64_t number = 0;  ///< the interlock's
 
@@ -72,6 +91,11 @@ class AmplitudeWitness {
     void begin() noexcept;  ///< excitation begins
     /// What it is to be at; from rest, as if excitation began.
     void retune(double frequency_hz) noexcept;
+    /// Likewise, from where it is now on; what was seen so far stays.
+    void follow(const Sweep& sweep) noexcept;
+    /// A sweep is where the samples' alias is too near to zero or half the rate to tell an
+    /// amplitude from a phase within the window.
+    [[nodiscard]] bool blind() const noexcept;
     /// True: a block is complete, and verdict() judges the newest.
     [[nodiscard]] bool add(const drivers::Sample& sample) noexcept;
     [[nodiscard]] Verdict verdict(const Situation& situation) noexcept;
@@ -95,6 +119,7 @@ class AmplitudeWitness {
     [[nodiscard]] double range(std::size_t channel, std::size_t blocks) const noexcept;
 
     Settings settings_;
+    Sweep sweep_;
     drivers::Time window_ = 0, block_ = 0;
     double fewest_ = 0;  ///< samples in a window
     LockIn<3> force_;

@@ -47,6 +47,7 @@ Interlock::Interlock(drivers::Shaker& shaker, drivers::Waiter& control, Limits l
       rules_(std::move(limits.rules)),
       transmission_(limits.transmission),
       frequency_hz_(limits.witness.frequency_hz),
+      rate_hz_(1 / drivers::to_seconds(limits.witness.sample_period)),
       seconds_(limits.witness.frequency_hz),
       witness_(limits.witness) {
     std::erase_if(rules_, [](const Rule& rule) { return rule.reaction == Reaction::off; });
@@ -140,13 +141,14 @@ void Interlock::forget(By by, Guard above) noexcept {
 
 void Interlock::check(const drivers::Sample& sample,
                       const drivers::PlatformStatus& platform) noexcept {
-    const Time now = sample.time;
+    const Time now = sample_time_ = sample.time;
     const Guard guard = follow_guard();
     table_bound_ = sample.of(Channel::table_accel) != drivers::Quality::unbound;
     if (seconds_.add(sample)) {
         MeanMotion second = seconds_.mean();
-        // A second of random vibration has a mean of its own.
-        second.good = second.good && !(guard == Guard::excitation && at_random());
+        // A second of random vibration, or of one that goes through multiples of the rate, has a
+        // mean of its own.
+        second.good = second.good && !(guard == Guard::excitation && (at_random() || sweeping()));
         second_.publish(second);
     }
     if (guard == Guard::excitation) {
@@ -183,7 +185,10 @@ void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
     if (told_.number != before) {
         controller_began_ = 0;
         const double hz = told_.frequency_hz > 0 ? told_.frequency_hz : frequency_hz_;
-        witness_.retune(hz);
+        if (told_.sweep.any())
+            witness_.follow(told_.sweep);
+        else
+            witness_.retune(hz);
         seconds_.retune(hz);
         if (told_.random > random_.size()) told_.random = 0;
         if (told_.random > 0 && told_.target_g > told_.start_g) {
@@ -196,6 +201,11 @@ void Interlock::follow_ramp(const drivers::Sample& sample) noexcept {
     const Time now = std::max(sample.time, now_);
     if (controller_began_ == 0 && !shaker_.busy() && !shaker_.stop_pending())
         controller_began_ = std::max(now, told_.begin);
+}
+
+bool Interlock::stands_in_samples(Time at) const noexcept {
+    constexpr double kFast_hz = 2;  // with a mean over two seconds
+    return std::abs(std::remainder(told_.sweep.hz(at), rate_hz_)) < kFast_hz;
 }
 
 void Interlock::check_random(const drivers::Sample& sample) noexcept {
@@ -236,6 +246,12 @@ void Interlock::check_motion(const drivers::Sample& sample) noexcept {
         judge(By::sample, Trip::gimbal_off, farthest * 180 / std::numbers::pi, sample.time);
     }
     if (!sample.force_good()) return;
+    // Samples near a multiple of the rate show a vibration as a force that stands, which is none.
+    if (sweeping() && stands_in_samples(sample.time)) {
+        motion_stood_ = true;
+        return;
+    }
+    if (std::exchange(motion_stood_, false)) motion_.begin();
     motion_.add(sample);
     // A share of a motion that is only just beginning or ending means nothing.
     if (const double share = motion_.cross_share(); share >= 0 && commanded_g_.load() > 0)

@@ -192,8 +192,15 @@ class Interlock {
     [[nodiscard]] bool at_random() const noexcept {
         return told_.random > 0 && std::max(told_.start_g, told_.target_g) > 0;
     }
+    /// What the table is told is a sweep, and it is not at rest.
+    [[nodiscard]] bool sweeping() const noexcept {
+        return told_.sweep.any() && std::max(told_.start_g, told_.target_g) > 0;
+    }
+    [[nodiscard]] bool stands_in_samples(drivers::Time at) const noexcept;
     /// Platform over table, of what the table is told.
     [[nodiscard]] double transmission_told() const noexcept {
+        if (told_.sweep.any() && told_.sweep.transmission[0] > 0)
+            return told_.sweep.transmission_at(std::max(now_, sample_time_));
         return told_.transmission > 0 ? told_.transmission : transmission_.load();
     }
     Guard follow_guard() noexcept;
@@ -228,6 +235,7 @@ class Interlock {
     drivers::Time arrived_ = 0;
     drivers::Time now_ = 0;      ///< when silence was last looked for
     const double frequency_hz_;  ///< the configuration's
+    const double rate_hz_;       ///< of the samples
     MeanMotionMeter seconds_;
     AmplitudeWitness witness_;
     AmplitudeWitness::Verdict verdict_;  ///< the newest
@@ -235,6 +243,8 @@ class Interlock {
     bool bands_needed_ = false;  ///< of the controller itself
     Ramp told_;
     drivers::Time controller_began_ = 0;
+    drivers::Time sample_time_ = 0;  ///< of the newest sample
+    bool motion_stood_ = false;      ///< no motion was to be had of the sample before
     Guard sampled_under_ = Guard::idle;
     MotionMonitor motion_;
     LossMonitor loss_;

@@ -80,6 +80,13 @@ void each_part(Stop& stop, Each&& each) {
     each(stop.used_s);
 }
 
+template <typename Sweep, typename Each>
+void each_of_sweep(Sweep& sweep, Each&& each) {
+    each(sweep.from_hz);
+    each(sweep.to_hz);
+    each(sweep.seconds);
+}
+
 template <typename Random, typename Each>
 void each_of_random(Random& random, Each&& each) {
     each(random.mean_square_g2);
@@ -126,6 +133,34 @@ std::string numbers_of(const estimator::DwellSummary& summary) {
     return bytes;
 }
 
+std::string no_sweep(DwellCheckpoint& dwell) {
+    dwell.info.sweep = {};
+    dwell.stop.swept_hz.clear();
+    return {};
+}
+
+std::string read_sweep(Reader& reader, DwellCheckpoint& dwell) {
+    each_of_sweep(dwell.info.sweep, [&reader](double& value) { reader.get(value); });
+    bool good = true;
+    each_of_sweep(dwell.info.sweep,
+                  [&good](double value) { good = good && std::isfinite(value) && value >= 0; });
+    std::uint32_t readings = 0;
+    reader.get(readings);
+    if (reader.good() && (!good || readings > reader.left() / (2 * sizeof(double))))
+        return "corrupt: sweep";
+    dwell.stop.swept_hz.resize(reader.good() ? readings : 0);
+    for (auto& reading : dwell.stop.swept_hz) {
+        for (double& value : reading) {
+            reader.get(value);
+            good = good && std::isfinite(value);
+        }
+        good = good && reading[1] > 0;
+    }
+    dwell.stop.sweep_from_hz = dwell.info.sweep.from_hz;
+    dwell.stop.sweep_to_hz = dwell.info.sweep.to_hz;
+    return good ? "" : "corrupt: sweep";
+}
+
 }  // namespace
 
 // FNV-1a, 64 bits.
@@ -154,6 +189,10 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     put(bytes, dwell.info.frequency_hz);
     bytes.push_back(dwell.info.held_out ? 1 : 0);
     each_of_random(dwell.info.random, [&bytes](auto value) { put(bytes, value); });
+    each_of_sweep(dwell.info.sweep, [&bytes](auto value) { put(bytes, value); });
+    put(bytes, static_cast<std::uint32_t>(dwell.stop.swept_hz.size()));
+    for (const auto& reading : dwell.stop.swept_hz)
+        for (const double value : reading) put(bytes, value);
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -237,6 +276,9 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     dwell.stop.profile = random.profile;
     dwell.stop.frequency_hz = dwell.info.frequency_hz;
     dwell.stop.held_out = dwell.info.held_out;
+    if (const std::string why = version >= 8 ? read_sweep(reader, dwell) : no_sweep(dwell);
+        !why.empty())
+        return why;
     std::uint64_t count = 0;
     reader.get(count);
     if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())

@@ -72,7 +72,8 @@ class KindRows {
   public:
     explicit KindRows(const configuration::Configuration& c) : c_(c) {
         for (const auto& stop : c.campaign.stops) {
-            if (!stop.verify && !at_reference(stop) && place(stop.kind()) == kinds_.size())
+            if (!stop.verify && !stop.sweep.any() && !at_reference(stop) &&
+                place(stop.kind()) == kinds_.size())
                 kinds_.push_back(stop.kind());
         }
     }
@@ -118,7 +119,9 @@ class KindRows {
 /// take nothing, evenly among them.
 std::vector<campaign::Stop> balanced(const configuration::Configuration& c) {
     std::vector<campaign::Stop> fitted, held_out;
-    for (const auto& stop : c.campaign.stops) (stop.verify ? held_out : fitted).push_back(stop);
+    std::vector<campaign::Stop> out;  // sweeps first: they determine nothing by themselves
+    for (const auto& stop : c.campaign.stops)
+        (stop.sweep.any() ? out : stop.verify ? held_out : fitted).push_back(stop);
     const KindRows kinds(c);
     std::vector<plan::Visit> visits;
     Eigen::MatrixXd rows;
@@ -132,7 +135,6 @@ std::vector<campaign::Stop> balanced(const configuration::Configuration& c) {
     how.starts = 1;
     const plan::Order order =
         estimator::uncertainty::balanced_order(visits, rows, timing_of(c), variance_of(c), how);
-    std::vector<campaign::Stop> out;
     for (const std::size_t i : order) out.push_back(fitted[i]);
     for (std::size_t i = 0; i < held_out.size(); ++i) {
         const std::size_t at = (2 * i + 1) * c.campaign.stops.size() / (2 * held_out.size());

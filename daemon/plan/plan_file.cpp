@@ -36,9 +36,9 @@ void check_position(const std::array<double, 3>& position, const std::string& pl
 /// Levels at the platform and at the table from what the file has of them.
 void join_levels(PlannedRun& run, std::optional<double> level, std::optional<double> table,
                  const TransmissionAt& at, const std::string& place) {
-    const auto known = at(run.frequency_hz > 0 ? std::optional(run.frequency_hz) : std::nullopt);
-    if (!known)
-        refuse(place, number(run.frequency_hz) + " Hz", "a frequency of spectrum.transmission");
+    const double at_hz = run.sweep_to_hz > 0 ? run.sweep_from_hz : run.frequency_hz;
+    const auto known = at(at_hz > 0 ? std::optional(at_hz) : std::nullopt);
+    if (!known) refuse(place, number(at_hz) + " Hz", "a frequency of spectrum.transmission");
     const double transmission = *known;
     for (const auto& g : {level, table}) {
         if (g && !(*g >= 0 && *g <= kMostG)) refuse(place, number(*g), "0 to 1000 g");
@@ -75,11 +75,47 @@ void take_level_db(PlannedRun& run, double db, const std::string& place) {
     run.level_db = db;
 }
 
+/// `beside`: a frequency of its own, which it has two of.
+void take_sweep(PlannedRun& run, const std::array<double, 3>& from_to_s,
+                std::optional<double> beside, const std::string& place) {
+    constexpr double kLeastRatio = 1.1, kLeast_s = 10, kMost_s = 86'400;
+    const auto [from, to, seconds] = from_to_s;
+    for (const double hz : {from, to}) {
+        if (!(hz >= 0.1 && hz <= kMostHz)) refuse(place, number(hz) + " Hz", "0.1 to 20000 Hz");
+    }
+    if (std::max(from, to) < kLeastRatio * std::min(from, to))
+        refuse(place, number(from) + " to " + number(to) + " Hz",
+               "ends that are 10 % apart at least");
+    if (!(seconds >= kLeast_s && seconds <= kMost_s))
+        refuse(place, number(seconds) + " s", "10 to 86400 s");
+    if (beside && *beside != 0)
+        refuse(place, number(*beside) + " Hz beside a sweep", "one of them");
+    run.sweep_from_hz = from;
+    run.sweep_to_hz = to;
+    run.sweep_s = seconds;
+    run.profile_place = place;
+}
+
+/// False: there is none.
+bool take_sweep(PlannedRun& run, const Json& json, const std::string& place) {
+    const auto found = json.find("sweep");
+    if (found == json.end()) return false;
+    const std::string at = place + ".sweep";
+    if (!found->is_object())
+        refuse(at, found->dump().substr(0, 60), "an object with from_hz, to_hz and s");
+    std::array<double, 3> values{};
+    for (std::size_t k = 0; k < 3; ++k) {
+        const char* key = std::array{"from_hz", "to_hz", "s"}[k];
+        const auto value = number_at(*found, key, at);
+        if (!value) refuse(at + "." + key, "nothing", "a number");
+        values[k] = *value;
+    }
+    take_sweep(run, values, number_at(json, "frequency_hz", place), at);
+    return true;
+}
+
 /// A profile in place of frequency and levels; false: there is none.
 bool take_profile(PlannedRun& run, const Json& json, const std::string& place) {
-    if (const auto found = json.find("sweep"); found != json.end())
-        refuse(place + ".sweep", found->dump().substr(0, 60),
-               "a sine with frequency_hz and level_g, or a profile: sweeps are not run");
     const auto found = json.find("profile");
     const auto level = number_at(json, "level_db", place);
     if (found == json.end()) {
@@ -90,7 +126,7 @@ bool take_profile(PlannedRun& run, const Json& json, const std::string& place) {
     if (found->is_number_unsigned() && *found != 0) run.profile = found->dump();
     if (run.profile.empty())
         refuse(place + ".profile", found->dump().substr(0, 60), "a profile's name or number");
-    for (const char* other : {"frequency_hz", "level_g", "table_g"}) {
+    for (const char* other : {"frequency_hz", "level_g", "table_g", "sweep"}) {
         if (const auto beside = json.find(other); beside != json.end())
             refuse(place + "." + other, beside->dump().substr(0, 60) + " beside a profile",
                    "level_db alone: the profile has frequencies and g");
@@ -124,7 +160,8 @@ PlannedRun from_json(const Json& json, const TransmissionAt& transmission,
     check_position(run.position_deg, place + ".position");
     run.verify = held_out(json, place);
     if (!take_profile(run, json, place)) {
-        if (const auto hz = number_at(json, "frequency_hz", place))
+        if (const auto hz = number_at(json, "frequency_hz", place);
+            !take_sweep(run, json, place) && hz)
             take_frequency(run, *hz, place + ".frequency_hz");
         join_levels(run, number_at(json, "level_g", place), number_at(json, "table_g", place),
                     transmission, place);
@@ -205,9 +242,6 @@ class PlanRow {
 
 /// As take_profile() of JSON; what a sine would have may be 0 beside it.
 bool take_profile(PlannedRun& run, const PlanRow& row) {
-    if (const std::string sweep = row.word("sweep"); !sweep.empty() && sweep != "0")
-        refuse(row.place("sweep"), "'" + proto::printable(sweep) + "'",
-               "a sine with frequency_hz and level_g, or a profile: sweeps are not run");
     const std::string profile = row.word("profile");
     const auto level = row.maybe("level_db");
     if (profile.empty() || profile == "0") {
@@ -226,6 +260,16 @@ bool take_profile(PlannedRun& run, const PlanRow& row) {
     return true;
 }
 
+/// False: there is none.
+bool take_sweep(PlannedRun& run, const PlanRow& row) {
+    const auto from = row.maybe("sweep_from_hz"), to = row.maybe("sweep_to_hz"),
+               seconds = row.maybe("sweep_s");
+    if (from.value_or(0) == 0 && to.value_or(0) == 0 && seconds.value_or(0) == 0) return false;
+    take_sweep(run, {from.value_or(0), to.value_or(0), seconds.value_or(0)},
+               row.maybe("frequency_hz"), row.place("sweep_from_hz"));
+    return true;
+}
+
 PlannedRun from_csv(const PlanRow& row, const std::array<double, 3>& position_deg,
                     const TransmissionAt& transmission) {
     PlannedRun run;
@@ -236,7 +280,8 @@ PlannedRun from_csv(const PlanRow& row, const std::array<double, 3>& position_de
         run.verify = true;
     }
     if (!take_profile(run, row)) {
-        if (const auto hz = row.number("frequency_hz"))
+        const bool swept = take_sweep(run, row);
+        if (const auto hz = swept ? std::nullopt : row.number("frequency_hz"))
             take_frequency(run, *hz, row.place("frequency_hz"));
         join_levels(run, row.number("level_g"), row.number("table_g"), transmission, row.place());
     }
@@ -253,8 +298,9 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
     // Which of the levels a row needs depends on whether it has a profile.
     const NumberTable table = read_table(text, path,
                                          {{"alpha_deg", "beta_deg", "gamma_deg", "count"},
-                                          {"level_g", "table_g", "frequency_hz", "level_db"},
-                                          {"profile", "role", "sweep"}});
+                                          {"level_g", "table_g", "frequency_hz", "level_db",
+                                           "sweep_from_hz", "sweep_to_hz", "sweep_s"},
+                                          {"profile", "role"}});
     const auto positions = positions_of(table, path);
     std::vector<PlannedRun> result;
     for (std::size_t i = 0; i < positions.size(); ++i)
@@ -270,6 +316,9 @@ std::vector<PlannedRun> read_plan(const std::string& path, double transmission) 
         if (!run.profile.empty())
             refuse(run.profile_place, run.profile,
                    "a sine: random vibration is for vibrigd's campaigns");
+        if (run.sweep_to_hz > 0)
+            refuse(run.profile_place, number(run.sweep_to_hz) + " Hz",
+                   "a sine that stands: sweeps are for vibrigd's campaigns");
     }
     return runs;
 }

@@ -27,7 +27,9 @@ struct PlannedRun {
     /// 0 then. Empty: a sine.
     std::string profile{};
     double level_db = 0;
-    std::string profile_place{};  ///< of the profile, in the file
+    std::string profile_place{};  ///< of the profile or the sweep, in the file
+    /// A sine that goes from one frequency to the other, exponentially; 0: it stands.
+    double sweep_from_hz = 0, sweep_to_hz = 0, sweep_s = 0;
 };
 
 /// Platform over table; of a frequency, or, for none, of the configuration's. None: not known.
@@ -36,12 +38,14 @@ using TransmissionAt = std::function<std::optional<double>(std::optional<double>
 /// Reads what `vibrig plan --json` prints ("runs" with position, level_g, table_g, count; others
 /// ignored), or CSV with the columns alpha_deg, beta_deg, gamma_deg, level_g or table_g, and count
 /// if not 1; and per run frequency_hz, and role "identify" or "verify", and `profile` with level_db
-/// in place of frequency and levels, which are empty or 0 in CSV then. Where one level is missing,
-/// `transmission` (platform over table) gives it; where both are there and disagree by more than 1
+/// in place of frequency and levels, which are empty or 0 in CSV then, or `sweep` {from_hz, to_hz,
+/// s} (CSV: sweep_from_hz, sweep_to_hz, sweep_s) in place of the frequency. Where one level is
+/// missing, `transmission` (platform over table) gives it; where both are there and disagree by
+/// more than 1
 /// %, the file is refused. Throws PlanFileError.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path,
                                                 const TransmissionAt& transmission);
-/// The same at every frequency; random vibration is refused.
+/// The same at every frequency; random vibration and sweeps are refused.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path, double transmission);
 
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError.

@@ -129,6 +129,12 @@ void read_orders(const File& file, Campaign& to) {
             square[i],  bandwidth[i], gain[i], highest[i], static_cast<std::uint16_t>(profile[i]),
             level_db[i]};
     };
+    const auto sweep_from = c.doubles_if_any("sweep_from_hz"),
+               sweep_to = c.doubles_if_any("sweep_to_hz"), sweep_s = c.doubles_if_any("sweep_s");
+    const auto sweep = [&](std::size_t i) -> estimator::SweptSine {
+        if (i >= std::min({sweep_from.size(), sweep_to.size(), sweep_s.size()})) return {};
+        return {sweep_from[i], sweep_to[i], sweep_s[i]};
+    };
     for (std::size_t i = 0; i < c.rows(); ++i) {
         to.orders.push_back({announced[i],
                              from[i],
@@ -144,8 +150,21 @@ void read_orders(const File& file, Campaign& to) {
                              i < power.size() && power[i] != 0,
                              i < frequency.size() ? frequency[i] : 0,
                              i < held_out.size() && held_out[i] != 0,
-                             random(i)});
+                             random(i),
+                             sweep(i)});
     }
+}
+
+/// Recordings made before there were any have none.
+void read_swept(const File& file, Campaign& to) {
+    if (!file.has("/sweeps")) return;
+    Columns c(file, "/sweeps");
+    const auto time = c.integers("time_ns"), run = c.integers("run"),
+               position = c.integers("position");
+    const auto hz = c.doubles("frequency_hz");
+    for (std::size_t i = 0; i < c.rows(); ++i)
+        to.swept.push_back({time[i], static_cast<std::int32_t>(run[i]),
+                            static_cast<std::int32_t>(position[i]), hz[i]});
 }
 
 void read_dwells(const File& file, Campaign& to) {
@@ -371,6 +390,7 @@ Campaign read_part(const std::string& path) {
     read_samples(file, campaign);
     read_orders(file, campaign);
     read_dwells(file, campaign);
+    read_swept(file, campaign);
     read_estimates(file, campaign);
     read_events(file, campaign);
     read_gaps(file, campaign);

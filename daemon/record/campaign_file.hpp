@@ -35,6 +35,7 @@ struct Campaign {
     std::vector<drivers::Sample> samples;
     std::vector<Order> orders;
     std::vector<Dwell> dwells;
+    std::vector<SweptRow> swept;
     std::vector<EstimateRow> estimates;
     std::vector<ConditionRow> conditions;  ///< none in recordings of vibrigd 0.1.0
     std::vector<EventRecord> events;

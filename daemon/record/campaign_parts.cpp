@@ -86,6 +86,7 @@ void move_times(Campaign& part, Time by) {
         order.to += by;
     }
     for (auto& dwell : part.dwells) dwell.time += by;
+    for (auto& row : part.swept) row.time += by;
     for (auto& row : part.estimates) row.time += by;
     for (auto& row : part.conditions) row.time += by;
     for (auto& event : part.events) event.time += by;
@@ -140,6 +141,9 @@ void join(Campaign& to, Campaign part) {
                 return order.announced == other.announced && order.cancel == other.cancel;
             });
         });
+        std::erase_if(part.swept, [&](const SweptRow& row) {
+            return !to.swept.empty() && row.time <= to.swept.back().time;
+        });
         std::erase_if(part.dwells, [&](const Dwell& dwell) {
             return !to.dwells.empty() && dwell.time <= to.dwells.back().time;
         });
@@ -148,6 +152,7 @@ void join(Campaign& to, Campaign part) {
     append(to.samples, part.samples);
     append(to.orders, part.orders);
     append(to.dwells, part.dwells);
+    append(to.swept, part.swept);
     append(to.estimates, part.estimates);
     append(to.conditions, part.conditions);
     append(to.events, part.events);

@@ -44,7 +44,17 @@ std::vector<ColumnSpec> order_columns() {
             {"random_mean_square_g2", Type::f64, {}, "g^2", "as the profile has it, platform"},
             {"random_bandwidth_hz", Type::f64, {}, "Hz", "(Int S)^2 over Int S^2"},
             {"random_gain_error", Type::f64, {}, "", "of the mean square, relative, 1 sigma"},
-            {"random_highest_hz", Type::f64, {}, "Hz", "up to which there is power"}};
+            {"random_highest_hz", Type::f64, {}, "Hz", "up to which there is power"},
+            {"sweep_from_hz", Type::f64, {}, "Hz", "where a sweep begins; 0: it is none"},
+            {"sweep_to_hz", Type::f64, {}, "Hz", "where it ends"},
+            {"sweep_s", Type::f64, {}, "s", "from one to the other"}};
+}
+
+std::vector<ColumnSpec> swept_columns() {
+    return {{"time_ns", Type::i64, {}, "ns", kTimeText},
+            {"run", Type::i32, {}, "", "from 1"},
+            {"position", Type::i32, {}, "", "from 1"},
+            {"frequency_hz", Type::f64, {}, "Hz", "where the shaker's controller says that it is"}};
 }
 
 std::vector<ColumnSpec> dwell_columns() {
@@ -271,6 +281,9 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     samples_ = table("/samples", sample_columns(), 1024, "one row for each instant of the rig");
     orders_ = table("/orders", order_columns(), 16, "dwells as they were ordered");
     dwells_ = table("/dwells", dwell_columns(), 4, "dwells done");
+    sweeps_ = table("/sweeps", swept_columns(), 256,
+                    "frequency in sweeps as the controller said it; between two rows its logarithm "
+                    "goes straight");
     estimates_ = table("/estimates", estimate_columns(), 64, "the filter while it works");
     events_ = table("/events", event_columns(), 16, "what happened");
     gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
@@ -325,6 +338,12 @@ void CampaignWriter::order(const Order& order) {
     const auto& random = order.random;
     orders_->put(std::int32_t{random.profile}).put(random.level_db).put(random.mean_square_g2);
     orders_->put(random.bandwidth_hz).put(random.gain_error).put(random.highest_hz);
+    orders_->put(order.sweep.from_hz).put(order.sweep.to_hz).put(order.sweep.seconds);
+}
+
+void CampaignWriter::swept(const Swept& swept) {
+    for (const SweptRow& row : swept.rows)
+        sweeps_->put(row.time).put(row.run).put(row.position).put(row.frequency_hz);
 }
 
 void CampaignWriter::dwell(const Dwell& dwell) {
@@ -380,14 +399,16 @@ void CampaignWriter::event(const EventRecord& event) {
 
 void CampaignWriter::commit() {
     // Samples last: whoever sees a sample also sees the order that it belongs to.
-    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
+    for (auto* table :
+         {&orders_, &dwells_, &sweeps_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
         (*table)->commit();
     file_->flush();
 }
 
 void CampaignWriter::end(const Ended& ended) {
     commit();
-    for (auto* table : {&orders_, &dwells_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
+    for (auto* table :
+         {&orders_, &dwells_, &sweeps_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
         table->reset();
     const std::string path = file_->path();
     file_->close();

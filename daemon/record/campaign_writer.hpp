@@ -31,6 +31,7 @@ class CampaignWriter {
     void sample(const drivers::Sample& sample) { put_sample(*samples_, sample); }
     void order(const Order& order);
     void dwell(const Dwell& dwell);
+    void swept(const Swept& swept);
     void estimate(const EstimateRow& row);
     void event(const EventRecord& event);
     void condition(const ConditionRow& row);
@@ -48,7 +49,7 @@ class CampaignWriter {
 
     std::unique_ptr<hdf5::File> file_;
     std::unique_ptr<WriterLock> lock_;
-    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, estimates_, events_, gaps_,
+    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, sweeps_, estimates_, events_, gaps_,
         conditions_;
     std::size_t interlock_rows_ = 0;
 };

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "daemon/dwells/anew.hpp"
@@ -97,9 +98,10 @@ void Recorder::ordered(const rt::DwellOrder& order, Time now, const estimator::N
     put(Order{now, order.from, order.to, order.dwell.run, order.dwell.position, order.dwell.table_g,
               order.cancel, order.zero_g, order.level_sigma_g, noise, order.dwell.begin_s,
               order.dwell.power_lost, order.dwell.frequency_hz, order.dwell.held_out,
-              order.dwell.random});
+              order.dwell.random, order.dwell.sweep});
 }
 void Recorder::dwell_done(Dwell dwell) { put(std::move(dwell)); }
+void Recorder::swept(Swept swept) { put(std::move(swept)); }
 void Recorder::event(const EventRecord& event) { put(event); }
 void Recorder::campaign_ended(Ended ended) { put(std::move(ended)); }
 
@@ -381,8 +383,8 @@ void Recorder::write_order_line(const Order& order) {
         return fmt::format("{}.{:06d}", t / 1'000'000, t % 1'000'000);
     };
     append_dwells(fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", order.run,
-        order.position, order.table_g, order.cancel ? "" : seconds(us(order.from)),
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+        order.run, order.position, order.table_g, order.cancel ? "" : seconds(us(order.from)),
         order.cancel ? "" : seconds(us(order.to)), order.cancel ? seconds(us(order.announced)) : "",
         head_->utc_offset_ns / drivers::kMicrosecond, order.zero_g[0], order.zero_g[1],
         order.zero_g[2], order.level_sigma_g, order.noise.angle_arcsec,
@@ -391,7 +393,8 @@ void Recorder::write_order_line(const Order& order) {
         std::isfinite(order.begin_s) ? fmt::format("{}", order.begin_s) : "",
         order.power_lost ? 1 : 0, order.frequency_hz, order.held_out ? 1 : 0, order.random.profile,
         order.random.level_db, order.random.mean_square_g2, order.random.bandwidth_hz,
-        order.random.gain_error, order.random.highest_hz));
+        order.random.gain_error, order.random.highest_hz, order.sweep.from_hz, order.sweep.to_hz,
+        order.sweep.seconds));
 }
 
 void Recorder::append_dwells(const std::string& line) {
@@ -416,6 +419,19 @@ void Recorder::take(const Dwell& dwell) {
     commit_now_ = true;
 }
 
+void Recorder::take(const Swept& swept) {
+    if (!head_) return;
+    kept_.push_back(swept);
+    if (!raw_ || swept.rows.empty()) return;
+    nlohmann::json readings = nlohmann::json::array();
+    for (const SweptRow& row : swept.rows)
+        readings.push_back({(row.time + head_->utc_offset_ns) / drivers::kMicrosecond,
+                            row.time % drivers::kMicrosecond, row.frequency_hz});
+    append_dwells(kSweptLine +
+                  nlohmann::json{swept.rows[0].run, swept.rows[0].position, readings}.dump() +
+                  "\n");
+}
+
 void Recorder::take(const EventRecord& event) { kept_.push_back(event); }
 
 /// Without a campaign the newest; without a disk as many as memory has for them.
@@ -434,6 +450,7 @@ void Recorder::write_kept() {
     for (const auto& entry : kept_) {
         if (const auto* order = std::get_if<Order>(&entry)) writer_->order(*order);
         if (const auto* dwell = std::get_if<Dwell>(&entry)) writer_->dwell(*dwell);
+        if (const auto* swept = std::get_if<Swept>(&entry)) writer_->swept(*swept);
         if (const auto* event = std::get_if<EventRecord>(&entry)) writer_->event(*event);
     }
     writer_->commit();

@@ -82,6 +82,7 @@ class Recorder {
     void ordered(const rt::DwellOrder& order, drivers::Time now,
                  const estimator::NoiseLevels& noise);
     void dwell_done(Dwell dwell);
+    void swept(Swept swept);
     void event(const EventRecord& event);
     void campaign_ended(Ended ended);
 
@@ -95,7 +96,7 @@ class Recorder {
     static constexpr std::size_t kMostWaiting = 10'000;
 
   private:
-    using Entry = std::variant<Head, Order, Dwell, EventRecord, Ended>;
+    using Entry = std::variant<Head, Order, Dwell, Swept, EventRecord, Ended>;
 
     void put(Entry entry);
     void loop();
@@ -107,6 +108,7 @@ class Recorder {
     [[nodiscard]] std::string journal_head() const;
     void take(const Order& order);
     void take(const Dwell& dwell);
+    void take(const Swept& swept);
     void take(const EventRecord& event);
     void take(const Ended& ended);
     void take(const drivers::Sample& sample);
@@ -148,7 +150,7 @@ class Recorder {
     std::unique_ptr<RawLog> raw_;
     std::deque<FrameRecord> late_sent_;
     /// What goes into the file once it can be written: few and small, unlike the samples.
-    std::deque<std::variant<Order, Dwell, EventRecord>> kept_;
+    std::deque<std::variant<Order, Dwell, Swept, EventRecord>> kept_;
     std::int64_t committed_wall_ns_ = 0, retry_wall_ns_ = 0;
     drivers::Time newest_sample_ = 0, estimate_at_ = 0, looked_around_at_ = 0;
     std::uint64_t estimate_samples_ = 0;

@@ -56,8 +56,10 @@ struct Order {
     double frequency_hz = 0;              ///< commanded; 0: the configuration's
     bool held_out = false;                ///< for verification
     estimator::RandomVibration random{};  ///< in place of a sine
+    estimator::SweptSine sweep{};         ///< likewise
     [[nodiscard]] estimator::DwellInfo dwell() const {
-        return {run, position, table_g, begin_s, power_lost, frequency_hz, held_out, random};
+        return {run,          position, table_g, begin_s, power_lost,
+                frequency_hz, held_out, random,  {},      sweep};
     }
 };
 
@@ -67,12 +69,28 @@ inline constexpr const char* kDwellsHeader =
     "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us,zero_x_g,zero_y_g,zero_z_g,"
     "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z,begin_s,"
     "power_lost,frequency_hz,held_out,profile,level_db,random_mean_square_g2,random_bandwidth_hz,"
-    "random_gain_error,random_highest_hz";
+    "random_gain_error,random_highest_hz,sweep_from_hz,sweep_to_hz,sweep_s";
 /// In it, with a number: the daemon was started again and went on after so many dwells.
 inline constexpr const char* kRestartLine = "# restart after dwells: ";
 
+/// In it, with JSON [run, position, [[s since the dwell began, Hz], ..]]: what the controller said
+/// of a sweep's frequency.
+inline constexpr const char* kSweptLine = "# swept: ";
+
 /// In it, at the end, with JSON: the result is not the live one, but identified anew.
 inline constexpr const char* kAnewLine = "# result: ";
+
+/// What the controller says of its frequency in a sweep.
+struct SweptRow {
+    drivers::Time time = 0;
+    std::int32_t run = 0, position = 0;
+    double frequency_hz = 0;
+};
+
+/// Of one sweep.
+struct Swept {
+    std::vector<SweptRow> rows;
+};
 
 /// A dwell that is over, and what was known after it.
 struct Dwell {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <fstream>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <thread>
@@ -224,6 +225,21 @@ void keep_dwells(Campaign& campaign, std::size_t count) {
     campaign.restarted_at = count;
 }
 
+/// Times are those of UTC yet.
+void read_swept(const std::string& text, const std::string& place, Campaign& to) {
+    try {
+        const auto json = nlohmann::json::parse(text);
+        for (const auto& one : json.at(2))
+            to.swept.push_back({one.at(0).get<std::int64_t>() * drivers::kMicrosecond +
+                                    one.at(1).get<std::int64_t>(),
+                                json.at(0).get<std::int32_t>(), json.at(1).get<std::int32_t>(),
+                                one.at(2).get<double>()});
+    } catch (const nlohmann::json::exception& error) {
+        throw std::runtime_error(place + ": found '" + proto::printable(text.substr(0, 80)) +
+                                 "', expected the frequencies of a sweep as JSON: " + error.what());
+    }
+}
+
 void read_dwells(const std::string& path, Campaign& to) {
     std::ifstream file(path);
     std::string line;
@@ -242,6 +258,10 @@ void read_dwells(const std::string& path, Campaign& to) {
                 throw std::runtime_error(place + ": found '" + proto::printable(line) +
                                          "', expected a number of dwells");
             keep_dwells(to, count);
+            continue;
+        }
+        if (line.starts_with(kSweptLine)) {
+            read_swept(line.substr(std::strlen(kSweptLine)), place, to);
             continue;
         }
         if (line.starts_with(kAnewLine)) {
@@ -279,7 +299,11 @@ void read_dwells(const std::string& path, Campaign& to) {
         const auto yes_or_no = [&fields](std::size_t at) {
             return fields.size() <= at || fields[at] == "1" || fields[at] == "0";
         };
-        bool good = fields.size() >= 15 && (fields.size() <= 19 || fields.size() == 25) &&
+        auto& sweep = order.sweep;
+        const std::array<std::pair<std::size_t, double*>, 3> of_sweep{
+            {{25, &sweep.from_hz}, {26, &sweep.to_hz}, {27, &sweep.seconds}}};
+        bool good = fields.size() >= 15 &&
+                    (fields.size() <= 19 || fields.size() == 25 || fields.size() == 28) &&
                     fields.size() != 18 && yes_or_no(16) && yes_or_no(18) &&
                     (fields.size() < 19 ||
                      (proto::read_number(fields[17], order.frequency_hz) &&
@@ -289,7 +313,12 @@ void read_dwells(const std::string& path, Campaign& to) {
                     proto::read_number(fields[0], order.run) &&
                     proto::read_number(fields[1], order.position) &&
                     proto::read_number(fields[6], offset_us);
-        if (fields.size() == 25) {
+        if (fields.size() == 28) {
+            for (const auto& [field, value] : of_sweep)
+                good = good && proto::read_number(fields[field], *value) && std::isfinite(*value) &&
+                       *value >= 0;
+        }
+        if (fields.size() >= 25) {
             good = good && proto::read_number(fields[19], random.profile);
             for (const auto& [field, value] : of_random)
                 good = good && proto::read_number(fields[field], *value) && std::isfinite(*value);
@@ -312,6 +341,7 @@ void read_dwells(const std::string& path, Campaign& to) {
         to.orders.push_back(order);
     }
     if (to.orders.empty()) throw std::runtime_error(path + ": found no dwell, expected some");
+    for (SweptRow& row : to.swept) row.time -= to.head.utc_offset_ns;
     for (Order& order : to.orders) {
         for (Time* time : {&order.announced, &order.from, &order.to})
             if (*time != 0) *time -= to.head.utc_offset_ns;
@@ -319,6 +349,23 @@ void read_dwells(const std::string& path, Campaign& to) {
 }
 
 }  // namespace
+
+estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
+                                        const estimator::Settings& settings,
+                                        const RecordedDwell& dwell) {
+    // Since its level was reached, before the dwell began, to the reading after its end.
+    constexpr Time kAround = 60 * drivers::kSecond;
+    const Order& order = *dwell.order;
+    estimator::spectrum::ReadSweep sweep(settings, order.run, order.position);
+    for (const SweptRow& row : campaign.swept) {
+        if (row.run == order.run && row.position == order.position &&
+            row.time > order.from - kAround && row.time < order.to + kAround)
+            sweep.frequency(drivers::to_seconds(row.time - order.from), row.frequency_hz);
+    }
+    for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
+        sweep.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
+    return sweep;
+}
 
 bool noise_known(const Campaign& campaign) {
     return std::ranges::all_of(campaign.orders, [](const Order& order) {

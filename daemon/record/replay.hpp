@@ -7,6 +7,7 @@
 #include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "estimator/identification/result.hpp"
+#include "estimator/spectrum/read_sweep.hpp"
 
 namespace vibrig::record {
 
@@ -38,6 +39,11 @@ struct ReplayResult {
 void forget_noise(Campaign& campaign);
 
 using OnStep = std::function<void(std::size_t sample, const estimator::StepResult&)>;
+/// A sweep with what the controller said of its frequency, and the recorded samples.
+[[nodiscard]] estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
+                                                      const estimator::Settings& settings,
+                                                      const RecordedDwell& dwell);
+
 /// One dwell into a filter, with the zeros of the recording and the noise levels of its result.
 void feed(estimator::Identification& identification, const Campaign& campaign,
           const RecordedDwell& dwell, const OnStep& on_step = {});

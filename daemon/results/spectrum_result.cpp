@@ -343,7 +343,8 @@ std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator
 
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
                                           const std::vector<estimator::DwellRow>& rows, Form form,
-                                          const NumberedKinds& profiles) {
+                                          const NumberedKinds& profiles,
+                                          std::vector<Sweep> sweeps) {
     std::vector<SpectralDwell> dwells;
     std::vector<Kind> kinds;
     std::vector<SpectrumResult::HeldOut> held_out;
@@ -362,8 +363,11 @@ std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
         dwells.back().kind = static_cast<std::size_t>(known - kinds.begin());
         if (known == kinds.end()) kinds.push_back(std::move(*kind));
     }
-    if (kinds.size() < 2 || dwells.size() > kMostSpectralDwells) return std::nullopt;
-    SpectrumResult found = spectrum_of(settings, std::move(dwells), std::move(kinds), form);
+    std::erase_if(sweeps, [](const Sweep& sweep) { return sweep.known() == 0; });
+    const bool several = kinds.size() >= 2 || (kinds.size() == 1 && !sweeps.empty());
+    if (!several || dwells.size() < 2 || dwells.size() > kMostSpectralDwells) return std::nullopt;
+    SpectrumResult found =
+        spectrum_of(settings, std::move(dwells), std::move(kinds), form, std::move(sweeps));
     found.held_out = std::move(held_out);
     return found;
 }

@@ -44,12 +44,12 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
 using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>>;
 
 /// Of a campaign's rows that say with which frequency they shook, or under which of `profiles`
-/// (others are left out), those held out left aside; nothing where there are not several kinds, or
-/// too few or too many rows.
+/// (others are left out), those held out left aside; nothing where there are neither several kinds
+/// nor a sweep, or too few or too many rows. Sweeps without a known second are left out.
 [[nodiscard]] std::optional<SpectrumResult> spectrum_of(
     const estimator::Settings& settings, const std::vector<estimator::DwellRow>& rows,
     estimator::spectrum::Form form = estimator::spectrum::Form::automatic,
-    const NumberedKinds& profiles = {});
+    const NumberedKinds& profiles = {}, std::vector<estimator::spectrum::Sweep> sweeps = {});
 
 /// With several frequencies the assessment's coefficients become those of the analysis, its rates
 /// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.

@@ -20,7 +20,8 @@ std::string values_script() {
                         {"number", is_number(row)},
                         {"decimals", row.decimals},
                         {"duration", row.duration},
-                        {"alarming", row.alarming}});
+                        {"alarming", row.alarming},
+                        {"unless", row.silenced_by == nullptr ? Json() : Json(row.silenced_by)}});
     }
     return "'use strict';\nconst kValues = " + rows.dump(1) + ";\n";
 }

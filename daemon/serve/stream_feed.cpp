@@ -11,10 +11,11 @@
 
 namespace vibrig::serve {
 
-using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr auto kYoung = std::chrono::milliseconds(20);    // the same status, whoever asks
 constexpr auto kShared = std::chrono::milliseconds(200);  // among those due together

@@ -68,11 +68,20 @@ std::string said(const StatusValue& row, const v1::Status& status) {
     return all;
 }
 
+/// What there is instead is said elsewhere.
+bool silenced(const StatusValue& row, const v1::Status& status) {
+    if (row.silenced_by == nullptr) return false;
+    const StatusScalar by = value_of(status, row.silenced_by);
+    const auto* const words = std::get_if<std::string>(&by);
+    return words != nullptr && !words->empty();
+}
+
 }  // namespace
 
 ValueLines::ValueLines(const v1::Status& status) {
     for (const StatusValue& row : status_values()) {
         if (row.line == nullptr) continue;
+        if (silenced(row, status)) continue;
         const std::string text = said(row, status);
         if (text.empty()) continue;
         const auto same = std::ranges::find(lines_, row.line, &decltype(lines_)::value_type::first);

@@ -211,6 +211,12 @@ const auto kValues = std::to_array<StatusValue>({
     row("vibration.high_g", "g",
         [](auto& s) { return only(s.vibration.high_g >= 0, s.vibration.high_g); }),
     row("vibration.psd_at", "", [](auto& s) { return s.vibration.psd_at; }),
+    row("vibration.from_hz", "Hz",
+        [](auto& s) { return only(s.vibration.from_hz > 0, s.vibration.from_hz); }),
+    row("vibration.to_hz", "Hz",
+        [](auto& s) { return only(s.vibration.to_hz > 0, s.vibration.to_hz); }),
+    row("vibration.words", "", [](auto& s) { return s.vibration.words; })
+        .shown("vibration", "{}", ""),
 
     row("interlock.tripped", "", [](auto& s) { return s.interlock.tripped; })
         .mqtt("Interlock/Tripped"),
@@ -353,7 +359,7 @@ const auto kValues = std::to_array<StatusValue>({
     row("estimate.amplitude_g", "g", [](auto& s) { return s.estimate.amplitude_g; })
         .shown("vibration", "{} on the platform").with_decimals(4),
     row("estimate.frequency_hz", "Hz", [](auto& s) { return s.estimate.frequency_hz; })
-        .shown("vibration", "{}").with_decimals(3),
+        .shown("vibration", "{}").with_decimals(3).unless("vibration.words"),
     row("estimate.kappa", "", [](auto& s) { return s.estimate.kappa; }),
     row("estimate.samples", "", [](auto& s) { return s.estimate.samples; })
         .shown("filter", "{} samples").off_page(),

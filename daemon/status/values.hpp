@@ -38,10 +38,11 @@ struct StatusValue {
     /// known; null: a dash for the number, nothing for the others.
     const char* words = nullptr;
     const char* otherwise = nullptr;
-    int decimals = -1;      ///< -1: as many as it has
-    bool duration = false;  ///< s, as "1 h 02 min"
-    bool alarming = false;  ///< beyond 0 the page marks it
-    bool on_page = true;    ///< else in a terminal alone: the page shows it somewhere else
+    int decimals = -1;                  ///< -1: as many as it has
+    bool duration = false;              ///< s, as "1 h 02 min"
+    bool alarming = false;              ///< beyond 0 the page marks it
+    const char* silenced_by = nullptr;  ///< a text: where it is not empty this is not said
+    bool on_page = true;  ///< else in a terminal alone: the page shows it somewhere else
 
     [[nodiscard]] constexpr StatusValue mqtt(const char* name, double factor = 1) const {
         StatusValue row = *this;
@@ -73,6 +74,9 @@ struct StatusValue {
     }
     [[nodiscard]] constexpr StatusValue alarms() const {
         return with(&StatusValue::alarming, true);
+    }
+    [[nodiscard]] constexpr StatusValue unless(const char* other) const {
+        return with(&StatusValue::silenced_by, other);
     }
     [[nodiscard]] constexpr StatusValue off_page() const {
         return with(&StatusValue::on_page, false);

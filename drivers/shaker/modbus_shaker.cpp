@@ -40,6 +40,15 @@ constexpr Time kTimeoutLook = 500 * kMillisecond;
                          std::span(words).first(map.random->profile_level_db.words()));
 }
 
+/// The same of a sweep.
+[[nodiscard]] bool sweepable(const proto::ShakerRegisters& map,
+                             const std::optional<SweepSetPoint>& sweep) noexcept {
+    return !sweep ||
+           (map.sweep && sweep->from_hz > 0 && sweep->to_hz > 0 && sweep->octaves_per_minute > 0 &&
+            encodable(map.sweep->from, sweep->from_hz) && encodable(map.sweep->to, sweep->to_hz) &&
+            encodable(map.sweep->rate, sweep->octaves_per_minute));
+}
+
 [[nodiscard]] bool nonzero(std::span<const std::uint16_t> words) noexcept {
     return std::any_of(words.begin(), words.end(), [](std::uint16_t word) { return word != 0; });
 }
@@ -69,7 +78,8 @@ bool ModbusShaker::request(const ShakerSetPoint& set_point, std::uint64_t stops)
     const proto::ShakerRegisters& map = settings_.registers;
     if (!encodable(map.frequency, set_point.frequency_hz) ||
         !encodable(map.amplitude, set_point.amplitude_g) ||
-        !encodable(map.ramp_time, set_point.ramp_s) || !playable(map, set_point.random)) {
+        !encodable(map.ramp_time, set_point.ramp_s) || !playable(map, set_point.random) ||
+        !sweepable(map, set_point.sweep) || (set_point.random && set_point.sweep)) {
         return false;
     }
     // Whatever the caller thinks: the frequency changes at rest only, or it passes the resonance.
@@ -422,9 +432,9 @@ bool ModbusShaker::write_steps(const ShakerSetPoint& set_point) {
     std::vector<Step> steps;
     // On the way to zero the frequency does not matter: nothing may keep the shaker from coming
     // down.
-    if (excite && !running && map.random && !choose(set_point.random)) return false;
+    if (excite && !running && (map.random || map.sweep) && !choose(set_point)) return false;
     const auto frequency = encoded(map.frequency, set_point.frequency_hz);
-    if (!set_point.random && (excite || (!running && nonzero(frequency))) &&
+    if (!set_point.random && !set_point.sweep && (excite || (!running && nonzero(frequency))) &&
         !same_raw(map.frequency, frequency, image_.words_of(map.frequency))) {
         // Frequency changes only at zero amplitude; at rest the register may still hold the last
         // one.
@@ -551,30 +561,6 @@ std::string ModbusShaker::differs(const char* role, const proto::Register& reg, 
                : std::string(role) + " was changed by another: reads back as " +
                      std::to_string(proto::decode(reg, read)) + ", was told " +
                      std::to_string(proto::decode(reg, ours));
-}
-
-std::string ModbusShaker::changed_by_others(const ShakerReading& reading) {
-    // A device that has stopped by itself and says so has a trip of its own.
-    if (!told_ || stop_pending() || reading.fault != 0 || reading.state == kShakerFault ||
-        reading.emergency_stop_open)
-        return {};
-    const proto::ShakerRegisters& map = settings_.registers;
-    std::string found;
-    if (map.random) found = differs("mode", map.random->mode, told_->random ? 1 : 0);
-    if (const auto& random = told_->random) {
-        if (found.empty())
-            found = differs("profile number", map.random->profile_number, random->profile);
-        if (found.empty())
-            found = differs("profile level", map.random->profile_level_db, random->level_db);
-        if (found.empty())
-            found = differs("profile checksum", map.random->profile_checksum, random->checksum);
-    } else if (found.empty()) {
-        found = differs("frequency", map.frequency, told_->frequency_hz);
-    }
-    if (found.empty()) found = differs("amplitude", map.amplitude, told_->amplitude_g);
-    if (found.empty()) found = differs("ramp time", map.ramp_time, told_->ramp_s);
-    if (found.empty()) found = differs("run", map.run, 1);
-    return found;
 }
 
 void ModbusShaker::settle(const std::string& why) {

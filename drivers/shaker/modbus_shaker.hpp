@@ -91,7 +91,8 @@ class ModbusShaker final : public Shaker {
     [[nodiscard]] bool write_steps(const ShakerSetPoint& set_point);
     [[nodiscard]] bool write_each(std::span<const Step> steps);
     /// What chooses the kind of vibration, at rest; of random vibration the checksum is looked at.
-    [[nodiscard]] bool choose(const std::optional<RandomSetPoint>& random);
+    [[nodiscard]] bool choose(const ShakerSetPoint& set_point);
+    [[nodiscard]] bool choose_random(const RandomSetPoint& random);
     [[nodiscard]] bool same_kind(const ShakerSetPoint& set_point,
                                  const ShakerReading& now) const noexcept;
     [[nodiscard]] std::string differs(const char* role, const proto::Register& reg, double told);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -53,6 +54,14 @@ struct RandomSetPoint {
     [[nodiscard]] bool operator==(const RandomSetPoint&) const = default;
 };
 
+/// A sweep of a sine: where it begins and ends.
+struct SweepSetPoint {
+    double from_hz = 0, to_hz = 0;
+    double octaves_per_minute = 0;
+
+    [[nodiscard]] bool operator==(const SweepSetPoint&) const = default;
+};
+
 /// What is asked of the shaker. Frequency may only change while the amplitude is zero (checked by
 /// the campaign).
 struct ShakerSetPoint {
@@ -64,6 +73,8 @@ struct ShakerSetPoint {
     /// run = 1 although the amplitude is 0: the controller runs, the table stands. Else 0 g is
     /// run = 0.
     bool run_at_zero = false;
+    /// In place of a sine that stands; likewise.
+    std::optional<SweepSetPoint> sweep{};
 };
 
 /// Values of the state register.
@@ -91,6 +102,21 @@ struct RandomReading {
     std::uint8_t abort_reason = 0;
 };
 
+/// Of a controller with registers for sweeps, as read back.
+struct SweepReading {
+    bool on = false;  ///< the mode
+    double from_hz = 0, to_hz = 0, octaves_per_minute = 0;
+    double actual_hz = 0;  ///< where it says that it is; not finite: it does not
+
+    /// It is told to do this, as far as registers resolve it.
+    [[nodiscard]] bool is(const SweepSetPoint& wanted) const noexcept {
+        return on && std::abs(from_hz - wanted.from_hz) < 0.01 &&
+               std::abs(to_hz - wanted.to_hz) < 0.01 &&
+               std::abs(octaves_per_minute - wanted.octaves_per_minute) <
+                   0.01 + 0.02 * wanted.octaves_per_minute;
+    }
+};
+
 /// Who the controller at the newest link says it is.
 struct ShakerIdentity {
     bool known = false;  ///< it was asked, and has answered or not
@@ -112,6 +138,7 @@ struct ShakerReading {
     WatchdogTimeout watchdog = WatchdogTimeout::unread;
     double watchdog_timeout_s = 0;          ///< as read
     std::optional<RandomReading> random{};  ///< none: no registers for it
+    std::optional<SweepReading> sweep{};    ///< likewise
     [[nodiscard]] bool still() const { return valid && measured_g < 0.05; }
     [[nodiscard]] bool at_rest() const { return still() && !running && state == 0; }
 };

@@ -48,8 +48,11 @@ ShakerImage::ShakerImage(const proto::ShakerRegisters& registers) : registers_(r
                       registers.emergency_stop, registers.measured_amplitude};
     if (const auto& random = registers.random)
         roles.insert(roles.end(),
-                     {random->mode, random->profile_number, random->profile_level_db,
-                      random->profile_checksum, random->measured_g_rms, random->control_state});
+                     {random->profile_number, random->profile_level_db, random->profile_checksum,
+                      random->measured_g_rms, random->control_state});
+    if (const auto& sweep = registers.sweep)
+        roles.insert(roles.end(), {sweep->from, sweep->to, sweep->rate, sweep->actual_frequency});
+    if (registers.random || registers.sweep) roles.push_back(registers.mode);
     std::sort(roles.begin(), roles.end(), [](const auto& a, const auto& b) {
         return std::pair(a.table, a.address) < std::pair(b.table, b.address);
     });
@@ -97,14 +100,20 @@ ShakerReading ShakerImage::reading(Time time) noexcept {
     reading.valid = std::isfinite(reading.frequency_hz) && std::isfinite(reading.amplitude_g) &&
                     std::isfinite(reading.measured_g);
     if (registers_.random) reading.random = random_reading(*registers_.random);
+    if (registers_.sweep) reading.sweep = sweep_reading(*registers_.sweep);
     return reading;
+}
+
+SweepReading ShakerImage::sweep_reading(const proto::SweepRegisters& map) noexcept {
+    return {value_of(registers_.mode) == kModeSweep, value_of(map.from), value_of(map.to),
+            value_of(map.rate), value_of(map.actual_frequency)};
 }
 
 RandomReading ShakerImage::random_reading(const proto::RandomRegisters& map) noexcept {
     RandomReading reading;
     const std::uint16_t control = to_u16(value_of(map.control_state));
     const double checksum = value_of(map.profile_checksum);
-    reading.random = value_of(map.mode) != 0;
+    reading.random = value_of(registers_.mode) == kModeRandom;
     reading.profile = to_u16(value_of(map.profile_number));
     reading.level_db = value_of(map.profile_level_db);
     if (checksum >= 0 && checksum <= 0xffffffff)
@@ -148,8 +157,14 @@ void check_registers(const ShakerSettings& settings) {
     check_role("fault", map.fault, true, false);
     check_role("emergency_stop", map.emergency_stop, true, false);
     check_role("measured_amplitude", map.measured_amplitude, true, false);
+    if (map.random || map.sweep) check_role("mode", map.mode, true, true);
+    if (const auto& sweep = map.sweep) {
+        check_role("sweep_from", sweep->from, true, true);
+        check_role("sweep_to", sweep->to, true, true);
+        check_role("sweep_rate", sweep->rate, true, true);
+        check_role("actual_frequency", sweep->actual_frequency, true, false);
+    }
     if (const auto& random = map.random) {
-        check_role("mode", random->mode, true, true);
         check_role("profile_number", random->profile_number, true, true);
         check_role("profile_level_db", random->profile_level_db, true, true);
         check_role("profile_checksum", random->profile_checksum, true, false);

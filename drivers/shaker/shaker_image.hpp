@@ -9,6 +9,9 @@
 
 namespace vibrig::drivers {
 
+/// Values of the mode register.
+inline constexpr int kModeSine = 0, kModeRandom = 1, kModeSweep = 2;
+
 /// Registers of one table that one request reads.
 struct RegisterRange {
     proto::RegisterTable table = proto::RegisterTable::holding;
@@ -31,6 +34,7 @@ class ShakerImage {
 
   private:
     [[nodiscard]] RandomReading random_reading(const proto::RandomRegisters& map) noexcept;
+    [[nodiscard]] SweepReading sweep_reading(const proto::SweepRegisters& map) noexcept;
 
     proto::ShakerRegisters registers_;
     std::vector<RegisterRange> ranges_;

@@ -28,6 +28,15 @@ struct RandomVibration {
     double level_db = 0;        ///< of what was played about the profile
 };
 
+/// A frequency that goes from one end to the other within a dwell, exponentially.
+struct SweptSine {
+    double from_hz = 0, to_hz = 0;  ///< 0: there is none
+    double seconds = 0;             ///< from one to the other
+
+    [[nodiscard]] bool any() const noexcept { return to_hz > 0; }
+    [[nodiscard]] bool operator==(const SweptSine&) const = default;
+};
+
 struct DwellInfo {
     int run = 1;          ///< from 1; the two-step route joins two runs
     int position = 1;     ///< from 1
@@ -41,6 +50,8 @@ struct DwellInfo {
     /// Of this vibration by the accelerometers; none: as Settings has it of the frequency or the
     /// profile.
     std::optional<Seen> seen{};
+    /// In place of a sine at one frequency: no row, and the filter is left alone.
+    SweptSine sweep{};
 };
 
 enum class StepOutcome : std::uint8_t {

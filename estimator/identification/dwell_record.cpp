@@ -63,6 +63,14 @@ void DwellRecord::count(const StepResult& step) noexcept {
     last_innovation = step.innovation_arcsec;
 }
 
+void DwellRecord::note_swept(const std::array<double, 3>& force_g) noexcept {
+    ++forces;
+    for (std::size_t i = 0; i < 3; ++i) {
+        force_sum[i] += force_g[i];
+        force_square += force_g[i] * force_g[i];
+    }
+}
+
 void DwellRecord::note_level(double kappa) noexcept {
     least_kappa = least_kappa > 0 ? std::min(least_kappa, kappa) : kappa;
     largest_kappa = std::max(largest_kappa, kappa);
@@ -98,7 +106,40 @@ const char* random_misfit(const RandomLevel::Level& level) noexcept {
     return "";
 }
 
+/// What its samples are good for shows where its blocks are made: a level about a frequency that
+/// does not stand is none.
+DwellVerdict judge_swept(const DwellRecord& r) noexcept {
+    DwellVerdict verdict;
+    DwellSummary& s = verdict.summary;
+    const double n = r.forces;
+    double square = r.forces > 0 ? r.force_square / n : 0;
+    for (const double sum : r.force_sum) square -= r.forces > 0 ? sum / n * (sum / n) : 0;
+    s.kappa = 1 + std::max(0.0, square) / r.seen.share;
+    s.amplitude_g = std::sqrt(2.0 * (s.kappa - 1));
+    if (r.samples == 0 || r.forces == 0) {
+        s.reason = r.samples == 0 ? "no samples" : "no usable specific force";
+        verdict.rejected = true;
+    } else if (r.saturated_axis >= 0) {
+        s.reason = kSaturated[r.saturated_axis];
+        verdict.rejected = true;
+    } else if (r.rejected > kRejectedTolerance * r.samples) {
+        s.reason = "more than 1 % of the samples rejected";
+    }
+    s.flagged = *s.reason != '\0';
+    return verdict;
+}
+
 DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
+    if (r.info.sweep.any()) {
+        DwellVerdict verdict = judge_swept(r);
+        DwellSummary& s = verdict.summary;
+        s.run = r.info.run;
+        s.position = r.info.position;
+        s.samples = r.samples;
+        s.used = verdict.rejected ? 0 : r.used;
+        s.rejected = verdict.rejected ? r.samples : r.rejected;
+        return verdict;
+    }
     DwellVerdict verdict;
     DwellSummary& s = verdict.summary;
     s.run = r.info.run;

@@ -33,6 +33,9 @@ struct DwellRecord {
     /// than the period: where many are missing, it is not known.
     double slots = 0;
     std::uint32_t forces = 0, crowded = 0;
+    /// Under a sweep: sums of the specific force and of its square, g.
+    std::array<double, 3> force_sum{};
+    double force_square = 0;
 
     /// 1 + the mean square, from what the accelerometers show of it.
     [[nodiscard]] double kappa_of(double shown) const noexcept {
@@ -40,6 +43,7 @@ struct DwellRecord {
     }
     void count(const StepResult& step) noexcept;
     void note_level(double kappa) noexcept;
+    void note_swept(const std::array<double, 3>& force_g) noexcept;
     /// `periods` from the reading before to this one; not across a pause.
     void note_interval(double periods) noexcept;
 };

@@ -129,8 +129,9 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     power_lost_ = power_lost_ || dwell.power_lost;
     const double hz = dwell.frequency_hz > 0 ? dwell.frequency_hz : settings.frequency_hz;
     random_ = dwell.random.mean_square_g2 > 0;
+    swept_ = dwell.sweep.any();
     apart_ = settings.method == Method::joint &&
-             (dwell.held_out || random_ || !at_reference(settings, hz));
+             (dwell.held_out || random_ || swept_ || !at_reference(settings, hz));
     record_.seen = seen_of(dwell, hz);
     level_.nominal(hz);
     sync_.nominal(hz);
@@ -196,6 +197,7 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         }
     }
     bad_times_in_a_row_ = 0;
+    if (swept_) return leave_alone(measurement);
     if (!first && (restart || dt > kLongestPause_s)) {
         end_stretch();
         active_->filter.begin_dwell();
@@ -210,6 +212,24 @@ StepResult Identification::Impl::add(const Measurement& measurement) noexcept {
         saturation_.add(measurement.force_g);
     }
     return accept(reading);
+}
+
+/// A drift that goes through a resonance is none that the filter could follow.
+StepResult Identification::Impl::leave_alone(const Measurement& measurement) noexcept {
+    StepResult step;
+    const bool angles = measurement.angles_good && finite(measurement.angle_rad);
+    const bool force = measurement.force_good && finite(measurement.force_g);
+    step.outcome = !angles  ? StepOutcome::bad_angles
+                   : !force ? StepOutcome::bad_force
+                            : StepOutcome::buffered;
+    last_time_s_ = measurement.time_s;
+    ++(angles && force ? record_.used : record_.rejected);
+    if (force) {
+        record_.note_swept(measurement.force_g);
+        saturation_.add(measurement.force_g);
+    }
+    primed_ = true;  // no gap to look for
+    return step;
 }
 
 StepResult Identification::Impl::accept(const Reading& reading) noexcept {
@@ -427,7 +447,8 @@ void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
 
 DwellSummary Identification::Impl::end_dwell() noexcept {
     if (!in_dwell_) return {};
-    if (active_ != nullptr) end_stretch();
+    if (active_ != nullptr && !swept_) end_stretch();
+    primed_ = false;
     record_.saturated_axis = saturation_.axis();
     DwellVerdict verdict = judge(record_, settings);
     if (active_ == nullptr) {
@@ -438,7 +459,7 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             verdict.summary.kappa = paper_.kappa();
             verdict.summary.amplitude_g = paper_.amplitude_g();
         }
-        if (!verdict.rejected) keep_row(verdict.summary);
+        if (!verdict.rejected && !swept_) keep_row(verdict.summary);
         active_->batch.end_dwell(!verdict.rejected && !apart_, walked_.value_or(0.0));
         if (!verdict.rejected && !apart_ && walked_)
             walked_from_.emplace(walk_begin_s_, last_time_s_ - dwell_begin_s_);

@@ -79,6 +79,7 @@ struct Identification::Impl {
     [[nodiscard]] Seen seen_of(const DwellInfo& dwell, double hz) const noexcept;
     void begin_paper_level() noexcept;
     StepResult accept(const Reading& reading) noexcept;
+    StepResult leave_alone(const Measurement& measurement) noexcept;
     StepResult replay() noexcept;
     StepResult through_filter(const Reading& reading) noexcept;
     void to_level(const Reading& reading) noexcept;
@@ -115,6 +116,7 @@ struct Identification::Impl {
     bool in_dwell_ = false;
     bool apart_ = false;   ///< this dwell: see DwellRow
     bool random_ = false;  ///< likewise
+    bool swept_ = false;   ///< likewise: the filter is left alone
     bool primed_ = false;  ///< the level of this stretch is known
     /// Of the biases' walk since the dwell kept before, (deg/h)^2; none: not in the filter yet.
     std::optional<double> walked_;

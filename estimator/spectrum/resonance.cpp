@@ -278,15 +278,6 @@ void add_nodes(const Likelihood& likelihood, const Point& top, std::vector<Node>
     }
 }
 
-MatrixXd swept_design(const SweptRates& swept, const std::vector<Resonance>& resonances) {
-    MatrixXd out(swept.size(), kBase + kElastic * static_cast<Index>(resonances.size()));
-    out.leftCols(kBase) = swept.base();
-    for (std::size_t r = 0; r < resonances.size(); ++r)
-        out.middleCols(kBase + kElastic * static_cast<Index>(r), kElastic) =
-            swept.elastic(resonances[r]);
-    return out;
-}
-
 void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
             Mixture& out) {
     std::stable_sort(out.list.begin(), out.list.end(),
@@ -304,6 +295,15 @@ void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& pro
 }
 
 }  // namespace
+
+MatrixXd swept_design(const SweptRates& swept, const std::vector<Resonance>& resonances) {
+    MatrixXd out(swept.size(), kBase + kElastic * static_cast<Index>(resonances.size()));
+    out.leftCols(kBase) = swept.base();
+    for (std::size_t r = 0; r < resonances.size(); ++r)
+        out.middleCols(kBase + kElastic * static_cast<Index>(r), kElastic) =
+            swept.elastic(resonances[r]);
+    return out;
+}
 
 MatrixXd design(const SpectralTable& table, std::size_t gyro,
                 const std::vector<Resonance>& resonances) {

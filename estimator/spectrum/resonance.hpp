@@ -46,11 +46,14 @@ struct Mixture {
 /// None, or one: a mixture over its frequency and damping.
 [[nodiscard]] Mixture one_resonance(const SpectralTable& table, std::size_t gyro,
                                     const GyroProblem& problem);
-/// Two, by Gauss and Newton's method from several starts, `first` the frequency of one. Of the
-/// rates of dwells alone: sweeps take no part.
+/// Two, by Gauss and Newton's method from several starts, `first` the frequency of one; of
+/// the rates of dwells and sweeps together. Chi-square and its degrees are of the dwells.
 [[nodiscard]] Mixture two_resonances(const SpectralTable& table, std::size_t gyro,
                                      const GyroProblem& problem, double first_hz);
 
+/// Of a gyro's sweep, whitened, n x (10 + 6 m).
+[[nodiscard]] Eigen::MatrixXd swept_design(const SweptRates& swept,
+                                           const std::vector<Resonance>& resonances);
 /// Of a gyro, n x (10 + 6 m).
 [[nodiscard]] Eigen::MatrixXd design(const SpectralTable& table, std::size_t gyro,
                                      const std::vector<Resonance>& resonances);

@@ -27,8 +27,13 @@ class TwoResonances {
         : table_(table),
           gyro_(gyro),
           factor_(problem.covariance),
+          swept_(problem.swept),
           rate_(factor_.matrixL().solve(problem.rate)),
           information_(kLinearColumns) {
+        for (const SweptRates& swept : swept_) {
+            rate_.conservativeResize(rate_.size() + swept.size());
+            rate_.tail(swept.size()) = swept.rate();
+        }
         information_.head(kBase) = problem.prior_sigma.array().square().inverse();
         information_.tail(2 * kElastic).setConstant(std::pow(kElasticSizes.back(), -2));
     }
@@ -77,7 +82,15 @@ class TwoResonances {
 
   private:
     [[nodiscard]] MatrixXd whitened(const Vector4d& p) const {
-        return factor_.matrixL().solve(design(table_, gyro_, resonances_at(p)));
+        const auto resonances = resonances_at(p);
+        MatrixXd out(rate_.size(), kLinearColumns);
+        Index row = table_.dwells();
+        out.topRows(row) = factor_.matrixL().solve(design(table_, gyro_, resonances));
+        for (const SweptRates& swept : swept_) {
+            out.middleRows(row, swept.size()) = swept_design(swept, resonances);
+            row += swept.size();
+        }
+        return out;
     }
     [[nodiscard]] static Eigen::Vector2d off_prior(const Vector4d& p) {
         return (p.tail<2>().array() - std::log(kDamping)) / kDampingSpread;
@@ -85,7 +98,8 @@ class TwoResonances {
     const SpectralTable& table_;
     std::size_t gyro_;
     Eigen::LLT<MatrixXd> factor_;
-    VectorXd rate_, information_;
+    const std::vector<SweptRates>& swept_;
+    VectorXd rate_, information_;  ///< of the dwells, then of the sweeps; whitened
 };
 
 /// Gauss and Newton's method, damped where it overshoots.
@@ -135,6 +149,12 @@ Mixture two_resonances(const SpectralTable& table, std::size_t gyro, const GyroP
     const VectorXd left = problem.rate - design(table, gyro, out.list[0].resonances) * best->x;
     out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
     out.degrees = static_cast<int>(problem.rate.size() - kLinearColumns - kNonlinear);
+    if (problem.swept.empty()) return out;
+    // What sweeps determine takes nothing from the dwells' rates.
+    const MatrixXd x = design(table, gyro, out.list[0].resonances);
+    out.degrees =
+        static_cast<int>(std::lround(static_cast<double>(problem.rate.size()) -
+                                     (gain(table, gyro, problem, out.list[0]) * x).trace()));
     return out;
 }
 

@@ -101,7 +101,6 @@ void SweepBlocks::take_moment(SweepBlock& block) {
                            return s.force_good && std::isfinite(s.hz) && s.hz > 0;
                        });
     if (!whole || samples_.back().time_s - samples_.front().time_s < kWhole * kBlock_s) return;
-    if (!clear(block, static_cast<double>(n) / kBlock_s)) return;
     Eigen::MatrixXd columns(static_cast<Index>(n), 3), force(static_cast<Index>(n), 3);
     Eigen::VectorXd root(static_cast<Index>(n));
     double phase = 0, sum = 0;
@@ -132,6 +131,8 @@ void SweepBlocks::take_moment(SweepBlock& block) {
         const Eigen::MatrixXd left = moving - of * of.colPivHouseholderQr().solve(moving);
         shares_.push_back(1 - std::max(0.0, left.squaredNorm() / sum - 3 * noise) / power);
     }
+    // What it is told apart from is there; how large it is is not.
+    if (!clear(block, static_cast<double>(n) / kBlock_s)) return;
     moment -= noise * Eigen::Matrix3d::Identity();
     const double seen =
         settings_.accelerometer_response.power(std::sqrt(block.from_hz * block.to_hz));

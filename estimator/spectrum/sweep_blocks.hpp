@@ -23,6 +23,8 @@ class SweepBlocks {
     /// blocks that shook; 1: of none. A frequency that is wrong by half a hertz, or late by half a
     /// second, leaves less than kShown.
     [[nodiscard]] double shown() const;
+    /// The same of each of them.
+    [[nodiscard]] const std::vector<double>& shares() const noexcept { return shares_; }
     static constexpr double kShown = 0.9;
 
   private:

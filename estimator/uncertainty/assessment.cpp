@@ -358,6 +358,7 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         const ForwardModel model(settings, of.coefficients);
         const Inputs declared = without(settings.uncertainty, settings.free);
         InputSignatures inputs = input_signatures(declared, table, model);
+        add_skew(table, model, inputs);
         out.inputs = std::move(inputs.list);
         const MatrixXd u = input_covariance(declared, out.inputs);
         const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));

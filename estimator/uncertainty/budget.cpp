@@ -128,6 +128,17 @@ InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
     return out;
 }
 
+void add_skew(const DwellTable& table, const ForwardModel& model, InputSignatures& to) {
+    double error = 0;
+    for (const DwellRow& row : table.rows)
+        if (!row.random) error = std::max(error, row.relative_error);
+    if (!(error > 0)) return;
+    // The moment goes with the square of the gain, by which the forward model has it.
+    const Set set = [](Disturbance& d, double x) { d.accelerometer_gain = x / 2; };
+    append(to, {"accelerometer_skew", "", Declared{error}, false, set},
+           signature(table, model, set, kShareStep));
+}
+
 MatrixXd input_covariance(const Inputs& inputs, const std::vector<InputSignature>& list) {
     const auto n = static_cast<Index>(list.size());
     MatrixXd u = MatrixXd::Zero(n, n);

@@ -30,6 +30,11 @@ struct InputSignatures {
 [[nodiscard]] InputSignatures input_signatures(const Inputs& inputs, const DwellTable& table,
                                                const ForwardModel& model);
 
+/// What the accelerometers' skew leaves unknown of the vibration's second moment, (pi f tau)^2
+/// relative (DwellRow::relative_error of a sine), in all dwells alike: one input more, none without
+/// a skew. Per unit the second moment is larger by 1.
+void add_skew(const DwellTable& table, const ForwardModel& model, InputSignatures& to);
+
 /// Covariance of the inputs; throws SettingsError when correlations name no input, or two that
 /// cannot be correlated so.
 [[nodiscard]] Eigen::MatrixXd input_covariance(const Inputs& inputs,

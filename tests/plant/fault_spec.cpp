@@ -17,6 +17,7 @@ enum class Value : std::uint8_t {
     factor,
     slowness,
     decibels,
+    either_way,
     whole,
     word
 };
@@ -29,7 +30,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 38> kDescriptions{{
+constexpr std::array<Description, 40> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -104,6 +105,12 @@ constexpr std::array<Description, 38> kDescriptions{{
      "profile-level-wrong=DB  random: the table does so much more than is told and read back"},
     {FaultKind::no_abort_bands, "no-abort-bands", Value::none, false,
      "no-abort-bands        random: the controller has none, and its control_state says so"},
+    {FaultKind::sweep_rate_scaled, "sweep-rate-scaled", Value::either_way, false,
+     "sweep-rate-scaled=FACTOR  sweeps go so many times as fast as is told; 0: not at all, below "
+     "0:\n"
+     "                        the other way"},
+    {FaultKind::actual_as_told, "actual-as-told", Value::none, false,
+     "actual-as-told        the register of the actual frequency shows the sweep that is told"},
     {FaultKind::timeout_register, "timeout-register", Value::whole, false,
      "timeout-register=MS   another master keeps this in the watchdog's timeout register; 0: off"},
     {FaultKind::latched_fault, "latched-fault", Value::none, false,
@@ -177,6 +184,9 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
             break;
         case Value::slowness:
             fault.value = number(spec, first, "a factor from 1 to 1000", 1, 1000);
+            break;
+        case Value::either_way:
+            fault.value = number(spec, first, "a factor from -20 to 20", -20, 20);
             break;
         case Value::decibels:
             fault.value = number(spec, first, "decibels from -60 to 20", -60, 20);

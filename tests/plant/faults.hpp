@@ -53,6 +53,8 @@ enum class FaultKind : std::uint8_t {
     wrong_profile,
     profile_level_wrong,
     no_abort_bands,
+    sweep_rate_scaled,
+    actual_as_told,
     timeout_register,
     latched_fault
 };

@@ -110,6 +110,8 @@ ShakerController::Answer ShakerController::write(std::size_t address,
     }
 
     const bool will_sweep = next[kMode] == 2;
+    if (!(will_sweep && moving))
+        told_hz_ = will_sweep ? 1e-3 * joined(next, kSweepFrom) : frequency;
     if (!lies_.frequency_ignored && !(will_sweep && moving))
         table_hz_ = will_sweep ? 1e-3 * joined(next, kSweepFrom) : frequency;
     if (lies_.timeout_register) next[kMap.watchdog_timeout.address] = *lies_.timeout_register;
@@ -151,7 +153,7 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     words[kProfileChecksum + 1] = static_cast<std::uint16_t>(checksum);
     split(words, kMeasuredRms, std::sqrt(mean_square_) / 1e-4);
     words[kControlState] = control_state();
-    split(words, kActualFrequency, 1e3 * table_hz_);
+    split(words, kActualFrequency, 1e3 * (lies_.actual_as_told ? told_hz_ : table_hz_));
     return words;
 }
 
@@ -183,13 +185,23 @@ void ShakerController::watch_bands(double dt_s) noexcept {
 
 /// Exponentially; a driver that ignores its frequency sweeps through nothing.
 void ShakerController::sweep(double dt_s) noexcept {
-    if (!sweeps() || state_ != ShakerState::running || lies_.frequency_ignored) return;
+    if (!sweeps() || state_ != ShakerState::running) return;
     swept_s_ += dt_s;
     if (swept_s_ < kSweepRests_s) return;
-    const double to_hz = 1e-3 * joined(holding_, kSweepTo);
     const double octaves = 0.01 * holding_[kSweepRate] * dt_s / 60;
-    table_hz_ = to_hz > table_hz_ ? std::min(to_hz, table_hz_ * std::exp2(octaves))
-                                  : std::max(to_hz, table_hz_ / std::exp2(octaves));
+    told_hz_ = swept(told_hz_, octaves);
+    if (!lies_.frequency_ignored) table_hz_ = swept(table_hz_, lies_.sweep_rate_scaled * octaves);
+}
+
+/// Within what the drive can do.
+double ShakerController::swept(double hz, double octaves) const noexcept {
+    constexpr double kLeast_hz = 1, kMost_hz = 200;
+    const double to_hz = 1e-3 * joined(holding_, kSweepTo);
+    if (octaves < 0)
+        return std::clamp(to_hz > hz ? hz * std::exp2(octaves) : hz / std::exp2(octaves), kLeast_hz,
+                          kMost_hz);
+    return to_hz > hz ? std::min(to_hz, hz * std::exp2(octaves))
+                      : std::max(to_hz, hz / std::exp2(octaves));
 }
 
 void ShakerController::open_emergency_stop(bool open) noexcept {

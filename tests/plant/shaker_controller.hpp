@@ -87,6 +87,7 @@ class ShakerController {
     [[nodiscard]] double commanded_g() const noexcept;
     void watch_bands(double dt_s) noexcept;
     void sweep(double dt_s) noexcept;
+    [[nodiscard]] double swept(double hz, double octaves) const noexcept;
     [[nodiscard]] std::uint16_t control_state() const noexcept;
     void ramp_to(double target_g, double time_s) noexcept;
     void trip(std::uint16_t fault, double stop_s) noexcept;
@@ -114,6 +115,7 @@ class ShakerController {
     double mean_square_ = 0;  ///< of the table as the controller's accelerometer has it, g^2
     double outside_bands_s_ = 0, at_level_s_ = 0;
     double swept_s_ = 0;         ///< at the level of a sweep
+    double told_hz_ = 15;        ///< where a sweep would be as it is told
     std::uint16_t aborted_ = 0;  ///< why
 };
 

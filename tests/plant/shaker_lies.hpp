@@ -30,6 +30,9 @@ struct ShakerLies {
     std::optional<std::uint16_t> wrong_profile{};
     double profile_level_wrong = 0;  ///< dB, the table does so much more than is told and measured
     bool no_abort_bands = false;     ///< the controller has none, and says so
+    /// Sweeps go so many times as fast as is told: 0 not at all, below 0 the other way.
+    double sweep_rate_scaled = 1;
+    bool actual_as_told = false;  ///< the register of the frequency shows the sweep that was told
     /// Another master keeps this in the watchdog's timeout register, which obeys it; ms, 0: off.
     std::optional<std::uint16_t> timeout_register{};
     bool latched_fault = false;  ///< trips by itself when this begins

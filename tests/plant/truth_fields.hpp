@@ -113,6 +113,8 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "wrong_profile", t.shaker_lies.wrong_profile, 0, 65535);
     field("shaker", "profile_level_wrong", t.shaker_lies.profile_level_wrong, -60.0, 20.0);
     field("shaker", "no_abort_bands", t.shaker_lies.no_abort_bands, 0, 0);
+    field("shaker", "sweep_rate_scaled", t.shaker_lies.sweep_rate_scaled, -20.0, 20.0);
+    field("shaker", "actual_as_told", t.shaker_lies.actual_as_told, 0, 0);
     field("shaker", "timeout_register", t.shaker_lies.timeout_register, 0, 65535);
     field("shaker", "latched_fault", t.shaker_lies.latched_fault, 0, 0);
 }

@@ -75,7 +75,10 @@ std::string Dwelling::vibration_may_change(Time now, bool& may) const {
     const auto& random = excitation_.random();
     return fmt::format("rest is not measured ({}): {} not written", stop_.what_moves(now),
                        random ? fmt::format("profile {} is", random->set_point.profile)
-                              : fmt::format("{:g} Hz are", excitation_.frequency_hz()));
+                       : excitation_.sweep().any()
+                           ? fmt::format("the sweep from {:g} to {:g} Hz is",
+                                         excitation_.sweep().from_hz, excitation_.sweep().to_hz)
+                           : fmt::format("{:g} Hz are", excitation_.frequency_hz()));
 }
 
 StageStep Dwelling::settled_or_recording(Time now) {
@@ -85,6 +88,7 @@ StageStep Dwelling::settled_or_recording(Time now) {
             return StageStep::failed(std::move(why));
     if (torquing(ports_.rig))
         return StageStep::failed("the platform is torqued during a dwell, expected free drift");
+    follow_sweep(now);
     if (part_ == Part::settle) {
         look_at_vibration(now);
         if (now < from_) return StageStep::going_on(std::min(from_, now + kStagePoll));
@@ -92,6 +96,7 @@ StageStep Dwelling::settled_or_recording(Time now) {
     }
     if (done_) {
         ordered_ = power_lost_ = false;
+        end_sweep();
         return StageStep::done();
     }
     if (now > to_ + kDoneGrace) return StageStep::failed("samples ceased during the dwell");
@@ -103,7 +108,7 @@ StageStep Dwelling::order(Time now) {
     const Time settled =
         excitation_.since() + std::max(from_seconds(settings_.settle_s), kOrderLead);
     from_ = (settled + drivers::kMillisecond - 1) / drivers::kMillisecond * drivers::kMillisecond;
-    to_ = from_ + from_seconds(settings_.dwell_s);
+    to_ = from_ + from_seconds(dwell_s());
     done_ = false;
     ordered_ = true;
     rt::DwellOrder order;
@@ -116,7 +121,7 @@ StageStep Dwelling::order(Time now) {
         order.zero_g = zeros_->raw_zero_g();
         order.level_sigma_g = zeros_->level_sigma(aim_.stop.position_deg);
     }
-    watch_vibration();
+    watch_vibration(order);
     if (!ports_.dwells.order(order)) return StageStep::failed("the estimator takes no order");
     return StageStep::going_on(now + kStagePoll);
 }
@@ -139,11 +144,14 @@ estimator::DwellInfo Dwelling::info() const {
             power_lost_ && !aim_.first,
             aim_.stop.frequency_hz,
             aim_.stop.verify,
-            aim_.stop.random ? aim_.stop.random->at_platform : estimator::RandomVibration{}};
+            aim_.stop.random ? aim_.stop.random->at_platform : estimator::RandomVibration{},
+            {},
+            aim_.stop.sweep};
 }
 
 void Dwelling::leave() {
-    if (std::exchange(watching_, false)) ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    if (std::exchange(watching_, false) || sweep_) ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    sweep_.reset();
     if (std::exchange(ordered_, false)) {
         rt::DwellOrder cancel;
         cancel.cancel = true;
@@ -160,10 +168,60 @@ double Dwelling::part_done(Time now) const {
 double Dwelling::left_s(Time now) const { return std::max(drivers::to_seconds(to_ - now), 0.0); }
 
 /// Of a plan that says no frequency there is one only, which the loop check has measured.
-void Dwelling::watch_vibration() {
+void Dwelling::watch_vibration(const rt::DwellOrder& order) {
     watching_ = aim_.stop.kind() != 0 && table_g() > kAtRestG && ports_.rig.feed != nullptr;
     shown_.clear();
-    if (watching_) ports_.rig.feed->order(rt::StageFeed::Mode::samples);
+    swept_hz_.clear();
+    if (!watching_) return;
+    ports_.rig.feed->order(rt::StageFeed::Mode::samples);
+    if (!aim_.stop.sweep.any()) return;
+    sweep_.emplace(settings_.rig, order, excitation_.since());
+    read_at_ = 0;
+}
+
+double Dwelling::dwell_s() const {
+    return aim_.stop.sweep.any() ? SweepWatch::dwell_s(aim_.stop.sweep) : settings_.dwell_s;
+}
+
+void Dwelling::trip(const std::string& why) {
+    ports_.log.event(Severity::trip, why);
+    ports_.rig.wrong_vibration();
+    excitation_.order_stop("another vibration than was asked for");
+}
+
+/// By the controller's word, and by the accelerometers'.
+void Dwelling::follow_sweep(Time now) {
+    if (!sweep_) return;
+    std::string other;
+    const RigFrame frame(settings_.rig);
+    rt::Motion motion;
+    while (ports_.rig.feed->pop(motion)) {
+        if (watching_ && motion.good)
+            shown_.push_back({drivers::to_seconds(motion.time), frame.force(motion.force, 1),
+                              motion.table, motion.table_good});
+        sweep_->add(motion);
+    }
+    const auto reading = ports_.rig.shaker.reading();
+    if (reading.valid && reading.sweep && reading.time > std::exchange(read_at_, reading.time))
+        other = sweep_->frequency(reading.time, reading.sweep->actual_hz);
+    if (const auto begun = sweep_->begun(); begun && other.empty()) {
+        excitation_.follow(*begun, sweep_->octaves_per_s(), now);
+        watching_ = false;  // it is elsewhere already
+    }
+    if (other.empty()) return;
+    ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    sweep_.reset();
+    watching_ = false;
+    trip(other);
+}
+
+void Dwelling::end_sweep() {
+    if (!sweep_) return;
+    ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    const auto sweep = sweep_->finish();
+    swept_hz_ = sweep_->readings();
+    sweep_.reset();
+    ports_.dwells.swept(sweep, swept_hz_);
 }
 
 void Dwelling::look_at_vibration(Time now) {
@@ -177,12 +235,9 @@ void Dwelling::look_at_vibration(Time now) {
     }
     if (now < from_ - kAhead) return;
     watching_ = false;
-    ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    if (!sweep_) ports_.rig.feed->order(rt::StageFeed::Mode::off);
     const std::string other = excitation_.random() ? other_level() : other_frequency();
-    if (other.empty()) return;
-    ports_.log.event(Severity::trip, other);
-    ports_.rig.wrong_vibration();
-    excitation_.order_stop("another vibration than was asked for");
+    if (!other.empty()) trip(other);
 }
 
 std::string Dwelling::other_frequency() const {

@@ -7,6 +7,7 @@
 
 #include "daemon/campaign/excitation.hpp"
 #include "daemon/campaign/stages/stage.hpp"
+#include "daemon/campaign/sweep_watch.hpp"
 #include "daemon/campaign/zero_calibration.hpp"
 #include "estimator/level/loop_response.hpp"
 
@@ -44,6 +45,8 @@ class Dwelling : public Stage {
     /// The gyros were seen run down since the dwell before.
     void lost_power() { power_lost_ = true; }
     [[nodiscard]] estimator::DwellInfo info() const;
+    /// Of a sweep what the controller said of its frequency, s since the dwell began and Hz.
+    [[nodiscard]] const std::vector<std::array<double, 2>>& swept_hz() const { return swept_hz_; }
     [[nodiscard]] std::int64_t utc_ns() const { return utc_ns_; }  ///< of its beginning
     /// While it records: how much of it is done, 0 to 1, and what is left, s.
     [[nodiscard]] double part_done(drivers::Time now) const;
@@ -57,7 +60,11 @@ class Dwelling : public Stage {
     void take_over_origin();
     /// Why it may not, else empty; `may` once it may.
     [[nodiscard]] std::string vibration_may_change(drivers::Time now, bool& may) const;
-    void watch_vibration();
+    void watch_vibration(const rt::DwellOrder& order);
+    void follow_sweep(drivers::Time now);
+    void end_sweep();
+    void trip(const std::string& why);
+    [[nodiscard]] double dwell_s() const;
     void look_at_vibration(drivers::Time now);
     /// What the accelerometers show in place of what was asked for; empty: that.
     [[nodiscard]] std::string other_frequency() const;
@@ -78,6 +85,9 @@ class Dwelling : public Stage {
     std::optional<StopDone> before_;
     bool watching_ = false;  ///< the accelerometers are to show it before the dwell
     std::vector<estimator::LoopReading> shown_;
+    std::optional<SweepWatch> sweep_;
+    drivers::Time read_at_ = 0;  ///< the controller's frequency, last
+    std::vector<std::array<double, 2>> swept_hz_;
 };
 
 }  // namespace vibrig::campaign

@@ -223,7 +223,7 @@
     const e = s.estimate, c = s.campaign;
     set('amplitude', fixed(s.shaker.measured_g, 3, 'g'));
     const random = (s.vibration || {}).kind === 'random';
-    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}${random ? ' rms, at random' : `, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`}`);
+    set('command', `commanded ${fixed(c.command_table_g, 2, 'g')}${random ? ' rms, at random' : (s.vibration || {}).kind === 'sweep' ? `, ${s.vibration.words}` : `, ${fixed(s.shaker.frequency_hz, 2, 'Hz')}`}`);
     byId('c-amplitude').setAttribute('aria-label', `Table amplitude ${fixed(s.shaker.measured_g, 3, 'g')}, commanded ${fixed(c.command_table_g, 2, 'g')}, since ${duration(s.time_s - start)}`);
     set('nis', e.nis_per_dof === undefined ? '' : `   NIS ${e.nis_per_dof.toFixed(3)}`);
     byId('c-innovations').setAttribute('aria-label', `Innovations ${['x', 'y', 'z'].map(a => fixed((e.innovation || {})[a + '_arcsec'], 1, 'arc seconds')).join(', ')}`);
@@ -302,7 +302,7 @@
       : [name, x.toFixed(3) + unit, steady && low !== undefined && (x < low || x > high)]);
     table('vibration', [['kind', v.kind], ...(v.kind === 'rest' ? [] : [
       ...(random ? [['profile', `${v.profile || 'unknown'} (number ${v.number}), ${v.level_db.toFixed(1)} dB`], ['controller says', v.control, v.control === 'aborted']]
-        : [['frequency', v.frequency_hz.toFixed(2) + ' Hz']]),
+        : [['frequency', v.kind === 'sweep' ? v.words : v.frequency_hz.toFixed(2) + ' Hz']]),
       ['commanded', v.commanded_g.toFixed(3) + unit], seen('controller', v.controller_g), seen('platform', v.platform_g), seen('table', v.table_g),
       ...(low === undefined ? [] : [['band', `${low.toFixed(3)} to ${high.toFixed(3)}${unit}`]])])]);
     const psd = v.psd || [], chart = byId('c-psd');

@@ -30,7 +30,7 @@ const Watch = (() => {
     const all = new Map();
     for (const v of kValues) {
       const x = value(s, v), text = said(v, x), line = all.get(v.line) || {text: '', bad: false};
-      if (!text) continue;
+      if (!text || (v.unless && value(s, {field: v.unless}))) continue;
       all.set(v.line, {text: line.text + (line.text && ', ') + text, bad: line.bad || (v.alarming && Number(x) > 0)});
     }
     return all;

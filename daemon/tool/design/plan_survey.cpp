@@ -113,10 +113,42 @@ class SurveyPlan {
         if (!profile_.psd.empty()) profile_top_ = profile_.psd.back().first;
     }
 
+    [[nodiscard]] bool sees(double hz) const {
+        return c_.estimator.accelerometer_response.power(hz) >= estimator::kLeastSeen;
+    }
+    void tell_unseen(double hz) {
+        warnings_.push_back(short_number(hz) + " Hz is left out: the accelerometers see " +
+                            short_number(c_.estimator.accelerometer_response.power(hz)) +
+                            " of its power, half of it is needed");
+    }
+    void leave_out_unseen(std::vector<double>& listed) {
+        std::erase_if(listed, [this](double hz) {
+            if (!sees(hz)) tell_unseen(hz);
+            return !sees(hz);
+        });
+        if (listed.empty())
+            throw std::runtime_error(
+                "--frequencies: found none of which the accelerometers see half of the power, "
+                "expected one at least (accelerometer.bandwidth_hz, accelerometer.response)");
+    }
+    /// The highest frequency up to this one, and from `least` on, that they see.
+    [[nodiscard]] double seen_up_to(double highest, double least) {
+        constexpr double kStep = 0.995;
+        double hz = highest;
+        while (hz > least && !sees(hz)) hz = std::max(least, std::round(10 * kStep * hz) / 10);
+        if (hz < highest)
+            warnings_.push_back(
+                "the plan goes up to " + short_number(hz) + " Hz and not to " +
+                short_number(highest) +
+                " Hz: beyond it the accelerometers see less than half of the power");
+        return hz;
+    }
+
     void choose_lines() {
         const SurveyRequest& asked = request_.survey;
         std::vector<double> listed = asked.frequencies;
         if (listed.empty()) listed = {c_.estimator.frequency_hz};
+        leave_out_unseen(listed);
         double highest = asked.highest_hz;
         const double last = *std::max_element(listed.begin(), listed.end());
         if (highest <= 0 && profile_top_ > last) {
@@ -126,6 +158,7 @@ class SurveyPlan {
                                     " Hz, the plan to " + short_number(highest) +
                                     " Hz (spectrum.highest_hz): what lies beyond is not measured");
         }
+        highest = seen_up_to(highest, last);
         double level = kLevel;
         if (!request_.levels_g.empty()) {
             level = *std::max_element(request_.levels_g.begin(), request_.levels_g.end());
@@ -144,6 +177,14 @@ class SurveyPlan {
         task_.lines =
             spectrum::survey_lines(spectrum::survey_frequencies(listed, highest), level,
                                    {1 / period(), c_.estimator.level_window_s}, mount_, limits);
+        // The nearest free one may lie beyond.
+        std::erase_if(task_.lines, [this](const auto& line) {
+            if (!sees(line.hz)) tell_unseen(line.hz);
+            return !sees(line.hz);
+        });
+        if (task_.lines.empty())
+            throw std::runtime_error(
+                "--frequencies: found none that the accelerometers see half of");
         for (const auto& line : task_.lines) {
             const double rate = 1 / period();
             const bool bad = spectrum::forbidden(line.asked_hz, rate, c_.estimator.level_window_s);

@@ -349,6 +349,7 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     const auto dwells = record::recorded_dwells(campaign);
     SeenPlan plan(settings);
     for (const auto& dwell : dwells) {
+        if (dwell.order->sweep.any()) continue;
         plan.begin_dwell(dwell.order->run);
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i)
             plan.add(
@@ -362,18 +363,25 @@ Found identify(const record::Campaign& campaign, const estimator::Settings& sett
     RigDoubts doubts(settings);
     Progress progress("identifying");
     std::size_t done = 0;
+    std::vector<estimator::spectrum::Sweep> sweeps;
     for (const auto& dwell : dwells) {
+        if (dwell.order->sweep.any() && !dwell.cut_short) {
+            auto sweep = record::sweep_of(campaign, settings, dwell).finish();
+            if (!sweep.blocks.empty()) sweeps.push_back(std::move(sweep));
+        }
         doubts.begin_dwell();
         record::feed(identification, campaign, dwell,
                      [&](std::size_t sample, const estimator::StepResult&) {
-                         doubts.add(rt::measurement_of(campaign.samples[sample], dwell.order->from,
-                                                       dwell.order->zero_g));
+                         if (!dwell.order->sweep.any())
+                             doubts.add(rt::measurement_of(campaign.samples[sample],
+                                                           dwell.order->from, dwell.order->zero_g));
                          if (++done % 1024 == 0) progress.show(done, campaign.samples.size());
                      });
     }
     Found found =
         with_doubts(anew ? anew->result() : identification.result(), identification.rows(), doubts);
     found.rows = identification.rows();
+    found.sweeps = std::move(sweeps);
     return found;
 }
 
@@ -466,8 +474,8 @@ Identified identify_recording(const std::string& file, const std::string& config
                         request.form, std::move(found.sweeps));
         adopt(*identified.spectrum, identified.settings, identified.assessed);
     } else if (identified.assessed.done) {
-        identified.spectrum =
-            spectrum_of(identified.settings, found.rows, request.form, found.profiles);
+        identified.spectrum = spectrum_of(identified.settings, found.rows, request.form,
+                                          found.profiles, std::move(found.sweeps));
         if (identified.spectrum)
             adopt(*identified.spectrum, identified.settings, identified.assessed);
     }

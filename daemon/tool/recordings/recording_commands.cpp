@@ -2,7 +2,9 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -12,8 +14,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/raw_log.hpp"
+#include "daemon/record/replay.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/progress.hpp"
@@ -29,10 +33,44 @@ namespace {
 namespace fs = std::filesystem;
 constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
+/// Hz at a time, by the sweep's readings: between two of them its logarithm goes straight.
+double swept_hz(const std::vector<std::array<double, 2>>& readings, double time_s) {
+    const auto after = std::ranges::lower_bound(readings, time_s, {},
+                                                [](const auto& reading) { return reading[0]; });
+    if (after == readings.end()) return readings.empty() ? 0 : readings.back()[1];
+    if (after == readings.begin()) return after->at(1);
+    const auto& [from_s, from_hz] = *(after - 1);
+    const auto& [to_s, to_hz] = *after;
+    return from_hz * std::pow(to_hz / from_hz, (time_s - from_s) / (to_s - from_s));
+}
+
+estimator::Settings estimator_of(const record::Campaign& campaign) {
+    return configuration::parse(record::identification_sections(campaign.head.configuration),
+                                "configuration in " + campaign.path, false)
+        .configuration.estimator;
+}
+
+/// The frequencies of its dwells are stated: a plan's. Random vibration has none.
+bool has_frequencies(const record::Campaign& campaign) {
+    return std::ranges::any_of(campaign.orders,
+                               [](const record::Order& order) {
+                                   return order.frequency_hz > 0 || order.sweep.any();
+                               }) &&
+           std::ranges::none_of(campaign.orders, [](const record::Order& order) {
+               return order.random.mean_square_g2 > 0;
+           });
+}
+
 void export_csv(const record::Campaign& campaign, const std::string& path) {
     std::vector<proto::RecordingRow> rows;
     std::size_t left_out = 0;
+    const bool frequencies = has_frequencies(campaign);
+    const double nominal_hz = frequencies ? estimator_of(campaign).frequency_hz : 0;
     for (const auto& dwell : record::recorded_dwells(campaign)) {
+        const record::Order& order = *dwell.order;
+        std::vector<std::array<double, 2>> swept;
+        if (order.sweep.any())
+            swept = record::sweep_of(campaign, estimator::Settings{}, dwell).readings();
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
             const auto& sample = campaign.samples[i];
             if (!sample.angles_good() || !sample.force_good()) {
@@ -47,6 +85,11 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
                 row.angle_deg[k] = sample.angle[k] * kDegreesPerRadian;
                 row.force_g[k] = sample.force[k] - dwell.order->zero_g[k];
             }
+            if (frequencies)
+                row.frequency_hz = order.sweep.any()        ? swept_hz(swept, row.time_s)
+                                   : !(order.table_g > 0)   ? 0
+                                   : order.frequency_hz > 0 ? order.frequency_hz
+                                                            : nominal_hz;
             rows.push_back(row);
         }
     }

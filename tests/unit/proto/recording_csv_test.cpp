@@ -148,6 +148,26 @@ TEST_F(Recording, IsGivenBackExactlyAfterWriting) {
     }
 }
 
+TEST_F(Recording, HasAFrequencyWhereItsRowsHaveOne) {
+    std::vector<RecordingRow> rows(300);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        rows[i].run = rows[i].position = 1;
+        rows[i].time_s = static_cast<double>(i) / 40;
+        rows[i].frequency_hz = 20 + 0.1 * static_cast<double>(i);
+    }
+    for (const bool simulated : {false, true}) {
+        write_recording(path(), rows, simulated);
+        EXPECT_TRUE(RecordingReader(path()).has_frequency());
+        const auto back = read_recording(path());
+        ASSERT_EQ(back.size(), rows.size());
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            ASSERT_EQ(back[i].frequency_hz, rows[i].frequency_hz);
+    }
+    for (RecordingRow& row : rows) row.frequency_hz = -1;
+    write_recording(path(), rows);
+    EXPECT_FALSE(RecordingReader(path()).has_frequency());
+}
+
 TEST_F(Recording, ThatIsNotThereIsNamed) {
     try {
         (void)read_recording(path());

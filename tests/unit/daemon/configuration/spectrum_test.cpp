@@ -415,10 +415,89 @@ TEST(RandomDwells, OfAPlanAreStopsWithChecksumLevelAndBands) {
     EXPECT_THAT(said(R"("profile":"p","table_g":3)", whole),
                 HasSubstr("runs[1].table_g: found 3 beside a profile, expected level_db alone"));
     EXPECT_THAT(said(R"("sweep":{"from_hz":20},"table_g":3)", whole),
-                HasSubstr("sweeps are not run"));
+                HasSubstr("runs[1].sweep.to_hz: found nothing, expected a number"));
     EXPECT_THAT(said(R"("profile":"p","level_db":20)", whole), HasSubstr("3 sigma of 42.4"));
     EXPECT_THAT(complaint(text(R"("profile":"p")", whole, "sine"), true),
                 HasSubstr("expected spectrum.mode \"mixed\" for random vibration"));
+}
+
+const char* const kSweepRegisters =
+    "shaker.registers.mode.address = 8\n"
+    "shaker.registers.sweep_from = { address = 11, type = \"u32\", scale = 0.001 }\n"
+    "shaker.registers.sweep_to = { address = 13, type = \"u32\", scale = 0.001 }\n"
+    "shaker.registers.sweep_rate = { address = 15, scale = 0.01 }\n"
+    "shaker.registers.actual_frequency = { address = 10, table = \"input\", type = \"u32\", "
+    "scale = 0.001 }\n";
+
+TEST(SpectrumKeys, APlanWithASweepNeedsRegistersRateAndLimits) {
+    const plant::TemporaryFolder folder;
+    const std::string plan = folder.file("plan.json");
+    const auto text = [&](const std::string& sweep, double table_g, const std::string& more) {
+        std::ofstream(plan) << R"({"runs":[{"position":[0,0,0],"table_g":6,"frequency_hz":15},)"
+                            << R"({"position":[0,0,45],"table_g":)" << table_g << R"(,"sweep":{)"
+                            << sweep << "}}]}";
+        return "campaign.plan = \"" + plan + "\"\n" + more;
+    };
+    const std::string up = R"("from_hz":20,"to_hz":120,"s":300)";
+    const std::string whole = std::string(kSweepRegisters) + "spectrum.mode = \"mixed\"\n" +
+                              "spectrum.mount = \"hard\"\ncan.sample_rate_hz = 400\n";
+    const auto c = accepted(
+        text(up, 6, whole + "accelerometer.bandwidth_hz = 200\naccelerometer.order = 2\n"), true);
+    ASSERT_EQ(c.campaign.stops.size(), 2U);
+    const auto& stop = c.campaign.stops[1];
+    EXPECT_EQ(stop.sweep, (estimator::SweptSine{20, 120, 300}));
+    EXPECT_EQ(stop.frequency_hz, 0);
+    EXPECT_FALSE(stop.random);
+    EXPECT_NE(stop.kind(), c.campaign.stops[0].kind());
+    // What the accelerometers show along it: Butterworth, order 2, 200 Hz.
+    EXPECT_NEAR(stop.along.front(), 1 / std::sqrt(1 + std::pow(0.1, 4)), 1e-9);
+    EXPECT_NEAR(stop.along.back(), 1 / std::sqrt(1 + std::pow(0.6, 4)), 1e-9);
+    EXPECT_GT(stop.along[4], stop.along.back());
+
+    const auto said = [&](const std::string& sweep, double table_g, const std::string& more) {
+        return complaint(text(sweep, table_g, more), true);
+    };
+    EXPECT_EQ(said(up, 6, whole), "");
+    EXPECT_THAT(said(up, 6, "spectrum.mount = \"hard\"\ncan.sample_rate_hz = 400\n"),
+                HasSubstr("a sweep from 20 to 120 Hz without registers for it, expected "
+                          "shaker.registers.mode, sweep_from"));
+    EXPECT_THAT(said(up, 6, std::string(kSweepRegisters) + "spectrum.mount = \"hard\"\n"),
+                HasSubstr("spectrum.mode \"mixed\" for sweeps"));
+    EXPECT_THAT(said(up, 6,
+                     std::string(kSweepRegisters) +
+                         "spectrum.mode = \"mixed\"\nspectrum.mount = \"hard\"\n"),
+                HasSubstr("at 40 samples/s, expected 100 at least"));
+    EXPECT_THAT(said(R"("from_hz":8,"to_hz":120,"s":300)", 6, whole),
+                HasSubstr("at 6 g, expected 3.0917 g at most, at 8 Hz"));
+    EXPECT_THAT(said(R"("from_hz":120,"to_hz":5,"s":300)", 2, whole), HasSubstr("g at most, at"));
+    EXPECT_THAT(said(up, 0, whole), HasSubstr("at 0 g, expected a level"));
+    EXPECT_THAT(said(up, 6, whole + "accelerometer.bandwidth_hz = 60\n"),
+                HasSubstr("expected frequencies of which they see half of the power at least"));
+    EXPECT_THAT(said(up, 6, whole + "estimator.method = \"two-step\"\n"),
+                HasSubstr("the two-step route has coefficients at one frequency only"));
+    // Isolators amplify below sqrt 2 of their own frequency.
+    EXPECT_THAT(said(R"("from_hz":9,"to_hz":120,"s":300)", 1,
+                     std::string(kSweepRegisters) +
+                         "spectrum.mode = \"mixed\"\ncan.sample_rate_hz = 400\n"),
+                HasSubstr("below it the isolators amplify"));
+}
+
+TEST(SpectrumKeys, RegistersOfSweepsAreAllThereOrNone) {
+    std::string some = kSweepRegisters;
+    some = some.substr(0, some.find("shaker.registers.sweep_rate"));
+    EXPECT_THAT(complaint(some, true),
+                AllOf(HasSubstr("shaker.registers.sweep_rate.address: found nothing"),
+                      HasSubstr("shaker.registers.actual_frequency.address: found nothing")));
+    EXPECT_EQ(complaint(kSweepRegisters, true), "");
+    const auto c = accepted(kSweepRegisters, true);
+    ASSERT_TRUE(c.shaker.registers.sweep);
+    EXPECT_FALSE(c.shaker.registers.random);
+    EXPECT_EQ(c.shaker.registers.sweep->rate.scale, 0.01);
+    // What is written is no input register.
+    std::string input = kSweepRegisters;
+    input.replace(input.find("type = \"u32\""), 0, "table = \"input\", ");
+    EXPECT_THAT(complaint(input, true), AllOf(HasSubstr("shaker.registers.sweep_from.table"),
+                                              HasSubstr("this register is written")));
 }
 
 }  // namespace

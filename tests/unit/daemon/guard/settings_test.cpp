@@ -77,6 +77,8 @@ gravity_mps2 = 9.81
 transmission = 0.5
 [accelerometer]
 zero_g = [0.01, 0, -0.5]
+bandwidth_hz = 200.0
+order = 2
 [can]
 port = "seqpacket"
 path = "@bus"
@@ -103,6 +105,24 @@ modbus = { host = "horn", port = 1503, unit = 9, horn_coil = 2, lamp_coil = 3 }
 command = "/usr/local/bin/page-me"
 command_limit_s = 20
 )");
+}
+
+/// |A| at the reference frequency: Butterworth, or straight on logarithmic scales between two rows.
+TEST(GuardSettings, KnowWhatTheAccelerometersSee) {
+    const auto seen = [](const std::string& text) {
+        return parse_settings(std::string(kGuard) + text, "rig.toml").witness.seen;
+    };
+    EXPECT_EQ(seen(""), 1);
+    EXPECT_NEAR(seen("[accelerometer]\nbandwidth_hz = 100\n"), 1 / std::sqrt(1.0225), 1e-12);
+    EXPECT_NEAR(seen("[accelerometer]\nbandwidth_hz = 100\norder = 2\n[vibration]\n"
+                     "frequency_hz = 100\n"),
+                std::sqrt(0.5), 1e-12);
+    const std::string table = "[accelerometer]\nresponse = [[20, 1], [80, 0.64]]\n";
+    EXPECT_EQ(seen(table), 1);
+    EXPECT_NEAR(seen(table + "[vibration]\nfrequency_hz = 40\n"), 0.8, 1e-12);
+    EXPECT_NE(refusal(std::string(kGuard) + "[accelerometer]\nresponse = [[80, 1], [20, 1]]\n")
+                  .find("accelerometer.response: found"),
+              std::string::npos);
 }
 
 TEST(GuardSettings, FoldTheAmplitudesUnitIn) {
@@ -211,7 +231,8 @@ limits = 5
           "rig.toml:7:6: can.signal: found an unknown table, expected one of dbc, fd, ",
           "rig.toml:10:1: can.signals.table_acel: found an unknown key, expected one of accel_x, ",
           "rig.toml:11:1: can.signals.\"accel_x.valid\": found an unknown key",
-          "rig.toml:13:1: shaker.registers.runs: found an unknown table, expected one of amplitude",
+          "rig.toml:13:1: shaker.registers.runs: found an unknown table, expected one of "
+          "actual_frequency, amplitude",
           "rig.toml:14:9: shaker.registers.run.adress: found an unknown key, expected one of "
           "access, address, mask, scale, table, type, word_order\n",
           "rig.toml:16:10: shaker.limits: found 5, expected a table\n",

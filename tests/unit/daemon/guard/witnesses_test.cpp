@@ -66,6 +66,16 @@ TEST(Witnesses, SeeThePlatformThroughItsTransmissionAndTheTableAsItIs) {
     EXPECT_FALSE(sight.rests(safety::kRest_g));
 }
 
+/// Accelerometers that see 0.8 of an amplitude: of 6 g at the table and 4 at the platform 3.2.
+TEST(Witnesses, SeeThePlatformThroughItsAccelerometers) {
+    WitnessSettings settings;
+    settings.seen = 0.8;
+    Witnesses witnesses{settings};
+    Bus bus(witnesses);
+    bus.shake(0.001, 3.2, 80);
+    EXPECT_NEAR(witnesses.sight(bus.now).table_g, 6, 0.3);
+}
+
 TEST(Witnesses, RestOnlyWhenAllOfThemDo) {
     Witnesses witnesses{WitnessSettings{}};
     Bus bus(witnesses);

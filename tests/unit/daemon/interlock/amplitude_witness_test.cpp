@@ -405,5 +405,77 @@ TEST(AmplitudeWitness, SeesTheAmplitudeAtAnyFrequencyAndRateThatAConfigurationMa
     }
 }
 
+/// A sweep at 6 g, 0.5 of it at the platform and 1 of it beyond 60 Hz; `scaled`: what the table
+/// does from 10 s on. When it was found wrong, s, negative: never; and for how long nothing was
+/// told.
+struct Swept {
+    double wrong_s = -1, blind_s = 0, farthest_g = 0;
+};
+Swept swept(double from_hz, double to_hz, double rate_hz, double scaled) {
+    constexpr double kLasts_s = 40, kBegins_s = 2;
+    const auto period = drivers::from_seconds(1 / rate_hz);
+    AmplitudeWitness::Settings settings;
+    settings.sample_period = period;
+    AmplitudeWitness witness(settings);
+    AmplitudeWitness::Situation now;
+    now.ramp.start_g = now.ramp.target_g = 6;
+    now.controller_began = 1;
+    now.limit_g = 12;
+    now.steady = true;
+    Sweep sweep{from_hz, to_hz, 0, kSecond, {}};
+    for (std::size_t i = 0; i < Sweep::kAlong; ++i)
+        sweep.transmission[i] = 0.5 + 0.5 * static_cast<double>(i) / (Sweep::kAlong - 1);
+    Swept out;
+    double phase = 0, told = 0, all = 0;
+    for (Time t = kSecond; drivers::to_seconds(t - kSecond) < kBegins_s + kLasts_s; t += period) {
+        const double since = drivers::to_seconds(t - kSecond);
+        if (since >= kBegins_s && sweep.octaves_per_s == 0) {
+            sweep.begin = kSecond + drivers::from_seconds(kBegins_s);
+            sweep.octaves_per_s = std::abs(std::log2(to_hz / from_hz)) / kLasts_s;
+            witness.follow(sweep);
+        } else if (t == kSecond) {
+            witness.follow(sweep);
+        }
+        phase += 2 * std::numbers::pi * sweep.hz(t) / rate_hz;
+        const double g = (since > 10 ? scaled : 1) * 6 * std::sin(phase);
+        drivers::Sample sample;
+        sample.time = now.now = t;
+        sample.quality.fill(drivers::Quality::good);
+        now.transmission = sweep.transmission_at(t);
+        sample.force = {0, 1 + now.transmission * g, 0};
+        sample.table_accel = g;
+        if (!witness.add(sample)) continue;
+        const auto verdict = witness.verdict(now);
+        all += 1;
+        told += verdict.seen_g[0] >= 0 ? 1 : 0;
+        if (verdict.seen_g[0] >= 0 && since > 1)
+            out.farthest_g = std::max(out.farthest_g, std::abs(verdict.seen_g[0] - 6));
+        if (verdict.off_command.wrong && out.wrong_s < 0) out.wrong_s = since;
+    }
+    out.blind_s = (1 - told / all) * (kBegins_s + kLasts_s);
+    return out;
+}
+
+TEST(AmplitudeWitness, FollowsASweepUpAndDown) {
+    for (const double rate_hz : {100.0, 400.0, 2000.0}) {
+        for (const auto& [from, to] : {std::pair{20.0, 120.0}, std::pair{120.0, 20.0}}) {
+            const Swept honest = swept(from, to, rate_hz, 1);
+            EXPECT_LT(honest.wrong_s, 0) << rate_hz << " " << from;
+            EXPECT_LT(honest.farthest_g, 0.15) << rate_hz << " " << from;
+            // About multiples of half the rate, of which there are two at 100/s, amplitude and
+            // phase are one: 3.4 Hz each, and as much as the window is long.
+            EXPECT_LT(honest.blind_s, rate_hz > 250 ? 1.5 : 7) << rate_hz << " " << from;
+        }
+    }
+}
+
+TEST(AmplitudeWitness, WhatDisagreesInASweepStopsWithinHalfASecond) {
+    for (const double scaled : {0.0, 0.7, 1.5}) {
+        const Swept lie = swept(20, 120, 400, scaled);
+        EXPECT_GT(lie.wrong_s, 10) << scaled;
+        EXPECT_LT(lie.wrong_s, 10.6) << scaled;
+    }
+}
+
 }  // namespace
 }  // namespace vibrig::rt

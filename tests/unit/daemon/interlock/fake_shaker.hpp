@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -46,6 +48,17 @@ class FakeShaker final : public drivers::Shaker {
         now.frequency_hz = wanted.frequency_hz;
         now.running = wanted.amplitude_g > 0;
         now.state = wanted.amplitude_g > 0 ? 2 : 0;
+        now.sweep.reset();
+        if (wanted.sweep) {
+            const double minutes = drivers::to_seconds(time - runs_since(time)) / 60;
+            const drivers::SweepSetPoint& told = *wanted.sweep;
+            const double octaves = sweep_rate_scaled * told.octaves_per_minute *
+                                   std::max(0.0, minutes - sweep_rests_s / 60);
+            const bool up = told.to_hz > told.from_hz;
+            const double hz = told.from_hz * std::exp2(up ? octaves : -octaves);
+            now.sweep = {true, told.from_hz, told.to_hz, told.octaves_per_minute,
+                         up ? std::min(hz, told.to_hz) : std::max(hz, told.to_hz)};
+        }
         if (!wanted.random) {
             now.random.reset();
             return;
@@ -61,6 +74,14 @@ class FakeShaker final : public drivers::Shaker {
                       0};
     }
 
+    /// Since when the newest set-point is there.
+    drivers::Time runs_since(drivers::Time time) {
+        if (requests.size() != told_) since_ = time;
+        told_ = requests.size();
+        return since_;
+    }
+    double sweep_rate_scaled = 1, sweep_rests_s = 5;
+
     drivers::ShakerReading now;
     drivers::ShakerCounters counts;
     std::vector<drivers::ShakerSetPoint> requests;
@@ -69,6 +90,8 @@ class FakeShaker final : public drivers::Shaker {
     drivers::Time hung_up_until = 0;
     bool only_read = false;
     bool refuse = false, writing = false;
+    std::size_t told_ = 0;
+    drivers::Time since_ = 0;
     /// Of random vibration, once it runs.
     drivers::RandomReading::State levelled = drivers::RandomReading::State::at_level;
 };

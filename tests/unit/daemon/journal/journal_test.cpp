@@ -245,6 +245,30 @@ TEST_F(JournalTest, KeepsTheVerdictOfTheNewestLoopCheck) {
     EXPECT_EQ(after({}), "") << "another one was in band";
 }
 
+/// With what was read of its frequency, so that its blocks can be made again.
+TEST_F(JournalTest, KeepsASweepWithItsFrequencies) {
+    estimator::Identification filter{estimator::Settings{}};
+    DwellCheckpoint swept = dwell(filter, 1, 3);
+    swept.info.sweep = {20, 120, 300};
+    swept.stop.swept_hz = {{-1, 20}, {2.5, 20.25}, {300, 120}};
+    const std::string bytes = encode(swept, kHash);
+    DwellCheckpoint out;
+    ASSERT_EQ(decode(bytes, kHash, out), "");
+    EXPECT_EQ(out.info.sweep, swept.info.sweep);
+    EXPECT_EQ(out.stop.swept_hz, swept.stop.swept_hz);
+    EXPECT_EQ(out.stop.sweep_from_hz, 20);
+    EXPECT_EQ(out.stop.sweep_to_hz, 120);
+    EXPECT_EQ(out.measurements.size(), swept.measurements.size());
+    // What cannot be a frequency is none.
+    for (const double hz : {0.0, -3.0, std::nan("")}) {
+        swept.stop.swept_hz[1][1] = hz;
+        EXPECT_EQ(decode(encode(swept, kHash), kHash, out), "corrupt: sweep") << hz;
+    }
+    swept.stop.swept_hz.clear();
+    swept.info.sweep.from_hz = -20;
+    EXPECT_EQ(decode(encode(swept, kHash), kHash, out), "corrupt: sweep");
+}
+
 TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
     // GIVEN good bytes of a checkpoint
     estimator::Identification filter{estimator::Settings{}};
@@ -256,12 +280,12 @@ TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
         const char* says;
     };
     std::string newer = good, foreign = good;
-    newer[8] = 8;
+    newer[8] = 9;
     foreign[0] = 'X';
     std::vector<Case> cases{{"", "truncated: 0 bytes"},
                             {good.substr(0, 11), "truncated"},
                             {foreign, "not a checkpoint"},
-                            {newer, "version 8, newer than 7"}};
+                            {newer, "version 9, newer than 8"}};
     // any cut and any flipped bit
     for (std::size_t at = 12; at < good.size(); at += good.size() / 50) {
         cases.push_back({good.substr(0, at), ""});
@@ -391,8 +415,9 @@ TEST_F(JournalTest, TakesNoImpossibleNoiseLevels) {
 std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
-    bytes.erase(numbers, (4 + 7 + 5) * sizeof(double) + sizeof(std::int32_t) +
-                             sizeof(std::int64_t) + 2 + sizeof(std::uint16_t));
+    bytes.erase(numbers, (4 + 7 + 5 + 3) * sizeof(double) + sizeof(std::int32_t) +
+                             sizeof(std::int64_t) + 2 + sizeof(std::uint16_t) +
+                             sizeof(std::uint32_t));
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);
     const auto sum = static_cast<std::uint32_t>(::crc32_z(

@@ -148,20 +148,68 @@ TEST_F(SurveyCommand, BadInputIsNamed) {
     }
 }
 
+/// First order, 100 Hz: of 100 Hz they see half. --check would refuse more; a plan has none of it.
+TEST_F(SurveyCommand, APlanAvoidsWhatTheAccelerometersDoNotSee) {
+    write("rig.toml", "[accelerometer]\nbandwidth_hz = 100.0\n[spectrum]\nmount = \"hard\"\n");
+    ASSERT_EQ(vibrig("plan --config rig.toml --frequencies 15,25,35,180 --highest 200 --json"), 0)
+        << error;
+    double highest = 0;
+    std::set<double> all;
+    const SurveyJson plan = json();
+    for (const auto& run : plan.at("runs")) {
+        const double hz = run.value("frequency_hz", 0.0);
+        highest = std::max(highest, hz);
+        if (hz > 0) all.insert(hz);
+    }
+    EXPECT_LE(highest, 100);
+    EXPECT_GT(highest, 90);
+    EXPECT_GE(all.size(), 5U);
+    const std::string warnings = plan.at("warnings").dump();
+    EXPECT_NE(warnings.find("180 Hz is left out: the accelerometers see 0.2358"), std::string::npos)
+        << warnings;
+    EXPECT_NE(warnings.find("and not to 200 Hz: beyond it the accelerometers see less than half"),
+              std::string::npos)
+        << warnings;
+    EXPECT_EQ(vibrig("plan --config rig.toml --frequencies 150,180 --json"), 2);
+    EXPECT_NE(error.find("--frequencies: found none of which the accelerometers see half"),
+              std::string::npos)
+        << error;
+}
+
 TEST_F(SurveyCommand, APlanFileWithWhatIsNotRunIsRefusedByItsPlace) {
     const std::string at = R"({"runs":[{"position":[0,0,0],"level_g":6)";
+    const std::string bare = R"({"runs":[{"position":[0,0,0])";
     EXPECT_TRUE(refuses(at + R"(,"frequency_hz":"x"}]})", "runs[0].frequency_hz: found \"x\""))
         << error;
     EXPECT_TRUE(refuses(at + R"(,"frequency_hz":-3}]})", "runs[0].frequency_hz: found -3"))
         << error;
     EXPECT_TRUE(refuses(at + R"(,"profile":"truck"}]})", "runs[0].level_g: found 6 beside a"))
         << error;
-    const std::string bare = R"({"runs":[{"position":[0,0,0])";
     EXPECT_TRUE(refuses(bare + R"(,"profile":"truck"}]})", "runs[0].profile: found truck"))
         << error;
     EXPECT_TRUE(refuses(bare + R"(,"profile":0}]})", "runs[0].profile: found 0")) << error;
     EXPECT_TRUE(refuses(at + R"(,"level_db":-3}]})", "runs[0].level_db: found -3")) << error;
-    EXPECT_TRUE(refuses(at + R"(,"sweep":{"s":9}}]})", "runs[0].sweep: found")) << error;
+    EXPECT_TRUE(refuses(at + R"(,"sweep":{"s":99}}]})", "runs[0].sweep.from_hz: found nothing"))
+        << error;
+    EXPECT_TRUE(refuses(at + R"(,"sweep":20}]})", "runs[0].sweep: found 20, expected an object"))
+        << error;
+    const auto sweep = [&](const char* more, const char* from, const char* to, const char* s) {
+        return at + more + R"(,"sweep":{"from_hz":)" + from + R"(,"to_hz":)" + to + R"(,"s":)" + s +
+               "}}]}";
+    };
+    EXPECT_TRUE(refuses(sweep("", "20", "21", "99"), "found 20.0 to 21.0 Hz, expected ends that"))
+        << error;
+    EXPECT_TRUE(refuses(sweep("", "-20", "120", "99"), "runs[0].sweep: found -20.0 Hz")) << error;
+    EXPECT_TRUE(refuses(sweep("", "20", "120", "9"), "found 9.0 s, expected 10 to 86400 s"))
+        << error;
+    EXPECT_TRUE(refuses(sweep(R"(,"frequency_hz":15)", "20", "120", "99"),
+                        "found 15.0 Hz beside a sweep, expected one of them"))
+        << error;
+    EXPECT_TRUE(refuses(sweep("", "20", "120", "99"), "sweeps are for vibrigd's campaigns"))
+        << error;
+    EXPECT_TRUE(refuses(bare + R"(,"profile":"truck","sweep":{"s":9}}]})",
+                        "runs[0].sweep: found {\"s\":9} beside a profile"))
+        << error;
     EXPECT_TRUE(refuses(at + R"(,"role":"test"}]})", "\"identify\" or \"verify\"")) << error;
     write("plan.csv",
           "alpha_deg,beta_deg,gamma_deg,level_g,frequency_hz\n0,0,0,6,35.1\n0,0,45,0,0\n");
@@ -196,6 +244,20 @@ TEST_F(SurveyCommand, ACsvPlanHasProfilesLevelsAndRoles) {
     EXPECT_TRUE(runs[2].verify);
     EXPECT_EQ(runs[3].profile, "");
     EXPECT_TRUE(runs[3].verify);
+    // Sweeps, up and down.
+    const auto swept = read(
+        "alpha_deg,beta_deg,gamma_deg,table_g,frequency_hz,sweep_from_hz,sweep_to_hz,sweep_s\n"
+        "0,0,0,6,15,,,\n"
+        "0,0,45,6,,20,120,300\n"
+        "0,0,45,6,0,120,20,300\n");
+    ASSERT_EQ(swept.size(), 3U);
+    EXPECT_EQ(swept[0].sweep_to_hz, 0);
+    EXPECT_EQ(swept[1].sweep_from_hz, 20);
+    EXPECT_EQ(swept[1].sweep_to_hz, 120);
+    EXPECT_EQ(swept[1].sweep_s, 300);
+    EXPECT_EQ(swept[1].frequency_hz, 0);
+    EXPECT_EQ(swept[1].level_g, 3);
+    EXPECT_EQ(swept[2].sweep_from_hz, 120);
     // The same as JSON says it.
     write(
         "plan.json",
@@ -209,7 +271,7 @@ TEST_F(SurveyCommand, ACsvPlanHasProfilesLevelsAndRoles) {
 TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsToldWithLineAndColumn) {
     const std::string head =
         "alpha_deg,beta_deg,gamma_deg,table_g,frequency_hz,profile,level_db,"
-        "role,sweep\n0,0,0,6,15,,,,\n";
+        "role,sweep_from_hz,sweep_to_hz,sweep_s\n0,0,0,6,15,,,,,,\n";
     const auto refusal = [&](const std::string& row) -> std::string {
         write("plan.csv", head + row + "\n");
         try {
@@ -220,30 +282,32 @@ TEST_F(SurveyCommand, WhatIsWrongInACsvPlanIsToldWithLineAndColumn) {
         }
         return "";
     };
-    EXPECT_EQ(refusal("0,0,0,6,15,broad,0,,"),
+    EXPECT_EQ(refusal("0,0,0,6,15,broad,0,,,,"),
               ":3: column frequency_hz: found 15.0 beside a profile, expected level_db alone: the "
               "profile has frequencies and g");
     EXPECT_EQ(
-        refusal("0,0,0,6,,broad,0,,"),
+        refusal("0,0,0,6,,broad,0,,,,"),
         ":3: column table_g: found 6.0 beside a profile, expected level_db alone: the profile "
         "has frequencies and g");
-    EXPECT_EQ(refusal("0,0,0,6,15,,-3,,"),
+    EXPECT_EQ(refusal("0,0,0,6,15,,-3,,,,"),
               ":3: column level_db: found -3.0, expected a profile beside it");
-    EXPECT_EQ(refusal("0,0,0,,,broad,61,,"),
+    EXPECT_EQ(refusal("0,0,0,,,broad,61,,,,"),
               ":3: column level_db: found 61.0, expected -60 to 60 dB");
-    EXPECT_EQ(refusal("0,0,0,,,broad,loud,,"),
+    EXPECT_EQ(refusal("0,0,0,,,broad,loud,,,,"),
               ":3: column level_db: found 'loud', expected a number");
-    EXPECT_EQ(refusal("0,0,0,,15,,,,"), ":3: column table_g: found nothing, expected a number");
-    EXPECT_EQ(refusal("0,0,0,6,,,,,"), ":3: column frequency_hz: found nothing, expected a number");
-    EXPECT_EQ(refusal("0,0,0,6,15,,,test,"),
+    EXPECT_EQ(refusal("0,0,0,,15,,,,,,"), ":3: column table_g: found nothing, expected a number");
+    EXPECT_EQ(refusal("0,0,0,6,,,,,,,"),
+              ":3: column frequency_hz: found nothing, expected a number");
+    EXPECT_EQ(refusal("0,0,0,6,15,,,test,,,"),
               ":3: column role: found 'test', expected identify or verify");
-    EXPECT_EQ(refusal("0,0,0,6,15,,,,20-120"),
-              ":3: column sweep: found '20-120', expected a sine with frequency_hz and level_g, or "
-              "a profile: sweeps are not run");
-    EXPECT_EQ(refusal("0,0,,,,broad,0,,"),
+    EXPECT_EQ(refusal("0,0,0,6,15,,,,20,120,100"),
+              ":3: column sweep_from_hz: found 15.0 Hz beside a sweep, expected one of them");
+    EXPECT_EQ(refusal("0,0,0,6,,,,,20,,100"),
+              ":3: column sweep_from_hz: found 0.0 Hz, expected 0.1 to 20000 Hz");
+    EXPECT_EQ(refusal("0,0,,,,broad,0,,,,"),
               ":3: column gamma_deg: found nothing, expected a number");
-    EXPECT_EQ(refusal("0,0,0,,,broad,0,verify,"), "");
-    write("plan.csv", head + "0,0,0,,,broad,0,,\n");
+    EXPECT_EQ(refusal("0,0,0,,,broad,0,verify,,,"), "");
+    write("plan.csv", head + "0,0,0,,,broad,0,,,,\n");
     try {
         static_cast<void>(vibrig::plan::read_plan(path("plan.csv"), 1));
         ADD_FAILURE() << "taken";

@@ -125,6 +125,59 @@ TEST_F(Recording, ComesBackToTheLastBitWhileItIsWrittenAndAfterwards) {
     }
 }
 
+TEST_F(Recording, HasTheFrequencyOfASweepAndMakesItsBlocksAgain) {
+    // GIVEN a dwell under a sweep, of which the controller told the frequency five times a second
+    constexpr double kRate_hz = 400, kFrom_hz = 20, kTo_hz = 80, kSweep_s = 20;
+    const Time from = 7 * drivers::kSecond;
+    const auto hz_at = [&](double t) {
+        return kFrom_hz * std::pow(kTo_hz / kFrom_hz, std::clamp(t / kSweep_s, 0.0, 1.0));
+    };
+    const std::string path = (folder_ / "campaign.h5").string();
+    CampaignWriter writer(path, head());
+    double phase = 0;
+    for (int i = 0; i < static_cast<int>(kSweep_s * kRate_hz); ++i) {
+        drivers::Sample s;
+        s.time = from + drivers::from_seconds(i / kRate_hz);
+        s.quality.fill(drivers::Quality::good);
+        phase += 2 * std::numbers::pi * hz_at(i / kRate_hz) / kRate_hz;
+        s.force = {0, 1 + 6 * std::sin(phase), 0};
+        writer.sample(s);
+    }
+    Order order{
+        from - drivers::kSecond, from, from + drivers::from_seconds(kSweep_s), 1, 2, 6.0, false};
+    order.sweep = {kFrom_hz, kTo_hz, kSweep_s};
+    writer.order(order);
+    Swept swept;
+    for (double t = -1; t <= kSweep_s + 0.5; t += 0.2)
+        swept.rows.push_back({from + drivers::from_seconds(t), 1, 2, hz_at(t)});
+    swept.rows.push_back({from + drivers::kSecond, 3, 2, 5});  // of another dwell
+    writer.swept(swept);
+    writer.commit();
+    writer.end({"finished", "", "", "{}", head().utc_ns + 1});
+    // WHEN it is read THEN they are there, and the accelerometers show what they say
+    const Campaign read = read_campaign(folder_.string());
+    ASSERT_EQ(read.swept.size(), swept.rows.size());
+    EXPECT_EQ(read.swept[7].time, swept.rows[7].time);
+    EXPECT_EQ(read.swept[7].frequency_hz, swept.rows[7].frequency_hz);
+    ASSERT_EQ(read.orders.size(), 1U);
+    EXPECT_EQ(read.orders[0].sweep, order.sweep);
+    EXPECT_EQ(read.orders[0].dwell().sweep, order.sweep);
+    const auto dwells = recorded_dwells(read);
+    ASSERT_EQ(dwells.size(), 1U);
+    auto sweep = sweep_of(read, estimator::Settings{}, dwells[0]);
+    const auto blocks = sweep.finish();
+    EXPECT_GT(sweep.shown(), 0.99);
+    ASSERT_EQ(blocks.blocks.size(), 20U);
+    for (const auto& block : blocks.blocks)
+        EXPECT_NEAR(block.from_hz, hz_at(block.time_s - 0.5), 0.01);
+    // 6 g peak along the vertical: 18 g^2
+    EXPECT_GT(blocks.known(), 15U);
+    for (const auto& block : blocks.blocks)
+        if (block.moment.allFinite()) {
+            EXPECT_NEAR(block.moment(1, 1), 18, 0.2);
+        }
+}
+
 TEST_F(Recording, HasWhatWasAroundTheMeasurement) {
     // GIVEN a campaign with an interlock of three rows, and a look at what is around it
     const std::string path = (folder_ / "campaign.h5").string();

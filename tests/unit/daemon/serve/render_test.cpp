@@ -115,6 +115,26 @@ TEST(Render, SaysEachSingleValueThatTheTableHasALineFor) {
     }
 }
 
+/// Random vibration and sweeps have no one frequency, whatever the filter makes of the last dwell.
+TEST(Render, SaysNoFrequencyOfWhatHasNone) {
+    StatusData data = full_status();
+    data.estimate.frequency_hz = 15.117;
+    const auto line_of = [&data] {
+        const Lines lines = render_summary(message_of(data), {}, 2000);
+        return *std::ranges::find_if(
+            lines, [](const std::string& one) { return one.starts_with("vibration "); });
+    };
+    EXPECT_FALSE(has(line_of(), "15.117")) << line_of();
+    EXPECT_TRUE(has(line_of(), "random, profile broad at -1.5 dB")) << line_of();
+    data.vibration.words = "sweep 20 to 120 Hz, now 45.12 Hz";
+    EXPECT_FALSE(has(line_of(), "15.117")) << line_of();
+    EXPECT_TRUE(has(line_of(), "sweep 20 to 120 Hz, now 45.12 Hz")) << line_of();
+    data.vibration = {};
+    EXPECT_TRUE(has(line_of(), "15.117 Hz")) << line_of();
+    // The page hides it by the same rule.
+    EXPECT_TRUE(has(std::string(page_values().text), R"("unless": "vibration.words")"));
+}
+
 TEST(Render, KeepsTheCoefficientsOfOneKindInARow) {
     StatusData data = full_status();
     data.simulated = false;

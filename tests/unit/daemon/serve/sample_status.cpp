@@ -70,7 +70,10 @@ StatusData full_status() {
                    0.84,
                    1.68,
                    {{20, 0.01}, {120, 0.02}},
-                   "table"};
+                   "table",
+                   20,
+                   120,
+                   "random, profile broad at -1.5 dB"};
     s.stop_pending = true;
     s.rest = {"stopping",
               {{rt::RestVerdict::moving, 0.25, 1, 2}, {rt::RestVerdict::moving, 0.375, 1, 2}},

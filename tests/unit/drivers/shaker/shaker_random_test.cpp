@@ -135,7 +135,7 @@ TEST(ShakerRandom, WithoutRegistersThereAreSinesAlone) {
     EXPECT_FALSE(random.request(profile(0)));
     EXPECT_FALSE(random.request(profile(4, 4000)));
     auto settings = with_random(other);
-    settings.registers.random->mode.access = proto::Access::read;
+    settings.registers.mode.access = proto::Access::read;
     RealClock clock;
     EXPECT_THROW(static_cast<void>(make_shaker(clock, settings)), ShakerError);
 }

@@ -100,5 +100,44 @@ TEST(Apart, AVibrationThatIsNotAtItsCommandedFrequencyIsRejected) {
     EXPECT_FALSE(rig.dwell(to, plan).left_out);
 }
 
+/// Through a resonance the drift is none that a filter could follow: it does not see a sweep.
+TEST(Apart, ASweepIsNoRowAndLeavesTheFilterAlone) {
+    Identification without{Settings{}}, with{Settings{}};
+    RigSimulator rig(11), same(11), elsewhere(12);
+    for (double& value : elsewhere.truth) value *= 30;
+    for (int run = 1; run <= 2; ++run) {
+        for (int position = 1; position <= 14; ++position) {
+            rig.dwell(without, apart_at(run, position, 15));
+            same.dwell(with, apart_at(run, position, 15));
+            if (position != 7) continue;
+            SimulatedDwell swept = apart_at(3, run, 15);
+            swept.info.sweep = {20, 120, 30};
+            const DwellSummary summary = elsewhere.dwell(with, swept);
+            EXPECT_FALSE(summary.flagged || summary.left_out) << summary.reason;
+            EXPECT_EQ(summary.samples, 1200U);
+            EXPECT_EQ(summary.used, 1200U);
+            EXPECT_EQ(summary.nis_per_dof, 0);
+            EXPECT_NEAR(summary.amplitude_g, 6, 0.05);
+        }
+    }
+    EXPECT_EQ(with.result().value, without.result().value);
+    EXPECT_EQ(with.rows().size(), 28U);
+    EXPECT_EQ(with.covariance_now(), without.covariance_now());
+    EXPECT_EQ(with.result().dwells.size(), 30U);
+}
+
+/// A dead accelerometer is no sweep.
+TEST(Apart, ASweepWithoutForceIsLeftOut) {
+    Identification to{Settings{}};
+    RigSimulator rig(11);
+    rig.spoil = [](const DwellInfo&, int, Measurement& m) { m.force_good = false; };
+    SimulatedDwell swept = apart_at(3, 1, 15);
+    swept.info.sweep = {20, 120, 30};
+    const DwellSummary summary = rig.dwell(to, swept);
+    EXPECT_TRUE(summary.flagged && summary.left_out);
+    EXPECT_STREQ(summary.reason, "no usable specific force");
+    EXPECT_EQ(summary.used, 0U);
+}
+
 }  // namespace
 }  // namespace vibrig::estimator::testing

@@ -96,18 +96,26 @@ void expect_survey_predicts(unsigned campaigns, double slack) {
 TEST(SpectrumAcceptance, SurveyPredictsTheSixProfiles) { expect_survey_predicts(3, 1.25); }
 TEST(SpectrumAcceptance, SoakSurveyPredictsTheSixProfiles) { expect_survey_predicts(20, 1); }
 
-TEST(SpectrumAcceptance, CampaignAtOneFrequencyIsWrongAndSaysThatItIsNotCovered) {
+/// Twenty campaigns, each of which says so of all six.
+TEST(SpectrumAcceptance, CampaignsAtOneFrequencyAreWrongAndSayThatItIsNotCovered) {
     constexpr std::array<double, 6> kPublished{0.211, 0.160, 0.125, 0.0415, 0.819, 0.0318};
+    constexpr unsigned kCampaigns = 20;
     const Truth truth = Truth::common(0.5, kSixty);
-    const Analysis found = campaign(undeclared(), truth, today(), 1);
-    EXPECT_EQ(found.form, Form::flat);
     const auto profiles = six_profiles();
+    std::array<Errors, 6> errors;
+    for (unsigned seed = 1; seed <= kCampaigns; ++seed) {
+        const Analysis found = campaign(undeclared(), truth, today(), seed);
+        EXPECT_EQ(found.form, Form::flat) << "seed " << seed;
+        for (std::size_t p = 0; p < profiles.size(); ++p) {
+            EXPECT_FALSE(predict(found.model, attitudes_of(profiles[p])).covered())
+                << profiles[p].name << ", seed " << seed;
+            add_errors(errors[p], undeclared(), truth, found.model, profiles[p]);
+        }
+    }
     for (std::size_t p = 0; p < profiles.size(); ++p) {
-        SCOPED_TRACE(profiles[p].name);
-        EXPECT_FALSE(predict(found.model, attitudes_of(profiles[p])).covered());
-        Errors errors;
-        add_errors(errors, undeclared(), truth, found.model, profiles[p]);
-        EXPECT_NEAR(errors.rms() / kPublished[p], 1, 0.15);
+        std::printf("one frequency, %-20s %.4f (%.0f u)\n", profiles[p].name.c_str(),
+                    errors[p].rms(), errors[p].rms_in_u());
+        EXPECT_NEAR(errors[p].rms() / kPublished[p], 1, 0.15) << profiles[p].name;
     }
 }
 
@@ -266,15 +274,24 @@ void expect_drift_is_no_spectrum(unsigned campaigns) {
 TEST(SpectrumAcceptance, MovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(2); }
 TEST(SpectrumAcceptance, SoakMovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(40); }
 
-TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) {
+/// In each campaign: not covered, and no error beyond the allowance, which is 0.2 to 0.6 of it.
+void expect_beyond_is_not_covered(unsigned campaigns) {
     const Truth truth = Truth::common(0.5, {300, 0.05});
-    const Analysis found = campaign(undeclared(), truth, survey(), 1);
     const Profile& integrity = built_in_profiles()[0];
-    const Prediction predicted = predict(found.model, attitudes_of(integrity));
-    EXPECT_FALSE(predicted.covered());
-    Errors errors;
-    add_errors(errors, undeclared(), truth, found.model, integrity, 1);
-    EXPECT_LT(errors.rms_in_u(), 1);
+    Errors all;
+    for (unsigned seed = 1; seed <= campaigns; ++seed) {
+        const Analysis found = campaign(undeclared(), truth, survey(), seed);
+        EXPECT_FALSE(predict(found.model, attitudes_of(integrity)).covered()) << "seed " << seed;
+        Errors errors;
+        add_errors(errors, undeclared(), truth, found.model, integrity, 1);
+        EXPECT_LT(errors.rms_in_u(), 1) << "seed " << seed;
+        add_errors(all, undeclared(), truth, found.model, integrity, 1);
+    }
+    std::printf("300 Hz beyond 125 Hz, %u campaigns: error/u %.2f\n", campaigns, all.rms_in_u());
+}
+TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) { expect_beyond_is_not_covered(3); }
+TEST(SpectrumAcceptance, SoakResonanceBeyondThePlanIsNotCovered) {
+    expect_beyond_is_not_covered(20);
 }
 
 /// Each gyro its own resonance, or none.

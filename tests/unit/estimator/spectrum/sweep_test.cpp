@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/spectrum/analysis.hpp"
 #include "estimator/spectrum/resonance.hpp"
 #include "estimator/spectrum/sweep_blocks.hpp"
 #include "tests/plant/recording.hpp"
@@ -287,6 +288,85 @@ TEST(SweepOfThePlant, TellsTheFrequencyAsWellAsItSays) {
         EXPECT_LT(rms, 0.27 * std::sqrt(1 + 3 * std::sqrt(2.0 / kSeeds)));
         EXPECT_NEAR(z / kSeeds, 1, 3 * std::sqrt(2.0 / kSeeds));
     }
+}
+
+/// The angles of a sweep as they drift by the model, at an attitude that hardly moves.
+void let_drift(const Settings& settings, const testing::Truth& truth, Sweep& sweep) {
+    const Kinematics kinematics(settings);
+    const double sign = settings.drift_sign < 0 ? -1 : 1;
+    Eigen::Vector3d angles = kinematics.gimbal_angles(sweep.blocks[0].angle_rad);
+    const Pose pose = kinematics.pose(angles);
+    std::vector<Eigen::Vector3d> rates;
+    for (const SweepBlock& block : sweep.blocks) {
+        const Attitude at = attitude(settings, angles, block.moment);
+        Eigen::Vector3d rate;
+        for (std::size_t j = 0; j < 3; ++j) {
+            double one = 0;
+            for (std::size_t g = 0; g < 10; ++g)
+                one += at.base[j][static_cast<Eigen::Index>(g)] *
+                       testing::table2()[internal_index(g, j)];
+            for (const auto& part : truth.elastic[j]) {
+                const double hz = std::sqrt(block.from_hz * block.to_hz);
+                for (std::size_t q = 0; q < 6; ++q)
+                    one += (in_phase(hz, part.resonance) - 1) * part.coefficients[q] *
+                           at.vibration[j][static_cast<Eigen::Index>(q)];
+            }
+            rate[static_cast<Eigen::Index>(j)] = one;
+        }
+        rates.push_back(rate);
+    }
+    std::array<double, 3> moved{};
+    for (std::size_t k = 1; k < sweep.blocks.size(); ++k) {
+        const Eigen::Vector3d mean = (rates[k - 1] + rates[k]) / 2;
+        const Eigen::Vector3d turn = pose.m * (sign * mean - pose.earth_rate) / kArcsecPerRad;
+        for (std::size_t i = 0; i < 3; ++i) {
+            moved[i] += turn[static_cast<Eigen::Index>(i)];
+            sweep.blocks[k].angle_rad[i] += moved[i];
+        }
+    }
+}
+
+/// A survey with two resonances within it, and two sweeps beside it: both frequencies are known
+/// better, and as well as is said.
+TEST(Sweep, TakesPartWhereTwoResonancesAre) {
+    testing::Truth truth = testing::Truth::common(0.25, {40, 0.05});
+    const testing::Truth other = testing::Truth::common(0.25, {95, 0.05});
+    for (std::size_t j = 0; j < 3; ++j)
+        truth.elastic[j].insert(truth.elastic[j].end(), other.elastic[j].begin(),
+                                other.elastic[j].end());
+    const Settings settings = testing::undeclared();
+    double square = 0, number = 0;
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+        std::mt19937_64 random(seed);
+        auto plan = testing::survey();
+        testing::shuffle(plan, random);
+        auto dwells = testing::dwells_of(settings, truth, plan);
+        testing::add_noise(dwells, random);
+        const SpectralTable table(settings, dwells.list, dwells.kinds);
+        std::vector<Sweep> sweeps{sweep_of(20, 120, 300, 6), sweep_of(120, 20, 300, 6)};
+        for (Sweep& sweep : sweeps) {
+            let_drift(settings, truth, sweep);
+            add_noise(settings, sweep, random);
+        }
+        const Analysis without = analyse(settings, table, Form::automatic),
+                       with = analyse(settings, table, Form::automatic, sweeps);
+        // Gyro y has its input axis along the vibration of the sweeps.
+        constexpr std::size_t kY = 1;
+        ASSERT_TRUE(without.second[kY] && with.second[kY]) << "seed " << seed;
+        EXPECT_GT(with.lack_of_fit[kY], 1e-3) << "seed " << seed;
+        const auto before = tell(without.gyros[kY]), after = tell(with.gyros[kY]);
+        ASSERT_EQ(after.size(), 2U);
+        for (std::size_t r = 0; r < 2; ++r) {
+            const bool low = after[r].hz.mean < 65;
+            EXPECT_LT(after[r].hz.sigma, 0.9 * before[r].hz.sigma) << "seed " << seed;
+            const double z = (after[r].hz.mean - (low ? 40 : 95)) / after[r].hz.sigma;
+            std::printf("# seed %u: %.3f +- %.3f Hz, without the sweeps %.3f +- %.3f\n", seed,
+                        after[r].hz.mean, after[r].hz.sigma, before[r].hz.mean, before[r].hz.sigma);
+            square += z * z;
+            number += 1;
+        }
+    }
+    EXPECT_LT(square / number, 1 + 3 * std::sqrt(2 / number));
 }
 
 }  // namespace

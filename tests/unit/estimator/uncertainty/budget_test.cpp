@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include "estimator/filter/kinematics.hpp"
@@ -66,6 +67,27 @@ TEST(Budget, OfACleanRigIsThatOfTheBalancedPlan) {
     near("accelerometer_zero_g", {.002, .026, .008, .013});
     near("accelerometer_cross", {.001, .007, .021, .036});
     near("local_g", {0, .003, .001, .001});
+}
+
+/// 60 Hz and 1 ms between two accelerometers: (pi f tau)^2 = 0.0355 of the second moment, that is
+/// half of it as a gain (docs/theory/spectrum.md), in a campaign at one frequency too.
+TEST(Budget, SkewOfTheAccelerometersIsInIt) {
+    const Settings settings;
+    const double error = std::pow(std::numbers::pi * 60 * 1e-3, 2);
+    EXPECT_NEAR(error, 0.0355, 1e-4);
+    auto rows = theory_rows(settings, balanced(6, 14.0 / 3));
+    const Assessment without = assess(settings, result_of(rows));
+    EXPECT_EQ(share(without, "accelerometer_skew"), (std::array<double, 4>{}));
+    for (auto& row : rows) {
+        if (row.vibration.kappa > 1) row.relative_error = error;
+    }
+    const Assessment with = assess(settings, result_of(rows));
+    const auto gain = share(with, "accelerometer_gain"), skew = share(with, "accelerometer_skew");
+    const double ratio = error / 2 / settings.uncertainty.accelerometer_gain.u;
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(skew[k], ratio * gain[k], 1e-6 * skew[k]) << k;
+    EXPECT_GT(skew[2], 1);
+    for (std::size_t i = 0; i < kParameters; ++i)
+        EXPECT_GE(with.coefficients[i].sigma, without.coefficients[i].sigma) << i;
 }
 
 TEST(Budget, AddsUpToTheCombinedUncertaintyWithTheLargestFirst) {

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "daemon/rt/dwell_order.hpp"
+#include "daemon/rt/stage_feed.hpp"
+#include "estimator/spectrum/read_sweep.hpp"
+
+namespace vibrig::campaign {
+
+/// Whether a sweep goes as it was asked for: by what the controller says of its frequency, and by
+/// what the accelerometers make of that. Makes its blocks on the way. Control thread only.
+class SweepWatch {
+  public:
+    /// The controller begins so long after the level is there, at the latest.
+    static constexpr double kBegins_s = 10;
+    /// A sweep is off by so much, and by so much of what it has lasted, at most.
+    static constexpr double kLate_s = 1.5, kLate = 0.05;
+    /// How long a dwell with this sweep takes, s.
+    [[nodiscard]] static double dwell_s(const estimator::SweptSine& sweep);
+
+    /// `at_level`: since when the level is there.
+    SweepWatch(const estimator::Settings& rig, const rt::DwellOrder& order, drivers::Time at_level);
+
+    /// What the controller says of its frequency. Why that is not what was asked for, else empty.
+    [[nodiscard]] std::string frequency(drivers::Time at, double hz);
+    void add(const rt::Motion& sample);
+
+    /// When it began, as far as the newest reading knows; none: it has not yet.
+    [[nodiscard]] std::optional<drivers::Time> begun() const;
+    [[nodiscard]] double octaves_per_s() const { return octaves_ / of_.seconds; }
+    [[nodiscard]] estimator::spectrum::Sweep finish() { return read_.finish(); }
+    /// s since the dwell began, and Hz.
+    [[nodiscard]] const std::vector<std::array<double, 2>>& readings() const {
+        return read_.readings();
+    }
+
+  private:
+    [[nodiscard]] std::string contradicted();
+
+    estimator::SweptSine of_;
+    double octaves_;
+    drivers::Time from_, at_level_;
+    std::array<double, 3> zero_g_;
+    estimator::spectrum::ReadSweep read_;
+    std::optional<double> began_s_, begins_s_;  ///< by the first reading that moved, by the newest
+    std::size_t judged_ = 0;
+    int in_a_row_ = 0;  ///< seconds that show another frequency
+};
+
+}  // namespace vibrig::campaign
