@@ -441,8 +441,11 @@ CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, con
     if (!kept.again.empty() && !kept.why_not.empty())
         return {false, kept.why_not + ": there is nothing to ask again"};
     if (what.contains("answers") && !configuration_.simulated()) return {false, kNoScript};
-    if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty())
-        return {false, why};
+    if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty()) {
+        // Samples at another rate than the configured one never show rest.
+        const auto rate = parts_.fitness.rate_misfit();
+        return {false, rate.empty() ? why : rate};
+    }
     procedure_ = make_procedure();
     if (what.contains("answers")) procedure_->answer_all(what["answers"]);
     procedure_->attend(request.by, rt::wall_clock());
