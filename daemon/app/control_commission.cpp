@@ -42,6 +42,46 @@ int bits_of(const proto::Dbc& dbc, const std::string& name) {
     return signal == nullptr ? 0 : static_cast<int>(signal->length);
 }
 
+/// Valid bits and the like, as vibrig commission bus --bits has proven them.
+Json bits_of_the_bus(const configuration::Loaded& file) {
+    const auto& c = file.configuration;
+    const auto text = c.dbc.empty() ? record::sha256_of_text(std::string(proto::rig_dbc_text()))
+                                    : record::sha256_of_file(c.dbc);
+    return commission::BitBook(c.commission.folder, text).bits();
+}
+
+/// Valid bits, loop closed, gyros at speed, ready and fault, of which nobody knows whether they say
+/// what they are called.
+std::vector<std::string> unproven_bits(const configuration::Loaded& loaded, const proto::Dbc& dbc) {
+    const Json proven = bits_of_the_bus(loaded);
+    std::vector<std::string> names;
+    for (const auto& value : loaded.effective) {
+        constexpr std::array<const char*, 4> kStates{"can.signals.loop_closed",
+                                                     "can.signals.gyros_at_speed",
+                                                     "can.signals.ready", "can.signals.fault"};
+        if (!value.key.starts_with("can.signals.") ||
+            (!value.key.ends_with("_valid") &&
+             std::ranges::find(kStates, value.key) == kStates.end()))
+            continue;
+        const Json text = Json::parse(value.value, nullptr, false);
+        const std::string name = text.is_string() ? text.get<std::string>() : std::string();
+        if (bits_of(dbc, name) == 1 && !proven.contains(name) &&
+            std::ranges::find(names, name) == names.end())
+            names.push_back(name);
+    }
+    return names;
+}
+
+/// What two persons confirm of bits that never changed, beside those that did.
+Json with_confirmed(Json bits, const Json& names, const std::vector<std::string>& by,
+                    std::int64_t utc_ns) {
+    for (const Json& name : names)
+        if (name.is_string() && !bits.contains(name.get<std::string>()))
+            bits[name.get<std::string>()] = {
+                {"proven", "confirmed"}, {"by", by}, {"utc", commission::instant_of(utc_ns)}};
+    return bits;
+}
+
 /// A wire leaves this machine, whatever the configuration says of its rig: gimbals may be at its
 /// end.
 bool real_wire(const drivers::CanPortSettings& can) {
@@ -75,6 +115,10 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
         for (const auto& name : *all)
             if (const int bits = bits_of(parts_.dbc, name); bits > 0 && bits < kFineBits)
                 names.coarse.push_back(fmt::format("{} has {} bits", name, bits));
+    for (const auto& value : loaded_.effective) {
+        if (value.key == "can.dbc") names.dbc = value.value;
+        if (value.key == "can.sample_rate_hz") names.sample_rate = value.value;
+    }
     names.command = configuration_.gimbal.message;
     names.torque = configuration_.campaign.level.torquer.message;
     commission::Ports ports;
@@ -115,6 +159,28 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
                       std::string("what is done is not kept: ") + error.what());
         }
     };
+    ports.rate = [this] {
+        const auto hz = acquisition_.view().rate.hz();
+        return commission::SampleRate{
+            hz, 1 / drivers::to_seconds(configuration_.assembler.sample_period),
+            parts_.fitness.rate_misfit()};
+    };
+    if (configuration_.campaign.zeroing) {  // whose input they are
+        ports.slew_counting = [this](const commission::Vec3& deg, Time now) {
+            const auto sample = acquisition_.view().sample;
+            if (sample.angles_good()) gimbal_.stands_at(in_degrees(sample.angle));
+            gimbal_.slew_to(deg, now, true);
+        };
+        ports.count = [this] {
+            counted_rad_ = {};
+            parts_.stage_feed.order(rt::StageFeed::Mode::increments);
+        };
+        ports.counted_deg = [this] {
+            take_increments();
+            parts_.stage_feed.order(rt::StageFeed::Mode::off);
+            return in_degrees(counted_rad_);
+        };
+    }
     ports.note = [this](const commission::Note& note) {
         keep_commissioned({note.part, note.step, note.by, {}, note.what, note.data.dump()});
     };
@@ -138,6 +204,12 @@ void ControlLoop::keep_commissioned(journal::Commissioned row) {
     row.by = name;
     row.utc_ns = utc_now();
     journal_->commissioned(row);
+}
+
+/// Before a shaker that is not understood yet runs at all; empty: each of its registers was tried.
+std::string ControlLoop::registers_not_tried() const {
+    return commission::TriedRegisters(configuration_.commission.folder)
+        .lacks(commission::TriedRegisters::keys_of(loaded_));
 }
 
 /// At the start: what was written to the controller meanwhile, without a daemon.
@@ -200,6 +272,13 @@ commission::Progress ControlLoop::progress() const {
     return {configuration_.commission.folder, Json(book_.keys(Part::bus))};
 }
 
+/// What the gyros count while the procedure has them counted.
+void ControlLoop::take_increments() {
+    rt::Motion motion;
+    while (parts_.stage_feed.pop(motion))
+        for (std::size_t i = 0; motion.increment && i < 3; ++i) counted_rad_[i] += motion.turn[i];
+}
+
 Time ControlLoop::step_commissioning(Time now) {
     if (!procedure_ || !procedure_->active()) return drivers::kNever;
     if (!campaign_.commissioning()) {
@@ -208,6 +287,7 @@ Time ControlLoop::step_commissioning(Time now) {
         procedure_->halt(status.reason, now);
         return drivers::kNever;
     }
+    if (configuration_.campaign.zeroing) take_increments();
     const Time next = procedure_->step(now, rt::wall_clock());
     if (!procedure_->active()) end_procedure(now);
     return next;
@@ -232,6 +312,8 @@ void ControlLoop::commission(WaitingCommand waiting, Time now) {
     Json record = book_.status(utc_now());
     record["buttons_left"] = campaign_.proof().buttons_left();
     record["ran_at_zero"] = campaign_.proof().ran_at_zero();
+    record["unproven_bits"] =
+        what.contains("bits") ? Json(unproven_bits(loaded_, parts_.dbc)) : Json::array();
     record["lacking"] = Json::object();
     if (what.contains("shaker"))  // why parts are not given: no business of a poll
         for (const auto& [part, why] : shaker_parts({}).lacking)
@@ -359,8 +441,11 @@ CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, con
     if (!kept.again.empty() && !kept.why_not.empty())
         return {false, kept.why_not + ": there is nothing to ask again"};
     if (what.contains("answers") && !configuration_.simulated()) return {false, kNoScript};
-    if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty())
-        return {false, why};
+    if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty()) {
+        // Samples at another rate than the configured one never show rest.
+        const auto rate = parts_.fitness.rate_misfit();
+        return {false, rate.empty() ? why : rate};
+    }
     procedure_ = make_procedure();
     if (what.contains("answers")) procedure_->answer_all(what["answers"]);
     procedure_->attend(request.by, rt::wall_clock());
@@ -389,7 +474,9 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
         const std::string second = text("second");
         if (auto why = commission::not_two(request.by, second); !why.empty()) return {false, why};
         const auto file = configuration::load(loaded_.path, true);
-        if (what["do"] == "accept") return accept_commissioning(request, second, file);
+        if (what["do"] == "accept")
+            return accept_commissioning(request, second,
+                                        what.value("confirmed_bits", Json::array()), file);
         if (text("part") != name_of(Part::gyros))
             return {false, "commission: part: found \"" + text("part") +
                                "\", expected gyros: what can be measured is not stated"};
@@ -398,6 +485,9 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
             return {false, why + ": restart vibrigd first"};
         const Json torquers = book_.evidence(Part::gimbals).value("torquers", Json());
         if (const auto why = commission::not_as_torqued(torquers, file); !why.empty())
+            return {false, why};
+        const Json increments = book_.evidence(Part::gimbals).value("increments", Json());
+        if (const auto why = commission::not_as_counted(increments, file); !why.empty())
             return {false, why};
         // Of a simulated rig a script may leave it out.
         const Json said = what.value("statements", Json::array());
@@ -409,6 +499,7 @@ CommandReply ControlLoop::enter_in_record(const CommandRequest& request, const J
         return record_parts(request, second, {Part::gyros},
                             {{"stated", "by two persons, from the drawing; nothing measures it"},
                              {"torquers", torquers},
+                             {"increments", increments},
                              {"drift_sign", said}},
                             file);
     } catch (const std::exception& error) {
@@ -439,21 +530,9 @@ CommandReply ControlLoop::sign_record(const CommandRequest& request, const Json&
     return {true, text};
 }
 
-namespace {
-
-/// Valid bits and the like, as vibrig commission bus --bits has proven them.
-Json bits_of_the_bus(const configuration::Loaded& file) {
-    const auto& c = file.configuration;
-    const auto text = c.dbc.empty() ? record::sha256_of_text(std::string(proto::rig_dbc_text()))
-                                    : record::sha256_of_file(c.dbc);
-    const Json bits = commission::BitBook(c.commission.folder, text).bits();
-    return bits.empty() ? Json("none was proven: vibrig commission bus --bits") : bits;
-}
-
-}  // namespace
-
 CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
                                                const std::string& second,
+                                               const Json& confirmed_bits,
                                                const configuration::Loaded& file) {
     using Outcome = commission::Finding::Outcome;
     const std::vector<Part> parts{Part::bus, Part::gimbals, Part::accelerometers, Part::earth};
@@ -465,8 +544,17 @@ CommandReply ControlLoop::accept_commissioning(const CommandRequest& request,
     if (const auto why = commission::not_as_found(finding, file); !why.empty()) return {false, why};
     if (const auto why = commission::not_as_running(parts, finding, book_, file); !why.empty())
         return {false, why + ": it was not measured with that: commission anew"};
+    std::string left;
+    for (const auto& name : unproven_bits(file, parts_.dbc))
+        if (std::ranges::find(confirmed_bits, Json(name)) == confirmed_bits.end())
+            left += (left.empty() ? "" : ", ") + name;
+    if (!left.empty())
+        return {false, "bus: " + left +
+                           " never changed: vibrig commission bus --bits changes them "
+                           "once, or two persons confirm them"};
     Json evidence = finding.evidence;
-    evidence["bits"] = bits_of_the_bus(file);
+    evidence["bits"] =
+        with_confirmed(bits_of_the_bus(file), confirmed_bits, {request.by, second}, utc_now());
     auto reply = record_parts(request, second, parts, evidence, file);
     if (reply.accepted) progress().remove();
     return reply;

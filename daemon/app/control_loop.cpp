@@ -118,6 +118,7 @@ void ControlLoop::take_over() {
         campaign_.take_over_loop_check(found);
         log(Severity::warning, "journal", "the newest loop check was out of band: " + found);
     }
+    book_.expect_signed(journal_->recovery().signed_parts);
     std::vector<campaign::ProofRecord> proofs;
     for (const auto& text : journal_->recovery().proofs) {
         if (auto record = campaign::proof_from_json(text)) {

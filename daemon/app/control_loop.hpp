@@ -123,8 +123,11 @@ class ControlLoop {
     void end_procedure(drivers::Time now);
     void void_gyros(const std::string& why);
     [[nodiscard]] bool first_shaking() const;
+    [[nodiscard]] std::string registers_not_tried() const;
+    void take_increments();
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,
+                                                    const commission::Json& confirmed_bits,
                                                     const configuration::Loaded& file);
     [[nodiscard]] CommandReply sign_record(const CommandRequest& request,
                                            const commission::Json& what);
@@ -168,6 +171,7 @@ class ControlLoop {
 
     commission::Book book_{loaded_};
     std::unique_ptr<commission::Procedure> procedure_;  ///< made when it is asked for
+    std::array<double, 3> counted_rad_{};  ///< by the gyros, while commissioning has them count
     /// Of a proof that a tool waits for: it ends with the tool.
     struct Attendance {
         std::string by;

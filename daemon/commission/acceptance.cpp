@@ -106,6 +106,22 @@ std::string not_as_torqued(const Json& torquers, const configuration::Loaded& fi
         file.path, said.dump(), torquers["sign"].dump());
 }
 
+std::string not_as_counted(const Json& increments, const configuration::Loaded& file) {
+    if (!increments.is_object() || !increments.contains("sign")) return {};
+    for (std::size_t g = 0; g < 3; ++g) {
+        const std::string letter(1, "xyz"[g]);
+        const std::string key = "platform.gyro_" + letter + "_axes";
+        const std::string expected = (increments["sign"].at(g) < 0 ? "-" : "+") + letter;
+        const Json axes = value_in(file, key.c_str());
+        const Json said = axes.is_array() && !axes.empty() ? axes[0] : Json();
+        if (said != Json(expected))
+            return fmt::format(
+                "{}: {}[0]: found {}, expected \"{}\" as its increments were counted", file.path,
+                key, said.dump(), expected);
+    }
+    return {};
+}
+
 std::vector<SignStatement> sign_statements(const Json& json) {
     std::vector<SignStatement> all;
     if (!json.is_array()) return all;

@@ -8,6 +8,9 @@
 
 namespace vibrig::commission {
 
+/// Why the gyros' axes of the file are not what their increments were counted about; empty: they
+/// are, or nobody has counted them.
+[[nodiscard]] std::string not_as_counted(const Json& increments, const configuration::Loaded& file);
 /// "A. Person" of "A. Person (uid 1000)".
 [[nodiscard]] std::string name_of_person(const std::string& by);
 

@@ -3,6 +3,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
 #include <map>
@@ -151,6 +153,26 @@ void fill_keys(Finding& f, const room::Description& d, const room::EarthRate& ra
                {"platform.encoder_zero_deg", {0.03, 0.03, 0.17}}};
 }
 
+void fill_bus_keys(Finding& f, const Names& names, double measured_hz) {
+    const auto found = [&f](const std::string& key) {
+        return std::ranges::find(f.keys, key, &FoundKey::key) != f.keys.end();
+    };
+    const auto add = [&](const std::string& key, const std::string& value, const char* evidence) {
+        if (!value.empty() && !found(key)) f.keys.push_back({key, value, evidence});
+    };
+    if (names.dbc != "\"\"") add("can.dbc", names.dbc, "as it was measured with");
+    constexpr std::array kAccelerometers{"x", "y", "z"};
+    for (std::size_t i = 0; i < 3; ++i) {
+        add(std::string("can.signals.") + kGimbalNames[i], "\"" + names.angle[i] + "\"",
+            "moves, gravity");
+        add(std::string("can.signals.accel_") + kAccelerometers[i], "\"" + names.force[i] + "\"",
+            "gravity; accelerometer.matrix says along which axis");
+    }
+    if (measured_hz > 0)
+        add("can.sample_rate_hz", names.sample_rate,
+            fmt::format("{:.2f} samples/s by the kernel's stamps", measured_hz).c_str());
+}
+
 std::string to_toml(const Finding& f, bool simulated) {
     const std::string mark = simulated ? "SIMULATED: " : "";
     std::map<std::string, std::string> tables;
@@ -173,6 +195,7 @@ Json to_json(const Finding& f) {
     }
     return {{"outcome", name_of(f.outcome)},
             {"why", f.why},
+            {"suspects", f.suspects},
             {"second_person", f.second_person},
             {"hypotheses", f.hypotheses},
             {"witnesses", f.witnesses},

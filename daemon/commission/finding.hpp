@@ -21,6 +21,7 @@ struct Names {
     std::array<std::string, 3> force;  ///< "AccelerometersXY.X"
     std::string command = "GimbalCommand", torque = "TorqueCommand";
     std::vector<std::string> coarse{};  ///< of fewer than 12 bits by the DBC, with how many
+    std::string dbc{}, sample_rate{};   ///< can.dbc, can.sample_rate_hz, as the file has them
 };
 
 /// What the configuration says that cannot be measured.
@@ -40,6 +41,7 @@ struct Finding {
     enum class Outcome : std::uint8_t { unfinished, decided, undecided, refused };
     Outcome outcome = Outcome::unfinished;
     std::string why;
+    std::vector<std::string> suspects;     ///< not decided: keys that may be wrong, likeliest first
     bool second_person = false;            ///< asked for, before it is accepted
     std::vector<FoundKey> keys;            ///< decided
     std::vector<std::string> corrections;  ///< of the DBC, before anything is accepted
@@ -56,6 +58,10 @@ struct Finding {
 
 /// Of the classes that gravity leaves, best first, five at most.
 [[nodiscard]] Json hypotheses_of(const estimator::commissioning::GravityFinding& gravity);
+
+/// Of the bus, whatever was found of it: DBC, names of angles and accelerometers, samples/s as they
+/// are measured.
+void fill_bus_keys(Finding& finding, const Names& names, double measured_hz);
 
 /// What is known of the commands: reading per commanded deg by channel, 0: not known, and the
 /// travel in readings.

@@ -62,6 +62,29 @@ std::string outvoted_latitude(const room::EarthFinding& earth, double stated_deg
         stated_deg, earth.rate.neu[2] > 0 ? "northern" : "southern", heard);
 }
 
+/// Keys that the witnesses stand for: those that are outvoted, or where too few agree all that
+/// parity stands on.
+std::vector<std::string> earth_suspects(const room::EarthFinding& earth) {
+    const auto key_of = [](const std::string& witness) {
+        return witness == "latitude"  ? "site.latitude_deg"
+               : witness == "compass" ? "site.azimuth_deg"
+               : witness == "drawing" ? "accelerometer.matrix"
+                                      : "platform.encoder_sign";
+    };
+    std::vector<std::string> keys;
+    if (earth.why.starts_with("site.") || earth.why.starts_with("time")) {
+        keys.push_back(earth.why.substr(0, earth.why.find_first_of(": ")));
+        return keys;
+    }
+    double sum = 0;
+    for (const auto& witness : earth.witnesses) sum += witness.ln_odds;
+    for (const auto& witness : earth.witnesses)
+        if (witness.ln_odds * sum < 0 && std::abs(witness.ln_odds) > kSaysNothing)
+            keys.emplace_back(key_of(witness.name));
+    if (keys.empty()) keys = {"accelerometer.matrix", "site.latitude_deg"};
+    return keys;
+}
+
 }  // namespace
 
 std::size_t Procedure::slot_of(std::size_t gimbal) const {
@@ -86,10 +109,10 @@ void Procedure::decide_gravity() {
         return why;
     };
     if (gravity_.verdict == Verdict::refused)
-        return conclude(Verdict::refused, channels(gravity_.why));
+        return conclude(Verdict::refused, channels(gravity_.why), gravity_suspects());
     if (gravity_.verdict == Verdict::undecided) {
         if (gravity_.hypotheses.size() > 1 && extra_ < kMostExtra && !by_hand_) return separate();
-        return conclude(Verdict::undecided, channels(gravity_.why));
+        return conclude(Verdict::undecided, channels(gravity_.why), gravity_suspects());
     }
     const auto& best = gravity_.hypotheses.front();
     named_ = room::preferred_of(best.best);
@@ -105,8 +128,33 @@ void Procedure::decide_gravity() {
         tell(fmt::format("   {} is the {} gimbal, in {}", names_.angle[c], kGimbalNames[g],
                          room::angle_units()[static_cast<std::size_t>(named_.unit[g])].name));
     }
-    if (const auto wrong = wrong_name(); !wrong.empty()) return conclude(Verdict::refused, wrong);
+    if (const auto wrong = wrong_name(); !wrong.empty())
+        return conclude(Verdict::refused, wrong, {key_of(0), key_of(1), key_of(2)});
     plan_drifts();
+}
+
+/// The keys in which the best two descriptions differ; of one that is no description at all what
+/// its reason is about.
+std::vector<std::string> Procedure::gravity_suspects() const {
+    std::vector<std::string> keys;
+    for (std::size_t c = 0; c < 3; ++c) {
+        if (gravity_.why.find(fmt::format("angle channel {} ", c + 1)) != std::string::npos ||
+            gravity_.why.find(fmt::format("angle channel {}:", c + 1)) != std::string::npos)
+            keys.push_back(key_of(c));
+        const std::string accelerometer(1, "xyz"[c]);
+        if (gravity_.why.starts_with("accelerometer." + accelerometer))
+            keys.push_back("can.signals.accel_" + accelerometer);
+    }
+    if (!keys.empty()) return keys;
+    if (gravity_.verdict == Verdict::refused || gravity_.hypotheses.size() < 2)
+        return {"accelerometer.matrix", "can.dbc"};
+    const auto& a = gravity_.hypotheses[0];
+    const auto& b = gravity_.hypotheses[1];
+    for (std::size_t g = 0; g < 3; ++g)
+        if (a.best.channel[g] != b.best.channel[g]) keys.push_back(key_of(g));
+    if (a.sign_product() != b.sign_product()) keys.emplace_back("platform.encoder_sign");
+    if (a.best.unit != b.best.unit) keys.emplace_back("can.dbc");
+    return keys;
 }
 
 /// What a person says a gimbal is, against what gravity says.
@@ -141,7 +189,8 @@ void Procedure::separate() {
         return conclude(Verdict::undecided,
                         gravity_.why + fmt::format("; within the travel a position tells them "
                                                    "apart by {:.1f} mg, 10 asked",
-                                                   1e3 * found.by_g));
+                                                   1e3 * found.by_g),
+                        gravity_suspects());
     ++extra_;
     tell("E  one more position, which separates best");
     move(travel, [this] {
@@ -326,9 +375,10 @@ void Procedure::decide() {
     for (const auto& witness : earth.witnesses)
         if (witness.name == "latitude" && std::abs(witness.ln_odds) < kSaysNothing)
             tell("   too near the equator: the hemisphere is " + by_ + "'s word alone");
-    if (earth.verdict != Verdict::decided) return conclude(Verdict::undecided, earth.why);
+    if (earth.verdict != Verdict::decided)
+        return conclude(Verdict::undecided, earth.why, earth_suspects(earth));
     if (const auto wrong = outvoted_latitude(earth, *said_of_rig_.latitude_deg); !wrong.empty())
-        return conclude(Verdict::undecided, wrong);
+        return conclude(Verdict::undecided, wrong, earth_suspects(earth));
     earth_ = std::move(earth);
     ask_torques();
 }
@@ -361,6 +411,9 @@ void Procedure::name_rig() {
                  ": levelling.torque_sign stays as stated, unproven");
     }
     fill_keys(finding_, earth_.description, earth_.rate, names_, said_of_rig_, commanded);
+    const auto rate = ports_.rate ? ports_.rate() : SampleRate{};
+    if (!rate.why.empty()) return conclude(Verdict::refused, rate.why, {"can.sample_rate_hz"});
+    fill_bus_keys(finding_, names_, rate.measured_hz);
     conclude(Verdict::decided, {});
 }
 

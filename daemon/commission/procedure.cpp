@@ -71,7 +71,7 @@ void Procedure::attend(const std::string& by, Time wall) {
 }
 
 std::string Procedure::step_name() const {
-    if (torquing_) return "G";
+    if (torquing_ || turning_) return "G";
     if (!gravity_.hypotheses.empty() && gravity_.verdict == Verdict::decided) return "F";
     if (extra_ > 0) return "E";
     if (at_ < plan_.size() && !careful_) return plan_[at_].slot >= 0 ? "C" : "D";
@@ -237,7 +237,7 @@ void Procedure::command_to(const Vec3& command) {
     commanded_ = true;
     released_ = false;
     note("move", {{"command_deg", command}});
-    if (!replaying_) ports_.slew(command, now_);
+    if (!replaying_) (counting_ ? ports_.slew_counting : ports_.slew)(command, now_);
 }
 
 void Procedure::release() {
@@ -286,7 +286,8 @@ void Procedure::watch_move(Time now) {
     if (const auto wrong = contradiction(seen); !wrong.empty())
         return conclude(
             Verdict::undecided,
-            fmt::format("stopped: {}: look at the rig, then by hand (--by-hand)", wrong));
+            fmt::format("stopped: {}: look at the rig, then by hand (--by-hand)", wrong),
+            keys_of_moving());
     switch (ports_.gimbal()) {
         case drivers::GimbalState::in_position:
             return arrive(now);
@@ -297,7 +298,8 @@ void Procedure::watch_move(Time now) {
                     "the command of the {} is not obeyed: not in position within its time{}",
                     moving_slot_ < 3 ? std::string(kLoudNames[moving_slot_]) + " gimbal"
                                      : std::string("gimbals"),
-                    stopped_short().empty() ? "" : "; " + stopped_short()));
+                    stopped_short().empty() ? "" : "; " + stopped_short()),
+                keys_of_moving());
         case drivers::GimbalState::no_status:
             return stop("no gimbal status", now);
         default:
@@ -456,9 +458,18 @@ void Procedure::halt(const std::string& why, Time now) {
     finding_.outcome = Finding::Outcome::unfinished;
 }
 
-void Procedure::conclude(Verdict verdict, const std::string& why) {
+/// Of a command, and the channel that follows it.
+std::vector<std::string> Procedure::keys_of_moving() const {
+    std::vector<std::string> keys{"gimbal.message"};
+    if (moving_slot_ < 3 && channel_of_[moving_slot_] < 3)
+        keys.push_back(key_of(channel_of_[moving_slot_]));
+    return keys;
+}
+
+void Procedure::conclude(Verdict verdict, const std::string& why,
+                         std::vector<std::string> suspects) {
     stand();
-    torquing_ = false;
+    torquing_ = turning_ = counting_ = false;
     doing_ = Doing::nothing;
     question_ = {};
     interrupted_.reset();
@@ -466,7 +477,9 @@ void Procedure::conclude(Verdict verdict, const std::string& why) {
                        : verdict == Verdict::refused ? Finding::Outcome::refused
                                                      : Finding::Outcome::undecided;
     finding_.why = why;
-    note("verdict", {{"outcome", name_of(finding_.outcome)}, {"why", why}});
+    finding_.suspects = std::move(suspects);
+    note("verdict",
+         {{"outcome", name_of(finding_.outcome)}, {"why", why}, {"suspects", finding_.suspects}});
     if (!why.empty()) tell(why);
 }
 

@@ -11,6 +11,7 @@
 #include "daemon/domain/events.hpp"
 #include "drivers/gimbal/gimbal.hpp"
 #include "estimator/commissioning/torques.hpp"
+#include "estimator/commissioning/turns.hpp"
 
 namespace vibrig::commission {
 
@@ -28,6 +29,12 @@ struct Note {
     Json data = Json::object();
 };
 
+/// Samples a second: counted against the kernel's stamps, and as configured.
+struct SampleRate {
+    double measured_hz = 0, configured_hz = 0;
+    std::string why{};  ///< they do not fit, or it is not measured; empty: they do
+};
+
 /// What it acts on. Control thread.
 struct Ports {
     std::function<Look()> sample, second;
@@ -40,6 +47,11 @@ struct Ports {
     /// What was answered and measured so far, on disk when this returns: begin_again() takes it.
     std::function<void(const Json& log)> keep;
     std::function<void(const Note& note)> note;
+    std::function<SampleRate()> rate;  ///< empty: nobody measures it
+    /// As `slew`, and the gyros count meanwhile; empty: no increments are on the bus.
+    std::function<void(const Vec3& command_deg, drivers::Time now)> slew_counting;
+    std::function<void()> count;        ///< from now on
+    std::function<Vec3()> counted_deg;  ///< since; and no longer
 };
 
 /// What an earlier daemon kept of a procedure.
@@ -118,7 +130,12 @@ class Procedure {
     void tell(const std::string& line);
     void note(const char* what, const Json& data) const;
     [[nodiscard]] std::string step_name() const;
-    void conclude(Verdict verdict, const std::string& why);
+    void conclude(Verdict verdict, const std::string& why, std::vector<std::string> suspects = {});
+    /// The key of an angle channel.
+    [[nodiscard]] static std::string key_of(std::size_t channel) {
+        return std::string("can.signals.") + (channel < 3 ? kGimbalNames[channel] : "outer");
+    }
+    [[nodiscard]] std::vector<std::string> keys_of_moving() const;
     void watch_move(drivers::Time now);
     void arrive(drivers::Time now);
     [[nodiscard]] std::string stopped_short() const;
@@ -155,6 +172,7 @@ class Procedure {
     void ask_stop_means();
     void look();
     void looked();
+    [[nodiscard]] std::string rate_text();
     [[nodiscard]] std::vector<std::string> stuck_channels() const;
     void hold_still();
     void held_still();
@@ -176,6 +194,7 @@ class Procedure {
     // naming.cpp: what follows from them
     void decide_gravity();
     [[nodiscard]] std::string wrong_name() const;
+    [[nodiscard]] std::vector<std::string> gravity_suspects() const;
     void separate();
     void plan_drifts();
     void next_drift();
@@ -194,6 +213,11 @@ class Procedure {
     /// Travel that brings a gimbal of the description to an angle, the shorter way.
     [[nodiscard]] double travel_to(std::size_t gimbal, double angle_deg) const;
     [[nodiscard]] std::size_t slot_of(std::size_t gimbal) const;
+
+    // turns.cpp: G, of the gyros' increments
+    void ask_turns();
+    void next_turn();
+    void decide_turns();
 
     // torques.cpp: G
     void ask_torques();
@@ -291,6 +315,10 @@ class Procedure {
     Look torque_from_;       ///< when it was
     std::vector<Vec3> torque_plan_;
     std::vector<estimator::commissioning::Torqued> torqued_;
+    bool turning_ = false;   ///< the gyros are looked at
+    bool counting_ = false;  ///< they count
+    Vec3 turn_from_{}, counted_deg_{};
+    std::vector<estimator::commissioning::CountedTurn> turns_;
     Look sense_before_;
     bool sense_again_ = false;  ///< asked when all was measured
     Finding finding_;

@@ -96,6 +96,8 @@ void Procedure::keep_mean() {
                {"noise", noise_}};
     for (const Look& one : seconds_)  // a drift is more than its mean
         if (released_ || by_hand_) entry["seconds"].push_back(Json{one.from, one.angle});
+    if (counting_ && !replaying_) counted_deg_ = ports_.counted_deg();
+    if (counting_) entry["counted_deg"] = counted_deg_;
     keep(std::move(entry));
 }
 
@@ -106,6 +108,8 @@ void Procedure::begin_again(const std::string& by, bool by_hand, const Kept& kep
     try {
         if (why_not.empty()) replay(kept.log);
         if (why_not.empty() && active() && careful_) why_not = "its gimbals were not known yet";
+        // What the gyros had counted of this turn is gone.
+        if (why_not.empty() && active() && counting_) next_turn();
     } catch (const Json::exception& wrong) {
         why_not = wrong.what();
     }
@@ -165,6 +169,7 @@ bool Procedure::replay_mean(const Json& entry) {
     mean_ = {entry.at("from").get<Time>(), entry.at("to").get<Time>(),
              entry.at("angle").get<Vec3>(), entry.at("force").get<Vec3>(), true};
     noise_ = entry.at("noise").get<Vec3>();
+    if (counting_) counted_deg_ = entry.at("counted_deg").get<Vec3>();
     seconds_.clear();
     for (const Json& one : entry.value("seconds", Json::array())) {
         Look look;
@@ -182,7 +187,8 @@ bool Procedure::replay_mean(const Json& entry) {
 void Procedure::leave_answers(const Json& log, std::size_t from) {
     for (; from < log.size(); ++from)
         if (const std::string id = log.at(from).value("id", "");
-            !id.empty() && id != again_ && id != "permit.torque")  // what moves it is asked anew
+            !id.empty() && id != again_ && id != "permit.torque" &&
+            id != "permit.turns")  // what moves it is asked anew
             left_[id] = log.at(from).at("value");
 }
 

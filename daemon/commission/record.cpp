@@ -346,6 +346,7 @@ void Book::sign(const std::vector<Part>& parts, const std::string& by, const std
     Record fresh = *record_;
     fresh.persons.push_back(std::move(one));
     write(std::move(fresh));
+    for (const Part part : parts) signed_by_[part].push_back(by);
 }
 
 std::string Book::key_path() const {
@@ -392,11 +393,33 @@ std::vector<Standing> Book::standing(std::int64_t utc_ns) const {
                 else
                     s.signed_by += (s.signed_by.empty() ? "" : ", ") + one.by;
             }
+            if (const auto gone = signature_gone(part); !gone.empty()) s.why = gone;
             s.proven = s.why.empty();
         }
         all.push_back(std::move(s));
     }
     return all;
+}
+
+void Book::expect_signed(const std::vector<std::pair<std::string, std::string>>& by_part) {
+    for (const auto& [name, by] : by_part)
+        if (const auto part = part_named(name)) signed_by_[*part].push_back(by);
+}
+
+/// Why a part is not what was signed; empty: all who have signed it still do, or nobody has.
+std::string Book::signature_gone(Part part) const {
+    const auto expected = signed_by_.find(part);
+    if (expected == signed_by_.end()) return {};
+    for (const auto& by : expected->second) {
+        const auto stands = [&](const PersonSignature& one) {
+            return journal::same_person(one.by, by) &&
+                   std::ranges::find(one.parts, part) != one.parts.end();
+        };
+        if (std::ranges::none_of(record_->persons, stands))
+            return fmt::format(
+                "the signature of {}, which the journal has, is gone from the record", by);
+    }
+    return {};
 }
 
 void Book::shaker_is(const std::string& device) {
@@ -440,6 +463,7 @@ void Book::prove(const std::vector<Part>& parts, const PartRecord& what,
         fresh.parts[part] = std::move(one);
     }
     write(std::move(fresh));
+    for (const Part part : parts) signed_by_.erase(part);
 }
 
 void Book::withdraw(Part part) {
@@ -476,6 +500,11 @@ Json Book::status(std::int64_t utc_ns) const {
         if (s.record) {
             one["by"] = s.record->by;
             one["utc"] = instant_of(s.record->utc_ns);
+            const double valid = loaded_.configuration.commission.valid_days;
+            one["age"] = {{"days", static_cast<double>(utc_ns - s.record->utc_ns) / kDay_ns},
+                          {"valid_days", valid},
+                          {"expires",
+                           date_of(s.record->utc_ns + static_cast<std::int64_t>(valid * kDay_ns))}};
             one["evidence"] = s.record->evidence;
             one["signed_by"] = s.signed_by;
             one["digest"] = digest_of(*s.record);

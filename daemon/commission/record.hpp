@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
@@ -129,6 +130,9 @@ class Book {
     /// to come from is server.clients_ca. Throws std::invalid_argument that says what does not
     /// hold, and as prove().
     void sign(const std::vector<Part>& parts, const std::string& by, const std::string& cms);
+    /// Who has signed which part, by a journal that nobody edits unseen: without these signatures
+    /// the part is not proven, whoever has taken them out of the file.
+    void expect_signed(const std::vector<std::pair<std::string, std::string>>& by_part);
     /// Takes a part out, if it is in, and writes the file. Throws as prove().
     void withdraw(Part part);
     [[nodiscard]] Json status(std::int64_t utc_ns) const;
@@ -141,6 +145,7 @@ class Book {
     [[nodiscard]] std::string path() const;
     [[nodiscard]] std::string key_path() const;
     [[nodiscard]] std::string doubt() const;
+    [[nodiscard]] std::string signature_gone(Part part) const;
     [[nodiscard]] std::string doubt_of(const PersonSignature& one) const;
     void write(Record fresh);
 
@@ -148,7 +153,8 @@ class Book {
     std::map<Part, Keys> keys_;  ///< now
     std::string device_;         ///< of the shaker; empty: not known
     std::optional<Record> record_;
-    std::string text_;  ///< of the file
+    std::map<Part, std::vector<std::string>> signed_by_;  ///< as the journal has it
+    std::string text_;                                    ///< of the file
     std::string trouble_;
 };
 

@@ -101,8 +101,11 @@ void Procedure::looked() {
         return conclude(Verdict::refused,
                         fmt::format("the accelerometers show {:.4g} at rest: {}, not g: mend their "
                                     "factors in the DBC",
-                                    size, unit));
-    tell(fmt::format("A  |f| = {:.3f} g{}", size,
+                                    size, unit),
+                        {"can.dbc"});
+    const std::string rate = rate_text();
+    if (!active()) return;
+    tell(fmt::format("A  {}|f| = {:.3f} g{}", rate, size,
                      std::abs(size - 1) < 0.05 ? "" : ": not 1, an accelerometer may be dead"));
     for (const auto& name : stuck_channels())
         tell(fmt::format("   {} has not changed while its neighbours did: not connected?", name));
@@ -111,6 +114,18 @@ void Procedure::looked() {
     if (by_hand_) return try_gimbal();
     ask_yes("permit.hold", "I will command the present readings: nothing should move. May I?",
             "nothing may be commanded: by hand (--by-hand)", [this] { hold_still(); });
+}
+
+/// "40.0 samples/s, 6 channels, "; it ends where that is not what is configured.
+std::string Procedure::rate_text() {
+    // What was kept was looked at by the daemon that kept it.
+    if (!ports_.rate || replaying_) return {};
+    const auto rate = ports_.rate();
+    if (!rate.why.empty()) {
+        conclude(Verdict::refused, rate.why, {"can.sample_rate_hz", "can.signals.sync_count"});
+        return {};
+    }
+    return fmt::format("{:.1f} samples/s, 6 channels, ", rate.measured_hz);
 }
 
 /// Through 50 samples at rest, where others of its kind show their noise.
@@ -155,7 +170,8 @@ void Procedure::held_still() {
         return conclude(Verdict::undecided,
                         fmt::format("commanded where they are, the gimbals moved by {:.2f} {:.2f} "
                                     "{:.2f}: command and encoder differ: by hand (--by-hand)",
-                                    moved[0], moved[1], moved[2]));
+                                    moved[0], moved[1], moved[2]),
+                        {"gimbal.message"});
     holds_ = true;
     try_gimbal();
 }
@@ -191,7 +207,8 @@ void Procedure::hand_moved() {
         return conclude(Verdict::undecided,
                         fmt::format("no angle channel follows the {} gimbal: it is stuck, or its "
                                     "channel is",
-                                    kLoudNames[slot_]));
+                                    kLoudNames[slot_]),
+                        {key_of(slot_)});
     channel_of_[slot_] = most;
     travel_[slot_] = kLast_deg;
     said_[slot_] = static_cast<int>(slot_);
@@ -216,7 +233,8 @@ void Procedure::nudged() {
         return conclude(
             Verdict::undecided,
             fmt::format("{} and {} both follow the command of the {} gimbal",
-                        names_.angle[moved[0]], names_.angle[moved[1]], kLoudNames[slot_]));
+                        names_.angle[moved[0]], names_.angle[moved[1]], kLoudNames[slot_]),
+            {key_of(moved[0]), key_of(moved[1])});
     if (moved.size() == 1) {
         channel_of_[slot_] = moved[0];
         return small_move(0);
@@ -225,7 +243,8 @@ void Procedure::nudged() {
         return conclude(Verdict::undecided,
                         fmt::format("no angle channel follows the command of the {} gimbal up to "
                                     "{:g} deg: it is stuck, or obeys nobody",
-                                    kLoudNames[slot_], kLast_deg));
+                                    kLoudNames[slot_], kLast_deg),
+                        {"gimbal.message", key_of(slot_)});
     amount_deg_ = std::min(2 * amount_deg_, kLast_deg);
     nudge();
 }
@@ -263,7 +282,8 @@ void Procedure::small_moved() {
         return conclude(Verdict::undecided,
                         fmt::format("{} follows the {} gimbal unevenly: {:.4g} {:.4g} {:.4g} for 1 "
                                     "deg",
-                                    names_.angle[c], kLoudNames[slot_], step[0], step[1], step[2]));
+                                    names_.angle[c], kLoudNames[slot_], step[0], step[1], step[2]),
+                        {key_of(c), "can.dbc"});
     ratio_[c] = ratio;
     respond_[slot_] =
         norm(difference(small_.back().force, small_.front().force)) / (kLast_deg * 0.01745329252);
@@ -318,7 +338,8 @@ void Procedure::next_gimbal() {
     auto sorted = channel_of_;
     std::ranges::sort(sorted);
     if (sorted != std::array<std::size_t, 3>{0, 1, 2})
-        return conclude(Verdict::undecided, "two gimbals move the same angle channel");
+        return conclude(Verdict::undecided, "two gimbals move the same angle channel",
+                        {key_of(0), key_of(1), key_of(2)});
     auto names = said_;
     std::ranges::sort(names);
     if (names != std::array<int, 3>{0, 1, 2})
@@ -327,7 +348,8 @@ void Procedure::next_gimbal() {
                                     "says {}: one is wrong",
                                     kGimbalNames[static_cast<std::size_t>(said_[0])],
                                     kGimbalNames[static_cast<std::size_t>(said_[1])],
-                                    kGimbalNames[static_cast<std::size_t>(said_[2])], by_));
+                                    kGimbalNames[static_cast<std::size_t>(said_[2])], by_),
+                        {"gimbal.message"});
     // Cables are the gimbals', whatever their commands are called.
     const auto limits = limits_deg_;
     const auto free = free_;

@@ -33,7 +33,7 @@ std::string axes_of(const room::TorqueFinding& f) {
 }  // namespace
 
 void Procedure::ask_torques() {
-    if (by_hand_ || !ports_.torque) return name_rig();
+    if (by_hand_ || !ports_.torque) return ask_turns();
     torque_deg_h_ = std::min(kTorque_deg_h, stated_.torque_limit_deg_h);
     const auto yes_or_no = [](std::string& value) {
         if (value == "y") value = "yes";
@@ -48,7 +48,7 @@ void Procedure::ask_torques() {
         [this](const std::string& value) {
             if (value == "yes") return plan_torques();
             tell("G  not torqued: levelling.torque_sign stays as stated, unproven");
-            name_rig();
+            ask_turns();
         });
 }
 
@@ -124,7 +124,8 @@ void Procedure::watch_torque(drivers::Time now) {
             fmt::format("torque command {} of {:g} deg/h: {} has turned by {:.2f} deg "
                         "in {:.1f} s, stopped",
                         kCommand[static_cast<std::size_t>(axis - torque_.begin())], *axis,
-                        names_.angle[c], turned, drivers::to_seconds(seen.to - torque_from_.to)));
+                        names_.angle[c], turned, drivers::to_seconds(seen.to - torque_from_.to)),
+            {"levelling.torque_message"});
     }
 }
 
@@ -138,7 +139,8 @@ void Procedure::decide_torques() {
         return conclude(Verdict::refused, wrong.what());
     }
     if (as_is.verdict != Verdict::decided)
-        return conclude(Verdict::refused, as_is.why + " (no torque: answer no)");
+        return conclude(Verdict::refused, as_is.why + " (no torque: answer no)",
+                        {"levelling.torque_sign", "levelling.torque_message"});
     if (!renamed.named()) return take_torques(as_is);
     if (as_is.named()) return take_torques(renamed);
     const auto text =
@@ -153,9 +155,11 @@ void Procedure::decide_torques() {
          }},
         [this, text, as_is, renamed](const std::string& value) {
             if (value == "-")
-                return conclude(Verdict::undecided, text +
-                                                        " One of both is misnamed: what would "
-                                                        "tell: the maker's drawing");
+                return conclude(Verdict::undecided,
+                                text +
+                                    " One of both is misnamed: what would "
+                                    "tell: the maker's drawing",
+                                {"accelerometer.matrix", "levelling.torque_message"});
             take_torques(value == "torquers" ? renamed : as_is);
         });
 }
@@ -185,7 +189,7 @@ void Procedure::take_torques(const room::TorqueFinding& f) {
                                  fmt::format("rates under {:g} deg/h: scale {:.3f} {:.3f} {:.3f}",
                                              torque_deg_h_, f.scale[0], f.scale[1], f.scale[2])});
     }
-    name_rig();
+    ask_turns();
 }
 
 }  // namespace vibrig::commission

@@ -122,6 +122,46 @@ std::vector<TrialLog::Json> TrialLog::take(const std::string& folder) {
     return lines;
 }
 
+TriedRegisters::TriedRegisters(const std::string& folder)
+    : path_((std::filesystem::path(folder) / "registers.json").string()) {}
+
+TriedRegisters::Keys TriedRegisters::keys_of(const configuration::Loaded& loaded) {
+    Keys keys;
+    for (const auto& value : loaded.effective)
+        if (value.key.starts_with("shaker.registers.")) keys[value.key] = value.value;
+    return keys;
+}
+
+void TriedRegisters::keep(const Keys& keys, const std::string& by, const std::string& device,
+                          std::int64_t utc_ns) const {
+    const TrialLog::Json all{{"version", 1},
+                             {"by", by},
+                             {"identity", identity()},
+                             {"device", device},
+                             {"utc", instant_of(utc_ns)},
+                             {"keys", keys}};
+    proto::write_durably(path_, all.dump(1) + "\n", 0644);
+}
+
+std::string TriedRegisters::lacks(const Keys& keys) const {
+    constexpr const char* kToDo =
+        ": vibrig commission registers --write, with vibrigd stopped, the chain open and the power "
+        "stage off";
+    std::ifstream file(path_);
+    const auto all = file ? TrialLog::Json::parse(file, nullptr, false) : TrialLog::Json();
+    if (!all.is_object() || !all.contains("keys") || !all["keys"].is_object())
+        return "the shaker's registers were not tried one by one, which comes before it runs" +
+               std::string(kToDo);
+    for (const auto& [key, value] : keys) {
+        const auto was = all["keys"].find(key);
+        const std::string then =
+            was != all["keys"].end() && was->is_string() ? was->get<std::string>() : "not known";
+        if (then != value)
+            return key + " is " + value + ", was " + then + " when it was tried" + kToDo;
+    }
+    return {};
+}
+
 TrialPort::Answer LoggedPort::write(std::uint16_t address, std::span<const std::uint16_t> words) {
     std::vector<std::uint16_t> held(words.size());
     const bool read =

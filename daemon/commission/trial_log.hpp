@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "daemon/commission/register_trial.hpp"
+#include "daemon/configuration/configuration.hpp"
 
 namespace vibrig::commission {
 
@@ -35,6 +37,26 @@ class TrialLog {
   private:
     std::string path_, by_;
     int file_ = -1;
+};
+
+/// That each written register was tried, chain open and power stage off: commission.folder,
+/// registers.json. It stands on shaker.registers.* as --check prints them.
+class TriedRegisters {
+  public:
+    using Keys = std::map<std::string, std::string>;
+
+    explicit TriedRegisters(const std::string& folder);
+    /// Throws std::runtime_error that names the file.
+    void keep(const Keys& keys, const std::string& by, const std::string& device,
+              std::int64_t utc_ns) const;
+    /// Why these were not tried; empty: they were.
+    [[nodiscard]] std::string lacks(const Keys& keys) const;
+
+    /// Of an effective configuration.
+    [[nodiscard]] static Keys keys_of(const configuration::Loaded& loaded);
+
+  private:
+    std::string path_;
 };
 
 /// Each write through it is in the log first, with what the registers held.

@@ -50,6 +50,8 @@ struct Recovery {
     std::string assumed;              ///< of what an older version did not keep; empty: nothing
     std::string out_of_band;          ///< what the newest loop check found so; empty: nothing
     std::vector<std::string> proofs;  ///< of the safe state, as they were kept, oldest first
+    /// Parts of the commissioning record, and who has signed each since it was recorded last.
+    std::vector<std::pair<std::string, std::string>> signed_parts;
     std::vector<std::string> certificates;  ///< numbers of those that were issued
     /// Not acknowledged; kDiedArmed among them if an arming had no end.
     std::vector<Latch> latches;
@@ -152,6 +154,7 @@ class Journal {
     void recover_loop_check();
     void recover_proofs();
     void recover_certificates();
+    void recover_signed_parts();
     void recover_safety();
     void read_safety(Database& from);
     void follow(const Safety& safety);

@@ -24,6 +24,7 @@ void Journal::recover() {
     recover_loop_check();
     recover_proofs();
     recover_certificates();
+    recover_signed_parts();
     recover_safety();
     const auto found = database().ask(
         "SELECT id, name, started_by, configuration_hash, state FROM campaign "
@@ -53,6 +54,15 @@ void Journal::recover_proofs() {
     for (auto row = rows.rbegin(); row != rows.rend(); ++row)
         recovery_.proofs.push_back(row->texts.at(0));
     note_proof(database().ask("SELECT max(id) FROM proof").at(0).numbers.at(0));
+}
+
+void Journal::recover_signed_parts() {
+    for (const Row& row :
+         database().ask("SELECT part, by FROM commissioning AS s WHERE what = 'sign' AND id > "
+                        "coalesce((SELECT max(id) FROM commissioning WHERE what = 'accept' AND "
+                        "part = s.part), "
+                        "0) ORDER BY id"))
+        recovery_.signed_parts.emplace_back(row.texts.at(0), row.texts.at(1));
 }
 
 void Journal::recover_certificates() {

@@ -14,14 +14,17 @@ import re
 import signal
 import socket
 import sqlite3
+import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 import pexpect
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import modbus_proxy  # noqa: E402
 import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "commissioned", "identify": "what-it-can", "positions_deg": [[-90, 0, 0]], "table_g": [5.0], "dwell_s": 10.0}
@@ -69,7 +72,7 @@ def after_slews(rig):
 class Unknown:
     """A rig with a truth of its own, of which the configuration says nothing."""
 
-    def __init__(self, checks, programs, folder, truth, speed="max", foreign=None):
+    def __init__(self, checks, programs, folder, truth, speed="max", foreign=None, proxied=False):
         self.checks, self.truth = checks, truth
         self.registers = {"shaker.registers." + role: keys for role, keys in (foreign or {}).items()}
         self.rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.1)
@@ -80,6 +83,9 @@ class Unknown:
         self.record = os.path.join(folder, "commission", "record.json")
         self.rig.start_plant("--seed", "4", "--warm-up", "1", "--start-temperature", "45", "--speed", speed,
                              "--truth", self.rig.truth_file(truth))
+        if proxied:
+            self.proxy = modbus_proxy.Proxy(self.rig.modbus_port)
+            self.rig.modbus_port = self.proxy.port
         self.configure()
         self.start()
 
@@ -99,6 +105,15 @@ class Unknown:
     def restart(self):
         self.rig.daemon.end()
         return self.start()
+
+    def registers_are_tried(self):
+        """As vibrig commission registers --write leaves it, of the registers that the configuration states (foreign_registers.py does it)."""
+        check = subprocess.run([self.rig.program("vibrigd"), "--check", "--config", self.rig.configuration], capture_output=True, text=True, check=True)
+        keys = dict(re.findall(r"^(shaker\.registers\.\S+) +=  (.*?)(?:  +\S.*)?$", check.stdout, re.M))
+        os.makedirs(os.path.dirname(self.record), exist_ok=True)
+        with open(os.path.join(os.path.dirname(self.record), "registers.json"), "w", encoding="utf-8") as file:
+            json.dump({"version": 1, "by": "Ada", "keys": keys}, file)
+        return keys
 
     def answers(self, **others):
         """Of people who say what is so."""
@@ -190,6 +205,7 @@ def whole(checks, programs, folder, seed):
         with open(u.rig.configuration, encoding="utf-8") as file:
             checks.check(file.read() == before and sorted(os.listdir(folder)) == files and not os.path.exists(u.record),
                          "and nothing is written then", os.listdir(folder))
+        one_bit_is_proven(u)
         os.chmod(u.rig.configuration, 0o604)
         real = os.path.join(folder, "etc", "rig.toml")
         os.mkdir(os.path.dirname(real))
@@ -197,6 +213,14 @@ def whole(checks, programs, folder, seed):
         os.symlink(real, u.rig.configuration)
         accepted = tool("commission", "accept", "--by", "Ada", "--second", "Bo", "--yes")
         checks.check(accepted.returncode == 0 and os.path.exists(u.record), "accepted by two", accepted.stdout + accepted.stderr)
+        with open(u.record, encoding="utf-8") as file:
+            known = json.load(file)["parts"]["bus"]["evidence"]["bits"]
+        checks.check(known["PlatformStatus.LoopClosed"]["proven"] == "changed once and back" and known["PlatformStatus.LoopClosed"]["by"] == ["Ada"] and
+                     known["Resolvers.OuterValid"]["proven"] == "confirmed" and known["Resolvers.OuterValid"]["by"][1] == "Bo",
+                     "what is known of each bit is in the record", known)
+        bits_are_asked_for(checks, u)
+        checks.check(keys["can.signals.accel_x"] == "AccelerometersXY.X" and keys["can.sample_rate_hz"] == 40 and "\nsample_rate_hz = 40.0" in kept and
+                     "samples/s by the kernel's stamps" in kept, "and what the bus is called was found, too", kept)
         with open(real + ".1", encoding="utf-8") as file:
             checks.check(os.path.islink(u.rig.configuration) and os.stat(real).st_mode & 0o777 == 0o604 and file.read() == before,
                          "the file keeps its mode, a link stays one, and the old one is beside it", os.listdir(os.path.dirname(real)))
@@ -216,9 +240,10 @@ def whole(checks, programs, folder, seed):
                                    "--identity", os.path.join(pki, "ada")], input=typed, capture_output=True, text=True, check=False)
             checks.check(said.returncode == code and word in said.stdout + said.stderr, f"drift_sign is stated by two apart: {word}", said.stdout + said.stderr)
         signed = tool("commission", "status").stdout.replace("\n   ", " ")
-        checks.check(re.search("^gyros .*Bo, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
+        checks.check(re.search("^gyros .*Bo, 0 days old, until [-0-9]+, signed with the certificate of Ada$", signed, re.M), "the person's certificate has signed it", signed)
         shaker_is_proven(checks, u)
         another_controller(checks, u)
+        another_one_while_armed(checks, u)
         proven = tool("commission", "status")
         checks.check(proven.returncode == 0 and "SIMULATED: this record counts on no real rig" in proven.stdout, "all parts are proven, of a simulated rig",
                      proven.stdout)
@@ -230,11 +255,47 @@ def whole(checks, programs, folder, seed):
         with open(u.rig.configuration, encoding="utf-8") as file:
             text = file.read()
         checks.check("# SIMULATED: ln LR" in text, "the configuration's comments say so, too", text)
+        signatures_are_missed(checks, u)
         each_key_is_caught_twice(checks, u, text)
         checks.check("commissioning: commissioning:" not in u.rig.daemon.text(), "no event names its source twice", u.rig.logs())
         journal_has_it(checks, u)
     finally:
         u.rig.stop()
+
+
+def one_bit_is_proven(u):
+    """As vibrig commission bus --bits leaves it."""
+    dbc = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "rig.dbc")
+    with open(dbc, "rb") as file:
+        text = hashlib.sha256(file.read()).hexdigest()
+    with open(os.path.join(os.path.dirname(u.record), "bus_bits.json"), "w", encoding="utf-8") as file:
+        json.dump({"version": 1, "dbc_sha256": text,
+                   "bits": {"PlatformStatus.LoopClosed": {"proven": "changed once and back", "by": ["Ada"], "rests_at": 1}}}, file)
+
+
+def bits_are_asked_for(checks, u):
+    """Of those that never changed nobody knows whether they say what they are called: not recorded, unless two persons confirm each."""
+    with open(u.record, "rb") as file:
+        recorded = file.read()
+    for confirmed in (None, [], ["Resolvers.OuterValid"], "all"):
+        what = {"do": "accept", "second": "Bo", **({} if confirmed is None else {"confirmed_bits": confirmed})}
+        body = json.dumps({"kind": "commission", "by": "Ada", "argument": json.dumps(what)})
+        answer = raw_command(u.rig, body)
+        left = ["Resolvers.InnerValid", "PlatformStatus.Fault", *([] if confirmed == ["Resolvers.OuterValid"] else ["Resolvers.OuterValid"])]
+        with open(u.record, "rb") as file:
+            same = file.read() == recorded
+        checks.check("bus: " in answer and all(name in answer for name in left) and "LoopClosed" not in answer and same,
+                     f"bits that never changed refuse the part bus: {confirmed}", answer)
+
+
+def raw_command(rig, body):
+    with socket.socket(socket.AF_UNIX) as line:
+        line.connect(rig.socket)
+        line.sendall(f"POST /api/v1/commands HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: {len(body)}\r\n\r\n{body}".encode())
+        answer = b""
+        while more := line.recv(65536):
+            answer += more
+    return answer.decode()
 
 
 def journal_has_it(checks, u):
@@ -305,6 +366,10 @@ def with_swapped_words(checks, u):
         with open(rig.configuration, "w", encoding="utf-8") as file:
             file.write(wrong)
         u.restart()
+        early = tried_first(rig, "units")
+        checks.check('shaker.registers.amplitude.word_order is "big", was "little" when it was tried' in unwrapped(early),
+                     "registers that are others than those that were tried are not tried", early)
+        u.registers_are_tried()
         refused = in_background(rig, "units")
         checks.check(press(rig, "rack") and press(rig, "door"), "each button comes before it shakes, whatever was asked for", refused.text())
         ended(refused)
@@ -315,8 +380,14 @@ def with_swapped_words(checks, u):
     finally:
         with open(rig.configuration, "w", encoding="utf-8") as file:
             file.write(right)
+    u.registers_are_tried()
     at_rest_again(rig)
     u.restart()
+
+
+def tried_first(rig, part):
+    refused = rig.tool("commission", part, "--by", "Ada", "--yes", timeout=60)
+    return refused.stdout + refused.stderr if refused.returncode == 1 else "accepted"
 
 
 def shaker_is_proven(checks, u):
@@ -327,6 +398,11 @@ def shaker_is_proven(checks, u):
                  "the shaker's parts are asked for", lacks.stderr)
     unknown = tool("commission", "watchdog", "earth", "--by", "Ada")
     checks.equal(unknown.returncode, 2, "parts of platform and shaker are not proven at once")
+    for order in (("commission", "watchdog", "--yes"), ("selftest",), ("selftest", "--at-zero")):
+        early = tool(*order, "--by", "Ada", timeout=60)
+        checks.check(early.returncode == 1 and "registers were not tried one by one, which comes before it runs: vibrig commission registers --write" in
+                     unwrapped(early.stdout + early.stderr), f"nothing runs before its registers were tried: {' '.join(order)}", early.stdout + early.stderr)
+    checks.check(len(u.registers_are_tried()) > 20, "they are")
     with_swapped_words(checks, u)
     early = tool("selftest", "--by", "Ada", timeout=120)
     checks.check("has not run at 0 g yet" in early.stderr, "nothing shakes before it has run at 0 g", early.stdout + early.stderr)
@@ -336,6 +412,7 @@ def shaker_is_proven(checks, u):
         checks.check(refused.returncode == 1 and "REFUSED: at 0 g: not completed: " + word in unwrapped(refused.stdout) and
                      highest_g(rig) == 0, f"it ends at 0 g, and nothing has moved: {lie}", refused.stdout + refused.stderr + rig.logs())
         at_rest_again(rig)
+    killed_at_zero(checks, u)
     checks.equal(tool("selftest", "--by", "Ada", "--at-zero", timeout=120).returncode != 2, True, "the run at 0 g")
     early = tool("selftest", "--by", "Ada", timeout=120)
     checks.check('the emergency stop was not pressed at 0 g yet ("rack", "door")' in unwrapped(early.stderr) and highest_g(rig) == 0,
@@ -414,6 +491,32 @@ def asks_first(rig, word):
     return resumed.returncode == 1 and word in unwrapped(resumed.stdout) and "nobody answers" in resumed.stderr and stays_at_rest(rig)
 
 
+def killed_at_zero(checks, u):
+    """Terminal and daemon are killed while the controller runs at 0 g: it stops, and the run begins anew by a question."""
+    rig = u.rig
+    rig.order("speed 4")
+    for who in ("terminal", "daemon"):
+        tool = in_background(rig, "watchdog")
+        begun = rig.wait_for(lambda s: s["campaign"]["state"] == "checking" and s["shaker"].get("state") == 2, 60)
+        if not checks.check(begun["shaker"].get("state") == 2 and tool.running(), "the run at 0 g is begun", tool.text() + rig.logs()):
+            return
+        if who == "terminal":
+            tool.process.send_signal(signal.SIGKILL)
+            ended(tool)
+            ends = rig.wait_for(lambda s: s["campaign"]["state"] != "checking", 30)
+            checks.check("nobody has been at the tool of Ada" in r.state_of(ends), "at 0 g: without its terminal it ends", r.state_of(ends))
+        else:
+            rig.daemon.process.send_signal(signal.SIGKILL)
+            ended(tool)
+            checks.equal(tool.process.poll(), 2, "at 0 g: without a daemon the tool ends")
+            u.start()
+        checks.check(stays_at_rest(rig) and highest_g(rig) == 0, f"at 0 g: nothing goes on by itself without its {who}", rig.logs())
+        for what in ("trip", "stop_disobeyed"):
+            rig.tool("ack", what, "--by", "Ada")
+        checks.check(asks_first(rig, "will run at 0 g, and its watchdog"), "at 0 g: it is begun anew, by a question", rig.logs())
+    rig.order("speed max")
+
+
 def killed_in_steps(checks, u):
     """Terminal and daemon are killed in each of the shaker's steps: all stops, nothing goes on by itself, and that step begins anew."""
     rig = u.rig
@@ -472,6 +575,30 @@ def another_controller(checks, u):
     u.restart()
 
 
+def another_one_while_armed(checks, u):
+    """A new link, and somebody else answers: what is armed is not armed any longer."""
+    rig = u.rig
+    rig.order("speed 1")
+    reason = ""
+    for _ in range(3):   # the link is lost for less than a reading lives, which a busy machine may not keep
+        armed = rig.tool("arm", "--by", "Ada")
+        if armed.returncode != 0:
+            break
+        rig.order("fault other-device")
+        rig.order("fault modbus-silent=0.7")
+        # Whoever waits for an answer on the rig's clock waits in wall time.
+        reason = r.state_of(rig.wait_for(lambda s: s["campaign"]["state"] != "armed", 60))
+        rig.order("clear other-device")
+        if "another" in reason:
+            break
+        rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest" and r.measuring(s), 20)
+    checks.check("another shaker's controller" in reason, "another controller answers while it is armed: it is aborted", reason + armed.stderr + rig.logs())
+    checks.check("identity of the shaker's controller is" in rig.tool("arm", "--by", "Ada").stderr, "and not armed again", rig.logs())
+    rig.order("clear")
+    rig.order("speed max")
+    u.restart()
+
+
 def turned(value, by):
     return round(remainder(value + by), 4)
 
@@ -484,6 +611,28 @@ WRONG = (
     ("site.latitude_deg", lambda v: -v),
     ("site.azimuth_deg", lambda v: turned(v, 90)),
 )
+
+
+def signatures_are_missed(checks, u):
+    """Root forges a record with the daemon's key: a person's signature nobody can make anew, and one that is taken out is missed."""
+    with open(u.record, encoding="utf-8") as file:
+        recorded = file.read()
+    forge(u, None)
+    u.restart()
+    forged = u.rig.tool("arm", "--by", "Ada")
+    checks.check(forged.returncode == 1 and "the signature of Ada, which the journal has, is gone from the record (gyros)" in forged.stderr,
+                 "a signature that has vanished is missed", forged.stderr)
+    with open(u.record, "w", encoding="utf-8") as file:
+        file.write(recorded)
+    u.restart()
+    checks.equal(u.rig.tool("arm", "--by", "Ada").returncode, 0, "and it is armed with it")
+    u.rig.tool("abort", "--by", "Ada")
+
+
+def unsigned(checks, u):
+    """Recorded anew by two persons without a certificate: what follows forges that."""
+    stated = u.rig.tool("commission", "gyros", "--by", "Ada", "--second", "Bo", "--yes")
+    checks.equal(stated.returncode, 0, "gyros are stated anew, and signed by nobody: " + stated.stderr)
 
 
 def each_key_is_caught_twice(checks, u, text):
@@ -516,8 +665,15 @@ def each_key_is_caught_twice(checks, u, text):
             forged = u.rig.tool("arm", "--by", "Ada")
             checks.check(forged.returncode == 1 and "the signature of Ada is not that of what the record says" in forged.stderr,
                          "nor is one that the daemon's key has signed, against a person's signature", forged.stderr)
-            with open(u.record, "w", encoding="utf-8") as file:
-                file.write(recorded)
+            for path, content in ((u.record, recorded), (u.rig.configuration, text)):
+                with open(path, "w", encoding="utf-8") as file:
+                    file.write(content)
+            u.restart()
+            unsigned(checks, u)
+            with open(u.record, encoding="utf-8") as file:
+                recorded = file.read()
+            with open(u.rig.configuration, "w", encoding="utf-8") as file:
+                file.write(text[:was.start(1)] + wrong + text[was.end(1):])
             u.restart()
         forge(u, key)
         u.restart()
@@ -536,8 +692,8 @@ def forge(unknown, key, with_its_key=True, with_persons=False):
     """The record says of the key what the daemon, which runs with a wrong one, says: all hashes fit, and the signature, too, where the
     forger is root and reads the daemon's key; persons' signatures, which nobody can make anew, are taken out."""
     proven = unknown.rig.tool("commission", "status", "--json")
-    now = [re.search(re.escape(key) + " is (.*), was proven as ", part["why"]) for part in json.loads(proven.stdout)["parts"].values()]
-    value = next(found[1] for found in now if found)
+    now = key and [re.search(re.escape(key) + " is (.*), was proven as ", part["why"]) for part in json.loads(proven.stdout)["parts"].values()]
+    value = key and next(found[1] for found in now if found)
     with open(unknown.record, encoding="utf-8") as file:
         record = json.load(file)
     for part in record["parts"].values():
@@ -560,6 +716,88 @@ def forge(unknown, key, with_its_key=True, with_persons=False):
         record["signature"]["value"] = made.stdout.hex()
     with open(unknown.record, "w", encoding="utf-8") as file:
         json.dump(record, file)
+
+
+def nothing_is_written(checks, programs, folder):
+    """The gimbals' parts: a device that counts what is written to it counts nothing, and is read all the time."""
+    u = Unknown(checks, programs, folder, drawn(9), speed="40", proxied=True)
+    seen = []
+
+    def look(over):
+        while not over.wait(0.1):
+            status = u.rig.status()
+            if status and status["campaign"]["state"] == "commissioning":
+                seen.append(time.monotonic())
+
+    over = threading.Event()
+    looker = threading.Thread(target=look, args=(over,), daemon=True)
+    try:
+        before = len(u.proxy.writes)
+        looker.start()
+        run, found = u.commission()
+        over.set()
+        looker.join()
+        within = [w for w in u.proxy.writes if seen and seen[0] + 0.3 < w[0] < seen[-1]]
+        checks.check(run.returncode == 0 and found["outcome"] == "decided" and before > 0 and seen and seen[-1] - seen[0] > 5,
+                     f"a rig is commissioned through it, for {seen[-1] - seen[0] if seen else 0:.0f} s", run.stderr)
+        checks.check(not within, "and nothing is written meanwhile", within[:5])
+        known = len(u.proxy.writes)
+        u.rig.wait_for(lambda s: len(u.proxy.writes) > known, 10)
+        checks.check(len(u.proxy.writes) > known, "afterwards its watchdog is fed again")
+        # A stop is written whoever commissions it.
+        child = r.Child("again", [u.rig.program("vibrig"), "commission", "--by", "Ada", "--answers", u.answers(), "--socket", u.rig.socket], folder)
+        u.rig.wait_for(lambda s: s["campaign"]["state"] == "commissioning", 20)
+        time.sleep(0.5)
+        known = len(u.proxy.writes)
+        u.rig.tool("abort", "--by", "Bo")
+        child.end()
+        stops = [w for w in u.proxy.writes[known:] if w[1] <= modbus_proxy.RUN < w[1] + len(w[2]) and w[2][-1] == 0]
+        checks.check(stops, "but a stop is, at once", u.proxy.writes[known:known + 5])
+    finally:
+        over.set()
+        u.rig.stop()
+
+
+def few_bits(checks, programs, folder):
+    """Angles of fewer than 12 bits by the DBC are told at the first look; 12 are enough."""
+    u = Unknown(checks, programs, folder, drawn(4))
+    dbc = os.path.join(folder, "narrow.dbc")
+    with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "proto", "rig.dbc"), encoding="utf-8") as file:
+        text = file.read()
+    try:
+        for bits, told in ((12, False), (11, True)):
+            with open(dbc, "w", encoding="utf-8") as file:
+                file.write(text.replace("SG_ Azimuth : 0|20@1+", f"SG_ Azimuth : 0|{bits}@1+"))
+            u.configure(can={"dbc": dbc})
+            u.restart()
+            run = u.rig.tool("commission", "--by", "Ada", "--answers", u.answers(**{"permit.hold": "no"}), timeout=60)
+            line = f"ResolverAzimuth.Azimuth has {bits} bits, 12 at least expected"
+            checks.equal(line in unwrapped(run.stdout), told, f"an angle of {bits} bits is {'told' if told else 'fine'}")
+            checks.check("A  40.0 samples/s, 6 channels, |f| = " in unwrapped(run.stdout), "with the rate of the samples", run.stdout + run.stderr)
+    finally:
+        u.rig.stop()
+
+
+def lying_clock(checks, programs, folder):
+    """Other samples a second than the configuration says: refused at the first look at the latest, and nothing has moved."""
+    u = Unknown(checks, programs, folder, drawn(4))
+    try:
+        u.configure(can={"sample_rate_hz": 20})
+        u.restart()
+        half = u.rig.tool("commission", "--by", "Ada", "--answers", u.answers(), timeout=60)
+        checks.check(half.returncode == 1 and "40 samples/s measured, can.sample_rate_hz = 20: expected within 1 %" in unwrapped(half.stderr),
+                     "with twice as many it is not even begun", half.stdout + half.stderr)
+        u.configure(can={"sample_rate_hz": 38.5})
+        u.restart()
+        u.rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest", 60)
+        before = u.rig.status()
+        run, found = u.commission()
+        checks.check(run.returncode == 1 and found["outcome"] == "refused" and "can.sample_rate_hz = 38.5: expected within 1 %" in found["why"] and
+                     found["suspects"][0] == "can.sample_rate_hz" and not found["found"], "a rate that is not the configured one is refused",
+                     run.stdout + run.stderr + u.rig.logs())
+        checks.check(not_moved(before, u.rig.status()) and "suspects: can.sample_rate_hz" in unwrapped(run.stderr), "and nothing has moved", run.stderr)
+    finally:
+        u.rig.stop()
 
 
 KILLS = (12, 60, 72, 80, 95)   # of what is kept on disk, by its number
@@ -619,7 +857,7 @@ def hidden(checks, programs, folder, truth, others, outcome, word):
     u = Unknown(checks, programs, folder, truth)
     try:
         run, found = u.commission(**others)
-        checks.check(found["outcome"] == outcome and word in found["why"] and run.returncode == 1 and not found["found"],
+        checks.check(found["outcome"] == outcome and word in found["why"] and run.returncode == 1 and not found["found"] and found["suspects"],
                      f"{outcome}, {word}", found)
     finally:
         u.rig.stop()
@@ -805,6 +1043,83 @@ def bits(checks, rig, dbc, folder):
     checks.check(code == 1 and len(kept) == 2 and any(name.endswith(".OuterValid") for name in asked), "what is left out is not proven", kept)
 
 
+class Hand:
+    """Turns a gimbal to and fro, as nothing on the rig's own side does: commands on the bus, of which the tool knows nothing."""
+
+    def __init__(self, path):
+        self.line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.line.connect(path)
+        self.counter = 0
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        try:
+            while self.line.recv(256):   # or the hub's queue fills
+                pass
+        except OSError:
+            pass
+
+    def slew(self, angles):
+        self.counter = (self.counter + 1) % 256
+        self.line.send(struct.pack("<IB3x3hBB", 0x200, 8, *(round(100 * remainder(a)) for a in angles), 1, self.counter))
+
+    def close(self):
+        self.line.close()
+
+
+def named_by_hand(checks, rig, dbc, folder):
+    """Each gimbal is turned in turn: its angle, accelerometers, counter and rate go into found.toml, and by two persons into a configuration."""
+    stands = [10.0, 5.0, 20.0]
+    hand = Hand(rig.path)
+    hand.slew(stands)
+    time.sleep(8)
+    argv = [rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "5", "--dbc", dbc, "--find", "--by", "Ada", "--folder", folder]
+    text, turns = "", []
+    with subprocess.Popen(argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=r.die_with_parent) as tool:
+        while True:
+            one = tool.stderr.read(1)
+            text += one
+            if not one:
+                break
+            if text.endswith("\n> "):
+                tool.stdin.write("\n")
+                tool.stdin.flush()
+            which = re.search(r"Now turn the (OUTER|INNER|AZIMUTH), that gimbal by hand[^\n]*\n$", text)
+            if which:
+                g = ("OUTER", "INNER", "AZIMUTH").index(which[1])
+                turns.append(which[1])
+                hand.slew([a + (15 if i == g and turns.count(which[1]) > (1 if g == 1 else 0) else 0) for i, a in enumerate(stands)])
+            elif "Nobody touches" in text[-40:] and text.endswith("s\n"):
+                hand.slew(stands)
+        out = tool.stdout.read()
+        code = tool.wait()
+    hand.close()
+    checks.check(turns == ["OUTER", "INNER", "INNER", "AZIMUTH"] and "INNER: no signal follows the gimbal alone: none" in unwrapped(text),
+                 "each gimbal is asked for, and again where nobody turned it", text)
+    found = os.path.join(folder, "found.toml")
+    said = ("[can]", f'dbc = "{os.path.abspath(dbc)}"', "sample_rate_hz = 40", "[can.signals]", 'outer = "Resolvers.Outer"', 'inner = "Resolvers.Inner"',
+            'azimuth = "ResolverAzimuth.Azimuth"', 'accel_x = "AccelerometersXY.X"', 'accel_z = "AccelerometerZ.Z"', "# SIMULATED: ")
+    checks.check(code == 0 and os.path.exists(found) and all(line in out for line in said), "angles, accelerometers, counter and rate are named", out + text)
+    file = os.path.join(folder, "new.toml")
+    with open(file, "w", encoding="utf-8") as new:
+        new.write(f'[can]\ninterface = "can0"\nsample_rate_hz = 20\n[can.signals]\nouter = "Resolvers.Inner"\n[commission]\nfolder = "{folder}"\n')
+    accept = [rig.program("vibrig"), "commission", "accept", "--bus", "--config", file, "--by", "Ada"]
+    one = subprocess.run([*accept, "--second", "ada"], input="yes\n", capture_output=True, text=True, check=False)
+    no = subprocess.run([*accept, "--second", "Bo"], input="no\n", capture_output=True, text=True, check=False)
+    checks.check(one.returncode == 1 and no.returncode == 1 and "nothing is written" in no.stderr and not os.path.exists(file + ".1"), "it takes two, and a yes",
+                 one.stderr + no.stdout + no.stderr)
+    two = subprocess.run([*accept, "--second", "Bo"], input="yes\n", capture_output=True, text=True, check=False)
+    with open(file, encoding="utf-8") as new:
+        text = new.read()
+    checks.check(two.returncode == 0 and '+ can.signals.outer = "Resolvers.Outer"' in two.stdout and 'outer = "Resolvers.Outer"' in text and
+                 "sample_rate_hz = 40" in text and os.path.exists(file + ".1"), "then it is in the configuration", two.stdout + two.stderr + text)
+    with open(file, "w", encoding="utf-8") as new:
+        new.write("[can]\nsample_rate_hz = 20\n")
+    lies = subprocess.run([*argv, "--config", file, "--json"], input="-\n-\n-\n", capture_output=True, text=True, check=False)
+    checks.check(lies.returncode == 1 and json.loads(lies.stdout)["outcome"] == "undecided" and json.loads(lies.stdout)["suspects"] == ["can.signals.outer"],
+                 "what is left out is not written", lies.stdout + lies.stderr)
+
+
 def real(checks, programs, folder):
     """A configuration that does not say that its rig is simulated: persons answer, and its gimbals are moved with their permission."""
     rig = r.Rig(programs, "seqpacket", "real", folder)
@@ -823,6 +1138,7 @@ def real(checks, programs, folder):
                      "Sync.SyncCount" in signals["counters"] and "Resolvers.OuterValid" in signals["unproven"] and signals["unknown"] == [],
                      "with a DBC its signals are, and nobody has turned any", bus.stdout + bus.stderr)
         bits(checks, rig, dbc, os.path.join(folder, "bits"))
+        named_by_hand(checks, rig, dbc, os.path.join(folder, "bits"))
         rig.configure(CAMPAIGN, **r.PATIENT)
         check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
         stated = {}
@@ -873,6 +1189,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         dialogue(checks, programs, folder)
     hard_ones(checks, programs)
+    for one in (nothing_is_written, few_bits, lying_clock):
+        with tempfile.TemporaryDirectory() as folder:
+            one(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:
         against_its_certificate(checks, programs, folder)
     with tempfile.TemporaryDirectory() as folder:

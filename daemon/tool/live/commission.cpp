@@ -13,6 +13,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <iterator>
 #include <memory>
@@ -220,6 +221,28 @@ void print_found(std::ostream& out, const CommissionJson& result) {
     }
 }
 
+/// "3 days old, until 2027-11-23".
+std::string age_text(const CommissionJson& age) {
+    const auto days = static_cast<long>(age["days"].get<double>());
+    return std::to_string(days) + (days == 1 ? " day" : " days") + " old, until " +
+           age["expires"].get<std::string>();
+}
+
+/// Keys that may be wrong, and the position that would tell two descriptions apart.
+void print_doubts(std::ostream& out, const CommissionJson& result) {
+    std::string keys;
+    for (const auto& key : result.value("suspects", CommissionJson::array()))
+        keys += (keys.empty() ? "" : ", ") + key.get<std::string>();
+    if (!keys.empty()) print_wrapped(out, "   suspects: " + keys);
+    const auto& position = result.value("would_separate", CommissionJson());
+    if (!position.is_object()) return;
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(1) << "   what would tell: the readings";
+    for (const auto& one : position["position_deg"]) text << ' ' << one.get<double>();
+    text << " deg, by " << position["by_mg"].get<double>() << " mg";
+    print_wrapped(out, text.str());
+}
+
 int commission_rig(const CommissionOptions& options) {
     std::ostream& out = options.json ? std::cerr : std::cout;
     const CommissionJson result = Dialogue(options, out).run();
@@ -229,7 +252,10 @@ int commission_rig(const CommissionOptions& options) {
     std::ranges::transform(head, head.begin(),
                            [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     print_wrapped(out, head + (decided ? "" : ": " + result["why"].get<std::string>()));
-    if (!decided) return kNo;
+    if (!decided) {
+        print_doubts(out, result);
+        return kNo;
+    }
     print_found(out, result);
     for (const auto& correction : result["corrections"])
         print_wrapped(out, "The DBC first: " + correction.get<std::string>());
@@ -263,6 +289,7 @@ int show_commission(const CommissionOptions& options) {
             for (const auto& one : part["by"])
                 by += (by.empty() ? "" : ", ") + one.get<std::string>();
             text += by;
+            if (part.contains("age")) text += ", " + age_text(part["age"]);
             if (const std::string person = part["signed_by"]; !person.empty())
                 text += ", signed with the certificate of " + person;
             if (const std::string told = part["told"]; !told.empty()) text += "; " + told;
@@ -419,6 +446,9 @@ void add_commission(CLI::App& app, int& exit_code) {
     add_identity(accepting, *accepted);
     accepting.add_option("--config", accepted->configuration,
                          "The daemon's configuration file; default: as the daemon names it");
+    accepting.add_flag(
+        "--bus", accepted->bus,
+        "Of vibrig commission bus --find: can.* only, without a daemon, into --config");
     accepting.add_flag("--yes", accepted->yes, "Do not ask");
     accepting.footer("Example: vibrig commission accept --by 'Ada Lovelace' --second 'Bo Ek'");
     run_as(accepting, exit_code, accepted, accept_commission);

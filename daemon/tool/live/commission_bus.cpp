@@ -5,6 +5,7 @@
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -14,14 +15,17 @@
 #include <vector>
 
 #include "daemon/commission/bus_bits.hpp"
+#include "daemon/commission/bus_find.hpp"
 #include "daemon/commission/bus_list.hpp"
 #include "daemon/commission/bus_signals.hpp"
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/live/commission_client.hpp"
 #include "daemon/tool/live/commission_registers.hpp"
 #include "drivers/can/can_port.hpp"
 #include "proto/candump.hpp"
+#include "proto/durable_file.hpp"
 
 namespace vibrig::tool {
 
@@ -30,8 +34,8 @@ namespace {
 struct BusOptions {
     std::string interface, seqpacket, candump, dbc;
     double seconds = 10, turn_at = 0;
-    bool turn = false, json = false, bits = false;
-    std::string by, folder;
+    bool turn = false, json = false, bits = false, find = false;
+    std::string by, folder, configuration;
 };
 
 /// Listens for so long. Throws CanError.
@@ -88,15 +92,15 @@ void start(drivers::CanPort& port, Ear& bus) {
         [](const drivers::ReceivedFrame&) {});
 }
 
-void listen_live(const BusOptions& options, Heard& bus) {
+void listen_live(const BusOptions& options, Heard& bus, const std::string& gimbal = "ONE") {
     boost::asio::io_context io;
     const auto port = make_port(options, io);
     start(*port, bus);
     std::cerr << "Nobody touches the gimbals: listening for " << options.seconds << " s\n";
     listen_for(*port, io, options.seconds);
     if (options.turn) {
-        std::cerr << "Now turn ONE gimbal by hand, about 20 deg, and back: " << options.seconds
-                  << " s\n";
+        std::cerr << "Now turn " << gimbal << (gimbal == "ONE" ? "" : ", that")
+                  << " gimbal by hand, about 20 deg, and back: " << options.seconds << " s\n";
         bus.turned();
         listen_for(*port, io, options.seconds);
     }
@@ -180,6 +184,61 @@ void read_log(const BusOptions& options, Heard& bus) {
     }
 }
 
+/// Each gimbal in turn; what was found goes into found.toml of the folder.
+int find_signals(BusOptions options) {
+    double configured_hz = 0;
+    bool simulated = !options.seqpacket.empty();
+    if (!options.configuration.empty()) {
+        const auto rig = configuration::load(options.configuration, false).configuration;
+        configured_hz = 1 / drivers::to_seconds(rig.assembler.sample_period);
+        simulated = simulated || rig.simulated();
+    }
+    options.turn = true;
+    const auto dbc = proto::read_dbc(options.dbc);
+    commission::BusFinder finder(std::filesystem::absolute(options.dbc).string(), configured_hz);
+    for (std::size_t g = 0; g < 3; ++g) {
+        for (bool over = false; !over;) {
+            const std::string name = commission::kLoudNames[g];
+            print_wrapped(std::cerr,
+                          "? Next the " + name + " gimbal. [Enter: listen now; -: leave it out]");
+            if (typed_line(std::cerr) == "-") break;
+            Heard bus{{}, commission::BusSignals(dbc)};
+            listen_live(options, bus, "the " + name);
+            const auto why = finder.turned(g, *bus.signals);
+            over = why.empty();
+            if (over)
+                finder.listen(dbc, *bus.signals, bus.bytes);
+            else
+                print_wrapped(std::cerr, "  " + why);
+        }
+    }
+    const auto found = finder.finding();
+    if (options.json) {
+        auto all = commission::to_json(found);
+        all["simulated"] = simulated;
+        all["by"] = options.by;
+        std::cout << all.dump(1) << '\n';
+    }
+    std::ostream& out = options.json ? std::cerr : std::cout;
+    if (found.outcome != commission::Finding::Outcome::decided) {
+        print_wrapped(
+            out,
+            (found.outcome == commission::Finding::Outcome::refused ? "REFUSED: " : "UNDECIDED: ") +
+                found.why);
+        return kNo;
+    }
+    const auto toml = commission::to_toml(found, simulated);
+    std::filesystem::create_directories(options.folder);
+    const auto path = (std::filesystem::path(options.folder) / "found.toml").string();
+    proto::write_durably(path, toml, 0644);
+    out << toml;
+    print_wrapped(out, "DECIDED, kept in " + path +
+                           ". Into the configuration: vibrig commission "
+                           "accept --bus --config FILE --by '" +
+                           options.by + "' --second NAME");
+    return 0;
+}
+
 int list_bus(const BusOptions& options) {
     const int sources = (options.interface.empty() ? 0 : 1) + (options.seqpacket.empty() ? 0 : 1) +
                         (options.candump.empty() ? 0 : 1);
@@ -193,6 +252,12 @@ int list_bus(const BusOptions& options) {
     if (options.bits && (!options.candump.empty() || options.dbc.empty() || options.by.empty() ||
                          options.folder.empty()))
         throw std::runtime_error("--bits: expected a bus, --dbc, --by and --folder");
+    if (options.find) {
+        if (!options.candump.empty() || options.dbc.empty() || options.by.empty() ||
+            options.folder.empty())
+            throw std::runtime_error("--find: expected a bus, --dbc, --by and --folder");
+        return find_signals(options);
+    }
     Heard bus;
     if (!options.dbc.empty()) bus.signals.emplace(proto::read_dbc(options.dbc));
     const bool turned = options.turn || options.turn_at > 0;
@@ -245,13 +310,22 @@ void add_commission_bus(CLI::App& commissioning, int& exit_code) {
     command.add_flag("--bits", options->bits,
                      "Then have each bit that never changed (valid bits, loop closed, ready, "
                      "fault) changed once by hand, or confirmed by two persons");
-    command.add_option("--by", options->by, "Who changes them");
+    command.add_flag(
+        "--find", options->find,
+        "Instead: each gimbal is turned by hand in turn, which names its angle; "
+        "can.dbc, can.signals.* and can.sample_rate_hz go into found.toml of --folder");
+    command
+        .add_option("--config", options->configuration,
+                    "--find: a configuration whose can.sample_rate_hz has to be the rate measured")
+        ->check(CLI::ExistingFile);
+    command.add_option("--by", options->by, "Who changes bits, or turns gimbals");
     command.add_option("--folder", options->folder,
-                       "commission.folder, where what is proven of them is kept");
+                       "commission.folder, where what is proven or found is kept");
     command.add_flag("--json", options->json, "As JSON");
     command.footer(
         "Example: vibrig commission bus --interface can0 --turn --dbc rig.dbc\n"
-        "Exit code 0: frames were heard, and if asked one signal follows; 1: not so.");
+        "Exit code 0: frames were heard, and if asked one signal follows, or all was found; 1: not "
+        "so.");
     command.callback([&exit_code, options] {
         exit_code = guarded([&] { return list_bus(*options); }, "vibrig commission bus: ");
     });

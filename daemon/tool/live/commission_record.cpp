@@ -9,6 +9,7 @@
 #include <iostream>
 #include <iterator>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -116,6 +117,25 @@ CommissionJson sign_said_by(const std::string& person) {
     return {{"by", person}, {"says", says[0] - '0'}, {"source", source}};
 }
 
+/// Bits that never changed, as far as both persons say that they are what they are called. Nobody
+/// says so for them: without a question none is confirmed on a real rig.
+CommissionJson confirmed_bits(serve::Client& client, const CommissionOptions& options,
+                              const CommissionJson& state) {
+    const auto with_bits = CommissionJson::parse(
+        commission_command(client, options.by, {{"do", "read"}, {"bits", true}}));
+    const auto left = with_bits["record"]["unproven_bits"];
+    if (left.empty()) return left;
+    const auto none = CommissionJson::array();
+    std::string names;
+    for (const auto& name : left) names += " " + name.get<std::string>();
+    print_wrapped(std::cout, "never changed, unproven:" + names);
+    if (options.yes && state["simulated"] != true) return none;
+    return agreed(options, options.by + " and " + options.second +
+                               ": by the maker's paper, is each what it is called?")
+               ? left
+               : none;
+}
+
 }  // namespace
 
 std::vector<TomlValue> values_of(const CommissionJson& found, const CommissionJson& by,
@@ -134,7 +154,61 @@ std::string mark_of(const CommissionJson& of) {
     return of.value("simulated", false) ? "SIMULATED: " : "";
 }
 
+namespace {
+
+/// Tables of found.toml as keys with their values as TOML has them, the line above each as comment.
+std::vector<TomlValue> values_in(const std::string& path) {
+    std::istringstream text(text_of_file(path));
+    std::vector<TomlValue> values;
+    std::string table, comment;
+    for (std::string line; std::getline(text, line);) {
+        const auto equals = line.find(" = ");
+        if (line.starts_with("# "))
+            comment = line.substr(2);
+        else if (line.starts_with("[") && line.ends_with("]"))
+            table = line.substr(1, line.size() - 2);
+        else if (equals != std::string::npos)
+            values.push_back(
+                {table + "." + line.substr(0, equals), line.substr(equals + 3), comment});
+    }
+    return values;
+}
+
+}  // namespace
+
+int accept_bus(const CommissionOptions& options) {
+    expect_two(options);
+    if (options.configuration.empty())
+        throw std::runtime_error("--bus: found no --config, expected the configuration to write");
+    const std::string path = options.configuration;
+    const std::string before = text_of_file(path);
+    const auto now = configuration::parse(before, path, false);
+    const auto found = std::filesystem::path(now.configuration.commission.folder) / "found.toml";
+    std::vector<TomlValue> changed;
+    for (auto& value : values_in(found.string())) {
+        if (!value.key.starts_with("can."))
+            throw std::runtime_error(found.string() + ": found " + value.key +
+                                     ", expected what vibrig commission bus --find wrote");
+        const auto at =
+            std::ranges::find(now.effective, value.key, &configuration::EffectiveValue::key);
+        const std::string was = at == now.effective.end() ? "nothing" : at->value;
+        if (was == value.value) continue;
+        print_wrapped(std::cout, "- " + value.key + " = " + was);
+        print_wrapped(std::cout, "+ " + value.key + " = " + value.value);
+        changed.push_back(std::move(value));
+    }
+    if (changed.empty()) throw CommissionRefused(path + " says so already: nothing is written");
+    const std::string after = with_values(before, path, changed);
+    // Before it takes the place of one that works.
+    static_cast<void>(configuration::parse(after, path, false));
+    if (!agreed(options, options.by + " and " + options.second + ": write " + path + "?"))
+        throw CommissionRefused("not accepted: nothing is written");
+    save_file(path, before, after);
+    return 0;
+}
+
 int accept_commission(const CommissionOptions& options) {
+    if (options.bus) return accept_bus(options);
     expect_two(options);
     expect_identity(options);
     serve::Client client(options.at);
@@ -175,8 +249,11 @@ int accept_commission(const CommissionOptions& options) {
     } else if (!agreed(options, options.by + " and " + options.second + ": record it?")) {
         throw CommissionRefused("not accepted");
     }
-    print_wrapped(std::cout, commission_command(client, options.by,
-                                                {{"do", "accept"}, {"second", options.second}}));
+    print_wrapped(std::cout,
+                  commission_command(client, options.by,
+                                     {{"do", "accept"},
+                                      {"second", options.second},
+                                      {"confirmed_bits", confirmed_bits(client, options, state)}}));
     sign_recorded(client, options, {"bus", "gimbals", "accelerometers", "earth"});
     return 0;
 }

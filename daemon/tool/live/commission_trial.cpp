@@ -164,6 +164,12 @@ int try_registers(const RegisterOptions& options) {
     for (const auto& row : trial.rows())
         rows.push_back({{"name", row.name}, {"passed", row.passed}, {"found", row.found}});
     log.add("verdict", {{"outcome", outcome}, {"why", why}, {"rows", rows}});
+    if (why.empty() && trial.passed()) {
+        const auto now = std::chrono::system_clock::now().time_since_epoch();
+        commission::TriedRegisters(rig.commission.folder)
+            .keep(commission::TriedRegisters::keys_of(loaded), options.by, device,
+                  std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+    }
     if (options.json) {
         std::cout << CommissionJson{{"outcome", outcome},
                                     {"why", why},

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "daemon/commission/procedure.hpp"
+#include "tests/plant/platform_model.hpp"
 #include "tests/unit/estimator/commissioning/unknown_rig.hpp"
 
 namespace vibrig::commission {
@@ -25,8 +26,14 @@ class Commissioned : public ::testing::Test {
     void rig_of(std::uint64_t seed) {
         rig = std::make_unique<UnknownRig>(seed);
         // A reading near its zero may wrap within a second's mean, here as on a rig.
-        procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
-                                                Stated{0, 2, true}, ports());
+        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, ports());
+    }
+
+    static Names names() {
+        Names n{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"};
+        n.dbc = "\"rig.dbc\"";
+        n.sample_rate = "40";
+        return n;
     }
 
     Ports ports() {
@@ -55,10 +62,39 @@ class Commissioned : public ::testing::Test {
                 ++torques;
                 return true;
             };
+        if (sample_rate) p.rate = [this] { return *sample_rate; };
+        if (counts) {
+            p.slew_counting = [this](const Vec3& command, Time) {
+                ++counting_slews;
+                slew(command);
+            };
+            p.count = [this] { counted_from = rig->angle_deg(); };
+            p.counted_deg = [this] { return counted(); };
+        }
         p.keep = [this](const Json& log) { kept = log; };
         p.note = [this](const Note& note) { notes.push_back(note); };
         p.event = [this](Severity, const std::string& text) { events.push_back(text); };
         return p;
+    }
+
+    /// What gyros along the platform's true axes have counted, of a turn below 90 deg.
+    [[nodiscard]] Vec3 counted() const {
+        using plant::operator*;
+        const plant::PlatformModel model(rig->truth);
+        Vec3 turn{};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            plant::Vec3 reference{};
+            reference[axis] = 1;
+            const auto before = model.seen((M_PI / 180) * counted_from, reference);
+            const auto after = model.seen((M_PI / 180) * rig->angle_deg(), reference);
+            for (std::size_t i = 0; i < 3; ++i)
+                turn[i] += 0.5 * (after[(i + 1) % 3] * before[(i + 2) % 3] -
+                                  after[(i + 2) % 3] * before[(i + 1) % 3]);
+        }
+        const double sine = std::hypot(turn[0], turn[1], turn[2]);
+        for (std::size_t i = 0; i < 3; ++i)
+            turn[i] *= (*counts)[i] * 180 / M_PI * (sine > 0 ? std::asin(sine) / sine : 1);
+        return turn;
     }
 
     [[nodiscard]] Vec3 turned_by(const Vec3& command) const {
@@ -207,6 +243,10 @@ class Commissioned : public ::testing::Test {
     }
 
     std::unique_ptr<UnknownRig> rig;
+    std::optional<std::array<int, 3>> counts;  ///< the gyros' signs; none: no increments
+    plant::Vec3 counted_from{};
+    int counting_slews = 0;
+    std::optional<SampleRate> sample_rate;  ///< none: nobody measures it
     std::unique_ptr<Procedure> procedure;
     std::map<std::string, std::string> answers;
     std::vector<std::string> asked, events;

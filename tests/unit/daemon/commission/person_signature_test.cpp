@@ -162,6 +162,39 @@ TEST_F(Signed, WhatIsNotThePersonsIsNotTaken) {
     EXPECT_THROW(without.sign(parts, "Ada", by("ada", text)), std::invalid_argument);
 }
 
+/// Root reads the daemon's key, and takes a person's signature out; the journal still has it.
+TEST_F(Signed, ASignatureThatHasVanishedIsMissed) {
+    const auto as = loaded();
+    {
+        Book book(as);
+        prove(book, as);
+        const std::vector<Part> parts{Part::gimbals};
+        book.sign(parts, "Ada", by("ada", statement(book, parts)));
+        EXPECT_TRUE(of(book, Part::gimbals).proven);
+    }
+    const std::vector<std::pair<std::string, std::string>> journal{{"gimbals", "Ada"}};
+    {
+        Book whole(as);
+        whole.expect_signed(journal);
+        EXPECT_TRUE(of(whole, Part::gimbals).proven) << of(whole, Part::gimbals).why;
+    }
+    std::ifstream in(folder / "record.json");
+    auto record = record_from_json({std::istreambuf_iterator<char>(in), {}});
+    record.persons.clear();
+    const journal::SigningKey daemons(at("record.key"));
+    put("record.json", to_json(record, &daemons));
+    Book robbed(as);
+    EXPECT_TRUE(of(robbed, Part::gimbals).proven) << "by itself it looks right";
+    robbed.expect_signed(journal);
+    EXPECT_FALSE(of(robbed, Part::gimbals).proven);
+    EXPECT_THAT(robbed.refusal(now),
+                HasSubstr("the signature of Ada, which the journal has, is gone from the record"));
+    EXPECT_TRUE(of(robbed, Part::earth).proven);
+    // Proven anew by two persons it needs none.
+    prove(robbed, as);
+    EXPECT_TRUE(of(robbed, Part::gimbals).proven);
+}
+
 TEST_F(Signed, AForgedRecordIsNamedAndVoid) {
     const auto as = loaded();
     Book book(as);

@@ -173,6 +173,7 @@ TEST_F(Commissioned, WhatIsStuckOrDeadIsNamed) {
     Json result = run()["result"];
     EXPECT_EQ(result["outcome"], "undecided");
     EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("INNER"));
+    EXPECT_EQ(result["suspects"][0], "gimbal.message");
     rig_of(4);
     based = false;
     travel = {};
@@ -180,7 +181,41 @@ TEST_F(Commissioned, WhatIsStuckOrDeadIsNamed) {
     result = run()["result"];
     EXPECT_EQ(result["outcome"], "refused");
     EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("accelerometer.z"));
+    EXPECT_EQ(result["suspects"], Json({"can.signals.accel_z"}));
     EXPECT_TRUE(result["found"].empty());
+}
+
+/// The kernel stamps each sample; counts of a clock that lies do not fit them.
+TEST_F(Commissioned, ASampleRateThatIsNotTheConfiguredOneEndsItBeforeAnythingMoves) {
+    sample_rate = {80.3, 40,
+                   "80.3 samples/s measured, can.sample_rate_hz = 40: expected within 1 %"};
+    rig_of(4);
+    const Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "refused");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("80.3 samples/s measured"));
+    EXPECT_EQ(result["suspects"][0], "can.sample_rate_hz");
+    EXPECT_EQ(slews, 0);
+    EXPECT_TRUE(result["found"].empty());
+}
+
+TEST_F(Commissioned, WhatTheBusIsCalledIsFoundToo) {
+    sample_rate = {40.01, 40, ""};
+    rig_of(3);
+    const Json state = run();
+    EXPECT_THAT(state["lines"].dump(), HasSubstr("A  40.0 samples/s, 6 channels, |f| = "));
+    const Json found = state["result"]["found"];
+    ASSERT_EQ(state["result"]["outcome"], "decided");
+    EXPECT_TRUE(state["result"]["suspects"].empty());
+    EXPECT_EQ(found["can.dbc"], "rig.dbc");
+    EXPECT_EQ(found["can.sample_rate_hz"], 40);
+    EXPECT_EQ(found["can.signals.accel_x"], "X");
+    std::string channels;
+    for (const char* const gimbal : kGimbals)
+        channels += found[std::string("can.signals.") + gimbal].get<std::string>();
+    for (std::size_t g = 0; g < 3; ++g)
+        EXPECT_EQ(channels[g], "ABC"[static_cast<std::size_t>(rig->channel[g])]);
+    EXPECT_THAT(state["result"]["found_by"]["can.sample_rate_hz"].get<std::string>(),
+                HasSubstr("40.01 samples/s"));
 }
 
 TEST_F(Commissioned, ALatitudeOfTheOtherHemisphereIsNotBelieved) {
@@ -205,6 +240,7 @@ TEST_F(Commissioned, ALatitudeOfTheOtherHemisphereIsNotBelieved) {
                                    " hemisphere measured"));
         EXPECT_THAT(why, HasSubstr("drawing +3.7"));
         EXPECT_THAT(why, HasSubstr("latitude -"));
+        EXPECT_EQ(result["suspects"], Json({"site.latitude_deg"}));
     }
     EXPECT_GE(outvoted, 4);
 }
@@ -216,6 +252,7 @@ TEST_F(Commissioned, AWordAgainstAMeasurementStopsItAndBothAreShown) {
     const Json result = run()["result"];
     EXPECT_EQ(result["outcome"], "refused");
     EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("gravity says"));
+    EXPECT_EQ(result["suspects"].size(), 3U);
     EXPECT_TRUE(result["found"].empty());
 }
 

@@ -61,6 +61,11 @@ TEST_F(Books, WhatIsProvenIsArmed) {
     prove_all(as);
     EXPECT_EQ(Book(as).refusal(kNow + kDay), "");
     EXPECT_EQ(Book(as).status(kNow)["parts"]["gimbals"]["by"][1], "B. Person");
+    // kNow is in 2026; its age, and until when it counts.
+    const auto age = Book(as).status(kNow + 3 * kDay)["parts"]["gimbals"]["age"];
+    EXPECT_NEAR(age["days"].get<double>(), 3, 1e-9);
+    EXPECT_EQ(age["valid_days"], 365);
+    EXPECT_EQ(age["expires"], date_of(kNow + 365 * kDay));
 }
 
 TEST_F(Books, AKeyThatHasChangedVoidsItsPartsAndNoOthers) {

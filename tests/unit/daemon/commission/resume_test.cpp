@@ -33,8 +33,7 @@ class Resumed : public Commissioned {
 
     /// Another daemon; the rig stands where it was, and drifts on if it was let go.
     void die() {
-        procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
-                                                Stated{0, 2, true}, ports());
+        procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, ports());
         now += 60 * kSecond;
         arrives = now;
     }

@@ -82,6 +82,51 @@ TEST_F(Torqued, AnEncoderMayEndItsTurnWhileItIsTorquedOrDrifts) {
     EXPECT_GE(decided, 18);
 }
 
+/// Where the bus has the gyros' increments, their own signs are measured, too.
+TEST_F(Torqued, GyrosThatCountAreNamedWithTheirOwnSigns) {
+    int decided = 0;
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        counts = std::array{1, seed % 2 == 0 ? -1 : 1, -1};
+        torqued_rig(seed, {1, 1, 1});
+        counting_slews = 0;
+        answers["names"] = "torquers";
+        answers["permit.turns"] = "yes";
+        const Json result = run()["result"];
+        if (most_torque == 0) continue;  // no parity
+        ASSERT_EQ(result["outcome"], "decided") << result["why"];
+        ++decided;
+        EXPECT_EQ(counting_slews, 3);
+        const Json found = result["evidence"]["increments"];
+        const auto sign = found["sign"].get<std::array<int, 3>>();
+        const auto torquer = result["evidence"]["torquers"]["sign"].get<std::array<int, 3>>();
+        for (std::size_t k = 0; k < 3; ++k) {
+            // Which end of an axis is which, gravity leaves open for two of three: of both alike.
+            EXPECT_EQ(sign[k] * torquer[k], (*counts)[k]);
+            EXPECT_NEAR(found["scale"][k].get<double>(), 1, 0.02);
+        }
+    }
+    EXPECT_GE(decided, 4);
+}
+
+TEST_F(Torqued, GyrosUnderAWrongSignsFactorAreRefusedAndWithoutPermissionNotCounted) {
+    counts = std::array{1, 0, 1};  // one counts nothing
+    torqued_rig(3, {1, 1, 1});
+    answers["names"] = "torquers";
+    answers["permit.turns"] = "yes";
+    Json result = run()["result"];
+    EXPECT_EQ(result["outcome"], "refused");
+    EXPECT_THAT(result["why"].get<std::string>(), HasSubstr("gyro increments Y count 0.000"));
+    EXPECT_EQ(result["suspects"][0], "zeroing.gyro_message");
+    torqued_rig(3, {1, 1, 1});
+    counting_slews = 0;
+    answers["permit.turns"] = "no";
+    result = run()["result"];
+    EXPECT_EQ(result["outcome"], "decided") << result["why"];
+    EXPECT_FALSE(result["evidence"].contains("increments"));
+    EXPECT_EQ(counting_slews, 0);
+}
+
 TEST_F(Torqued, ADeadOneEndsItAndIsNamed) {
     for (const std::size_t dead : {0U, 1U, 2U}) {
         Eigen::Vector3d response(1, 1, 1);
@@ -192,8 +237,7 @@ TEST_F(Torqued, AfterTheDaemonsEndNothingIsTorquedBeforeANewPermission) {
     to_the_first_torque();
     const Json log = kept;
     // Another daemon; the platform is still torqued, as the last frame said.
-    procedure = std::make_unique<Procedure>(Names{{"A", "B", "C"}, {"X", "Y", "Z"}, "Command"},
-                                            Stated{0, 2, true}, ports());
+    procedure = std::make_unique<Procedure>(names(), Stated{0, 2, true}, ports());
     const Vec3 left = torque;
     const int before = torques;
     procedure->attend("Ada", now);

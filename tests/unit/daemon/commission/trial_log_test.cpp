@@ -44,6 +44,25 @@ class Logged : public ::testing::Test, public TrialPort {
     bool refuses = false;
 };
 
+TEST_F(Logged, WhatWasTriedIsThatOfTheseRegistersAndOfNoOthers) {
+    TriedRegisters::Keys keys{{"shaker.registers.run.address", "71"},
+                              {"shaker.registers.run.type", "\"u16\""}};
+    const TriedRegisters tried(folder.string());
+    EXPECT_THAT(tried.lacks(keys), HasSubstr("were not tried one by one"));
+    std::filesystem::create_directories(folder);
+    tried.keep(keys, "Ada", "ACME", 1'795'000'000'000'000'000);
+    EXPECT_EQ(TriedRegisters(folder.string()).lacks(keys), "");
+    keys["shaker.registers.run.address"] = "72";
+    EXPECT_THAT(tried.lacks(keys),
+                HasSubstr("shaker.registers.run.address is 72, was 71 when it was tried: vibrig "
+                          "commission registers --write"));
+    keys = {{"shaker.registers.ramp_time.address", "70"}};
+    EXPECT_THAT(tried.lacks(keys),
+                HasSubstr("shaker.registers.ramp_time.address is 70, was not known when it"));
+    std::ofstream(folder / "registers.json") << "nonsense";
+    EXPECT_THAT(tried.lacks(keys), HasSubstr("were not tried"));
+}
+
 TEST_F(Logged, AWriteIsKeptWithWhoWhenAddressOldAndNewValue) {
     {
         TrialLog log(folder.string(), "Ada");

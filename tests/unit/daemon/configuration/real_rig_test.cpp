@@ -204,13 +204,19 @@ TEST(Zeroing, TakesASecondAxisWhereZCannotBeDown) {
     EXPECT_TRUE(of("zeroing.second_axis = true"));
 }
 
-TEST(OpeningCheck, IsOfRigsThatAreArmedByTheRecord) {
+TEST(OpeningCheck, BeginsTheCampaignsOfRigsThatAreArmedByTheRecord) {
+    const auto first = [](const std::string& text) {
+        return parse(text, "rig.toml", true).configuration.campaign.open_first;
+    };
+    EXPECT_FALSE(first("[commission]\nsimulated = true\n"));
+    EXPECT_TRUE(first(kMap));
+    EXPECT_FALSE(first("commission.opening_check = false\n" + kMap));
     const auto of = [](const std::string& text) {
         return parse(text, "rig.toml", true).configuration.campaign.opening;
     };
-    EXPECT_TRUE(of("[commission]\nsimulated = true\n").empty());
+    // Alone it is made of every rig.
+    EXPECT_EQ(of("[commission]\nsimulated = true\n").size(), 5U);
     EXPECT_EQ(of(kMap).size(), 5U);
-    EXPECT_TRUE(of("commission.opening_check = false\n" + kMap).empty());
     // AND it looks where the travel allows it: as the encoders count, this way up or that
     const auto stops =
         of("gimbal.travel_deg = [[-130, 80], [-30, 30], [-160, 175]]\n"

@@ -268,6 +268,26 @@ TEST_F(ChainTest, TheTableOfCommissioningCameLaterAndIsMissedOnceItSaysSomething
     EXPECT_THAT(next_start(), HasSubstr("table commissioning is missing"));
 }
 
+TEST_F(ChainTest, WhoHasSignedAPartOfTheCommissioningRecordIsKnownAtTheNextStart) {
+    const auto signers = [this](const std::vector<std::pair<const char*, const char*>>& rows) {
+        {
+            Journal journal(path, kRig);
+            journal.start();
+            for (const auto& [part, what] : rows)
+                journal.commissioned({part, "", "Ada", "uid 0", what, "{}", 9});
+            journal.stop();
+        }
+        return Journal(path, kRig).recovery().signed_parts;
+    };
+    const std::pair<std::string, std::string> gyros{"gyros", "Ada"}, earth{"earth", "Ada"};
+    EXPECT_THAT(signers({{"gyros", "accept"}, {"earth", "accept"}}), IsEmpty());
+    EXPECT_THAT(signers({{"gyros", "sign"}}), testing::ElementsAre(gyros));
+    EXPECT_THAT(signers({{"earth", "sign"}, {"gyros", "void"}}),
+                testing::ElementsAre(gyros, earth));
+    // Recorded anew, it was signed by nobody since.
+    EXPECT_THAT(signers({{"gyros", "accept"}}), testing::ElementsAre(earth));
+}
+
 TEST_F(ChainTest, NoticesWhatSomebodyAddsWhoKnowsTheChainAndHasNoKey) {
     live();
     {

@@ -163,6 +163,7 @@ StatusData full_status() {
         {2, -1}, {1, -1, 1}, {1, 2, 3}, {0.1, 0.2, 0.3}, {{{2, 1, 1}, {1, 2, 1}, {1, 1, 2}}}};
     s.loop_check = {
         "out of band", "Ada", "transmission", {{"transmission", "1", 0.5, 0.6, 0.7, true}}};
+    s.rest_check = {"refused", "Ada", 141, "mean force 33 deg off", {"platform.encoder_sign"}};
     s.latency.add(150'000);
     s.mqtt = {"broker.lab:8883", true, "no route to host", 101, 102, 103, 104};
     s.server = {{{"control", "/run/vibrig/vibrigd.sock", true, "gone", 131}},
