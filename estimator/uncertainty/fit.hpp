@@ -48,8 +48,8 @@ class NullFit {
     [[nodiscard]] Eigen::MatrixXd left(const Eigen::MatrixXd& white) const;
 
     DwellTable table_;
-    Eigen::MatrixXd h_, declared_;  ///< 3 n x 30, 3 n x m
-    Eigen::MatrixXd white_;         ///< both, whitened
+    Eigen::MatrixXd h_, declared_;            ///< 3 n x 30, 3 n x m
+    Eigen::MatrixXd white_;                   ///< both, whitened
     std::vector<Eigen::Matrix3d> whitening_;  ///< of each dwell
     std::optional<linear_algebra::Cholesky> normal_;
     Eigen::VectorXd y_left_, value_;
