@@ -9,6 +9,7 @@
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/identification/dwell_row.hpp"
 
@@ -183,7 +184,7 @@ RateFit fit_rates(const Settings& settings, const std::vector<DwellMean>& dwells
         variance += one.variance.trace() / 3 / static_cast<double>(rates.size());
     }
     normal.diagonal() += prior_of(priors).cwiseAbs2().cwiseInverse();
-    const auto solver = normal.ldlt();
+    const linear_algebra::PivotedCholesky solver(normal);
     const Fitted x = solver.solve(right);
     fit.cost = std::max(0.0, all - right.dot(x));
     fit.north = x[kFitted - 2];

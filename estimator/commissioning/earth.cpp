@@ -11,6 +11,7 @@
 
 #include "estimator/commissioning/words.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -165,7 +166,7 @@ EarthRate earth_rate(const Description& description, const std::vector<FreeDrift
         const double sigma = i < 6 ? settings.bias_sigma : settings.linear_sigma;
         normal(i, i) += 1 / (sigma * sigma);
     }
-    const auto solver = normal.ldlt();
+    const linear_algebra::PivotedCholesky solver(normal);
     const Unknown x = solver.solve(right);
     const Normal covariance = solver.solve(Normal::Identity());
     return {x.head<3>(), covariance.diagonal().head<3>().cwiseSqrt(),

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -280,7 +281,7 @@ Structured fit_structure(const Class& c, const Bend& bend, const GravitySettings
     for (int round = 0; round < 20; ++round) {
         linearise(c, wiring, fit.p, sigma, s.force_sigma_g, normal, gradient);
         normal.diagonal() *= 1 + damping;
-        const Full moved = fit.p + normal.ldlt().solve(gradient);
+        const Full moved = fit.p + linear_algebra::PivotedCholesky(normal).solve(gradient);
         double rms = 0;
         const double cost = cost_at(c, wiring, moved, sigma, s.force_sigma_g, &rms);
         if (!(cost < fit.cost)) {

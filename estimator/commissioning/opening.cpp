@@ -11,6 +11,7 @@
 #include "estimator/commissioning/suspect_search.hpp"
 #include "estimator/commissioning/words.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/settings_check.hpp"
 
 namespace vibrig::estimator::commissioning {
@@ -66,11 +67,11 @@ RestFit fit_rest(const Settings& settings, const std::vector<DwellMean>& stops, 
     if (fit.drifts == 0) return fit;
     for (int i = 0; i < kAtRest; ++i)
         normal(i, i) += std::pow(i < 2 ? earth_sigma : i < 5 ? drift_sigma : kUsualLinear, -2);
-    const auto solver = normal.ldlt();
+    const linear_algebra::PivotedCholesky solver(normal);
     fit.x = solver.solve(right);
     fit.cost = std::max(0.0, all - right.dot(fit.x));
     for (int i = 0; i < 2; ++i)
-        fit.sigma = std::max(fit.sigma, std::sqrt(solver.solve(AtRest::Unit(i))[i]));
+        fit.sigma = std::max(fit.sigma, std::sqrt(solver.solve(AtRest::Unit(i))(i, 0)));
     fit.vertical = fit.x.dot(vertical) / fit.drifts;
     return fit;
 }

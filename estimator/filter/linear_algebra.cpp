@@ -41,6 +41,20 @@ Matrix Cholesky::solve(MatrixIn b) const {
 
 Matrix Cholesky::inverse() const { return solve(Matrix::Identity(lower_.rows(), lower_.cols())); }
 
+Matrix positive_inverse(MatrixIn a) {
+    const auto factor = Cholesky::of(a);
+    return factor ? factor->inverse()
+                  : Matrix::Constant(a.rows(), a.cols(), std::numeric_limits<double>::quiet_NaN());
+}
+
+struct PivotedCholesky::Factor {
+    Eigen::LDLT<Matrix> of;
+};
+PivotedCholesky::PivotedCholesky(MatrixIn a)
+    : factor_(std::make_unique<Factor>(Factor{Eigen::LDLT<Matrix>(a)})) {}
+PivotedCholesky::~PivotedCholesky() = default;
+Matrix PivotedCholesky::solve(MatrixIn b) const { return factor_->of.solve(b); }
+
 Matrix orthogonal_factor(MatrixIn a) {
     return Eigen::ColPivHouseholderQR<Matrix>(a).householderQ();
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 
 #include "estimator/filter/parameters.hpp"
@@ -43,12 +44,30 @@ class Cholesky {
     [[nodiscard]] double log_det() const;
     /// Smallest element on L's diagonal.
     [[nodiscard]] double least_pivot() const;
+    [[nodiscard]] const Matrix& lower() const { return lower_; }
     [[nodiscard]] Matrix solve(MatrixIn b) const;
     [[nodiscard]] Matrix inverse() const;
 
   private:
     explicit Cholesky(Matrix lower) : lower_(std::move(lower)) {}
     Matrix lower_;
+};
+
+/// Of a symmetric positive definite matrix; NaN if it is none.
+[[nodiscard]] Matrix positive_inverse(MatrixIn a);
+
+/// Of a symmetric matrix that rounding may have made indefinite: A = P' L D L' P, pivoted.
+class PivotedCholesky {
+  public:
+    explicit PivotedCholesky(MatrixIn a);
+    ~PivotedCholesky();
+    PivotedCholesky(const PivotedCholesky&) = delete;
+    PivotedCholesky& operator=(const PivotedCholesky&) = delete;
+    [[nodiscard]] Matrix solve(MatrixIn b) const;
+
+  private:
+    struct Factor;
+    std::unique_ptr<Factor> factor_;
 };
 
 /// Orthogonal matrix Q, rows x rows: its first columns span those of `a`, the others are normal to

@@ -1,5 +1,6 @@
 #include "estimator/filter/settings_check.hpp"
 
+#include <array>
 #include <cmath>
 #include <sstream>
 
@@ -97,10 +98,12 @@ void check(const Settings& s) {
 }
 
 std::vector<DoubtfulAxes> doubtful_axes(const Settings& settings) {
+    constexpr std::array kKeys{"platform.gyro_x_axes", "platform.gyro_y_axes",
+                               "platform.gyro_z_axes"};
     std::vector<DoubtfulAxes> doubts;
     for (std::size_t j = 0; j < 3; ++j) {
         const auto& axes = settings.gyro_axes[j];
-        const std::string gyro(1, "xyz"[j]), key = "platform.gyro_" + gyro + "_axes";
+        const std::string gyro(1, "xyz"[j]), key = kKeys[j];
         const int input = axes[0].axis;
         if (input != static_cast<int>(j)) {
             std::string found =

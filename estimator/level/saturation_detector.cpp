@@ -38,15 +38,28 @@ void SaturationDetector::add(const std::array<double, 3>& force_g) noexcept {
     for (std::size_t k = 0; k < 3; ++k) {
         Axis& a = axes_[k];
         const double reading = force_g[k];
-        const auto kept = Eigen::Map<const Eigen::ArrayXd>(
-            a.kept.data(), static_cast<Eigen::Index>(std::min<std::size_t>(a.count, kKept)));
-        if (a.count > 0 && (reading - kept).abs().minCoeff() > kSame * noise_g_) ++a.moved;
+        if (a.count > 0 && a.nearest(reading) > kSame * noise_g_) ++a.moved;
         if (range_g_ > 0 && std::abs(reading) >= range_g_ * (1 - kRounding)) ++a.beyond;
         a.kept[a.count % kKept] = reading;
         ++a.count;
         a.highest.add(reading, kSpread * noise_g_);
         a.lowest.add(-reading, kSpread * noise_g_);
     }
+}
+
+double SaturationDetector::Axis::nearest(double reading) const noexcept {
+    // Twenty side by side: one after the other, each would wait for the one before.
+    constexpr std::size_t kSide = 20;
+    static_assert(kKept % kSide == 0);
+    if (count < kKept) {
+        const Eigen::Map<const Eigen::ArrayXd> first(kept.data(), count);
+        return (reading - first).abs().minCoeff();
+    }
+    using Side = Eigen::Array<double, kSide, 1>;
+    Side least = (reading - Side::Map(kept.data())).abs();
+    for (std::size_t at = kSide; at < kKept; at += kSide)
+        least = least.min((reading - Side::Map(&kept[at])).abs());
+    return least.minCoeff();
 }
 
 bool SaturationDetector::Axis::enough(std::uint32_t readings) const noexcept {

@@ -39,6 +39,8 @@ class SaturationDetector {
         std::uint32_t count = 0, moved = 0;  ///< moved: unlike all of those kept
         std::uint32_t beyond = 0;            ///< of the range
         End highest, lowest;
+        /// Distance of the nearest of those kept; there must be one.
+        [[nodiscard]] double nearest(double reading) const noexcept;
         [[nodiscard]] bool enough(std::uint32_t readings) const noexcept;
         [[nodiscard]] bool saturated(const End& end) const noexcept;
     };

@@ -1,5 +1,6 @@
 #include "estimator/uncertainty/assessment.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <random>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/rates_covariance.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -66,8 +67,7 @@ GyroRates rates_of(const std::vector<plan::Visit>& visits, const plan::Order& or
 VectorXd variances(const GyroRates& gyro, const RatesCovariance& rates) {
     MatrixXd information = rates.square(gyro.regressors);
     information.diagonal() += gyro.prior_information;
-    const Index n = information.rows();
-    return information.llt().solve(MatrixXd::Identity(n, n)).diagonal();
+    return linear_algebra::positive_inverse(information).diagonal();
 }
 
 /// The last moves of a search are judged by chance alone: an own generator, the same everywhere.
@@ -104,7 +104,7 @@ double step_inflation(const GyroRates& gyro) {
     const VectorXd all = gyro.regressors.transpose() * weight;
     information.diagonal() += gyro.prior_information;
     const Index columns = information.rows();
-    const MatrixXd p = information.llt().solve(MatrixXd::Identity(columns, columns));
+    const MatrixXd p = linear_algebra::positive_inverse(information);
     const double sum = weight.sum();
     double worst = 1, tail = 0;
     VectorXd of_tail = VectorXd::Zero(columns);

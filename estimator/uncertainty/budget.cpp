@@ -1,9 +1,10 @@
 #include "estimator/uncertainty/budget.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::uncertainty {
 namespace {
@@ -174,8 +175,7 @@ void check(const Inputs& inputs) {
                                 "', expected two inputs and a number from -1 to 1");
         r(a, b) = r(b, a) = c.value;
     }
-    const double least =
-        Eigen::SelfAdjointEigenSolver<MatrixXd>(r, Eigen::EigenvaluesOnly).eigenvalues()[0];
+    const double least = linear_algebra::symmetric_eigenvalues(r)[0];
     if (least < -1e-12)
         throw SettingsError(
             "uncertainty.correlation: found correlations that exclude one another "

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/rates_covariance.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -173,13 +174,14 @@ struct Fit {
         const MatrixXd square = rates.square(columns);
         MatrixXd information = square.topLeftCorner(terms, terms);
         information.diagonal() += gyro.prior_information;
-        const Eigen::LLT<MatrixXd> normal(information);
+        const auto normal = linear_algebra::Cholesky::of(information);
         const VectorXd right = square.col(terms).head(terms);
-        covariance_of = normal.solve(MatrixXd::Identity(terms, terms));
+        covariance_of = linear_algebra::positive_inverse(information);
         value = covariance_of * right;
-        log_likelihood = -0.5 * rates.log_determinant() -
-                         normal.matrixLLT().diagonal().array().log().sum() -
-                         0.5 * (square(terms, terms) - right.dot(value));
+        log_likelihood =
+            -0.5 * rates.log_determinant() -
+            (normal ? 0.5 * normal->log_det() : std::numeric_limits<double>::quiet_NaN()) -
+            0.5 * (square(terms, terms) - right.dot(value));
     }
     [[nodiscard]] MatrixXd gain(const GyroRates& gyro) const {
         return covariance_of * rates.solve(gyro.regressors).transpose();

@@ -1,6 +1,7 @@
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "estimator/filter/linear_algebra.hpp"
 
 #include "estimator/uncertainty/fit.hpp"
 
@@ -28,14 +29,14 @@ double log_mean(const std::vector<double>& logs) {
 
 /// Logarithms of the odds for each size of the unknowns' prior.
 std::vector<double> log_odds(const NullFit::Projection& of) {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(of.f);
-    const VectorXd s = eigen.eigenvectors().transpose() * of.s;
-    const double least = std::max(kLeastEigenvalue, kLeastShare * eigen.eigenvalues().maxCoeff());
+    const auto [values, vectors] = linear_algebra::symmetric_eigen(of.f);
+    const VectorXd s = vectors.transpose() * of.s;
+    const double least = std::max(kLeastEigenvalue, kLeastShare * values.maxCoeff());
     std::vector<double> logs;
     for (const double q : kSizes) {
         double sum = 0;
         for (Index i = 0; i < s.size(); ++i) {
-            const double f = eigen.eigenvalues()[i];
+            const double f = values[i];
             if (f < least) continue;
             sum += -0.5 * std::log1p(q * q * f) + 0.5 * s[i] * s[i] / (f + 1 / (q * q));
         }
@@ -48,8 +49,7 @@ void take_size(Evidence& out, const Signatures& of, const NullFit& fit,
                const NullFit::Projection& projection) {
     MatrixXd information = projection.f;
     information.diagonal().array() += 1 / (kLargestSize * kLargestSize);
-    const MatrixXd covariance =
-        information.llt().solve(MatrixXd::Identity(information.rows(), information.cols()));
+    const MatrixXd covariance = linear_algebra::positive_inverse(information);
     const VectorXd p = covariance * projection.s;
     out.elements = of.elements;
     out.unit = of.unit;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -13,6 +15,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr auto kCoefficients = static_cast<Index>(kParameters);
+
+/// W with W variance W' = 1: triangular. NaN if the variance is none.
+Eigen::Matrix3d whitening_of(const Eigen::Matrix3d& variance) {
+    const auto factor = linear_algebra::Cholesky::of(variance);
+    if (!factor) return Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    const Eigen::Matrix3d root = factor->lower();
+    return root.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity());
+}
 
 }  // namespace
 
@@ -37,6 +47,7 @@ VectorXd all_rates(const DwellTable& table) {
 NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
                  const VectorXd& prior_information, int freed)
     : table_(table), h_(all_regressors(table)), declared_(declared) {
+    for (const auto& row : table_.rows) whitening_.push_back(whitening_of(row.variance));
     MatrixXd columns(h_.rows(), kCoefficients + declared.cols());
     columns << h_, declared;
     white_ = whitened(columns);
@@ -45,7 +56,7 @@ NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
     MatrixXd normal = white_.transpose() * white_;
     const MatrixXd of_data = normal.topLeftCorner(kCoefficients, kCoefficients);
     normal.diagonal() += information;
-    normal_.compute(normal);
+    normal_ = linear_algebra::Cholesky::of(normal);
 
     const MatrixXd y = whitened(all_rates(table));
     y_left_ = left(y);
@@ -53,8 +64,7 @@ NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
 
     MatrixXd constant = of_data;
     constant.diagonal() += prior_information;
-    const Eigen::LLT<MatrixXd> factor(constant);
-    covariance_ = factor.solve(MatrixXd::Identity(kCoefficients, kCoefficients));
+    covariance_ = linear_algebra::positive_inverse(constant);
     value_ = covariance_ * (white_.leftCols(kCoefficients).transpose() * y);
     // trace(I - P Pi0): how many coefficients the data determine.
     const double determined =
@@ -65,14 +75,17 @@ NullFit::NullFit(const DwellTable& table, const MatrixXd& declared,
 MatrixXd NullFit::whitened(const MatrixXd& x) const {
     MatrixXd white = x;
     for (Index k = 0; k < table_.dwells(); ++k) {
-        const Eigen::LLT<Eigen::Matrix3d> factor(table_.rows[static_cast<std::size_t>(k)].variance);
-        factor.matrixL().solveInPlace(white.middleRows<3>(3 * k));
+        const Eigen::Matrix3d& whitening = whitening_[static_cast<std::size_t>(k)];
+        white.middleRows<3>(3 * k) = whitening.lazyProduct(x.middleRows<3>(3 * k));
     }
     return white;
 }
 
 MatrixXd NullFit::left(const MatrixXd& white) const {
-    return white - white_ * normal_.solve(white_.transpose() * white);
+    if (!normal_)
+        return MatrixXd::Constant(white.rows(), white.cols(),
+                                  std::numeric_limits<double>::quiet_NaN());
+    return white - white_ * normal_->solve(white_.transpose() * white);
 }
 
 NullFit::Projection NullFit::project(const MatrixXd& z) const {
@@ -83,8 +96,9 @@ NullFit::Projection NullFit::project(const MatrixXd& z) const {
 MatrixXd NullFit::weights(const MatrixXd& z) const {
     MatrixXd out = left(whitened(z));
     for (Index k = 0; k < table_.dwells(); ++k) {
-        const Eigen::LLT<Eigen::Matrix3d> factor(table_.rows[static_cast<std::size_t>(k)].variance);
-        factor.matrixU().solveInPlace(out.middleRows<3>(3 * k));
+        const Eigen::Matrix3d& whitening = whitening_[static_cast<std::size_t>(k)];
+        out.middleRows<3>(3 * k) =
+            whitening.transpose().lazyProduct(out.middleRows<3>(3 * k)).eval();
     }
     return out;
 }

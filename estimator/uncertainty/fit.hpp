@@ -1,11 +1,12 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/drift_states.hpp"
 #include "estimator/uncertainty/signatures.hpp"
 
@@ -49,7 +50,8 @@ class NullFit {
     DwellTable table_;
     Eigen::MatrixXd h_, declared_;  ///< 3 n x 30, 3 n x m
     Eigen::MatrixXd white_;         ///< both, whitened
-    Eigen::LLT<Eigen::MatrixXd> normal_;
+    std::vector<Eigen::Matrix3d> whitening_;  ///< of each dwell
+    std::optional<linear_algebra::Cholesky> normal_;
     Eigen::VectorXd y_left_, value_;
     Eigen::MatrixXd covariance_;
     double chi_square_ = 0;

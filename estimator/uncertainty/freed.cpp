@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/fit.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -60,7 +61,7 @@ Freed determine_freed(const Settings& settings, const DwellTable& table, const F
     MatrixXd information = fit.project(out.z).f;
     information.diagonal().array() += 1 / (kPriorSizes * kPriorSizes);
     const Index unknowns = out.z.cols();
-    out.covariance = information.llt().solve(MatrixXd::Identity(unknowns, unknowns));
+    out.covariance = linear_algebra::positive_inverse(information);
     out.gain = out.covariance * fit.weights(out.z).transpose();
     out.determined = static_cast<int>(std::lround(
         static_cast<double>(unknowns) - out.covariance.trace() / (kPriorSizes * kPriorSizes)));

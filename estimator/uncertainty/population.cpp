@@ -1,12 +1,11 @@
 #include "estimator/uncertainty/population.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -19,9 +18,8 @@ using Eigen::VectorXd;
 
 /// Without what cannot be of a covariance.
 MatrixXd positive_part(const MatrixXd& of) {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(of);
-    return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0).asDiagonal() *
-           solver.eigenvectors().transpose();
+    const auto [values, vectors] = linear_algebra::symmetric_eigen(of);
+    return linear_algebra::product(vectors * values.cwiseMax(0).asDiagonal(), vectors.transpose());
 }
 
 /// Sums over units; rows of `mean`: a unit each.
@@ -125,8 +123,7 @@ Population population_of(const std::vector<std::vector<Found>>& units) {
     const double least_share =
         size > 1 ? std::clamp(1 - (most - 1) / static_cast<double>(size - 1), 0.0, 1.0) : 1;
     out.independent = std::max(shrinkage(centred), least_share);
-    const double lowest =
-        Eigen::SelfAdjointEigenSolver<MatrixXd>(next, Eigen::EigenvaluesOnly).eigenvalues()(0);
+    const double lowest = linear_algebra::symmetric_eigenvalues(next)(0);
     // (1 - a) lowest + a stays above a hundredth.
     constexpr double kLowest = 0.01;
     if (lowest < kLowest)
@@ -142,10 +139,10 @@ Population population_of(const std::vector<std::vector<Found>>& units) {
 
 Distance distance(const Population& type, const Found& unit) {
     const VectorXd off = unit.value - type.mean;
-    const Eigen::LLT<MatrixXd> root(type.predicted + unit.covariance);
+    const auto root = linear_algebra::Cholesky::of(type.predicted + unit.covariance);
     Distance out;
-    out.squared = root.info() == Eigen::Success ? off.dot(root.solve(off))
-                                                : std::numeric_limits<double>::quiet_NaN();
+    out.squared =
+        root ? off.dot(root->solve(off).col(0)) : std::numeric_limits<double>::quiet_NaN();
     const auto size = static_cast<double>(off.size());
     const double nu = static_cast<double>(type.units) - 1;
     // A square of Student's t over its mean scatters more than one of the normal distribution.
@@ -155,8 +152,8 @@ Distance distance(const Population& type, const Found& unit) {
 }
 
 Found with_type(const Population& type, const Found& unit) {
-    const Eigen::LLT<MatrixXd> sum(type.predicted + unit.covariance);
-    const MatrixXd gain = sum.solve(unit.covariance).transpose();
+    const MatrixXd gain = linear_algebra::product(
+        unit.covariance, linear_algebra::positive_inverse(type.predicted + unit.covariance));
     Found out{unit.value - gain * (unit.value - type.mean),
               unit.covariance - gain * unit.covariance};
     out.covariance = (out.covariance + out.covariance.transpose().eval()) / 2;

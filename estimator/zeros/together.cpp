@@ -1,11 +1,10 @@
 #include "estimator/zeros/together.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/units.hpp"
 
 namespace vibrig::estimator::zeros {
@@ -86,7 +85,8 @@ Solution solve(const std::vector<CalibrationResult>& runs, const Unknowns& at, d
     for (const CalibrationResult& run : runs) {
         const auto k = static_cast<std::size_t>(run.upright);
         const Eigen::MatrixXd seen = seen_of(run, at);
-        Eigen::MatrixXd information = matrix_of(run.joint).inverse();
+        Eigen::MatrixXd information = linear_algebra::PivotedCholesky(matrix_of(run.joint))
+                                          .solve(Eigen::MatrixXd::Identity(kSize, kSize));
         const Eigen::Map<const Eigen::VectorXd> value(run.joint.value.data(), kSize);
         right += seen.transpose() * (information * value);
         // What the filter was told beforehand of what is shown of the level axes is the same in
@@ -109,8 +109,8 @@ Solution solve(const std::vector<CalibrationResult>& runs, const Unknowns& at, d
         for (std::size_t j = 0; j < 3; ++j)
             if (!known[i][j]) know(Unknowns::level(i, j), kExact_mg);
     }
-    const Eigen::MatrixXd covariance =
-        normal.ldlt().solve(Eigen::MatrixXd::Identity(at.count, at.count));
+    const Eigen::MatrixXd covariance = linear_algebra::PivotedCholesky(normal).solve(
+        Eigen::MatrixXd::Identity(at.count, at.count));
     return {covariance * right, covariance};
 }
 

@@ -1,7 +1,7 @@
 #include "estimator/zeros/zero_filter.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/units.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -140,10 +140,10 @@ ZeroFilter::Innovation ZeroFilter::update(const Eigen::Vector3d& velocity,
     const Eigen::Matrix<double, kFilterStates, 6> ph = p_ * h_.transpose();
     Square s = h_ * ph;
     s.diagonal() += r;
-    const Eigen::LLT<Square> llt(s);
-    const Eigen::Matrix<double, kFilterStates, 6> gain = llt.solve(ph.transpose()).transpose();
+    const Square weight = linear_algebra::positive_inverse(s);
+    const Eigen::Matrix<double, kFilterStates, 6> gain = ph * weight;
     Innovation innovation;
-    innovation.nis = z.dot(llt.solve(z));
+    innovation.nis = z.dot(weight * z);
     innovation.ratio = z.cwiseAbs2().cwiseQuotient(s.diagonal());
     const FilterVector x = gain * z;
     // Joseph's form keeps the covariance symmetric and positive.

@@ -59,81 +59,113 @@ Found with_doubts(estimator::Result result, const std::vector<estimator::DwellRo
     return found;
 }
 
-/// One dwell for each stretch of rows with the same run and position: a pair that comes back
-/// begins another.
-class RowsIdentified {
+/// What the filter need not be asked for, of rows in their order: where a dwell begins, what a plan
+/// would have said of it, and what contradicts the configuration.
+class RowsSeen {
   public:
-    explicit RowsIdentified(const estimator::Settings& settings)
-        : identification_(settings, room_), doubts_(settings), plan_(settings) {}
+    struct Row {
+        estimator::Measurement measurement;
+        int run = 0, position = 0;
+        bool begins = false;  ///< another dwell
+    };
 
-    void add(const RecordingRow& row) {
-        if (dwells_ == 0 || row.run != run_ || row.position != position_) begin_dwell(row);
+    explicit RowsSeen(const estimator::Settings& settings) : doubts_(settings), plan_(settings) {}
+
+    /// One dwell for each stretch of rows with the same run and position: a pair that comes back
+    /// begins another.
+    [[nodiscard]] Row see(const RecordingRow& row) {
+        Row seen{measurement_of(row), row.run, row.position,
+                 !any_ || row.run != run_ || row.position != position_};
+        if (seen.begins) {
+            // The times of the file may go on from dwell to dwell; that they do is known at its
+            // end.
+            if (any_ && !(row.time_s > last_s_)) common_clock_ = false;
+            any_ = true;
+            run_ = row.run;
+            position_ = row.position;
+            doubts_.begin_dwell();
+            plan_.begin_dwell(run_);
+        }
         last_s_ = row.time_s;
-        const auto measurement = measurement_of(row);
-        plan_.add(measurement);
-        static_cast<void>(identification_.add(measurement));
-        doubts_.add(measurement);
+        plan_.add(seen.measurement);
+        doubts_.add(seen.measurement);
+        return seen;
     }
-    /// `held_out`: a few dwells that a result is tried on determine nothing by themselves.
-    Found found(bool held_out) {
-        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
-        if (!held_out) plan_.tell();
-        auto result = identification_.result();
-        for (auto& row : result.rows) row.common_clock = common_clock_;
-        return with_doubts(std::move(result), identification_.rows(), doubts_);
-    }
+    [[nodiscard]] bool common_clock() const { return common_clock_; }
+    [[nodiscard]] const RigDoubts& doubts() const { return doubts_; }
+    [[nodiscard]] SeenPlan& plan() { return plan_; }
 
   private:
-    void begin_dwell(const RecordingRow& row) {
-        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
-        // The times of the file may go on from dwell to dwell; that they do is known at its end.
-        if (dwells_ > 0 && !(row.time_s > last_s_)) common_clock_ = false;
-        if (++dwells_ > room_) identification_.reserve(room_ *= 2);
-        run_ = row.run;
-        position_ = row.position;
-        estimator::DwellInfo info{run_, position_};
-        info.begin_s = 0;
-        identification_.begin_dwell(info);
-        doubts_.begin_dwell();
-        plan_.begin_dwell(run_);
-    }
-
-    std::size_t room_ = 1024, dwells_ = 0;
-    estimator::Identification identification_;
     RigDoubts doubts_;
     SeenPlan plan_;
-    bool common_clock_ = true;
+    bool any_ = false, common_clock_ = true;
     int run_ = 0, position_ = 0;
     double last_s_ = 0;
 };
 
-/// A file of any length, in memory that does not grow with it: another thread reads ahead.
+/// Through the filter, with room for more dwells as they come.
+class RowsIdentified {
+  public:
+    explicit RowsIdentified(const estimator::Settings& settings)
+        : identification_(settings, room_) {}
+
+    void add(const RowsSeen::Row& row) {
+        if (row.begins) begin_dwell(row);
+        static_cast<void>(identification_.add(row.measurement));
+    }
+    Found found(const RowsSeen& seen) {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        auto result = identification_.result();
+        for (auto& row : result.rows) row.common_clock = seen.common_clock();
+        return with_doubts(std::move(result), identification_.rows(), seen.doubts());
+    }
+
+  private:
+    void begin_dwell(const RowsSeen::Row& row) {
+        if (dwells_ > 0) static_cast<void>(identification_.end_dwell());
+        if (++dwells_ > room_) identification_.reserve(room_ *= 2);
+        estimator::DwellInfo info{row.run, row.position};
+        info.begin_s = 0;
+        identification_.begin_dwell(info);
+    }
+
+    std::size_t room_ = 1024, dwells_ = 0;
+    estimator::Identification identification_;
+};
+
+/// A file of any length, in memory that does not grow with it: another thread reads ahead, and does
+/// what the filter does not wait for.
 Found identify(proto::RecordingReader& file, std::uint64_t size,
                const configuration::Configuration& rig, const std::string& path, bool held_out) {
     const estimator::Settings& settings = rig.estimator;
     struct Block {
-        std::vector<RecordingRow> rows;
+        std::vector<RowsSeen::Row> rows;
         std::uint64_t bytes = 0;  ///< of the file, up to its end
     };
     constexpr std::size_t kBlock = 4096;
-    record::InOrder<Block> blocks(
-        [&file]() -> std::optional<Block> {
-            Block block;
-            block.rows.resize(kBlock);
-            std::size_t count = 0;
-            while (count < kBlock && file.next(block.rows[count])) ++count;
-            block.rows.resize(count);
-            block.bytes = file.bytes();
-            return count > 0 ? std::optional(std::move(block)) : std::nullopt;
-        },
-        std::identity(), 1);
+    RowsSeen seen(settings);
     RowsIdentified identified(settings);
-    Progress progress("identifying");
-    while (const auto block = blocks.next()) {
-        for (const RecordingRow& row : block->rows) identified.add(row);
-        progress.show(block->bytes, std::max(size, block->bytes));
+    {
+        record::InOrder<Block> blocks(
+            [&]() -> std::optional<Block> {
+                Block block;
+                block.rows.reserve(kBlock);
+                RecordingRow row;
+                while (block.rows.size() < kBlock && file.next(row))
+                    block.rows.push_back(seen.see(row));
+                block.bytes = file.bytes();
+                return !block.rows.empty() ? std::optional(std::move(block)) : std::nullopt;
+            },
+            std::identity(), 1);
+        Progress progress("identifying");
+        while (const auto block = blocks.next()) {
+            for (const RowsSeen::Row& row : block->rows) identified.add(row);
+            progress.show(block->bytes, std::max(size, block->bytes));
+        }
     }
-    Found found = identified.found(held_out);
+    // A few dwells that a result is tried on determine nothing by themselves.
+    if (!held_out) seen.plan().tell();
+    Found found = identified.found(seen);
     // All that shook did so at the frequency of the configuration.
     const Spectra none;
     DwellKinds kinds(rig, none);

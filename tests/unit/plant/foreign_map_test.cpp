@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/plant/modbus_server.hpp"
+#include "tests/unit/plant/replaced.hpp"
 #include "tests/unit/plant/temporary_folder.hpp"
 
 namespace vibrig::plant {
@@ -32,12 +33,6 @@ fault = { address = 21, type = "u16", table = "input" }
 emergency_stop = { address = 22, type = "bits", table = "input", mask = 8 }
 measured_amplitude = { address = 30, type = "f32", word_order = "big", table = "input", scale = 1 }
 )";
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-    const auto at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return text.replace(at, from.size(), to);
-}
 
 class ForeignMapTest : public testing::Test {
   protected:

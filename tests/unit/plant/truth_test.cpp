@@ -4,14 +4,10 @@
 
 #include <string>
 
+#include "tests/unit/plant/replaced.hpp"
+
 namespace vibrig::plant {
 namespace {
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-    const auto at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return at == std::string::npos ? text : text.replace(at, from.size(), to);
-}
 
 std::string complaint(const std::string& json) {
     try {
