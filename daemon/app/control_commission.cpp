@@ -443,8 +443,8 @@ CommandReply ControlLoop::begin_commissioning(const CommandRequest& request, con
     if (what.contains("answers") && !configuration_.simulated()) return {false, kNoScript};
     if (auto why = campaign_.begin_commissioning(request.by, now); !why.empty()) {
         // Samples at another rate than the configured one never show rest.
-        const auto rate = parts_.fitness.rate_misfit();
-        return {false, rate.empty() ? why : rate};
+        const auto off = acquisition_.view().rate.hz() > 0 ? parts_.fitness.rate_misfit() : "";
+        return {false, off.empty() ? why : off};
     }
     procedure_ = make_procedure();
     if (what.contains("answers")) procedure_->answer_all(what["answers"]);
