@@ -84,7 +84,10 @@ void Campaign::conclude_opening(Time now) {
     if (alone) {
         if (!verdict.refused.empty())
             ports_.log.event(Severity::alarm, "opening check: " + refused);
-        return conclude_rest_check(verdict.refused, verdict.told, verdict.suspects, now);
+        const auto more = verdict.told +
+                          (verdict.told.empty() || verdict.apart.empty() ? "" : "; ") +
+                          verdict.apart;
+        return conclude_rest_check(verdict.refused, more, verdict.suspects, now);
     }
     opened_ = true;
     if (!verdict.refused.empty()) {

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "estimator/commissioning/opening.hpp"
+#include "estimator/commissioning/told_apart.hpp"
 
 namespace vibrig::campaign {
 
@@ -111,15 +112,17 @@ OpeningCheck::Verdict OpeningCheck::judge(const Vector& zero_g) const {
     std::vector<room::DwellMean> means;
     for (const Stood& stood : stops_) means.push_back(mean_of(stood.seconds, stood.stop.drifts));
     const auto found = room::hold_at_rest(rig, means, limits);
-    Verdict verdict{in_one(found.refused), in_one(found.told), {}};
+    Verdict verdict{in_one(found.refused), in_one(found.told), {}, {}};
     if (found.refused.empty()) {  // what would do away with what is told
         limits.refused_deg = limits.told_deg;
         limits.refused_deg_h = limits.told_deg_h;
         limits.refused_vertical_deg_h = limits.told_vertical_deg_h;
     }
-    if (!found.refused.empty() || !found.told.empty())
-        for (const auto& suspect : room::suspects_at_rest(rig, means, limits))
-            verdict.suspects.push_back(suspect.words);
+    if (!found.refused.empty() || !found.told.empty()) {
+        const auto suspects = room::suspects_at_rest(rig, means, limits);
+        for (const auto& suspect : suspects) verdict.suspects.push_back(suspect.words);
+        verdict.apart = room::told_apart_words(rig, suspects);
+    }
     if (!found.earth_known)
         verdict.told += std::string(verdict.told.empty() ? "" : "; ") +
                         "the travel leaves fewer than three free drifts: nothing is said of north "
@@ -128,7 +131,8 @@ OpeningCheck::Verdict OpeningCheck::judge(const Vector& zero_g) const {
 }
 
 std::string OpeningCheck::Verdict::suspects_text() const {
-    return suspects.empty() ? "no single key explains it" : "suspects: " + in_one(suspects);
+    if (suspects.empty()) return "no single key explains it";
+    return "suspects: " + in_one(suspects) + (apart.empty() ? "" : "; " + apart);
 }
 
 }  // namespace vibrig::campaign

@@ -39,6 +39,7 @@ class OpeningCheck {
         /// Of what is refused, or else told: keys that alone, changed, would explain it, best
         /// first.
         std::vector<std::string> suspects;
+        std::string apart;  ///< which position tells the first two of them apart; empty: no matter
         /// "suspects: a; b"; "no single key explains it".
         [[nodiscard]] std::string suspects_text() const;
     };

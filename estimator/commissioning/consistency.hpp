@@ -61,8 +61,10 @@ struct Consistency {
 
 /// A single change that would bring a contradicting configuration within the limits.
 struct Suspect {
-    std::string words;  ///< "platform.encoder_sign: [1, -1, 1] instead of [1, 1, 1]"
-    double cost = 0;    ///< -2 ln likelihood with it
+    std::string words;       ///< "platform.encoder_sign: [1, -1, 1] instead of [1, 1, 1]"
+    double cost = 0;         ///< -2 ln likelihood with it
+    Settings settings;       ///< with it
+    double time_factor = 1;  ///< slopes are too large by that
 };
 /// Best first, `most` at most: encoder signs and zeros, order and signs of the accelerometers,
 /// platform.up, elevation, sign of the latitude, latitude, azimuth, unit of time

@@ -52,7 +52,7 @@ class Search {
     /// Takes it if all limits hold with it.
     void consider(const Settings& s, std::string what) {
         if (!judge_.fits(s, dwells_)) return;
-        found_.push_back({std::move(what), cost(s)});
+        found_.push_back({std::move(what), cost(s), s});
     }
 
     /// The value about which the cost is least: `steps` of `step` to both sides, then finer.
@@ -183,8 +183,8 @@ class Search {
                 dwell.duration_s *= factor;
             }
             if (!judge_.fits(as_is_, scaled)) continue;
-            found_.push_back(
-                {words("time_s: it is in %s", name), gravity(as_is_) + rates(as_is_, factor)});
+            found_.push_back({words("time_s: it is in %s", name),
+                              gravity(as_is_) + rates(as_is_, factor), as_is_, factor});
         }
     }
 

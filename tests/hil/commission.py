@@ -14,6 +14,7 @@ import re
 import signal
 import socket
 import sqlite3
+import struct
 import subprocess
 import sys
 import tempfile
@@ -1042,6 +1043,85 @@ def bits(checks, rig, dbc, folder):
     checks.check(code == 1 and len(kept) == 2 and any(name.endswith(".OuterValid") for name in asked), "what is left out is not proven", kept)
 
 
+class Hand:
+    """Turns a gimbal to and fro, as nothing on the rig's own side does: commands on the bus, of which the tool knows nothing."""
+
+    def __init__(self, path):
+        self.line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.line.connect(path)
+        self.counter = 0
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        try:
+            while self.line.recv(256):   # or the hub's queue fills
+                pass
+        except OSError:
+            pass
+
+    def slew(self, angles):
+        self.counter = (self.counter + 1) % 256
+        self.line.send(struct.pack("<IB3x3hBB", 0x200, 8, *(round(100 * remainder(a)) for a in angles), 1, self.counter))
+
+    def close(self):
+        self.line.close()
+
+
+def named_by_hand(checks, rig, dbc, folder):
+    """Each gimbal is turned in turn: its angle, accelerometers, counter and rate go into found.toml, and by two persons into a configuration."""
+    stands = [10.0, 5.0, 20.0]
+    hand = Hand(rig.path)
+    hand.slew(stands)
+    time.sleep(8)
+    argv = [rig.program("vibrig"), "commission", "bus", "--seqpacket", rig.path, "--for", "4", "--dbc", dbc, "--find", "--by", "Ada", "--folder", folder]
+    text, turns = "", []
+    with subprocess.Popen(argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=r.die_with_parent) as tool:
+        while True:
+            one = tool.stderr.read(1)
+            text += one
+            if not one:
+                break
+            if text.endswith("\n> "):   # while it listens at rest nothing moves
+                hand.slew(stands)
+                time.sleep(4)
+                tool.stdin.write("\n")
+                tool.stdin.flush()
+            which = re.search(r"Now turn the (OUTER|INNER|AZIMUTH) gimbal by hand[^\n]*\n$", text)
+            if which:
+                g = ("OUTER", "INNER", "AZIMUTH").index(which[1])
+                turns.append(which[1])
+                if len(turns) > 8:
+                    tool.kill()
+                hand.slew([a + (12 if i == g and turns.count(which[1]) > (1 if g == 1 else 0) else 0) for i, a in enumerate(stands)])
+        out = tool.stdout.read()
+        code = tool.wait()
+    hand.close()
+    checks.check(turns == ["OUTER", "INNER", "INNER", "AZIMUTH"] and "INNER: no signal follows the gimbal alone: none" in unwrapped(text),
+                 "each gimbal is asked for, and again where nobody turned it", text)
+    found = os.path.join(folder, "found.toml")
+    said = ("[can]", f'dbc = "{os.path.abspath(dbc)}"', "sample_rate_hz = 40", "[can.signals]", 'outer = "Resolvers.Outer"', 'inner = "Resolvers.Inner"',
+            'azimuth = "ResolverAzimuth.Azimuth"', 'accel_x = "AccelerometersXY.X"', 'accel_z = "AccelerometerZ.Z"', "# SIMULATED: ")
+    checks.check(code == 0 and os.path.exists(found) and all(line in out for line in said), "angles, accelerometers, counter and rate are named", out + text)
+    file = os.path.join(folder, "new.toml")
+    with open(file, "w", encoding="utf-8") as new:
+        new.write(f'[can]\ninterface = "can0"\nsample_rate_hz = 20\n[can.signals]\nouter = "Resolvers.Inner"\n[commission]\nfolder = "{folder}"\n')
+    accept = [rig.program("vibrig"), "commission", "accept", "--bus", "--config", file, "--by", "Ada"]
+    one = subprocess.run([*accept, "--second", "ada"], input="yes\n", capture_output=True, text=True, check=False)
+    no = subprocess.run([*accept, "--second", "Bo"], input="no\n", capture_output=True, text=True, check=False)
+    checks.check(one.returncode == 1 and no.returncode == 1 and "nothing is written" in no.stderr and not os.path.exists(file + ".1"), "it takes two, and a yes",
+                 one.stderr + no.stdout + no.stderr)
+    two = subprocess.run([*accept, "--second", "Bo"], input="yes\n", capture_output=True, text=True, check=False)
+    with open(file, encoding="utf-8") as new:
+        text = new.read()
+    checks.check(two.returncode == 0 and '+ can.signals.outer = "Resolvers.Outer"' in two.stdout and 'outer = "Resolvers.Outer"' in text and
+                 "sample_rate_hz = 40" in text and os.path.exists(file + ".1"), "then it is in the configuration", two.stdout + two.stderr + text)
+    with open(file, "w", encoding="utf-8") as new:
+        new.write("[can]\nsample_rate_hz = 20\n")
+    lies = subprocess.run([*argv, "--config", file, "--json"], input="-\n-\n-\n", capture_output=True, text=True, check=False)
+    checks.check(lies.returncode == 1 and json.loads(lies.stdout)["outcome"] == "undecided" and json.loads(lies.stdout)["suspects"] == ["can.signals.outer"],
+                 "what is left out is not written", lies.stdout + lies.stderr)
+
+
 def real(checks, programs, folder):
     """A configuration that does not say that its rig is simulated: persons answer, and its gimbals are moved with their permission."""
     rig = r.Rig(programs, "seqpacket", "real", folder)
@@ -1060,6 +1140,7 @@ def real(checks, programs, folder):
                      "Sync.SyncCount" in signals["counters"] and "Resolvers.OuterValid" in signals["unproven"] and signals["unknown"] == [],
                      "with a DBC its signals are, and nobody has turned any", bus.stdout + bus.stderr)
         bits(checks, rig, dbc, os.path.join(folder, "bits"))
+        named_by_hand(checks, rig, dbc, os.path.join(folder, "bits"))
         rig.configure(CAMPAIGN, **r.PATIENT)
         check = subprocess.run([rig.program("vibrigd"), "--check", "--config", rig.configuration], capture_output=True, text=True, check=True)
         stated = {}

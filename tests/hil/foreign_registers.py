@@ -252,6 +252,14 @@ def tried(checks, programs, line):
         log = os.path.join(folder, "commission", "registers.jsonl")
         with open(log, encoding="utf-8") as file:
             lines = [json.loads(one) for one in file]
+        kept = os.path.join(folder, "commission", "registers.json")
+        with open(kept, encoding="utf-8") as file:
+            proof = json.load(file)
+        check = subprocess.run([os.path.join(programs, "vibrigd"), "--check", "--config", os.path.join(folder, "vibrigd.toml")], capture_output=True,
+                               text=True, check=False)
+        stated = dict(re.findall(r"^(shaker\.registers\.\S+) +=  (.*?)(?:  +\S.*)?$", check.stdout, re.M))
+    checks.check(proof["by"] == "Ada" and len(stated) > 20 and proof["keys"] == stated, f"{name}: it is kept what was tried, by which a daemon lets it run",
+                 [proof, stated, check.stderr])
     writes = [one for one in lines if one["what"] == "write"]
     first = writes[1] if len(writes) > 1 else {}
     checks.check(len(writes) == sum(one["what"] == "answer" for one in lines) and all(one["by"] == "Ada" and one["identity"].startswith("uid ") and one["utc_ns"] > 0 for one in lines) and

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "estimator/commissioning/told_apart.hpp"
 #include "estimator/filter/settings_check.hpp"
 
 namespace vibrig::tool {
@@ -42,9 +43,11 @@ std::string RigDoubts::tell(estimator::Result& result,
     for (const auto& contradiction : found.contradictions)
         result.warnings.push_back("configuration and recording do not fit: " + contradiction);
     if (found.contradictions.empty()) return {};
+    const auto list = commissioning::suspects(settings_, means);
     std::string suspects;
-    for (const auto& suspect : commissioning::suspects(settings_, means))
-        suspects += (suspects.empty() ? "" : "; ") + suspect.words;
+    for (const auto& suspect : list) suspects += (suspects.empty() ? "" : "; ") + suspect.words;
+    if (const auto apart = commissioning::told_apart_words(settings_, list); !apart.empty())
+        suspects += "; " + apart;
     result.warnings.push_back(suspects.empty() ? "no single key explains it"
                                                : "suspects, best first: " + suspects);
     return found.contradictions.front();

@@ -99,7 +99,7 @@ void listen_live(const BusOptions& options, Heard& bus, const std::string& gimba
     std::cerr << "Nobody touches the gimbals: listening for " << options.seconds << " s\n";
     listen_for(*port, io, options.seconds);
     if (options.turn) {
-        std::cerr << "Now turn " << gimbal << (gimbal == "ONE" ? "" : ", that")
+        std::cerr << "Now turn " << gimbal
                   << " gimbal by hand, about 20 deg, and back: " << options.seconds << " s\n";
         bus.turned();
         listen_for(*port, io, options.seconds);

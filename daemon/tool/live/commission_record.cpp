@@ -9,7 +9,6 @@
 #include <iostream>
 #include <iterator>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -154,28 +153,6 @@ std::string mark_of(const CommissionJson& of) {
     return of.value("simulated", false) ? "SIMULATED: " : "";
 }
 
-namespace {
-
-/// Tables of found.toml as keys with their values as TOML has them, the line above each as comment.
-std::vector<TomlValue> values_in(const std::string& path) {
-    std::istringstream text(text_of_file(path));
-    std::vector<TomlValue> values;
-    std::string table, comment;
-    for (std::string line; std::getline(text, line);) {
-        const auto equals = line.find(" = ");
-        if (line.starts_with("# "))
-            comment = line.substr(2);
-        else if (line.starts_with("[") && line.ends_with("]"))
-            table = line.substr(1, line.size() - 2);
-        else if (equals != std::string::npos)
-            values.push_back(
-                {table + "." + line.substr(0, equals), line.substr(equals + 3), comment});
-    }
-    return values;
-}
-
-}  // namespace
-
 int accept_bus(const CommissionOptions& options) {
     expect_two(options);
     if (options.configuration.empty())
@@ -185,7 +162,7 @@ int accept_bus(const CommissionOptions& options) {
     const auto now = configuration::parse(before, path, false);
     const auto found = std::filesystem::path(now.configuration.commission.folder) / "found.toml";
     std::vector<TomlValue> changed;
-    for (auto& value : values_in(found.string())) {
+    for (auto& value : values_in(text_of_file(found.string()), found.string())) {
         if (!value.key.starts_with("can."))
             throw std::runtime_error(found.string() + ": found " + value.key +
                                      ", expected what vibrig commission bus --find wrote");

@@ -28,6 +28,29 @@ std::size_t end_of_line(std::string_view text, std::size_t from) {
     return end == std::string_view::npos ? text.size() : end;
 }
 
+/// Of the line before this one; empty: it is none.
+std::string comment_above(std::string_view text, const toml::source_position& at) {
+    if (at.line < 2) return {};
+    const auto begin = place_in(text, {at.line - 1, 1});
+    const auto line = text.substr(begin, end_of_line(text, begin) - begin);
+    return line.starts_with("# ") ? std::string(line.substr(2)) : std::string();
+}
+
+void gather(const toml::table& table, const std::string& prefix, std::string_view text,
+            std::vector<TomlValue>& values) {
+    for (const auto& [key, node] : table) {
+        const std::string name = prefix + std::string(key.str());
+        if (const auto* inner = node.as_table(); inner != nullptr) {
+            gather(*inner, name + ".", text, values);
+            continue;
+        }
+        const auto& where = node.source();
+        const auto begin = place_in(text, where.begin), end = place_in(text, where.end);
+        values.push_back(
+            {name, std::string(text.substr(begin, end - begin)), comment_above(text, where.begin)});
+    }
+}
+
 void set(std::string& text, const std::string& file, const TomlValue& value) {
     const toml::table root = toml::parse(text, file);
     if (const auto node = root.at_path(value.key); node) {
@@ -68,6 +91,17 @@ std::string with_values(std::string text, const std::string& file,
         }
     }
     return text;
+}
+
+std::vector<TomlValue> values_in(const std::string& text, const std::string& file) {
+    std::vector<TomlValue> values;
+    try {
+        gather(toml::parse(text, file), "", text, values);
+    } catch (const toml::parse_error& error) {
+        throw std::runtime_error(file + ":" + std::to_string(error.source().begin.line) + ": " +
+                                 std::string(error.description()));
+    }
+    return values;
 }
 
 }  // namespace vibrig::tool

@@ -16,4 +16,8 @@ struct TomlValue {
 [[nodiscard]] std::string with_values(std::string text, const std::string& file,
                                       const std::vector<TomlValue>& values);
 
+/// All keys that are no tables, with a comment that stands alone in the line above. Throws
+/// std::runtime_error that names the file and the place.
+[[nodiscard]] std::vector<TomlValue> values_in(const std::string& text, const std::string& file);
+
 }  // namespace vibrig::tool
