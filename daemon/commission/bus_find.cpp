@@ -26,10 +26,15 @@ BusFinder::BusFinder(std::string dbc, double configured_hz)
     : dbc_(std::move(dbc)), configured_hz_(configured_hz) {}
 
 std::string BusFinder::turned(std::size_t gimbal, const BusSignals& bus) {
+    // One that stands still, the table's, leaves the norm of two that answer as it is. In the DBC's
+    // order.
+    std::vector<std::string> accelerometers;
     for (const auto& signal : bus.signals())
-        if (signal.kind == BusSignals::Kind::accelerometer &&
-            std::ranges::find(accelerometers_, signal.name) == accelerometers_.end())
-            accelerometers_.push_back(signal.name);
+        if (std::ranges::find(accelerometers_, signal.name) != accelerometers_.end() ||
+            (signal.kind == BusSignals::Kind::accelerometer &&
+             signal.score() >= BusSignals::kAnswers))
+            accelerometers.push_back(signal.name);
+    accelerometers_ = std::move(accelerometers);
     const auto winner = bus.winner();
     if (!winner) {
         std::vector<std::string> names;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::size_t kFewFrames = 8;  // may count by chance
 constexpr std::size_t kMostRows = 20'000;
-constexpr double kSameNorm = 0.1;  // of the widest range of the three
+constexpr double kSameNorm = 0.1;         // of the widest range of the three
+constexpr std::size_t kShakenShare = 10;  // of the rows, %, at either end
 
 bool wraps_around(const proto::Signal& signal) {
     return signal.type == proto::ValueType::integer && !signal.is_signed && signal.length > 1 &&
@@ -126,13 +127,12 @@ std::vector<std::array<std::size_t, 3>> BusSignals::of_constant_norm() const {
             widest = std::max(widest, of[i].turned_range);
         }
         if (answers < 2) return false;
-        double low = 0, high = 0;
-        for (std::size_t n = 0; n < rows_.size(); ++n) {
-            const double norm = std::hypot(rows_[n][a], rows_[n][b], rows_[n][c]);
-            low = n == 0 ? norm : std::min(low, norm);
-            high = n == 0 ? norm : std::max(high, norm);
-        }
-        return high - low < kSameNorm * widest;
+        std::vector<double> norms;
+        for (const auto& row : rows_) norms.push_back(std::hypot(row[a], row[b], row[c]));
+        // A gimbal that starts and stops shakes the platform on its pads for a while.
+        std::ranges::sort(norms);
+        const std::size_t shaken = norms.size() * kShakenShare / 100;
+        return norms[norms.size() - 1 - shaken] - norms[shaken] < kSameNorm * widest;
     };
     for (std::size_t i = 0; i < values.size(); ++i)
         for (std::size_t j = i + 1; j < values.size(); ++j)

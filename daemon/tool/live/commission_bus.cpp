@@ -195,7 +195,8 @@ int find_signals(BusOptions options) {
     }
     options.turn = true;
     const auto dbc = proto::read_dbc(options.dbc);
-    commission::BusFinder finder(std::filesystem::absolute(options.dbc).string(), configured_hz);
+    commission::BusFinder finder(std::filesystem::absolute(options.dbc).lexically_normal().string(),
+                                 configured_hz);
     for (std::size_t g = 0; g < 3; ++g) {
         for (bool over = false; !over;) {
             const std::string name = commission::kLoudNames[g];

@@ -24,6 +24,8 @@ BO_ 48 Forces: 6 Rig
  SG_ P : 0|16@1- (0.0001,0) [-3|3] "g" Us
  SG_ Q : 16|16@1- (0.0001,0) [-3|3] "g" Us
  SG_ R : 32|16@1- (0.0001,0) [-3|3] "g" Us
+BO_ 64 Table: 2 Rig
+ SG_ S : 0|16@1- (0.0001,0) [-3|3] "g" Us
 )";
 
 struct Turned {
@@ -61,8 +63,14 @@ struct Turned {
                                                       static_cast<std::uint8_t>(count >> 8)};
             add(16, counter);
             add(32, words(100 * angle[0], 100 * angle[1], 100 * angle[2]));
-            add(48, words(1e4 * 0.6 * std::cos(lean) + (i % 3), 1e4 * 0.8,
-                          1e4 * 0.6 * std::sin(lean) + (i % 2)));
+            // About the third axis, or about the second.
+            const double c = std::cos(lean), s = std::sin(lean);
+            const std::array<double, 3> force =
+                gimbal == 1 ? std::array{0.6 * c - 0.8 * s, 0.6 * s + 0.8 * c, 0.0}
+                            : std::array{0.6 * c, 0.8, 0.6 * s};
+            add(48, words(1e4 * force[0] + (i % 3), 1e4 * force[1], 1e4 * force[2] + (i % 2)));
+            const std::array<std::uint8_t, 2> still{static_cast<std::uint8_t>(i % 2), 0};
+            add(64, still);
         }
     }
     void turn(int gimbal, double hz = 40) {

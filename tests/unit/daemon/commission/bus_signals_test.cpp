@@ -32,7 +32,7 @@ struct Bus {
         signals.add(message->id, message->extended, std::span(data).first(message->size));
     }
     /// Outer, inner and azimuth readings, deg; gravity follows outer and inner.
-    void frame(int n, double outer, double inner, double azimuth) {
+    void frame(int n, double outer, double inner, double azimuth, double kick_g = 0) {
         const auto noisy = [this](double deg) {
             return std::fmod(deg + 5 / 3600.0 * random.normal() + 720, 360.0);
         };
@@ -40,8 +40,9 @@ struct Bus {
         send("Sync", {{"SyncCount", n}});
         send("Resolvers", {{"Outer", noisy(outer)}, {"Inner", noisy(inner)}, {"OuterValid", 1}});
         send("ResolverAzimuth", {{"Azimuth", noisy(azimuth)}, {"AzimuthValid", 1}});
-        send("AccelerometersXY", {{"X", g(std::sin(inner * kRad))},
-                                  {"Y", g(std::cos(outer * kRad) * std::cos(inner * kRad))}});
+        send("AccelerometersXY",
+             {{"X", g(std::sin(inner * kRad))},
+              {"Y", g(std::cos(outer * kRad) * std::cos(inner * kRad) + kick_g)}});
         send("AccelerometerZ", {{"Z", g(std::sin(outer * kRad) * std::cos(inner * kRad))}});
         send("TableAccelerometer", {{"Axial", g(0)}});
     }
@@ -72,6 +73,16 @@ TEST(BusSignals, TheAngleThatIsTurnedFollowsAndAccelerometersAreToldByTheirNorm)
     EXPECT_THAT(json["unproven"], Contains("Resolvers.OuterValid"));
     EXPECT_THAT(json["missing"], Contains("GyroIncrements"));
     EXPECT_THAT(table_of(bus.signals, true), HasSubstr("Resolvers.Outer follows the gimbal"));
+}
+
+TEST(BusSignals, AGimbalThatShakesThePlatformAsItStartsAndStopsIsFoundAllTheSame) {
+    Bus bus;
+    bus.run([&bus](int n, double by) {
+        const int of_turn = n - 200;  // of 200: a third of a second at either end
+        const bool shaken = of_turn < 8 || of_turn >= 192;
+        bus.frame(n, 12 + by, 3, 359.9, shaken ? (n % 2 == 0 ? 0.2 : -0.2) : 0);
+    });
+    EXPECT_EQ(bus.signals.winner(), "Resolvers.Outer");
 }
 
 TEST(BusSignals, AnAngleThatPassesItsTurnGoesOn) {
