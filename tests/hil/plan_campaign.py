@@ -48,7 +48,8 @@ class Run:
         if not checks.check(self.last and self.last["campaign"]["state"] == "finished" and self.result, text,
                             f"{r.state_of(self.last)} {self.arm.stderr}\n{self.text[-3000:]}"):
             return False
-        checks.equal(self.judged.returncode, 0, f"{text}: all 30 estimates are within 4 sigma of the truth")
+        checks.check(self.judged.returncode == 0, f"{text}: all 30 estimates are within 4 sigma of the truth",
+                     f"{self.judged.stdout}{self.judged.stderr}{self.last['campaign'].get('dwells')}\n{self.text[-3000:]}")
         return True
 
 
