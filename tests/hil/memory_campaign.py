@@ -59,8 +59,9 @@ def main():
                 status = rig.status()
                 if status is None or status["campaign"]["state"] in ("finished", "aborted", "tripped", "idle"):
                     break
-                looks.append((len(status["campaign"]["dwells"]), resident_kb(rig)))
+                # Not at once: what an answer has while it is made grows with the dwells, too, and is not kept.
                 time.sleep(0.5)
+                looks.append((len(status["campaign"]["dwells"]), resident_kb(rig)))
             checks.equal(r.state_of(status), "finished", f"a campaign of {given.dwells} dwells finishes {''.join(said)}")
         finally:
             rig.stop()
