@@ -15,6 +15,7 @@ namespace vibrig::tool {
 struct HeldOut {
     estimator::DwellRow row;
     std::string profile;
+    std::vector<estimator::spectrum::Band> bands;  ///< by a PSD of its own; none: its profile's
 };
 
 /// What a recording gives: coefficients, and what can be believed of them.
