@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include "estimator/spectrum/table.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {
@@ -121,6 +122,26 @@ TEST(ControllerPsd, AnotherShapeOfTheSameRmsIsAnotherProfiles) {
                   for (std::size_t i = 0; i < 101; ++i) p[i][1] = i < 33 ? 0.02 : 0.005;
               }),
               "");
+}
+
+/// It is the dwell's own: its kind keeps the profile's shape for the others.
+TEST(ControllerPsd, WeighsTheElasticPartOfItsDwell) {
+    const Resonance at{60, 0.05};
+    const Kind kind{"broad", bands_of(flat().nominal)};
+    const auto own = bands_of(Profile{"", {{20, 0.02}, {70, 0.02}}, {}, {0, 1, 0}, 0}, 100);
+    std::vector<SpectralDwell> dwells(3);
+    for (SpectralDwell& dwell : dwells) {
+        dwell.kind = 0;
+        dwell.row.vibration.kappa = 2;
+        dwell.row.random = true;
+    }
+    dwells[1].bands = own;
+    const SpectralTable table(Settings{}, dwells, {kind});
+    const Eigen::VectorXd weights = table.elastic_weights(at);
+    EXPECT_DOUBLE_EQ(weights[0], elastic_weight(kind.bands, at));
+    EXPECT_DOUBLE_EQ(weights[1], elastic_weight(own, at));
+    EXPECT_DOUBLE_EQ(weights[2], weights[0]);
+    EXPECT_GT(std::abs(weights[1] - weights[0]), 0.1);
 }
 
 }  // namespace
