@@ -20,7 +20,7 @@ struct Column {
     const char* unit = "";
 };
 
-constexpr std::array<Column, 12> kColumns = {{{"time_s", 1e12, "s"},
+constexpr std::array<Column, 13> kColumns = {{{"time_s", 1e12, "s"},
                                               {"run", 0, ""},
                                               {"position", 0, ""},
                                               {"alpha_deg", 1e4, "deg"},
@@ -31,9 +31,10 @@ constexpr std::array<Column, 12> kColumns = {{{"time_s", 1e12, "s"},
                                               {"az_g", 1e3, "g"},
                                               {"frequency_hz", 2e3, "Hz"},
                                               {"profile", 0, ""},
-                                              {"level_db", 100, "dB"}}};
+                                              {"level_db", 100, "dB"},
+                                              {"role", 0, ""}}};
 constexpr std::size_t kNeeded = 9;  ///< the others may be missing
-constexpr std::size_t kFrequency = 9, kProfile = 10, kLevel = 11;
+constexpr std::size_t kFrequency = 9, kProfile = 10, kLevel = 11, kRole = 12;
 constexpr std::size_t kMostProfiles = 1000;
 constexpr std::size_t kTime = 0;
 constexpr std::size_t kRun = 1;
@@ -243,6 +244,9 @@ class RecordingReader::Rows {
                     break;
                 case kLevel:
                     row.level_db = field.empty() ? 0 : real(role, field);
+                    break;
+                case kRole:
+                    row.held_out = field == "verify";
                     break;
                 default:
                     if (role < kForces) {

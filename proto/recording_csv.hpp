@@ -23,7 +23,8 @@ struct RecordingRow {
     double frequency_hz = -1;
     /// Of random vibration: its place in RecordingReader::profiles, from 1; 0: none.
     std::uint16_t profile = 0;
-    double level_db = 0;  ///< of it about its profile
+    double level_db = 0;    ///< of it about its profile
+    bool held_out = false;  ///< its dwell is to prove a result, not to be in it
 };
 
 /// A recording that cannot be read or written: "file:line: column X: found Y, expected Z".
@@ -41,8 +42,9 @@ class RecordingError : public std::runtime_error {
 };
 
 /// Reads a CSV recording with the columns time_s, run, position, alpha_deg, beta_deg, gamma_deg,
-/// ax_g, ay_g, az_g, and if it likes frequency_hz, profile and level_db, in any order and any case,
-/// row by row in bounded memory; other columns are ignored. A profile is a name or a number; 0 or
+/// ax_g, ay_g, az_g, and if it likes frequency_hz, profile, level_db and role, in any order and any
+/// case, row by row in bounded memory; other columns are ignored. The role "verify" holds a dwell
+/// out, any other does not. A profile is a name or a number; 0 or
 /// nothing: the dwell was at rest or under a sine. Fields are separated by commas, or by semicolons
 /// or tabs as the header says; then numbers may have decimal commas. Lines of comment (#) may come
 /// before the header. A (run, position) pair that comes back after another one begins a new dwell.
@@ -73,8 +75,10 @@ class RecordingReader {
 };
 
 /// Writes what RecordingReader reads, every number with the digits that give it back exactly. Of a
-/// simulated rig each row says so, in a last column `simulated`. Throws RecordingError.
+/// simulated rig each row says so, in a last column `simulated`. The column frequency_hz is there
+/// where the first row has one, profile and level_db where there are `profiles` (which
+/// RecordingRow::profile counts), role where a dwell is held out. Throws RecordingError.
 void write_recording(const std::string& path, std::span<const RecordingRow> rows,
-                     bool simulated = false);
+                     bool simulated = false, std::span<const std::string> profiles = {});
 
 }  // namespace vibrig::proto

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -22,17 +23,61 @@ void append(std::string& text, Number value, char after) {
     text += after;
 }
 
+/// As the reader takes a field: in quotes where it would end early.
+std::string field_of(const std::string& name) {
+    const bool plain = name.find_first_of(",;\t") == std::string::npos && !name.starts_with(' ') &&
+                       !name.ends_with(' ');
+    return plain ? name : '"' + name + '"';
+}
+
+/// What a recording has beside time, dwell, angles and forces.
+class Extras {
+  public:
+    Extras(std::span<const RecordingRow> rows, bool simulated,
+           std::span<const std::string> profiles)
+        : frequency_(!rows.empty() && rows.front().frequency_hz >= 0),
+          role_(std::ranges::any_of(rows, &RecordingRow::held_out)),
+          simulated_(simulated) {
+        for (const std::string& name : profiles) profiles_.push_back(field_of(name));
+    }
+    [[nodiscard]] std::string header() const {
+        std::string text;
+        if (frequency_) text += ",frequency_hz";
+        if (!profiles_.empty()) text += ",profile,level_db";
+        if (role_) text += ",role";
+        if (simulated_) text += ",simulated";
+        return text;
+    }
+    /// Behind the forces, which leave a comma.
+    void append_to(std::string& text, const RecordingRow& row) const {
+        if (frequency_) append(text, row.frequency_hz, ',');
+        if (!profiles_.empty()) {
+            text += row.profile > 0 ? profiles_.at(row.profile - 1U) : "0";
+            text += ',';
+            append(text, row.level_db, ',');
+        }
+        if (role_) text += row.held_out ? "verify," : "identify,";
+        if (simulated_) text += "1,";
+        text.back() = '\n';
+    }
+
+  private:
+    bool frequency_, role_, simulated_;
+    std::vector<std::string> profiles_;
+};
+
 }  // namespace
 
-void write_recording(const std::string& path, std::span<const RecordingRow> rows, bool simulated) {
+void write_recording(const std::string& path, std::span<const RecordingRow> rows, bool simulated,
+                     std::span<const std::string> profiles) {
     const auto fail = [&](const char* what) {
         throw RecordingError(path, 0, "", std::string(what) + std::strerror(errno));
     };
     std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "wb"));
     if (!file) fail("cannot be opened for writing: ");
-    std::string text = "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g";
-    const bool frequency = !rows.empty() && rows.front().frequency_hz >= 0;
-    text += std::string(frequency ? ",frequency_hz" : "") + (simulated ? ",simulated\n" : "\n");
+    const Extras extras(rows, simulated, profiles);
+    std::string text =
+        "time_s,run,position,alpha_deg,beta_deg,gamma_deg,ax_g,ay_g,az_g" + extras.header() + "\n";
     const auto flush = [&] {
         if (std::fwrite(text.data(), 1, text.size(), file.get()) != text.size()) {
             fail("cannot be written: ");
@@ -45,11 +90,8 @@ void write_recording(const std::string& path, std::span<const RecordingRow> rows
         append(text, row.run, ',');
         append(text, row.position, ',');
         for (const double angle : row.angle_deg) append(text, angle, ',');
-        append(text, row.force_g[0], ',');
-        append(text, row.force_g[1], ',');
-        append(text, row.force_g[2], simulated || frequency ? ',' : '\n');
-        if (frequency) append(text, row.frequency_hz, simulated ? ',' : '\n');
-        if (simulated) text += "1\n";
+        for (const double force : row.force_g) append(text, force, ',');
+        extras.append_to(text, row);
         if (text.size() > kChunk) flush();
     }
     flush();

@@ -25,6 +25,16 @@ struct Register {
     [[nodiscard]] std::size_t words() const noexcept;
 };
 
+/// What a controller measured of a random vibration at the table, and keeps until the next one: one
+/// behind the other Hz and g^2/Hz of so many lines, pairs of floats. Those that are not used are 0
+/// at the end.
+struct PsdBlock {
+    Register first{16, RegisterType::f32, WordOrder::big, RegisterTable::input, Access::read,
+                   1};  ///< the scale is that of the densities
+    int pairs = 200;
+    int attempts = 2;  ///< how often it is tried after a dwell
+};
+
 /// Of a controller that plays random vibration by profiles of its own.
 struct RandomRegisters {
     Register profile_number{
@@ -41,6 +51,7 @@ struct RandomRegisters {
     /// armed; the high byte: why it aborted.
     Register control_state{9, RegisterType::u16, WordOrder::big, RegisterTable::input, Access::read,
                            1};
+    std::optional<PsdBlock> psd_block{};  ///< none: it is not told
 };
 
 /// Of a controller that goes from one frequency to another by itself, exponentially, and stays

@@ -49,6 +49,8 @@ void CampaignDwells::begin() {
     with_.identification.reserve(planned_dwells());
     noise_monitor_.reset();
     sweeps_.clear();
+    psds_.clear();
+    psd_before_.clear();
     verdict_told_.clear();
     take_type_prior();
     const std::lock_guard lock(mutex_);
@@ -149,6 +151,8 @@ void CampaignDwells::resume(const std::string& by) {
     with_.identification.reserve(planned_dwells());
     noise_monitor_.continue_from(std::move(interrupted_->noise));
     sweeps_ = std::move(interrupted_->sweeps);
+    psds_ = std::move(interrupted_->psds);
+    psd_before_ = std::move(interrupted_->psd_before);
     if (with_.journal) with_.journal->campaign_resumed(interrupted_->id, by);
     interrupted_.reset();
     auto result = with_.identification.result();
@@ -190,6 +194,11 @@ void CampaignDwells::offer_unfinished(journal::Unfinished& unfinished,
         if (dwell.stop_known) stops.push_back(dwell.stop);
         if (dwell.info.sweep.any() && !dwell.summary.left_out)
             fresh.sweeps.push_back(sweep_again(configuration_.estimator, dwell));
+        if (!dwell.stop.psd.empty()) fresh.psd_before = dwell.stop.psd;
+        if (dwell.info.played && dwell.info.played->word == estimator::PlayedRandom::Word::good)
+            fresh.psds.push_back(
+                configuration::bands_told(configuration_, dwell.info.random.profile,
+                                          dwell.info.random.level_db, dwell.stop.psd));
     }
     const std::size_t count = done.size();
     if (why.empty() && !campaign.offer(std::move(done), std::move(stops)))
@@ -217,12 +226,14 @@ void CampaignDwells::take_noise(estimator::DwellSummary& dwell) {
 }
 
 void CampaignDwells::take_done(campaign::Campaign& campaign) {
+    keep_revised(campaign);
     rt::DwellDone done;
     while (with_.stage.take_done(done)) {
         if (--with_estimator_ == 0) take_noise(done.summary);
         auto result = with_.identification.result();
-        record_dwell(done.summary);
         campaign.on_dwell_done(done.summary);
+        // Of a random dwell it is not known yet what was played.
+        if (!campaign.psd_awaited()) record_dwell(done.summary);
         campaign.qualify(result);
         keep(std::move(result));
         verdict_due_ = true;
@@ -253,9 +264,10 @@ void CampaignDwells::record_dwell(const estimator::DwellSummary& summary) {
 void CampaignDwells::write_out(campaign::Campaign& campaign) {
     if (written() || with_estimator_ != 0) return;
     assessing_.abandon();
+    keep_revised(campaign);
     write_result(judge(configuration_.estimator, whole_result(), again(),
                        estimator::uncertainty::Stage::ended, with_.identification.rows(),
-                       configuration::numbered_kinds(configuration_), sweeps_),
+                       configuration::numbered_kinds(configuration_), sweeps_, psds_),
                  campaign);
 }
 

@@ -53,6 +53,7 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] bool order(const rt::DwellOrder& order) override;
     void swept(const estimator::spectrum::Sweep& sweep,
                const std::vector<std::array<double, 2>>& readings) override;
+    [[nodiscard]] campaign::Played played(const campaign::ToldPsd& told) override;
     [[nodiscard]] bool free() const override { return with_estimator_ == 0 && written(); }
     void levelled(const LevelDrift& drift) override { noise_monitor_.levelled(drift); }
     [[nodiscard]] std::optional<campaign::Next> next(const std::array<double, 3>& here_deg,
@@ -101,13 +102,11 @@ class CampaignDwells final : public campaign::Dwells {
         std::optional<tool::SpectrumResult> spectrum = {};  ///< of several frequencies, in the end
     };
     [[nodiscard]] std::optional<Again> again() const;
-    [[nodiscard]] static Judged judge(const estimator::Settings& settings,
-                                      const estimator::Result& result,
-                                      const std::optional<Again>& again,
-                                      estimator::uncertainty::Stage stage,
-                                      const std::vector<estimator::DwellRow>& all_rows,
-                                      const tool::NumberedKinds& profiles,
-                                      std::vector<estimator::spectrum::Sweep> sweeps);
+    [[nodiscard]] static Judged judge(
+        const estimator::Settings& settings, const estimator::Result& result,
+        const std::optional<Again>& again, estimator::uncertainty::Stage stage,
+        const std::vector<estimator::DwellRow>& all_rows, const tool::NumberedKinds& profiles,
+        std::vector<estimator::spectrum::Sweep> sweeps, const tool::PlayedBands& psds);
     [[nodiscard]] static std::vector<estimator::DwellRow> assess(
         Judged& out, const estimator::Settings& settings, const estimator::Result& result,
         const std::optional<Again>& again, estimator::uncertainty::Stage stage);
@@ -115,6 +114,9 @@ class CampaignDwells final : public campaign::Dwells {
     [[nodiscard]] bool verdict_wanted();
     void take_noise(estimator::DwellSummary& dwell);
     void record_dwell(const estimator::DwellSummary& summary);
+    [[nodiscard]] std::string take_psd(const campaign::ToldPsd& told,
+                                       estimator::PlayedRandom& played);
+    void keep_revised(campaign::Campaign& campaign);
     void take_type_prior();
     void keep(estimator::Result result);
     [[nodiscard]] estimator::Result whole_result() const;
@@ -137,10 +139,15 @@ class CampaignDwells final : public campaign::Dwells {
         noise::NoiseMonitor noise;
         std::int64_t id = 0;
         std::vector<estimator::spectrum::Sweep> sweeps{};
+        tool::PlayedBands psds{};
+        std::vector<std::array<double, 2>> psd_before{};
     };
     std::optional<Interrupted> interrupted_;
     std::vector<estimator::spectrum::Sweep> sweeps_;  ///< of the campaign so far
-    rt::DwellOrder ordered_;                          ///< the newest
+    tool::PlayedBands psds_;                          ///< of its random dwells, at the platform
+    std::vector<std::array<double, 2>> psd_before_;   ///< as it came after the newest of them
+    bool revised_ = false;    ///< a dwell is another one than the result kept has
+    rt::DwellOrder ordered_;  ///< the newest
     std::optional<std::size_t> resumed_;
     std::optional<plan::AdaptivePlan> adaptive_;
     std::shared_ptr<const plan::TypePrior> type_prior_;  ///< null: it is planned without

@@ -74,14 +74,17 @@ std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
         out.not_anew =
             again->journal.empty()
                 ? "no journal is kept"
-                : journal::reread(again->journal, again->configuration_hash, result.dwells.back(),
-                                  [&](const journal::DwellCheckpoint& dwell) {
-                                      if (dwell.measurements.empty()) return;
-                                      identification.begin_dwell(dwell.info);
-                                      for (const auto& m : dwell.measurements)
-                                          static_cast<void>(identification.add(m));
-                                      static_cast<void>(identification.end_dwell());
-                                  });
+                : journal::reread(
+                      again->journal, again->configuration_hash, result.dwells.back(),
+                      [&](const journal::DwellCheckpoint& dwell) {
+                          if (dwell.measurements.empty()) return;
+                          identification.begin_dwell(dwell.info);
+                          for (const auto& m : dwell.measurements)
+                              static_cast<void>(identification.add(m));
+                          static_cast<void>(identification.end_dwell());
+                          if (dwell.info.played)
+                              static_cast<void>(identification.played(*dwell.info.played));
+                      });
         auto found = anew.result();
         if (out.not_anew.empty() && found.dwells.size() != result.dwells.size())
             out.not_anew = fmt::format("{} of {} dwells are in {}", found.dwells.size(),
@@ -100,20 +103,18 @@ std::vector<estimator::DwellRow> CampaignDwells::assess(Judged& out,
 }
 
 /// `all_rows`: with those apart from the result's.
-CampaignDwells::Judged CampaignDwells::judge(const estimator::Settings& settings,
-                                             const estimator::Result& result,
-                                             const std::optional<Again>& again,
-                                             uncertainty::Stage stage,
-                                             const std::vector<estimator::DwellRow>& all_rows,
-                                             const tool::NumberedKinds& profiles,
-                                             std::vector<estimator::spectrum::Sweep> sweeps) {
+CampaignDwells::Judged CampaignDwells::judge(
+    const estimator::Settings& settings, const estimator::Result& result,
+    const std::optional<Again>& again, uncertainty::Stage stage,
+    const std::vector<estimator::DwellRow>& all_rows, const tool::NumberedKinds& profiles,
+    std::vector<estimator::spectrum::Sweep> sweeps, const tool::PlayedBands& psds) {
     Judged out;
     const auto anew = assess(out, settings, result, again, stage);
     if (stage != uncertainty::Stage::ended || !out.assessed.done) return out;
     const auto in_force = out.anew ? dwells::Anew::settings_of(settings, again->found) : settings;
     out.spectrum =
         tool::spectrum_of(in_force, out.anew ? anew : all_rows,
-                          estimator::spectrum::Form::automatic, profiles, std::move(sweeps));
+                          estimator::spectrum::Form::automatic, profiles, std::move(sweeps), psds);
     if (out.spectrum) tool::adopt(*out.spectrum, in_force, out.assessed);
     return out;
 }
@@ -160,11 +161,12 @@ void CampaignDwells::take_verdict(campaign::Campaign& campaign) {
                            rows = with_.identification.rows(),
                            profiles = configuration::numbered_kinds(configuration_),
                            sweeps = concluding_ ? sweeps_ : decltype(sweeps_){},
+                           psds = concluding_ ? psds_ : decltype(psds_){},
                            anew = concluding_ ? again() : std::nullopt,
                            stage = concluding_ ? uncertainty::Stage::ended
                                                : uncertainty::Stage::under_way,
                            trim = !with_.memory_locked] {
-            auto found = judge(settings, result, anew, stage, rows, profiles, sweeps);
+            auto found = judge(settings, result, anew, stage, rows, profiles, sweeps, psds);
             // Locked memory is not given back; asking for it would only disturb.
             if (trim) rt::give_free_memory_back();
             return found;

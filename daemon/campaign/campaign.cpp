@@ -112,6 +112,8 @@ void Campaign::begin(const std::string& by, Time now) {
     repeat_after_interruption();
     pause_asked_ = false;
     rejected_in_a_row_ = 0;
+    psd_due_ = false;
+    unread_.reset();
     vibration_off_.clear();
     vibration_off_since_ = -1;
     doubted_.reset();
@@ -240,6 +242,7 @@ void Campaign::end(State state, const std::string& why, Time now) {
                                                 : "loop check aborted: ";
     if (checking) end_check(state, why, now);
     const bool slewing = state_ == State::slewing || state_ == State::zeroing || opening();
+    if (psd_due_) close_psd({{}, "the campaign ended before it was read", 0});
     leave_stage();
     zeroing_ = ZeroingAt::none;
     armed_by_.clear();

@@ -97,6 +97,8 @@ class Campaign {
     /// Does what is due at `now`; returns when to be called next at the latest.
     drivers::Time step(drivers::Time now);
     void on_dwell_done(const estimator::DwellSummary& summary);
+    /// What was played in the dwell done last is still to be told: Dwells::played().
+    [[nodiscard]] bool psd_awaited() const { return psd_due_; }
     /// An interlock has ordered the stop; latches until acknowledged.
     void on_trip(const std::string& cause, drivers::Time now);
     /// Ramps down and ends; step() goes on until done() is true.
@@ -188,6 +190,11 @@ class Campaign {
     drivers::Time rest(drivers::Time now);
     void enter(CampaignState state, drivers::Time now);
     void next_position(drivers::Time now);
+    // campaign_psd.cpp
+    [[nodiscard]] bool asks_for_psd(const estimator::DwellSummary& summary) const;
+    [[nodiscard]] bool psd_told(drivers::Time now);
+    void close_psd(ToldPsd told);
+    void count_rejected(const estimator::DwellSummary& summary);
     void start_position(drivers::Time now);
     void abort(const std::string& why, drivers::Time now);
     void end(CampaignState state, const std::string& why, drivers::Time now);
@@ -303,7 +310,17 @@ class Campaign {
     std::string rejected_for_;
     std::optional<Doubt> doubted_;  ///< and nothing done about it yet
     SafetyProof proof_;
-    bool climbs_ = false;  ///< the next proof goes up a ladder
+    /// A random dwell that is over, until the controller has said what it played.
+    struct Unread {
+        estimator::DwellInfo info;
+        StopDone stop;
+        double measured_g_rms = 0;
+        std::uint64_t request = 0;  ///< of the shaker; 0: not asked yet
+        drivers::Time until = 0;
+    };
+    std::optional<Unread> unread_;
+    bool psd_due_ = false;  ///< of the dwell done last
+    bool climbs_ = false;   ///< the next proof goes up a ladder
     ZeroingAt zeroing_ = ZeroingAt::none;
     bool zeroed_ = false;  ///< in this campaign, before the first dwell
     bool opened_ = false;  ///< likewise, the opening check

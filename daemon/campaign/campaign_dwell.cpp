@@ -83,11 +83,24 @@ void Campaign::next_position(Time now) {
     ++positions_done_;
     pace_.stop_done(now);
     const auto info = dwelling_->info();
-    ports_.log.position_done(
-        info, dwells_.back(),
-        {here().stop.position_deg, table_g(), repeats_, used_s(now), info.begin_s,
-         dwelling_->utc_ns(), here().stop.frequency_hz, here().stop.verify, info.random.profile,
-         here().stop.sweep.from_hz, here().stop.sweep.to_hz, dwelling_->swept_hz()});
+    StopDone stop{here().stop.position_deg,
+                  table_g(),
+                  repeats_,
+                  used_s(now),
+                  info.begin_s,
+                  dwelling_->utc_ns(),
+                  here().stop.frequency_hz,
+                  here().stop.verify,
+                  info.random.profile,
+                  here().stop.sweep.from_hz,
+                  here().stop.sweep.to_hz,
+                  dwelling_->swept_hz(),
+                  {}};
+    if (psd_due_) {
+        unread_ = Unread{info, std::move(stop), dwelling_->measured_g_rms(), 0, 0};
+    } else {
+        ports_.log.position_done(info, dwells_.back(), stop);
+    }
     ++at_;
     enter(State::resting, now);
 }
@@ -111,6 +124,7 @@ Time Campaign::rest(Time now) {
         end(State::aborted, "the daemon is shutting down", now);
         return now;
     }
+    if (psd_due_ && !psd_told(now)) return now + kStagePoll;
     repeat_doubted();
     if (at_ == stops_.size()) {
         const Choice choice = choose_next(now);
@@ -131,6 +145,11 @@ void Campaign::on_dwell_done(const estimator::DwellSummary& summary) {
         const double sigma = zeros()->level_sigma(here().stop.position_deg);
         level_variances_.emplace_back(summary.run, sigma * sigma);
     }
+    psd_due_ = asks_for_psd(summary);
+    if (!psd_due_) count_rejected(summary);
+}
+
+void Campaign::count_rejected(const estimator::DwellSummary& summary) {
     rejected_in_a_row_ = summary.left_out ? rejected_in_a_row_ + 1 : 0;
     if (summary.left_out) rejected_for_ = summary.reason;
     if (summary.flagged) {

@@ -29,6 +29,18 @@ struct Next {
     std::string words;
 };
 
+/// What became of asking the controller what it played in a random dwell that is over.
+struct ToldPsd {
+    std::vector<std::array<double, 2>> pairs;  ///< Hz and g^2/Hz at the table, as they came
+    std::string why_not;                       ///< why there are none
+    double measured_g_rms = 0;  ///< by the controller over the dwell; 0: it did not say
+};
+/// And what the dwell is with it; a summary without samples: as it was.
+struct Played {
+    estimator::DwellSummary summary;
+    estimator::PlayedRandom random;
+};
+
 /// A stop that is made to happen, by order or by not feeding the watchdog: the amplitude may fall
 /// as it likes, and the controller may say fault; unlinked: and nobody talks to it.
 enum class Proving : std::uint8_t { nothing, stop, watchdog, unlinked };
@@ -89,6 +101,9 @@ class Dwells {
     /// What a sweep has left, before its dwell is done.
     virtual void swept(const estimator::spectrum::Sweep&,
                        const std::vector<std::array<double, 2>>& /*readings*/) {}
+    /// After the random dwell that was done last, where Settings::read_psd asks for it: once for
+    /// each, and before the next one is ordered.
+    [[nodiscard]] virtual Played played(const ToldPsd&) { return {}; }
     /// No dwell is with the estimator.
     [[nodiscard]] virtual bool free() const { return true; }
     /// A position was levelled, and this is what was torqued out.

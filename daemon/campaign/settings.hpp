@@ -148,6 +148,7 @@ struct Settings {
     double target_quadratic = 0;  ///< deg/h/g^2
     double time_limit_s = 0;      ///< of an adaptive campaign; 0: none
     bool type_prior = false;      ///< it starts from what the archive knows of the unit's type
+    bool read_psd = false;        ///< after each random dwell, from the shaker's controller
     bool levelling = false;       ///< before each position
     bool zeroing = false;         ///< at start and end
     /// Where the opening check looks; empty: there is none.

@@ -259,7 +259,7 @@ void take_controller_psd(Configuration& c, const std::string& name,
                          const std::map<std::string, Place>& places, Problems& problems) {
     auto& said = c.spectrum.controller_psd;
     const auto place = places.find("spectrum.controller_psd");
-    if (said == "nominal" || place == places.end()) {
+    if (said == "nominal" || said == "registers" || place == places.end()) {
         for (auto& one : c.profiles) one.controller_psd.clear();
         return;
     }
@@ -414,6 +414,7 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
     c.shaker.registers.amplitude.scale *= factor;
     c.shaker.registers.measured_amplitude.scale *= factor;
     c.campaign.frequency_hz = c.estimator.frequency_hz;
+    c.campaign.read_psd = c.spectrum.controller_psd == "registers";
     c.campaign.rig = c.estimator;
     c.campaign.proof.demanded = c.proofs_demanded();
     c.campaign.proof.keys = covered_by_proof(loaded.effective);

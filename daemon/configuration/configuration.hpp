@@ -82,7 +82,8 @@ struct Configuration {
         double pads_damping = 0.2;
         /// Of the mean square that a controller plays about its profile, 1 sigma.
         double controller_gain = 0.01;
-        /// controller_psd: "nominal", "profile", or a file that becomes the profiles' when loaded.
+        /// controller_psd: "nominal", "registers", "profile", or a file that becomes the profiles'
+        /// when loaded.
         std::string controller_psd = "nominal";
         double highest_hz = 500;           ///< of what a survey plans
         double elastic_beyond = 1;         ///< see estimator::spectrum::PredictionOptions

@@ -43,6 +43,7 @@ class CrossCheck {
     void registers_stated();
     void registers();
     void random_registers();
+    void psd_block(const proto::PsdBlock& block);
     void sweep_registers();
     void sweeps_of_plan();
     void writable_registers_apart();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "daemon/configuration/value.hpp"
+#include "estimator/spectrum/controller_psd.hpp"
 #include "estimator/spectrum/seen.hpp"
 
 namespace vibrig::configuration {
@@ -89,6 +90,41 @@ std::optional<PlayedProfile> played(const Configuration& rig, const Named& of) {
         out.highest_hz = std::max(out.highest_hz, of.controller_psd.back().first);
     out.checksum = checksum_of(of.profile.psd);
     return out;
+}
+
+std::optional<ToldAtPlatform> at_platform(const Configuration& rig,
+                                          const spectrum::Profile& at_table) {
+    constexpr int kPerDecade = 100;  // 1/24 octave is 80
+    ToldAtPlatform out;
+    out.bands = spectrum::bands_of(at_table, kPerDecade);
+    const double through = weigh(rig, out.bands, true);
+    if (!(through > 0)) return std::nullopt;
+    out.random.mean_square_g2 = spectrum::mean_square(at_table) * through;
+    out.random.bandwidth_hz = spectrum::bandwidth_hz(out.bands);
+    out.random.gain_error = rig.spectrum.controller_gain;
+    out.random.highest_hz = at_table.psd.back().first;
+    const auto& response = rig.estimator.accelerometer_response;
+    if (!response.flat() || response.skew_ms > 0) out.seen = spectrum::seen_of(response, out.bands);
+    if (out.seen.share < estimator::kLeastSeen) return std::nullopt;
+    return out;
+}
+
+std::vector<spectrum::Band> bands_told(const Configuration& rig, int number, double level_db,
+                                       std::span<const std::array<double, 2>> pairs) {
+    const auto nominal = stated_at(rig, number, level_db);
+    if (!nominal) return {};
+    const auto taken = spectrum::lines_of(pairs, nominal->name);
+    if (taken.psd.size() < 2) return {};
+    auto there = at_platform(rig, taken);
+    return there ? std::move(there->bands) : std::vector<spectrum::Band>{};
+}
+
+std::optional<spectrum::Profile> stated_at(const Configuration& rig, int number, double level_db) {
+    const auto found = std::ranges::find(rig.profiles, number, &Named::number);
+    if (found == rig.profiles.end()) return std::nullopt;
+    spectrum::Profile profile = found->profile;
+    for (auto& [hz, density] : profile.psd) density *= std::pow(10, level_db / 10);
+    return profile;
 }
 
 campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run) {

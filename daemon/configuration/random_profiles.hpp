@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -22,6 +24,23 @@ struct PlayedProfile {
 /// None where the transmission is not known, or where there is no psd.
 [[nodiscard]] std::optional<PlayedProfile> played(const Configuration& rig,
                                                   const Configuration::NamedProfile& profile);
+
+/// What a controller's PSD at the table, of its dwell, is at the platform.
+struct ToldAtPlatform {
+    estimator::RandomVibration random;  ///< profile and level are left to the dwell
+    estimator::Seen seen;
+    std::vector<estimator::spectrum::Band> bands;
+};
+/// None where the transmission is not known, or the accelerometers see less than half of it.
+[[nodiscard]] std::optional<ToldAtPlatform> at_platform(
+    const Configuration& rig, const estimator::spectrum::Profile& at_table);
+/// The same of pairs as a recording has them, which were taken: their bands alone, or none.
+[[nodiscard]] std::vector<estimator::spectrum::Band> bands_told(
+    const Configuration& rig, int number, double level_db,
+    std::span<const std::array<double, 2>> pairs);
+/// The profile with this number in the controller, at this level; none: there is no such.
+[[nodiscard]] std::optional<estimator::spectrum::Profile> stated_at(const Configuration& rig,
+                                                                    int number, double level_db);
 
 /// The dwell of a plan's run under a profile, and its abort bands with the configuration's. Throws
 /// plan::PlanFileError with its place, what was found and what was expected.

@@ -55,6 +55,8 @@ void CrossCheck::registers_stated() {
                                    {"profile_checksum", &random->profile_checksum, false},
                                    {"measured_g_rms", &random->measured_g_rms, true},
                                    {"control_state", &random->control_state, false}});
+    if (r.random && r.random->psd_block)
+        roles.push_back({"psd_block", &r.random->psd_block->first, true});
     if (const auto& sweep = r.sweep)
         roles.insert(roles.end(), {{"sweep_from", &sweep->from, true},
                                    {"sweep_to", &sweep->to, true},
@@ -84,6 +86,9 @@ void CrossCheck::registers_stated() {
                                            {"mask", type == RegisterType::bits},
                                            {"table", !own_table}})
             if (needed && !stated(part)) miss(key + "." + part);
+        const bool block =
+            r.random && r.random->psd_block && role.reg == &r.random->psd_block->first;
+        if (block && !stated("pairs")) miss(key + ".pairs");
     }
 }
 

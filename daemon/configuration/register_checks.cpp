@@ -41,6 +41,8 @@ std::vector<Role> roles_of(const proto::ShakerRegisters& r) {
                                    {"profile_checksum", &random->profile_checksum, false},
                                    {"measured_g_rms", &random->measured_g_rms, false},
                                    {"control_state", &random->control_state, false}});
+    if (r.random && r.random->psd_block)
+        roles.push_back({"psd_block", &r.random->psd_block->first, false});
     if (const auto& sweep = r.sweep)
         roles.insert(roles.end(), {{"sweep_from", &sweep->from, true},
                                    {"sweep_to", &sweep->to, true},
@@ -158,8 +160,22 @@ void CrossCheck::random_registers() {
                                     std::pair{"profile_number", &random->profile_number},
                                     std::pair{"control_state", &random->control_state}})
         type_of(role, *reg, reg->type == u16 || reg->type == u32, "u16 or u32");
+    if (random->psd_block) psd_block(*random->psd_block);
     type_of("measured_g_rms", random->measured_g_rms, random->measured_g_rms.type != bits,
             "a number");
+}
+
+/// Of one that is stated: where it is, and that all of it is there.
+void CrossCheck::psd_block(const proto::PsdBlock& block) {
+    const std::string key = "shaker.registers.psd_block";
+    if (!places_.contains(key + ".address"))
+        problems_.add({}, key + ".address", "nothing", "an address: of the first pair");
+    if (block.first.type != RegisterType::f32)
+        refuse({key + ".type", key + ".address"}, name_of(block.first), "f32: pairs of floats");
+    if (const int end = block.first.address + 4 * block.pairs; end > 65'536)
+        refuse({key + ".pairs", key + ".address"},
+               std::to_string(block.pairs) + " pairs from " + std::to_string(block.first.address),
+               std::to_string((65'536 - block.first.address) / 4) + " pairs of 4 words at most");
 }
 
 /// Likewise.

@@ -155,6 +155,33 @@ void add_watchdog_keys(std::vector<Key>& keys) {
     }
 }
 
+/// Of one that says what it measured, too.
+void add_psd_keys(std::vector<Key>& keys) {
+    const std::size_t first = keys.size();
+    const auto block = [](C& c) -> proto::PsdBlock& {
+        auto& random = c.shaker.registers.random;
+        if (!random) random.emplace();
+        if (!random->psd_block) random->psd_block.emplace();
+        return *random->psd_block;
+    };
+    add_register_keys(keys, "psd_block", "g^2/Hz",
+                      "what was measured at the table in the last random dwell, and is kept until "
+                      "the next one: Hz and g^2/Hz of each line, pairs of f32",
+                      [block](C& c) -> Register& { return block(c).first; });
+    keys.push_back(integer("shaker.registers.psd_block.pairs", "", 2, 1000,
+                           "of Hz and g^2/Hz that there is room for; what is not used is 0 at the "
+                           "end",
+                           [block](C& c) -> int& { return block(c).pairs; }));
+    keys.push_back(integer("shaker.registers.psd_block.attempts", "", 1, 5,
+                           "how often it is tried after each random dwell",
+                           [block](C& c) -> int& { return block(c).attempts; }));
+    for (std::size_t i = first; i < keys.size(); ++i)
+        keys[i].write = [write = std::move(keys[i].write)](C& c) {
+            const auto& random = c.shaker.registers.random;
+            return random && random->psd_block ? write(c) : std::string();
+        };
+}
+
 /// Of a controller that plays random vibration too: what states one of them has them all, and
 /// --check shows none where there are none.
 void add_random_keys(std::vector<Key>& keys) {
@@ -184,6 +211,7 @@ void add_random_keys(std::vector<Key>& keys) {
         keys[i].write = [write = std::move(keys[i].write)](C& c) {
             return c.shaker.registers.random ? write(c) : std::string();
         };
+    add_psd_keys(keys);
 }
 
 /// Of a controller that sweeps: likewise.

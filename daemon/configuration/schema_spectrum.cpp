@@ -289,14 +289,12 @@ void add_spectrum_keys(std::vector<Key>& keys) {
                           "1 sigma",
                           [](C& c) -> double& { return c.spectrum.controller_gain; }));
     keys.push_back(text(
-        "spectrum.controller_psd", "\"nominal\", \"profile\" or a file",
-        "how a random profile lies over frequency at the table: as stated; as "
-        "profile.controller_psd "
-        "says, where it does; or as a file does (JSON: [{profile, psd}, ..])",
+        "spectrum.controller_psd", "\"nominal\", \"registers\", \"profile\" or a file",
+        "how a random profile lies over frequency at the table: as stated; as the controller says "
+        "after each dwell (shaker.registers.psd_block); as profile.controller_psd says, where it "
+        "does; or as a file does (JSON: [{profile, psd}, ..])",
         [](const std::string& value) -> std::string {
-            if (value == "registers")
-                return "\"nominal\", \"profile\" or a file: PSDs are not read from the controller";
-            return value.empty() ? "\"nominal\", \"profile\" or a file" : "";
+            return value.empty() ? "\"nominal\", \"registers\", \"profile\" or a file" : "";
         },
         [](C & c) -> auto& { return c.spectrum.controller_psd; }));
     keys.push_back(number("spectrum.highest_hz", "Hz", {1, 20'000},

@@ -190,6 +190,11 @@ void CrossCheck::mode() {
     if (c_.spectrum.mixed && !c_.shaker.registers.random && !c_.shaker.registers.sweep)
         refuse({"spectrum.mode"}, "\"mixed\" without registers of mode and profile",
                "shaker.registers.mode and its five companions, or \"sine\"");
+    if (c_.spectrum.controller_psd == "registers" &&
+        !(c_.shaker.registers.random && c_.shaker.registers.random->psd_block))
+        refuse({"spectrum.controller_psd", "shaker.registers"},
+               "\"registers\" without shaker.registers.psd_block",
+               "its address, pairs and word order, or \"nominal\"");
     if (!sound({"campaign.plan"})) return;
     sweeps_of_plan();
     const auto random = std::ranges::find_if(

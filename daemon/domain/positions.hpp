@@ -28,6 +28,8 @@ struct StopDone {
     /// since the dwell began and Hz.
     double sweep_from_hz = 0, sweep_to_hz = 0;
     std::vector<std::array<double, 2>> swept_hz{};
+    /// Of random vibration: what the controller says that it played, Hz and g^2/Hz at the table.
+    std::vector<std::array<double, 2>> psd{};
     /// As campaign::Stop::kind().
     [[nodiscard]] double kind() const {
         if (sweep_to_hz > 0) return kind_of_sweep(sweep_from_hz, sweep_to_hz);

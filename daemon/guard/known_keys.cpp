@@ -9,13 +9,14 @@ std::set<std::string> registers(std::set<std::string> names) {
     for (const char* role :
          {"frequency", "amplitude", "watchdog", "watchdog_timeout", "state", "fault",
           "emergency_stop", "mode", "profile_number", "profile_level_db", "profile_checksum",
-          "measured_g_rms", "control_state", "sweep_from", "sweep_to", "sweep_rate",
+          "measured_g_rms", "control_state", "psd_block", "sweep_from", "sweep_to", "sweep_rate",
           "actual_frequency"})
         for (const char* field :
              {"address", "type", "word_order", "table", "access", "scale", "mask"})
             names.insert(table + role + "." + field);
     for (const char* role : {"ramp_time", "run", "measured_amplitude"})
         names.insert(table + role + ".access");
+    for (const char* field : {"pairs", "attempts"}) names.insert(table + "psd_block." + field);
     names.insert(table + "watchdog");  // false: there is none
     return names;
 }

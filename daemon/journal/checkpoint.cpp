@@ -133,6 +133,46 @@ std::string numbers_of(const estimator::DwellSummary& summary) {
     return bytes;
 }
 
+template <typename Played, typename Each>
+void each_of_played(Played& played, Each&& each) {
+    each_of_random(played.random, each);
+    each(played.seen.share);
+    each(played.seen.error);
+    each(played.place);
+}
+
+void put_played(std::string& bytes, const DwellCheckpoint& dwell) {
+    const auto& played = dwell.info.played;
+    bytes.push_back(static_cast<char>(played ? 1 + static_cast<int>(played->word) : 0));
+    if (!played) return;
+    each_of_played(*played, [&bytes](auto value) { put(bytes, value); });
+    put(bytes, static_cast<std::uint32_t>(dwell.stop.psd.size()));
+    for (const auto& line : dwell.stop.psd)
+        for (const double value : line) put(bytes, value);
+}
+
+/// What a controller lies may be any number; what was taken may not.
+std::string read_played(Reader& reader, DwellCheckpoint& dwell) {
+    char known = 0;
+    reader.get(known);
+    if (known == 0 || !reader.good()) return {};
+    if (known < 1 || known > 3) return "corrupt: what was played";
+    auto& played = dwell.info.played.emplace();
+    played.word = static_cast<estimator::PlayedRandom::Word>(known - 1);
+    each_of_played(played, [&reader](auto& value) { reader.get(value); });
+    bool good = played.seen.share > 0;
+    each_of_played(
+        played, [&good](auto value) { good = good && std::isfinite(static_cast<double>(value)); });
+    std::uint32_t lines = 0;
+    reader.get(lines);
+    if (reader.good() && (!good || lines > reader.left() / (2 * sizeof(double))))
+        return "corrupt: what was played";
+    dwell.stop.psd.resize(reader.good() ? lines : 0);
+    for (auto& line : dwell.stop.psd)
+        for (double& value : line) reader.get(value);
+    return {};
+}
+
 std::string no_sweep(DwellCheckpoint& dwell) {
     dwell.info.sweep = {};
     dwell.stop.swept_hz.clear();
@@ -193,6 +233,7 @@ std::string encode(const DwellCheckpoint& dwell, std::uint64_t configuration_has
     put(bytes, static_cast<std::uint32_t>(dwell.stop.swept_hz.size()));
     for (const auto& reading : dwell.stop.swept_hz)
         for (const double value : reading) put(bytes, value);
+    put_played(bytes, dwell);
     put(bytes, static_cast<std::uint64_t>(dwell.measurements.size()));
     bytes.reserve(bytes.size() + dwell.measurements.size() * kMeasurement + kChecksum);
     for (const auto& m : dwell.measurements) {
@@ -279,6 +320,10 @@ std::string decode(std::string_view bytes, std::uint64_t configuration_hash,
     if (const std::string why = version >= 8 ? read_sweep(reader, dwell) : no_sweep(dwell);
         !why.empty())
         return why;
+    dwell.info.played.reset();
+    dwell.stop.psd.clear();
+    if (const std::string why = version >= 9 ? read_played(reader, dwell) : ""; !why.empty())
+        return why;
     std::uint64_t count = 0;
     reader.get(count);
     if (!reader.good() || count > kMostMeasurements || count * kMeasurement != reader.left())
@@ -327,6 +372,10 @@ std::string replay(std::vector<DwellCheckpoint>& dwells, const Replay& to) {
             blocks.consume([&to](const rt::BlockRecord& block) { to.noise.add(block); }, 256);
         }
         to.noise.conclude(summary, to.identification);
+        if (dwell.info.played) {
+            const auto known = to.identification.played(*dwell.info.played);
+            if (known.samples > 0) summary = known;
+        }
         // An earlier program kept left out as flagged; what is left out has no sample in use.
         if (dwell.summary.flagged) dwell.summary.left_out = summary.left_out;
         if (numbers_of(summary) != numbers_of(dwell.summary))

@@ -23,7 +23,7 @@ struct DwellCheckpoint {
     bool time_known = true;   ///< false: of version 3 or older
 };
 
-inline constexpr std::uint32_t kCheckpointVersion = 8;
+inline constexpr std::uint32_t kCheckpointVersion = 9;
 
 /// Of everything that the results depend on, "key = value" one per line.
 [[nodiscard]] std::uint64_t configuration_hash(std::string_view text) noexcept;

@@ -151,8 +151,38 @@ void read_orders(const File& file, Campaign& to) {
                              i < frequency.size() ? frequency[i] : 0,
                              i < held_out.size() && held_out[i] != 0,
                              random(i),
-                             sweep(i)});
+                             sweep(i),
+                             std::nullopt,
+                             {}});
     }
+}
+
+/// Recordings made before there were any have none.
+void read_played(const File& file, Campaign& to) {
+    if (!file.has("/played")) return;
+    Columns c(file, "/played"), lines(file, "/psd_lines");
+    const auto from = c.integers("from_ns"), run = c.integers("run"),
+               position = c.integers("position"), word = c.integers("word");
+    const auto square = c.doubles("mean_square_g2"), bandwidth = c.doubles("bandwidth_hz"),
+               gain = c.doubles("gain_error"), highest = c.doubles("highest_hz"),
+               share = c.doubles("seen_share"), error = c.doubles("seen_error");
+    const auto of = lines.integers("from_ns");
+    const auto hz = lines.doubles("frequency_hz"), density = lines.doubles("psd_g2_hz");
+    using Word = estimator::PlayedRandom::Word;
+    for (std::size_t i = 0; i < c.rows(); ++i) {
+        Played played{from[i],
+                      static_cast<std::int32_t>(run[i]),
+                      static_cast<std::int32_t>(position[i]),
+                      // Anything unknown is not good.
+                      {word[i] == 0 || word[i] == 1 ? static_cast<Word>(word[i]) : Word::refused,
+                       {square[i], bandwidth[i], gain[i], highest[i]},
+                       {share[i], error[i]}},
+                      {}};
+        for (std::size_t k = 0; k < of.size(); ++k)
+            if (of[k] == from[i]) played.psd.push_back({hz[k], density[k]});
+        to.played.push_back(std::move(played));
+    }
+    place_played(to);
 }
 
 /// Recordings made before there were any have none.
@@ -373,6 +403,20 @@ bool of_simulated_rig(const std::string& configuration) {
     return false;
 }
 
+void place_played(Campaign& campaign) {
+    for (Order& order : campaign.orders) {
+        if (order.cancel || order.played) continue;
+        const auto found = std::ranges::find_if(campaign.played, [&order](const Played& one) {
+            return one.from == order.from && one.run == order.run && one.position == order.position;
+        });
+        if (found == campaign.played.end()) continue;
+        order.played = found->random;
+        order.played->random.profile = order.random.profile;
+        order.played->random.level_db = order.random.level_db;
+        order.psd = found->psd;
+    }
+}
+
 bool is_hdf5(const std::string& path) {
     std::array<char, 8> head{};
     std::ifstream file(path, std::ios::binary);
@@ -389,6 +433,7 @@ Campaign read_part(const std::string& path) {
     read_head(file, campaign);
     read_samples(file, campaign);
     read_orders(file, campaign);
+    read_played(file, campaign);
     read_dwells(file, campaign);
     read_swept(file, campaign);
     read_estimates(file, campaign);

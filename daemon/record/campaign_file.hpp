@@ -36,11 +36,15 @@ struct Campaign {
     std::vector<Order> orders;
     std::vector<Dwell> dwells;
     std::vector<SweptRow> swept;
+    std::vector<Played> played;  ///< in the orders, too, once those are there
     std::vector<EstimateRow> estimates;
     std::vector<ConditionRow> conditions;  ///< none in recordings of vibrigd 0.1.0
     std::vector<EventRecord> events;
     std::vector<Gap> gaps;
 };
+
+/// Into the orders what was played in them.
+void place_played(Campaign& campaign);
 
 /// A dwell that was not cancelled before it began, with its samples.
 struct RecordedDwell {

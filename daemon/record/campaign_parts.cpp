@@ -87,6 +87,7 @@ void move_times(Campaign& part, Time by) {
     }
     for (auto& dwell : part.dwells) dwell.time += by;
     for (auto& row : part.swept) row.time += by;
+    for (auto& one : part.played) one.from += by;
     for (auto& row : part.estimates) row.time += by;
     for (auto& row : part.conditions) row.time += by;
     for (auto& event : part.events) event.time += by;
@@ -153,6 +154,8 @@ void join(Campaign& to, Campaign part) {
     append(to.orders, part.orders);
     append(to.dwells, part.dwells);
     append(to.swept, part.swept);
+    append(to.played, part.played);
+    place_played(to);
     append(to.estimates, part.estimates);
     append(to.conditions, part.conditions);
     append(to.events, part.events);
@@ -301,7 +304,8 @@ std::vector<RecordedDwell> recorded_dwells(const Campaign& campaign) {
             if (summary.run == order.run && summary.position == order.position) {
                 ++done;
                 if (cancelled) {
-                    dwell.cut_short = summary.samples < dwell.count;
+                    dwell.cut_short =
+                        summary.samples < dwell.count || (order.sweep.any() && summary.used == 0);
                     dwell.count = std::min<std::size_t>(dwell.count, summary.samples);
                 }
             }

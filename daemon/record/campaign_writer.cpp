@@ -57,6 +57,25 @@ std::vector<ColumnSpec> swept_columns() {
             {"frequency_hz", Type::f64, {}, "Hz", "where the shaker's controller says that it is"}};
 }
 
+std::vector<ColumnSpec> played_columns() {
+    return {{"from_ns", Type::i64, {}, "ns", "of the dwell in /orders"},
+            {"run", Type::i32, {}, "", "from 1"},
+            {"position", Type::i32, {}, "", "from 1"},
+            {"word", Type::u8, {}, "", "0: taken, 1: not read, 2: refused"},
+            {"mean_square_g2", Type::f64, {}, "g^2", "by the controller's PSD, platform"},
+            {"bandwidth_hz", Type::f64, {}, "Hz", "(Int S)^2 over Int S^2"},
+            {"gain_error", Type::f64, {}, "", "of the mean square, relative, 1 sigma"},
+            {"highest_hz", Type::f64, {}, "Hz", "up to which there is power"},
+            {"seen_share", Type::f64, {}, "", "of its power, by the accelerometers"},
+            {"seen_error", Type::f64, {}, "", "of that, relative, 1 sigma"}};
+}
+
+std::vector<ColumnSpec> psd_columns() {
+    return {{"from_ns", Type::i64, {}, "ns", "of the dwell in /orders"},
+            {"frequency_hz", Type::f64, {}, "Hz", "as the controller says it after the dwell"},
+            {"psd_g2_hz", Type::f64, {}, "g^2/Hz", "likewise, at the table"}};
+}
+
 std::vector<ColumnSpec> dwell_columns() {
     return {{"time_ns", Type::i64, {}, "ns", kTimeText},
             {"run", Type::i32, {}, "", "from 1"},
@@ -284,6 +303,8 @@ CampaignWriter::CampaignWriter(const std::string& path, const Head& head)
     sweeps_ = table("/sweeps", swept_columns(), 256,
                     "frequency in sweeps as the controller said it; between two rows its logarithm "
                     "goes straight");
+    played_ = table("/played", played_columns(), 16, "random dwells as they were played");
+    psd_lines_ = table("/psd_lines", psd_columns(), 256, "the controller's PSDs of random dwells");
     estimates_ = table("/estimates", estimate_columns(), 64, "the filter while it works");
     events_ = table("/events", event_columns(), 16, "what happened");
     gaps_ = table("/gaps", gap_columns(), 16, "what is missing in this recording");
@@ -346,6 +367,15 @@ void CampaignWriter::swept(const Swept& swept) {
         sweeps_->put(row.time).put(row.run).put(row.position).put(row.frequency_hz);
 }
 
+void CampaignWriter::played(const Played& played) {
+    const auto& [word, random, seen, place] = played.random;
+    played_->put(played.from).put(played.run).put(played.position);
+    played_->put(static_cast<std::uint8_t>(word)).put(random.mean_square_g2);
+    played_->put(random.bandwidth_hz).put(random.gain_error).put(random.highest_hz);
+    played_->put(seen.share).put(seen.error);
+    for (const auto& [hz, density] : played.psd) psd_lines_->put(played.from).put(hz).put(density);
+}
+
 void CampaignWriter::dwell(const Dwell& dwell) {
     const auto& s = dwell.summary;
     dwells_->put(dwell.time).put(std::int32_t{s.run}).put(std::int32_t{s.position});
@@ -399,16 +429,16 @@ void CampaignWriter::event(const EventRecord& event) {
 
 void CampaignWriter::commit() {
     // Samples last: whoever sees a sample also sees the order that it belongs to.
-    for (auto* table :
-         {&orders_, &dwells_, &sweeps_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
+    for (auto* table : {&orders_, &dwells_, &sweeps_, &played_, &psd_lines_, &estimates_, &events_,
+                        &gaps_, &conditions_, &samples_})
         (*table)->commit();
     file_->flush();
 }
 
 void CampaignWriter::end(const Ended& ended) {
     commit();
-    for (auto* table :
-         {&orders_, &dwells_, &sweeps_, &estimates_, &events_, &gaps_, &conditions_, &samples_})
+    for (auto* table : {&orders_, &dwells_, &sweeps_, &played_, &psd_lines_, &estimates_, &events_,
+                        &gaps_, &conditions_, &samples_})
         table->reset();
     const std::string path = file_->path();
     file_->close();

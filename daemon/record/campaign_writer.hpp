@@ -32,6 +32,7 @@ class CampaignWriter {
     void order(const Order& order);
     void dwell(const Dwell& dwell);
     void swept(const Swept& swept);
+    void played(const Played& played);
     void estimate(const EstimateRow& row);
     void event(const EventRecord& event);
     void condition(const ConditionRow& row);
@@ -49,8 +50,8 @@ class CampaignWriter {
 
     std::unique_ptr<hdf5::File> file_;
     std::unique_ptr<WriterLock> lock_;
-    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, sweeps_, estimates_, events_, gaps_,
-        conditions_;
+    std::unique_ptr<hdf5::Table> samples_, orders_, dwells_, sweeps_, played_, psd_lines_,
+        estimates_, events_, gaps_, conditions_;
     std::size_t interlock_rows_ = 0;
 };
 

@@ -95,13 +95,28 @@ void Recorder::put(Entry entry) {
 
 void Recorder::campaign_begun(Head head) { put(std::move(head)); }
 void Recorder::ordered(const rt::DwellOrder& order, Time now, const estimator::NoiseLevels& noise) {
-    put(Order{now, order.from, order.to, order.dwell.run, order.dwell.position, order.dwell.table_g,
-              order.cancel, order.zero_g, order.level_sigma_g, noise, order.dwell.begin_s,
-              order.dwell.power_lost, order.dwell.frequency_hz, order.dwell.held_out,
-              order.dwell.random, order.dwell.sweep});
+    put(Order{now,
+              order.from,
+              order.to,
+              order.dwell.run,
+              order.dwell.position,
+              order.dwell.table_g,
+              order.cancel,
+              order.zero_g,
+              order.level_sigma_g,
+              noise,
+              order.dwell.begin_s,
+              order.dwell.power_lost,
+              order.dwell.frequency_hz,
+              order.dwell.held_out,
+              order.dwell.random,
+              order.dwell.sweep,
+              std::nullopt,
+              {}});
 }
 void Recorder::dwell_done(Dwell dwell) { put(std::move(dwell)); }
 void Recorder::swept(Swept swept) { put(std::move(swept)); }
+void Recorder::played(Played played) { put(std::move(played)); }
 void Recorder::event(const EventRecord& event) { put(event); }
 void Recorder::campaign_ended(Ended ended) { put(std::move(ended)); }
 
@@ -432,6 +447,30 @@ void Recorder::take(const Swept& swept) {
                   "\n");
 }
 
+namespace {
+
+/// JSON has no others: what a controller lies is in the HDF5 file.
+std::vector<std::array<double, 2>> finite_only(const std::vector<std::array<double, 2>>& lines) {
+    const bool finite = std::ranges::all_of(
+        lines, [](const auto& line) { return std::isfinite(line[0]) && std::isfinite(line[1]); });
+    return finite ? lines : std::vector<std::array<double, 2>>{};
+}
+
+}  // namespace
+
+void Recorder::take(const Played& played) {
+    if (!head_) return;
+    kept_.push_back(played);
+    if (!raw_) return;
+    const auto& [word, random, seen, place] = played.random;
+    append_dwells(kPlayedLine +
+                  nlohmann::json{played.run, played.position, static_cast<int>(word),
+                                 random.mean_square_g2, random.bandwidth_hz, random.gain_error,
+                                 random.highest_hz, seen.share, seen.error, finite_only(played.psd)}
+                      .dump() +
+                  "\n");
+}
+
 void Recorder::take(const EventRecord& event) { kept_.push_back(event); }
 
 /// Without a campaign the newest; without a disk as many as memory has for them.
@@ -451,6 +490,7 @@ void Recorder::write_kept() {
         if (const auto* order = std::get_if<Order>(&entry)) writer_->order(*order);
         if (const auto* dwell = std::get_if<Dwell>(&entry)) writer_->dwell(*dwell);
         if (const auto* swept = std::get_if<Swept>(&entry)) writer_->swept(*swept);
+        if (const auto* played = std::get_if<Played>(&entry)) writer_->played(*played);
         if (const auto* event = std::get_if<EventRecord>(&entry)) writer_->event(*event);
     }
     writer_->commit();

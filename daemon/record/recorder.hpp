@@ -83,6 +83,7 @@ class Recorder {
                  const estimator::NoiseLevels& noise);
     void dwell_done(Dwell dwell);
     void swept(Swept swept);
+    void played(Played played);
     void event(const EventRecord& event);
     void campaign_ended(Ended ended);
 
@@ -96,7 +97,7 @@ class Recorder {
     static constexpr std::size_t kMostWaiting = 10'000;
 
   private:
-    using Entry = std::variant<Head, Order, Dwell, Swept, EventRecord, Ended>;
+    using Entry = std::variant<Head, Order, Dwell, Swept, Played, EventRecord, Ended>;
 
     void put(Entry entry);
     void loop();
@@ -109,6 +110,7 @@ class Recorder {
     void take(const Order& order);
     void take(const Dwell& dwell);
     void take(const Swept& swept);
+    void take(const Played& played);
     void take(const EventRecord& event);
     void take(const Ended& ended);
     void take(const drivers::Sample& sample);
@@ -150,7 +152,7 @@ class Recorder {
     std::unique_ptr<RawLog> raw_;
     std::deque<FrameRecord> late_sent_;
     /// What goes into the file once it can be written: few and small, unlike the samples.
-    std::deque<std::variant<Order, Dwell, Swept, EventRecord>> kept_;
+    std::deque<std::variant<Order, Dwell, Swept, Played, EventRecord>> kept_;
     std::int64_t committed_wall_ns_ = 0, retry_wall_ns_ = 0;
     drivers::Time newest_sample_ = 0, estimate_at_ = 0, looked_around_at_ = 0;
     std::uint64_t estimate_samples_ = 0;

@@ -57,10 +57,22 @@ struct Order {
     bool held_out = false;                ///< for verification
     estimator::RandomVibration random{};  ///< in place of a sine
     estimator::SweptSine sweep{};         ///< likewise
+    /// Under random vibration what was played, as the controller says: known after the dwell, and
+    /// its PSD at the table, Hz and g^2/Hz, as it came.
+    std::optional<estimator::PlayedRandom> played{};
+    std::vector<std::array<double, 2>> psd{};
     [[nodiscard]] estimator::DwellInfo dwell() const {
-        return {run,          position, table_g, begin_s, power_lost,
-                frequency_hz, held_out, random,  {},      sweep};
+        return {run,      position, table_g, begin_s, power_lost, frequency_hz,
+                held_out, random,   {},      sweep,   played};
     }
+};
+
+/// What became of asking what was played in a random dwell.
+struct Played {
+    drivers::Time from = 0;  ///< of its order
+    std::int32_t run = 0, position = 0;
+    estimator::PlayedRandom random;
+    std::vector<std::array<double, 2>> psd;
 };
 
 /// dwells.csv beside the raw log: orders in the log's times. Older ones end before profile,
@@ -76,6 +88,11 @@ inline constexpr const char* kRestartLine = "# restart after dwells: ";
 /// In it, with JSON [run, position, [[s since the dwell began, Hz], ..]]: what the controller said
 /// of a sweep's frequency.
 inline constexpr const char* kSweptLine = "# swept: ";
+
+/// In it, behind the order of a random dwell, with JSON [run, position, word, mean_square_g2,
+/// bandwidth_hz, gain_error, highest_hz, share seen, its error, [[Hz, g^2/Hz], ..]]: what the
+/// controller says that it played.
+inline constexpr const char* kPlayedLine = "# played: ";
 
 /// In it, at the end, with JSON: the result is not the live one, but identified anew.
 inline constexpr const char* kAnewLine = "# result: ";

@@ -56,14 +56,19 @@ void feed_as_it_is(estimator::Identification& identification, const Campaign& ca
             identification.add(rt::measurement_of(campaign.samples[i], order.from, order.zero_g));
         if (on_step) on_step(i, step);
     }
-    static_cast<void>(identification.end_dwell());
+    static_cast<void>(identification.end_dwell(dwell.cut_short));
+    if (order.played) static_cast<void>(identification.played(*order.played));
 }
 
-/// One finished dwell as a recording has it, if there is one.
-bool take_done(dwells::Player& player, Dwell& dwell, bool decide) {
+/// One finished dwell as a recording has it, if there is one; `order`: the newest.
+bool take_done(dwells::Player& player, Dwell& dwell, bool decide, const Order* order) {
     rt::DwellDone done;
     if (!player.take_done(done, decide)) return false;
     dwell.time = player.now();
+    if (order != nullptr && order->played) {
+        const auto known = player.identification().played(*order->played);
+        if (known.samples > 0) done.summary = known;
+    }
     dwell.summary = done.summary;
     dwell.reason = done.summary.reason;
     take_estimate(player.identification(), dwell);
@@ -225,6 +230,32 @@ void keep_dwells(Campaign& campaign, std::size_t count) {
     campaign.restarted_at = count;
 }
 
+/// Into the newest order, which it stands behind.
+void read_played(const std::string& text, const std::string& place, Campaign& to) {
+    try {
+        const auto json = nlohmann::json::parse(text);
+        const auto of = std::ranges::find_if(to.orders.rbegin(), to.orders.rend(),
+                                             [](const Order& order) { return !order.cancel; });
+        if (of == to.orders.rend() || of->run != json.at(0).get<int>() ||
+            of->position != json.at(1).get<int>())
+            throw std::runtime_error(place + ": found what was played in run " + json.at(0).dump() +
+                                     " position " + json.at(1).dump() +
+                                     ", expected that of the dwell before it");
+        const int word = json.at(2).get<int>();
+        using Word = estimator::PlayedRandom::Word;
+        of->played = estimator::PlayedRandom{
+            word == 0 || word == 1 ? static_cast<Word>(word) : Word::refused,
+            {json.at(3).get<double>(), json.at(4).get<double>(), json.at(5).get<double>(),
+             json.at(6).get<double>(), of->random.profile, of->random.level_db},
+            {json.at(7).get<double>(), json.at(8).get<double>()}};
+        for (const auto& line : json.at(9))
+            of->psd.push_back({line.at(0).get<double>(), line.at(1).get<double>()});
+    } catch (const nlohmann::json::exception& error) {
+        throw std::runtime_error(place + ": found '" + proto::printable(text.substr(0, 80)) +
+                                 "', expected what was played as JSON: " + error.what());
+    }
+}
+
 /// Times are those of UTC yet.
 void read_swept(const std::string& text, const std::string& place, Campaign& to) {
     try {
@@ -262,6 +293,10 @@ void read_dwells(const std::string& path, Campaign& to) {
         }
         if (line.starts_with(kSweptLine)) {
             read_swept(line.substr(std::strlen(kSweptLine)), place, to);
+            continue;
+        }
+        if (line.starts_with(kPlayedLine)) {
+            read_played(line.substr(std::strlen(kPlayedLine)), place, to);
             continue;
         }
         if (line.starts_with(kAnewLine)) {
@@ -367,6 +402,13 @@ estimator::spectrum::ReadSweep sweep_of(const Campaign& campaign,
     return sweep;
 }
 
+void number_psds(Campaign& campaign) {
+    std::uint32_t place = 0;
+    for (Order& order : campaign.orders)
+        if (order.played && order.played->word == estimator::PlayedRandom::Word::good)
+            order.played->place = ++place;
+}
+
 bool noise_known(const Campaign& campaign) {
     return std::ranges::all_of(campaign.orders, [](const Order& order) {
         return order.cancel || order.noise.angle_arcsec > 0;
@@ -433,8 +475,9 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
         }
     };
     const bool decide = !noise_known(campaign);
+    const Order* newest = nullptr;
     const auto take = [&] {
-        for (Dwell dwell; take_done(player, dwell, decide);) {
+        for (Dwell dwell; take_done(player, dwell, decide, newest);) {
             if (out.dwells.size() < campaign.dwells.size()) {
                 ++out.compared;
                 const Dwell& was = campaign.dwells[out.dwells.size()];
@@ -452,6 +495,7 @@ ReplayResult replay(const Campaign& campaign, const estimator::Settings& setting
     };
     for (const RecordedDwell& dwell : recorded_dwells(campaign)) {
         play_until(std::max(at, dwell.first));
+        newest = dwell.order;
         set_noise(player.identification(), dwell.order->noise);
         rt::DwellOrder order;
         order.from = dwell.order->from;

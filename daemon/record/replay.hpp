@@ -44,6 +44,9 @@ using OnStep = std::function<void(std::size_t sample, const estimator::StepResul
                                                       const estimator::Settings& settings,
                                                       const RecordedDwell& dwell);
 
+/// Numbers the PSDs that its random dwells were taken with, from 1: PlayedRandom::place.
+void number_psds(Campaign& campaign);
+
 /// One dwell into a filter, with the zeros of the recording and the noise levels of its result.
 void feed(estimator::Identification& identification, const Campaign& campaign,
           const RecordedDwell& dwell, const OnStep& on_step = {});

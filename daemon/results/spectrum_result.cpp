@@ -349,19 +349,22 @@ std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator
 
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
                                           const std::vector<estimator::DwellRow>& rows, Form form,
-                                          const NumberedKinds& profiles,
-                                          std::vector<Sweep> sweeps) {
+                                          const NumberedKinds& profiles, std::vector<Sweep> sweeps,
+                                          const PlayedBands& psds) {
     std::vector<SpectralDwell> dwells;
     std::vector<Kind> kinds;
     std::vector<SpectrumResult::HeldOut> held_out;
     for (const estimator::DwellRow& row : rows) {
         std::optional<Kind> kind = kind_of(settings, row, profiles);
         if (!kind) continue;
+        const bool own = row.psd > 0 && row.psd <= psds.size();
         if (row.held_out) {
+            if (own) kind->bands = psds[row.psd - 1];
             held_out.push_back({row, std::move(*kind)});
             continue;
         }
         dwells.push_back({row, {}, row.relative_error});
+        if (own) dwells.back().bands = psds[row.psd - 1];
         if (kind->bands.empty()) continue;
         const auto known = std::ranges::find_if(kinds, [&kind](const Kind& one) {
             return one.profile == kind->profile && (!one.profile.empty() || one.hz() == kind->hz());

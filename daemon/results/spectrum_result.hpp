@@ -20,7 +20,7 @@ struct SpectrumResult {
     double reference_hz = 0;  ///< of the coefficients that are not static
     struct HeldOut {
         estimator::DwellRow row;
-        estimator::spectrum::Kind kind;  ///< no bands: at rest
+        estimator::spectrum::Kind kind;  ///< no bands: at rest; of a PSD of its own: its bands
     };
     std::vector<HeldOut> held_out = {};
     std::vector<estimator::spectrum::Sweep> sweeps = {};
@@ -43,13 +43,18 @@ inline constexpr std::size_t kMostSpectralDwells = 400;
 /// The kinds of random vibration by their numbers in the controller.
 using NumberedKinds = std::vector<std::pair<std::uint16_t, estimator::spectrum::Kind>>;
 
+/// Of the random dwells whose PSD a controller told: their bands at the platform, by
+/// DwellRow::psd, from 1.
+using PlayedBands = std::vector<std::vector<estimator::spectrum::Band>>;
+
 /// Of a campaign's rows that say with which frequency they shook, or under which of `profiles`
 /// (others are left out), those held out left aside; nothing where there are neither several kinds
 /// nor a sweep, or too few or too many rows. Sweeps without a known second are left out.
 [[nodiscard]] std::optional<SpectrumResult> spectrum_of(
     const estimator::Settings& settings, const std::vector<estimator::DwellRow>& rows,
     estimator::spectrum::Form form = estimator::spectrum::Form::automatic,
-    const NumberedKinds& profiles = {}, std::vector<estimator::spectrum::Sweep> sweeps = {});
+    const NumberedKinds& profiles = {}, std::vector<estimator::spectrum::Sweep> sweeps = {},
+    const PlayedBands& psds = {});
 
 /// With several frequencies the assessment's coefficients become those of the analysis, its rates
 /// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.

@@ -19,7 +19,7 @@ void EstimatorStage::run() noexcept {
         if (stays_) follow();
         self_.wait_until(drivers::kNever);
     }
-    if (begun_) finish();
+    if (begun_) finish(true);
 }
 
 void EstimatorStage::work() noexcept {
@@ -64,7 +64,7 @@ bool EstimatorStage::take_block(BlockRecord& block) noexcept {
 }
 
 void EstimatorStage::take_order(const DwellOrder& order) noexcept {
-    if (ordered_) finish();
+    if (ordered_) finish(true);
     if (order.cancel) return;
     current_ = order;
     ordered_ = true;
@@ -72,7 +72,7 @@ void EstimatorStage::take_order(const DwellOrder& order) noexcept {
 
 void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
     // First, since it publishes counts: those hold whole samples only.
-    if (ordered_ && sample.time >= current_.to) finish();
+    if (ordered_ && sample.time >= current_.to) finish(false);
     ++shown_.taken;
     shown_.sample_time = sample.time;
     if (!ordered_ || sample.time < current_.from) {
@@ -96,11 +96,11 @@ void EstimatorStage::take_sample(const drivers::Sample& sample) noexcept {
                             static_cast<double>(current_.to - current_.from);
 }
 
-void EstimatorStage::finish() noexcept {
+void EstimatorStage::finish(bool cut_short) noexcept {
     DwellDone done;
     shown_.dwell_fraction = 0;
     if (begun_) {
-        done.summary = identification_.end_dwell();
+        done.summary = identification_.end_dwell(cut_short);
         averager_.end();
         publish();
     } else {

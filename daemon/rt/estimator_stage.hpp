@@ -64,7 +64,7 @@ class EstimatorStage {
   private:
     void take_order(const DwellOrder& order) noexcept;
     void take_sample(const drivers::Sample& sample) noexcept;
-    void finish() noexcept;
+    void finish(bool cut_short) noexcept;
     void publish() noexcept;
     void follow() noexcept;
 

@@ -186,6 +186,7 @@ void ModbusShaker::work(Time now) {
     if (!stop && orders_.waiting() && now >= stop_alone_until_) return write_set_point();
     if (now >= next_poll_) return poll(now);
     if (!stop && identity_due()) return ask_identity();
+    if (!stop && psd_due()) return read_psd_part();
     Time next = std::min(next_poll_, stop ? next_stop_ : next_feed_);
     if (!timeout_due_) next = std::min(next, next_look_);
     sleep_until(next);

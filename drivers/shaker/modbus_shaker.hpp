@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "drivers/shaker/modbus_link.hpp"
 #include "drivers/shaker/shaker.hpp"
@@ -43,6 +44,8 @@ class ModbusShaker final : public Shaker {
     }
     [[nodiscard]] std::uint64_t beats() const noexcept override { return beats_; }
     [[nodiscard]] ShakerIdentity identity() const override;
+    std::uint64_t read_psd() noexcept override;
+    [[nodiscard]] ShakerPsd psd() const override;
     void shut_down() noexcept override;
 
   private:
@@ -108,6 +111,10 @@ class ModbusShaker final : public Shaker {
     void link_is_new();
     [[nodiscard]] bool identity_due() const noexcept;
     void ask_identity();
+    // shaker_psd.cpp
+    [[nodiscard]] bool psd_due() noexcept;
+    void read_psd_part();
+    void tell_psd(std::string why_not);
     /// Registers that no longer hold what the table was told; empty: they do.
     [[nodiscard]] std::string changed_by_others(const ShakerReading& reading);
 
@@ -138,6 +145,9 @@ class ModbusShaker final : public Shaker {
     std::thread thread_;
     mutable std::mutex identity_mutex_;
     ShakerIdentity identity_;
+    std::atomic<std::uint64_t> psd_asked_{0};  ///< requests so far
+    mutable std::mutex psd_mutex_;
+    ShakerPsd psd_;
 
     // The rest belongs to the shaker's thread.
     bool was_connected_ = false;
@@ -152,9 +162,12 @@ class ModbusShaker final : public Shaker {
     bool timeout_due_ = false;    ///< the watchdog's timeout is to be written
     WatchdogTimeout timeout_seen_ = WatchdogTimeout::unread;
     double timeout_read_s_ = 0;
-    int asks_left_ = 0;                   ///< who it is
-    bool closed_by_us_ = false;           ///< the link, or by asking: the device is the same
-    std::optional<ShakerSetPoint> told_;  ///< what the table does by our word; none: at rest
+    int asks_left_ = 0;                     ///< who it is
+    bool closed_by_us_ = false;             ///< the link, or by asking: the device is the same
+    std::uint64_t psd_request_ = 0;         ///< that is being read, or was
+    int psd_attempts_left_ = 0;             ///< of it; 0: it is answered
+    std::vector<std::uint16_t> psd_words_;  ///< of it so far
+    std::optional<ShakerSetPoint> told_;    ///< what the table does by our word; none: at rest
     std::uint16_t feed_ = 0;
     Time backoff_ = 0;
     Time next_attempt_ = 0, next_stop_ = 0, next_poll_ = 0, next_feed_ = 0, next_look_ = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -7,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "drivers/base/clock.hpp"
 #include "proto/register_map.hpp"
@@ -123,6 +125,14 @@ struct ShakerIdentity {
     std::string text{};  ///< empty: it says nothing
 };
 
+/// What the controller says that it measured of the last random vibration.
+struct ShakerPsd {
+    std::uint64_t request = 0;  ///< of read_psd() that this answers; 0: of none yet
+    /// Hz and g^2/Hz of each pair, all that there are, as they came; empty: `why_not`.
+    std::vector<std::array<double, 2>> pairs{};
+    std::string why_not{};
+};
+
 /// The newest read-back. Nothing of it is valid while `valid` is false.
 struct ShakerReading {
     Time time = 0;
@@ -198,6 +208,13 @@ class Shaker {
     [[nodiscard]] virtual LinkState state() const noexcept = 0;
     /// Not known where settings do not ask. Any thread.
     [[nodiscard]] virtual ShakerIdentity identity() const { return {}; }
+    /// Asks for the block of pairs of a random vibration that is over. It is read at rest, behind
+    /// everything else and a part at a time; what it costs a request that is more urgent is half a
+    /// feed's period at most, and a stop nothing. Returns the request's number, 0: there are no
+    /// such registers. Any thread; never blocks.
+    virtual std::uint64_t read_psd() noexcept { return 0; }
+    /// The answer to the newest request that has one. Any thread.
+    [[nodiscard]] virtual ShakerPsd psd() const { return {}; }
     /// Called in the shaker's thread after every completed read-back, to wake whoever waits for
     /// one. Before start().
     virtual void on_reading(std::function<void()> wake) = 0;

@@ -39,6 +39,19 @@ void check_role(const char* role, const proto::Register& reg, bool read, bool wr
     }
 }
 
+void check_block(const proto::PsdBlock& block) {
+    const std::string key = "shaker.registers.psd_block";
+    check_role("psd_block", block.first, true, false);
+    if (block.first.type != proto::RegisterType::f32)
+        throw ShakerError(key + ".type: must be f32, pairs of floats");
+    if (block.pairs < 2 || block.first.address + 4 * block.pairs > 0x10000)
+        throw ShakerError(key +
+                          ".pairs: must be 2 at least and leave room for 4 words each below "
+                          "65536, got " +
+                          std::to_string(block.pairs) + " from " +
+                          std::to_string(block.first.address));
+}
+
 }  // namespace
 
 ShakerImage::ShakerImage(const proto::ShakerRegisters& registers) : registers_(registers) {
@@ -170,6 +183,7 @@ void check_registers(const ShakerSettings& settings) {
         check_role("profile_checksum", random->profile_checksum, true, false);
         check_role("measured_g_rms", random->measured_g_rms, true, false);
         check_role("control_state", random->control_state, true, false);
+        if (random->psd_block) check_block(*random->psd_block);
     }
     std::array<std::uint16_t, 2> words{};
     const double timeout_s = 3 * to_seconds(settings.watchdog_period);

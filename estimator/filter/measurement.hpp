@@ -37,6 +37,15 @@ struct SweptSine {
     [[nodiscard]] bool operator==(const SweptSine&) const = default;
 };
 
+/// What became of the question what a controller played in a random dwell.
+struct PlayedRandom {
+    enum class Word : std::uint8_t { good, not_read, refused };
+    Word word = Word::good;
+    RandomVibration random{};  ///< as its PSD has it; in place of the profile's where it is good
+    Seen seen{};               ///< likewise
+    std::uint32_t place = 0;   ///< of the PSD among the campaign's good ones, from 1
+};
+
 struct DwellInfo {
     int run = 1;          ///< from 1; the two-step route joins two runs
     int position = 1;     ///< from 1
@@ -52,6 +61,8 @@ struct DwellInfo {
     std::optional<Seen> seen{};
     /// In place of a sine at one frequency: no row, and the filter is left alone.
     SweptSine sweep{};
+    /// Known after a random dwell alone: for Identification::played(), nothing before it.
+    std::optional<PlayedRandom> played{};
 };
 
 enum class StepOutcome : std::uint8_t {

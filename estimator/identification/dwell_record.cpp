@@ -84,11 +84,13 @@ void DwellRecord::note_interval(double periods) noexcept {
 /// In place of what a sine's level says.
 RandomLevel::Level take_random_level(const DwellRecord& r, const Settings& settings,
                                      DwellSummary& s) noexcept {
-    RandomVibration shown = r.info.random;
-    shown.mean_square_g2 *= r.seen.share;
+    const bool told = r.played && r.played->word == PlayedRandom::Word::good;
+    RandomVibration shown = told ? r.played->random : r.info.random;
+    const Seen seen = told ? r.played->seen : r.seen;
+    shown.mean_square_g2 *= seen.share;
     const auto level = r.random_level.level(shown, settings.accelerometer_g, r.period_s, r.span_s);
-    s.kappa = r.kappa_of(1 + level.mean_square_g2);
-    s.relative_error = std::hypot(level.relative_error, r.seen.error);
+    s.kappa = 1 + level.mean_square_g2 / seen.share;
+    s.relative_error = std::hypot(level.relative_error, seen.error);
     s.mean_force_g = level.mean_force_g;
     s.amplitude_g = std::sqrt(2 * (s.kappa - 1));
     s.frequency_hz = 0;
@@ -96,13 +98,18 @@ RandomLevel::Level take_random_level(const DwellRecord& r, const Settings& setti
 }
 
 /// What is wrong with the level of a random vibration; empty: nothing.
-const char* random_misfit(const RandomLevel::Level& level) noexcept {
+const char* random_misfit(const DwellRecord& r, const RandomLevel::Level& level) noexcept {
+    if (r.played && r.played->word == PlayedRandom::Word::refused)
+        return "the controller's PSD contradicts itself or the dwell: dwell rejected";
     if (!(std::abs(level.mean_force_g - 1) <=
           std::max(kForceTolerance, kForceSigmas * level.mean_force_sigma_g)))
         return "mean vertical specific force is not 1 g: dwell rejected";
     if (!(level.sigmas_apart <= kLevelSigmas))
-        return "accelerometers and profile disagree on the level of the random vibration: dwell "
-               "rejected";
+        return r.played && r.played->word == PlayedRandom::Word::good
+                   ? "accelerometers and the controller's PSD disagree on the level of the random "
+                     "vibration: dwell rejected"
+                   : "accelerometers and profile disagree on the level of the random vibration: "
+                     "dwell rejected";
     return "";
 }
 
@@ -121,6 +128,9 @@ DwellVerdict judge_swept(const DwellRecord& r) noexcept {
         verdict.rejected = true;
     } else if (r.saturated_axis >= 0) {
         s.reason = kSaturated[r.saturated_axis];
+        verdict.rejected = true;
+    } else if (r.cut_short) {
+        s.reason = "a sweep that was cut short: not used";
         verdict.rejected = true;
     } else if (r.rejected > kRejectedTolerance * r.samples) {
         s.reason = "more than 1 % of the samples rejected";
@@ -185,7 +195,7 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag("too many readings are missing to know the vibration level: dwell rejected", true);
     } else if (r.saturated_axis >= 0) {
         flag(kSaturated[r.saturated_axis], true);
-    } else if (const char* misfit = random ? random_misfit(random_level) : ""; *misfit != '\0') {
+    } else if (const char* misfit = random ? random_misfit(r, random_level) : ""; *misfit != '\0') {
         flag(misfit, true);
     } else if (!random && !(std::abs(s.mean_force_g - 1.0) <= kForceTolerance)) {
         flag("mean vertical specific force is not 1 g within 2 %: dwell rejected", true);
@@ -210,6 +220,9 @@ DwellVerdict judge(const DwellRecord& r, const Settings& settings) noexcept {
         flag(alias, false);
     } else if (r.stuck > 0) {
         flag("a resolver stood still", false);
+    } else if (r.played && r.played->word == PlayedRandom::Word::not_read) {
+        flag("the controller's PSD could not be read: its profile's stands in its place", false);
+        s.followed = true;
     } else if (s.rejected > kRejectedTolerance * s.samples) {
         flag("more than 1 % of the samples rejected", false);
     } else if (!random && r.largest_kappa > (1.0 + kLevelDrift) * r.least_kappa &&

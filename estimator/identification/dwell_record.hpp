@@ -36,6 +36,8 @@ struct DwellRecord {
     /// Under a sweep: sums of the specific force and of its square, g.
     std::array<double, 3> force_sum{};
     double force_square = 0;
+    std::optional<PlayedRandom> played{};  ///< under random vibration, once it is known
+    bool cut_short = false;                ///< ended before its time
 
     /// 1 + the mean square, from what the accelerometers show of it.
     [[nodiscard]] double kappa_of(double shown) const noexcept {

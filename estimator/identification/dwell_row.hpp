@@ -41,6 +41,7 @@ struct DwellRow {
     bool held_out = false;      ///< as DwellInfo
     bool random = false;        ///< random vibration: `regressors` are with its profile's level
     std::uint16_t profile = 0;  ///< of random vibration: as RandomVibration
+    std::uint32_t psd = 0;      ///< likewise, as PlayedRandom::place; 0: as its profile has it
     double relative_error = 0;  ///< of the vibration's mean square, 1 sigma; known of random alone
     bool apart = false;         ///< held out, or of another frequency: the coefficients lack it
 };

@@ -419,38 +419,14 @@ void Identification::Impl::end_stretch() noexcept {
     primed_ = false;
 }
 
-void Identification::Impl::keep_row(const DwellSummary& summary) noexcept {
-    DwellRow row;
-    if (rows.size() == rows.capacity() || !active_->batch.row(row)) return;
-    row.run = summary.run;
-    row.position = summary.position;
-    row.table_g = record_.info.table_g;
-    row.after_power_loss = std::exchange(power_lost_, false);
-    row.common_clock = std::isfinite(record_.info.begin_s);
-    if (row.common_clock) row.middle_s += record_.info.begin_s;
-    row.vibration = summary.vibration();
-    row.frequency_hz = summary.frequency_hz;
-    row.nis_per_dof = summary.nis_per_dof;
-    row.innovation_correlation = summary.innovation_correlation;
-    row.flagged = summary.flagged && !summary.followed;
-    row.commanded_hz = record_.info.frequency_hz;
-    row.held_out = record_.info.held_out;
-    row.apart = apart_;
-    row.random = random_;
-    row.profile = record_.info.random.profile;
-    row.relative_error = summary.relative_error;
-    if (row.frequency_hz > 0)
-        row.sync_arcsec =
-            sync_.amplitude_arcsec(row.frequency_hz, noise.angle_arcsec * noise.angle_arcsec);
-    rows.push_back(row);
-}
-
-DwellSummary Identification::Impl::end_dwell() noexcept {
+DwellSummary Identification::Impl::end_dwell(bool cut_short) noexcept {
     if (!in_dwell_) return {};
+    record_.cut_short = cut_short;
     if (active_ != nullptr && !swept_) end_stretch();
     primed_ = false;
     record_.saturated_axis = saturation_.axis();
     DwellVerdict verdict = judge(record_, settings);
+    last_random_.reset();
     if (active_ == nullptr) {
         verdict.rejected = verdict.summary.flagged = true;
         verdict.summary.reason = "the two-step route takes two runs only: dwell rejected";
@@ -459,7 +435,12 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
             verdict.summary.kappa = paper_.kappa();
             verdict.summary.amplitude_g = paper_.amplitude_g();
         }
-        if (!verdict.rejected && !swept_) keep_row(verdict.summary);
+        DwellRow row;
+        const bool known = !swept_ && row_of(verdict.summary, row);
+        const bool kept = known && !verdict.rejected && rows.size() < rows.capacity();
+        if (kept) keep_row(row);
+        if (random_ && apart_)
+            last_random_ = {record_, {}, known ? std::optional(row) : std::nullopt, kept};
         active_->batch.end_dwell(!verdict.rejected && !apart_, walked_.value_or(0.0));
         if (!verdict.rejected && !apart_ && walked_)
             walked_from_.emplace(walk_begin_s_, last_time_s_ - dwell_begin_s_);
@@ -477,6 +458,7 @@ DwellSummary Identification::Impl::end_dwell() noexcept {
     }
     verdict.summary.noise = noise;
     verdict.summary.left_out = verdict.rejected;
+    if (last_random_) last_random_->summary = verdict.summary;
     samples += verdict.summary.samples;
     used += verdict.summary.used;
     rejected += verdict.summary.rejected;
@@ -545,7 +527,12 @@ void Identification::begin_dwell(const DwellInfo& dwell) noexcept { impl_->begin
 StepResult Identification::add(const Measurement& measurement) noexcept {
     return impl_->add(measurement);
 }
-DwellSummary Identification::end_dwell() noexcept { return impl_->end_dwell(); }
+DwellSummary Identification::end_dwell(bool cut_short) noexcept {
+    return impl_->end_dwell(cut_short);
+}
+DwellSummary Identification::played(const PlayedRandom& played) noexcept {
+    return impl_->played(played);
+}
 void Identification::estimate(Estimate& out) const noexcept { impl_->estimate(out); }
 void Identification::set_noise(const NoiseLevels& levels) noexcept {
     impl_->noise = levels;

@@ -48,7 +48,8 @@ struct Identification::Impl {
     void reserve(std::size_t max_dwells);
     void begin_dwell(const DwellInfo& dwell) noexcept;
     StepResult add(const Measurement& measurement) noexcept;
-    DwellSummary end_dwell() noexcept;
+    DwellSummary end_dwell(bool cut_short = false) noexcept;
+    DwellSummary played(const PlayedRandom& played) noexcept;
     void estimate(Estimate& out) const noexcept;
     void solved(Estimate& out) const noexcept;
     [[nodiscard]] Result result() const;
@@ -90,7 +91,9 @@ struct Identification::Impl {
     void tell(const ParameterArray& value, const ParameterArray& sigma,
               Estimate& out) const noexcept;
     void end_stretch() noexcept;
-    void keep_row(const DwellSummary& summary) noexcept;
+    [[nodiscard]] bool row_of(const DwellSummary& summary, DwellRow& row) noexcept;
+    static void take_level(const DwellSummary& summary, DwellRow& row) noexcept;
+    void keep_row(DwellRow& row) noexcept;
 
     /// Final eq. 13 amplitude of a position of the first run, for eq. 17.
     struct PaperStart {
@@ -113,6 +116,14 @@ struct Identification::Impl {
     RunFilter* active_ = nullptr;
     DwellRecord record_;
     bool power_lost_ = false;  ///< since the row kept last
+    /// The random dwell that ended last, until it is known what was played in it.
+    struct Random {
+        DwellRecord record;
+        DwellSummary summary;
+        std::optional<DwellRow> row;  ///< none: there is nothing to be had of it
+        bool kept = false;
+    };
+    std::optional<Random> last_random_;
     bool in_dwell_ = false;
     bool apart_ = false;   ///< this dwell: see DwellRow
     bool random_ = false;  ///< likewise

@@ -85,8 +85,9 @@ VectorXd SpectralTable::elastic_weights(const Resonance& of) const {
     for (const Kind& kind : kinds_) kinds.push_back(elastic_weight(kind.bands, of));
     VectorXd out = VectorXd::Zero(dwells());
     for (Index i = 0; i < dwells(); ++i) {
-        const auto& kind = dwells_[static_cast<std::size_t>(i)].kind;
-        if (kind) out[i] = kinds[*kind];
+        const SpectralDwell& dwell = dwells_[static_cast<std::size_t>(i)];
+        if (dwell.kind)
+            out[i] = dwell.bands.empty() ? kinds[*dwell.kind] : elastic_weight(dwell.bands, of);
     }
     return out;
 }

@@ -27,6 +27,8 @@ struct SpectralDwell {
     DwellRow row;
     std::optional<std::size_t> kind = {};  ///< of SpectralTable::kinds
     double relative_error = 0;             ///< of the mean square of its vibration, 1 sigma
+    /// Of a random one whose PSD is known: in place of its kind's.
+    std::vector<Band> bands = {};
 };
 
 /// Elastic and static columns of a gyro: the base model, and its quadratic part once more.

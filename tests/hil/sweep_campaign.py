@@ -167,6 +167,8 @@ def aborted(checks, programs, folder):
         rest = rig.wait_for(lambda s: s["shaker"]["measured_g"] == 0 and not s["shaker"]["running"], 60)
         checks.check(last and last["campaign"]["state"] == "aborted" and rest, "aborted in a sweep, the table comes to rest",
                      f"{r.state_of(last)}\n{rig.daemon.text()[-2000:]}")
+        checks.equal([(d["used"], d["reason"]) for d in (last or rig.status())["campaign"]["dwells"]],
+                     [(0, "a sweep that was cut short: not used")], "and the status says that the sweep is not used, and why")
     finally:
         rig.stop()
 
@@ -185,6 +187,9 @@ def lies(checks, programs, folder, name, faults, trip, says):
         _, text = rig.result()
         checks.equal(((json.loads(text) if text else {}).get("spectrum") or {}).get("sweeps", []), [],
                      f"{name}: nothing of it is in a result")
+        dwells = last["campaign"]["dwells"] if last else []
+        checks.equal([d["used"] for d in dwells], [0] * len(dwells), f"{name}: nor is it used by what the status says")
+        checks.check(all("not used" in d["reason"] or d["samples"] == 0 for d in dwells), f"{name}: which says why", dwells)
     finally:
         rig.stop()
 

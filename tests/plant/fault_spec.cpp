@@ -30,7 +30,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 40> kDescriptions{{
+constexpr std::array<Description, 45> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -105,6 +105,17 @@ constexpr std::array<Description, 40> kDescriptions{{
      "profile-level-wrong=DB  random: the table does so much more than is told and read back"},
     {FaultKind::no_abort_bands, "no-abort-bands", Value::none, false,
      "no-abort-bands        random: the controller has none, and its control_state says so"},
+    {FaultKind::profile_tilted, "profile-tilted", Value::decibels, false,
+     "profile-tilted=DB     random: the table plays so much more with each octave, at the same "
+     "rms"},
+    {FaultKind::psd_stale, "psd-stale", Value::none, false,
+     "psd-stale             random: the measured PSD stays what it was"},
+    {FaultKind::psd_nan, "psd-nan", Value::none, false,
+     "psd-nan               random: a line of the measured PSD is no number"},
+    {FaultKind::psd_scaled, "psd-scaled", Value::factor, false,
+     "psd-scaled=FACTOR     random: the measured PSD is so many times what it was"},
+    {FaultKind::psd_refused, "psd-refused", Value::none, false,
+     "psd-refused           random: the measured PSD cannot be read (exception 4)"},
     {FaultKind::sweep_rate_scaled, "sweep-rate-scaled", Value::either_way, false,
      "sweep-rate-scaled=FACTOR  sweeps go so many times as fast as is told; 0: not at all, below "
      "0:\n"

@@ -49,6 +49,11 @@ ShakerLies lies_at(double time_s, ShakerLies lies, const Faults& faults) noexcep
         lies.wrong_profile = static_cast<std::uint16_t>(fault->value);
     value(FaultKind::profile_level_wrong, lies.profile_level_wrong);
     yes(FaultKind::no_abort_bands, lies.no_abort_bands);
+    value(FaultKind::profile_tilted, lies.profile_tilted);
+    yes(FaultKind::psd_stale, lies.psd_stale);
+    yes(FaultKind::psd_nan, lies.psd_nan);
+    value(FaultKind::psd_scaled, lies.psd_scaled);
+    yes(FaultKind::psd_refused, lies.psd_refused);
     value(FaultKind::sweep_rate_scaled, lies.sweep_rate_scaled);
     yes(FaultKind::actual_as_told, lies.actual_as_told);
     if (const Fault* fault = faults.active(FaultKind::timeout_register, time_s))

@@ -24,8 +24,8 @@ using Query = std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH>;
 using Answer = ShakerController::Answer;
 
 constexpr int kConnections = 16;
-constexpr int kWriteSingle = 0x06, kServerId = 0x11, kWriteMultiple = 0x10, kMaskWrite = 0x16,
-              kWriteAndRead = 0x17;
+constexpr int kReadInput = 0x04, kWriteSingle = 0x06, kServerId = 0x11, kWriteMultiple = 0x10,
+              kMaskWrite = 0x16, kWriteAndRead = 0x17;
 
 std::uint16_t word(const std::uint8_t* bytes) {
     return static_cast<std::uint16_t>(bytes[0] << 8 | bytes[1]);
@@ -221,6 +221,10 @@ ModbusServer::Outcome ModbusServer::apply(const std::uint8_t* pdu, std::size_t l
     if (write.any && wrong == nullptr)
         outcome.answer = foreign_ ? foreign_->write(shaker, write.address, write.values)
                                   : shaker.write(write.address, write.values);
+    // Reads of what the controller measured; other maps have none.
+    if (!foreign_ && pdu[0] == kReadInput && length >= 3 && shaker.psd_refused() &&
+        word(pdu + 1) >= ShakerController::kPsdBlock)
+        outcome.failure = true;
     const auto as_wrong = [wrong_value](std::uint16_t word) {
         return static_cast<std::uint16_t>(word ^ (wrong_value ? 0x5555 : 0));
     };

@@ -1,5 +1,6 @@
 #include "tests/plant/random_drive.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <unsupported/Eigen/FFT>
@@ -7,8 +8,10 @@
 namespace vibrig::plant {
 
 void RandomDrive::shape(const ShakerProfile& profile) {
-    const double line_hz = 1 / (step_s_ * static_cast<double>(kFrame)), rms = profile.rms_g();
+    const double line_hz = this->line_hz(), rms = profile.rms_g();
     amplitude_.assign(kFrame / 2, 0);
+    heard_.assign(kFrame / 2, 0);
+    frames_ = 0;
     double all = 0;
     for (std::size_t k = 1; k < amplitude_.size(); ++k) {
         const double hz = static_cast<double>(k) * line_hz;
@@ -29,7 +32,9 @@ void RandomDrive::make_frame() {
     for (std::size_t k = 1; k < amplitude_.size(); ++k) {
         if (amplitude_[k] > 0)
             spectrum_[k] = amplitude_[k] * std::complex(random_.normal(), random_.normal());
+        heard_[k] += std::norm(spectrum_[k]) / 2;
     }
+    ++frames_;
     Eigen::FFT<double> fft(Eigen::default_fft_impl<double>(), Eigen::FFT<double>::Unscaled);
     fft.inv(frame_, spectrum_);
     constexpr std::size_t kHalf = kFrame / 2;
@@ -51,6 +56,18 @@ void RandomDrive::next(std::span<Shake> out) {
         if (at_ == kFrame / 2) make_frame();
         shake = ahead_[at_++];
     }
+}
+
+std::vector<double> RandomDrive::heard() const {
+    if (frames_ == 0) return {};
+    std::vector<double> mean = heard_;
+    for (double& one : mean) one /= static_cast<double>(frames_);
+    return mean;
+}
+
+void RandomDrive::forget() noexcept {
+    std::ranges::fill(heard_, 0.0);
+    frames_ = 0;
 }
 
 }  // namespace vibrig::plant

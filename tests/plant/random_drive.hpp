@@ -21,6 +21,13 @@ class RandomDrive {
     void shape(const ShakerProfile& profile);
     /// The next steps.
     void next(std::span<Shake> out);
+    /// Mean power of each line over the frames since the last call of forget(), of a sum of about
+    /// 1; empty: there was none.
+    [[nodiscard]] std::vector<double> heard() const;
+    void forget() noexcept;
+    [[nodiscard]] double line_hz() const noexcept {
+        return 1 / (step_s_ * static_cast<double>(kFrame));
+    }
 
   private:
     static constexpr std::size_t kFrame = 8192;  ///< steps
@@ -29,6 +36,8 @@ class RandomDrive {
 
     double step_s_;
     Random random_;
+    std::vector<double> heard_;      ///< sums
+    std::size_t frames_ = 0;         ///< in them
     std::vector<double> amplitude_;  ///< of each line, of either of its two parts, 1 sigma
     std::vector<std::complex<double>> spectrum_, frame_;
     std::vector<Shake> ahead_;  ///< of the frame before and this one, then of this one alone

@@ -17,6 +17,14 @@ bool finely(const Truth& truth) noexcept {
            truth.accelerometer_bandwidth_hz > 0 || truth.accelerometer_skew_ms > 0;
 }
 
+/// So many dB more with each octave; the level is the controller's.
+ShakerProfile tilted(ShakerProfile profile, double decibels) {
+    const double from = profile.psd.front().first;
+    for (auto& [hz, density] : profile.psd)
+        density *= std::pow(10, decibels / 10 * std::log2(hz / from));
+    return profile;
+}
+
 }  // namespace
 
 Rig::Rig(const Truth& truth)
@@ -141,7 +149,8 @@ void Rig::vibrate() {
 void Rig::vibrate_at_random(const ShakerProfile& profile, double begin_g, double end_g) {
     if (shaped_ != &profile) {
         shaped_ = &profile;
-        random_drive_.shape(profile);
+        random_drive_.shape(tilted(profile, shaker_.profile_tilted()));
+        heard_ = false;
         played_.assign(played_.size(), {});
     }
     still_ = begin_g == 0 && end_g == 0 && isolator_.at_rest();
@@ -150,6 +159,11 @@ void Rig::vibrate_at_random(const ShakerProfile& profile, double begin_g, double
         std::ranges::fill(played_, Shake{});
         return;
     }
+    // The controller's PSD is of the time at level.
+    const bool at_level = shaker_.state() == ShakerState::running;
+    if (at_level && !heard_) random_drive_.forget();
+    if (!at_level && heard_) shaker_.measured(random_drive_.heard(), random_drive_.line_hz());
+    heard_ = at_level;
     played_.front() = played_.back();
     const std::span<Shake> next = std::span(played_).subspan(1);
     random_drive_.next(next);

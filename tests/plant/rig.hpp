@@ -75,6 +75,7 @@ class Rig {
     Gimbals gimbals_;
     Isolator isolator_;
     RandomDrive random_drive_;
+    bool heard_ = false;  ///< it is at level
     ShakerController shaker_;
     Sensors sensors_;
     Increments increments_;

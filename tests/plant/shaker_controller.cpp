@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -154,7 +155,45 @@ std::array<std::uint16_t, ShakerController::kInput> ShakerController::input() co
     split(words, kMeasuredRms, std::sqrt(mean_square_) / 1e-4);
     words[kControlState] = control_state();
     split(words, kActualFrequency, 1e3 * (lies_.actual_as_told ? told_hz_ : table_hz_));
+    const auto put = [&words](std::size_t at, double number) {
+        const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(number));
+        words[at] = static_cast<std::uint16_t>(bits >> 16);
+        words[at + 1] = static_cast<std::uint16_t>(bits);
+    };
+    for (std::size_t i = 0; i < psd_.size(); ++i) {
+        put(kPsdBlock + 4 * i, psd_[i][0]);
+        put(kPsdBlock + 4 * i + 2, lies_.psd_nan && i == psd_.size() / 2
+                                       ? std::numeric_limits<double>::quiet_NaN()
+                                       : lies_.psd_scaled * psd_[i][1]);
+    }
     return words;
+}
+
+void ShakerController::measured(std::span<const double> power, double line_hz) {
+    constexpr std::size_t kMostBins = kPsdPairs - 60;
+    const ShakerProfile* profile = played();
+    if (profile == nullptr || power.empty() || (lies_.psd_stale && !psd_.empty())) return;
+    const auto first = static_cast<std::size_t>(std::floor(profile->psd.front().first / line_hz)),
+               last = std::min(
+                   static_cast<std::size_t>(std::ceil(profile->psd.back().first / line_hz)) + 1,
+                   power.size());
+    if (last <= first + 1) return;
+    const std::size_t bin = (last - first + kMostBins - 1) / kMostBins;
+    const double level = commanded_g() * commanded_g();
+    // A line at an end is within the profile by a part of its width.
+    const double from = profile->psd.front().first, to = profile->psd.back().first;
+    psd_.clear();
+    for (std::size_t k = first; k < last; k += bin) {
+        const std::size_t end = std::min(k + bin, last);
+        double sum = 0;
+        for (std::size_t i = k; i < end; ++i) sum += power[i];
+        const double low = std::max(from, (static_cast<double>(k) - 0.5) * line_hz),
+                     high = std::min(to, (static_cast<double>(end) - 0.5) * line_hz);
+        if (high > low) psd_.push_back({(low + high) / 2, level * sum / (high - low)});
+    }
+    // What it is at the very ends, so that nothing is left out.
+    psd_.insert(psd_.begin(), {from, psd_.front()[1]});
+    psd_.push_back({to, psd_.back()[1]});
 }
 
 std::uint16_t ShakerController::control_state() const noexcept {

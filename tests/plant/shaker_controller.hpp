@@ -30,7 +30,8 @@ inline constexpr std::uint16_t kAbortAbove = 1, kAbortBelow = 2, kAbortStopped =
 class ShakerController {
   public:
     static constexpr std::size_t kHolding = 16;
-    static constexpr std::size_t kInput = 12;
+    static constexpr std::size_t kPsdBlock = 16, kPsdPairs = 200;  ///< input: f32, Hz and g^2/Hz
+    static constexpr std::size_t kInput = kPsdBlock + 4 * kPsdPairs;
     /// Holding: 0 sine, 1 random, 2 sweep; a number; i16, 0.1 dB. Input: u32; u32, 1e-4 g; u16.
     static constexpr std::size_t kMode = 8, kProfileNumber = 9, kProfileLevel = 10;
     static constexpr std::size_t kProfileChecksum = 5, kMeasuredRms = 7, kControlState = 9;
@@ -64,6 +65,11 @@ class ShakerController {
     [[nodiscard]] const ShakerProfile* played() const noexcept;
     /// The mean square of what is played over the last tick, of a mean of 1.
     void felt(double mean_square) noexcept { felt_ = mean_square; }
+    /// What was played since the level was there, at its end: power of each line, of a sum of about
+    /// 1. The controller's PSD is that, at the level that it believes in, in fewer lines.
+    void measured(std::span<const double> power, double line_hz);
+    [[nodiscard]] bool psd_refused() const noexcept { return lies_.psd_refused; }
+    [[nodiscard]] double profile_tilted() const noexcept { return lies_.profile_tilted; }
     /// Time goes on by dt; the table's amplitude follows its ramp.
     void advance(double dt_s) noexcept;
 
@@ -114,9 +120,10 @@ class ShakerController {
     double felt_ = 1;         ///< of the last tick
     double mean_square_ = 0;  ///< of the table as the controller's accelerometer has it, g^2
     double outside_bands_s_ = 0, at_level_s_ = 0;
-    double swept_s_ = 0;         ///< at the level of a sweep
-    double told_hz_ = 15;        ///< where a sweep would be as it is told
-    std::uint16_t aborted_ = 0;  ///< why
+    double swept_s_ = 0;                      ///< at the level of a sweep
+    double told_hz_ = 15;                     ///< where a sweep would be as it is told
+    std::uint16_t aborted_ = 0;               ///< why
+    std::vector<std::array<double, 2>> psd_;  ///< measured last: Hz, g^2/Hz at the table
 };
 
 }  // namespace vibrig::plant

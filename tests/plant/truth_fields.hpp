@@ -112,6 +112,11 @@ void for_each_field(T& t, Field&& field) {
     field("shaker", "frequency_ignored", t.shaker_lies.frequency_ignored, 0, 0);
     field("shaker", "wrong_profile", t.shaker_lies.wrong_profile, 0, 65535);
     field("shaker", "profile_level_wrong", t.shaker_lies.profile_level_wrong, -60.0, 20.0);
+    field("shaker", "profile_tilted", t.shaker_lies.profile_tilted, -20.0, 20.0);
+    field("shaker", "psd_stale", t.shaker_lies.psd_stale, 0, 0);
+    field("shaker", "psd_nan", t.shaker_lies.psd_nan, 0, 0);
+    field("shaker", "psd_scaled", t.shaker_lies.psd_scaled, 0.0, 1000.0);
+    field("shaker", "psd_refused", t.shaker_lies.psd_refused, 0, 0);
     field("shaker", "no_abort_bands", t.shaker_lies.no_abort_bands, 0, 0);
     field("shaker", "sweep_rate_scaled", t.shaker_lies.sweep_rate_scaled, -20.0, 20.0);
     field("shaker", "actual_as_told", t.shaker_lies.actual_as_told, 0, 0);

@@ -94,6 +94,7 @@ StageStep Dwelling::settled_or_recording(Time now) {
         if (now < from_) return StageStep::going_on(std::min(from_, now + kStagePoll));
         part_ = Part::record;
     }
+    note_rms();
     if (done_) {
         ordered_ = power_lost_ = false;
         end_sweep();
@@ -117,6 +118,7 @@ StageStep Dwelling::order(Time now) {
     utc_ns_ = ports_.log.utc_ns() + (from_ - now);
     if (!origin_) take_over_origin();
     order.dwell = info();
+    square_ = readings_ = 0;
     if (zeros_ != nullptr) {
         order.zero_g = zeros_->raw_zero_g();
         order.level_sigma_g = zeros_->level_sigma(aim_.stop.position_deg);
@@ -146,7 +148,8 @@ estimator::DwellInfo Dwelling::info() const {
             aim_.stop.verify,
             aim_.stop.random ? aim_.stop.random->at_platform : estimator::RandomVibration{},
             {},
-            aim_.stop.sweep};
+            aim_.stop.sweep,
+            {}};
 }
 
 void Dwelling::leave() {
@@ -213,6 +216,18 @@ void Dwelling::follow_sweep(Time now) {
     sweep_.reset();
     watching_ = false;
     trip(other);
+}
+
+/// What its PSD is held against.
+void Dwelling::note_rms() {
+    if (!excitation_.random()) return;
+    const auto reading = ports_.rig.shaker.reading();
+    if (!reading.valid || !reading.random || reading.time <= read_at_ || reading.time < from_ ||
+        reading.time > to_)
+        return;
+    read_at_ = reading.time;
+    square_ += reading.random->measured_g_rms * reading.random->measured_g_rms;
+    ++readings_;
 }
 
 void Dwelling::end_sweep() {

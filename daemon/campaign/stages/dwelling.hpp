@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -47,6 +48,10 @@ class Dwelling : public Stage {
     [[nodiscard]] estimator::DwellInfo info() const;
     /// Of a sweep what the controller said of its frequency, s since the dwell began and Hz.
     [[nodiscard]] const std::vector<std::array<double, 2>>& swept_hz() const { return swept_hz_; }
+    /// Of random vibration, by the controller's readings while it recorded; 0: there were none.
+    [[nodiscard]] double measured_g_rms() const {
+        return readings_ > 0 ? std::sqrt(square_ / readings_) : 0;
+    }
     [[nodiscard]] std::int64_t utc_ns() const { return utc_ns_; }  ///< of its beginning
     /// While it records: how much of it is done, 0 to 1, and what is left, s.
     [[nodiscard]] double part_done(drivers::Time now) const;
@@ -63,6 +68,7 @@ class Dwelling : public Stage {
     void watch_vibration(const rt::DwellOrder& order);
     void follow_sweep(drivers::Time now);
     void end_sweep();
+    void note_rms();
     void trip(const std::string& why);
     [[nodiscard]] double dwell_s() const;
     void look_at_vibration(drivers::Time now);
@@ -86,7 +92,8 @@ class Dwelling : public Stage {
     bool watching_ = false;  ///< the accelerometers are to show it before the dwell
     std::vector<estimator::LoopReading> shown_;
     std::optional<SweepWatch> sweep_;
-    drivers::Time read_at_ = 0;  ///< the controller's frequency, last
+    drivers::Time read_at_ = 0;         ///< the controller's frequency or rms, last
+    double square_ = 0, readings_ = 0;  ///< of that rms
     std::vector<std::array<double, 2>> swept_hz_;
 };
 

@@ -130,10 +130,13 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
     const auto count = static_cast<Index>(found.held_out.size());
     held.rates.resize(count, 3);
     for (Index k = 0; k < count; ++k) {
-        const estimator::DwellRow& row = found.held_out[static_cast<std::size_t>(k)].row;
+        const HeldOut& one = found.held_out[static_cast<std::size_t>(k)];
+        const estimator::DwellRow& row = one.row;
         // What happened, not what was asked for.
         held.situations.push_back(
-            {row.angles, level_moment(row.vibration), vibration.bands, row.duration_s, true});
+            {row.angles, level_moment(row.vibration),
+             row.psd > 0 && !one.kind.bands.empty() ? one.kind.bands : vibration.bands,
+             row.duration_s, true});
         held.rates.row(k) = row.rate;
         held.variances.push_back(row.variance);
         held.relative_errors.push_back(row.relative_error);

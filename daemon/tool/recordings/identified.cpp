@@ -52,8 +52,10 @@ struct Found {
     std::vector<estimator::spectrum::SpectralDwell> spectral;
     std::vector<estimator::spectrum::Kind> kinds;
     std::vector<estimator::spectrum::Sweep> sweeps;
-    NumberedKinds profiles;                 ///< of a campaign's random dwells
-    std::vector<estimator::DwellRow> rows;  ///< of a campaign, those apart included
+    std::vector<SpectrumResult::HeldOut> kept_out;  ///< of a CSV file, by its roles
+    NumberedKinds profiles;                         ///< of a campaign's random dwells
+    std::vector<estimator::DwellRow> rows;          ///< of a campaign, those apart included
+    PlayedBands psds;                               ///< of its random dwells
 };
 
 /// `rows`: of all dwells.
@@ -313,6 +315,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
         const std::size_t before = identification.rows().size();
         estimator::DwellInfo info{dwell.run, dwell.position};
         if (common_clock) info.begin_s = 0;
+        info.held_out = dwell.rows.front()->held_out;
         info.random = kinds.random(d);
         const bool random = info.random.mean_square_g2 > 0;
         if (kind && !random) info.frequency_hz = kinds.kinds()[*kind].hz();
@@ -406,6 +409,7 @@ Found identify_campaign(const std::string& path, const std::string& config,
     record::Campaign campaign = read_named_campaign(path);
     if (!campaign.incomplete.empty()) throw std::runtime_error(campaign.incomplete);
     if (!config.empty()) record::forget_noise(campaign);
+    record::number_psds(campaign);
     const auto loaded =
         config.empty()
             ? configuration::parse(record::identification_sections(campaign.head.configuration),
@@ -420,6 +424,11 @@ Found identify_campaign(const std::string& path, const std::string& config,
     settings = dwells::Anew::settings_of(settings, campaign.found);
     Found found = identify(campaign, settings);
     found.profiles = configuration::numbered_kinds(loaded.configuration);
+    for (const record::Order& order : campaign.orders) {
+        if (!order.played || order.played->place == 0) continue;
+        found.psds.push_back(configuration::bands_told(loaded.configuration, order.random.profile,
+                                                       order.random.level_db, order.psd));
+    }
     return found;
 }
 
@@ -442,9 +451,11 @@ bool is_campaign(const std::string& argument) {
                : record::is_hdf5(argument);
 }
 
-/// Of a recording whose dwells are to prove a result: all of them.
+/// Of a recording whose dwells are to prove a result: those that it holds out itself, or all.
 std::vector<HeldOut> held_out_of(const Found& found) {
     std::vector<HeldOut> list;
+    for (const auto& [row, kind] : found.kept_out) list.push_back({row, kind});
+    if (!list.empty()) return list;
     for (const auto& dwell : found.spectral)
         list.push_back(
             {dwell.row, dwell.kind ? found.kinds[*dwell.kind] : estimator::spectrum::Kind{}});
@@ -488,10 +499,11 @@ Identified identify_recording(const std::string& file, const std::string& config
         identified.spectrum =
             spectrum_of(identified.settings, std::move(found.spectral), std::move(found.kinds),
                         request.form, std::move(found.sweeps));
+        identified.spectrum->held_out = std::move(found.kept_out);
         adopt(*identified.spectrum, identified.settings, identified.assessed);
     } else if (identified.assessed.done) {
         identified.spectrum = spectrum_of(identified.settings, found.rows, request.form,
-                                          found.profiles, std::move(found.sweeps));
+                                          found.profiles, std::move(found.sweeps), found.psds);
         if (identified.spectrum)
             adopt(*identified.spectrum, identified.settings, identified.assessed);
     }
@@ -504,6 +516,8 @@ Identified identify_recording(const std::string& file, const std::string& config
             row.commanded_hz > 0 ? row.commanded_hz : identified.settings.frequency_hz;
         identified.held_out.push_back(
             {row, row.random ? profile->second : estimator::spectrum::Kind{"", {{hz, 1, 0}}}});
+        if (row.psd > 0 && row.psd <= found.psds.size())
+            identified.held_out.back().kind.bands = found.psds[row.psd - 1];
     }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;

@@ -14,7 +14,8 @@ namespace vibrig::tool {
 /// A dwell that a result is tried on, and the name of the profile that shook it; none: a sine.
 struct HeldOut {
     estimator::DwellRow row;
-    estimator::spectrum::Kind kind;  ///< of what it shook with
+    /// Of what it shook with; of a random one whose PSD is known its own bands.
+    estimator::spectrum::Kind kind;
 };
 
 /// What a recording gives: coefficients, and what can be believed of them.

@@ -44,33 +44,79 @@ double swept_hz(const std::vector<std::array<double, 2>>& readings, double time_
     return from_hz * std::pow(to_hz / from_hz, (time_s - from_s) / (to_s - from_s));
 }
 
-estimator::Settings estimator_of(const record::Campaign& campaign) {
-    return configuration::parse(record::identification_sections(campaign.head.configuration),
-                                "configuration in " + campaign.path, false)
-        .configuration.estimator;
-}
+/// What the rows of a dwell say beside angles and forces.
+class DwellColumns {
+  public:
+    explicit DwellColumns(const record::Campaign& campaign) : campaign_(campaign) {
+        const auto any = [&campaign](auto has) {
+            return std::ranges::any_of(campaign.orders, has);
+        };
+        random_ = any([](const record::Order& order) { return order.random.mean_square_g2 > 0; });
+        stated_ = random_ || any([](const record::Order& order) {
+                      return order.frequency_hz > 0 || order.sweep.any();
+                  });
+        if (!stated_) return;
+        rig_ = configuration::parse(record::identification_sections(campaign.head.configuration),
+                                    "configuration in " + campaign.path, false)
+                   .configuration;
+    }
 
-/// The frequencies of its dwells are stated: a plan's. Random vibration has none.
-bool has_frequencies(const record::Campaign& campaign) {
-    return std::ranges::any_of(campaign.orders,
-                               [](const record::Order& order) {
-                                   return order.frequency_hz > 0 || order.sweep.any();
-                               }) &&
-           std::ranges::none_of(campaign.orders, [](const record::Order& order) {
-               return order.random.mean_square_g2 > 0;
-           });
-}
+    void begin(const record::RecordedDwell& dwell) {
+        order_ = dwell.order;
+        swept_.clear();
+        if (order_->sweep.any())
+            swept_ = record::sweep_of(campaign_, estimator::Settings{}, dwell).readings();
+        profile_ = order_->random.mean_square_g2 > 0 ? place_of(order_->random.profile) : 0;
+    }
+    void put(proto::RecordingRow& row, double since_begin_s) const {
+        row.run = order_->run;
+        row.position = order_->position;
+        row.held_out = order_->held_out;
+        if (!stated_) return;
+        row.profile = static_cast<std::uint16_t>(profile_);
+        row.level_db = profile_ > 0 ? order_->random.level_db : 0;
+        row.frequency_hz = order_->sweep.any()                    ? swept_hz(swept_, since_begin_s)
+                           : profile_ > 0 || order_->table_g <= 0 ? 0
+                           : order_->frequency_hz > 0             ? order_->frequency_hz
+                                                                  : rig_.estimator.frequency_hz;
+    }
+    [[nodiscard]] const std::vector<std::string>& profiles() const { return profiles_; }
+
+  private:
+    /// From 1, by its name in the configuration; by its number where that is none for CSV.
+    std::size_t place_of(int number) {
+        std::string name = std::to_string(number);
+        for (const auto& one : rig_.profiles) {
+            if (one.number == number &&
+                one.profile.name.find_first_of("\"\n\r") == std::string::npos)
+                name = one.profile.name;
+        }
+        const auto known = std::ranges::find(profiles_, name);
+        const auto place = known - profiles_.begin();
+        if (known == profiles_.end()) profiles_.push_back(name);
+        return static_cast<std::size_t>(place) + 1;
+    }
+
+    const record::Campaign& campaign_;
+    configuration::Configuration rig_;
+    bool random_ = false, stated_ = false;  ///< what shook is said
+    const record::Order* order_ = nullptr;
+    std::vector<std::array<double, 2>> swept_;
+    std::size_t profile_ = 0;
+    std::vector<std::string> profiles_;
+};
 
 void export_csv(const record::Campaign& campaign, const std::string& path) {
     std::vector<proto::RecordingRow> rows;
     std::size_t left_out = 0;
-    const bool frequencies = has_frequencies(campaign);
-    const double nominal_hz = frequencies ? estimator_of(campaign).frequency_hz : 0;
-    for (const auto& dwell : record::recorded_dwells(campaign)) {
-        const record::Order& order = *dwell.order;
-        std::vector<std::array<double, 2>> swept;
-        if (order.sweep.any())
-            swept = record::sweep_of(campaign, estimator::Settings{}, dwell).readings();
+    DwellColumns columns(campaign);
+    const auto dwells = record::recorded_dwells(campaign);
+    // One clock where all of them are on it: how long a bias walked is told, too.
+    const bool common_clock = std::ranges::all_of(
+        dwells, [](const auto& dwell) { return std::isfinite(dwell.order->begin_s); });
+    for (const auto& dwell : dwells) {
+        columns.begin(dwell);
+        const double begin_s = common_clock ? dwell.order->begin_s : 0;
         for (std::size_t i = dwell.first; i < dwell.first + dwell.count; ++i) {
             const auto& sample = campaign.samples[i];
             if (!sample.angles_good() || !sample.force_good()) {
@@ -78,28 +124,28 @@ void export_csv(const record::Campaign& campaign, const std::string& path) {
                 continue;
             }
             proto::RecordingRow row;
-            row.time_s = drivers::to_seconds(sample.time - dwell.order->from);
-            row.run = dwell.order->run;
-            row.position = dwell.order->position;
+            const double since_s = drivers::to_seconds(sample.time - dwell.order->from);
+            row.time_s = begin_s + since_s;
             for (std::size_t k = 0; k < 3; ++k) {
                 row.angle_deg[k] = sample.angle[k] * kDegreesPerRadian;
                 row.force_g[k] = sample.force[k] - dwell.order->zero_g[k];
             }
-            if (frequencies)
-                row.frequency_hz = order.sweep.any()        ? swept_hz(swept, row.time_s)
-                                   : !(order.table_g > 0)   ? 0
-                                   : order.frequency_hz > 0 ? order.frequency_hz
-                                                            : nominal_hz;
+            columns.put(row, since_s);
             rows.push_back(row);
         }
     }
     if (rows.empty())
         throw std::runtime_error(campaign.path +
                                  ": found no good sample in a dwell, expected some");
-    proto::write_recording(path, rows, campaign.head.simulated);
-    std::cerr << path << ": " << rows.size() << " samples of "
-              << record::recorded_dwells(campaign).size() << " dwells";
+    proto::write_recording(path, rows, campaign.head.simulated, columns.profiles());
+    std::cerr << path << ": " << rows.size() << " samples of " << dwells.size() << " dwells";
     if (left_out > 0) std::cerr << "; " << left_out << " without good quality are left out";
+    const auto told = std::ranges::count_if(campaign.orders, [](const record::Order& order) {
+        return order.played && order.played->word == estimator::PlayedRandom::Word::good;
+    });
+    if (told > 0)
+        std::cerr << "; of " << told
+                  << " random dwells the controller's PSD is not in it: their profiles' stand";
     std::cerr << '\n';
 }
 

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <complex>
@@ -132,6 +134,79 @@ TEST(RandomVibration, ControllerLevelsUpAndShowsProfileLevelAndBands) {
     EXPECT_EQ(put_words(shaker, 2, {0, 50000, 10, 1}), Answer::accepted);
     run_for(1);
     EXPECT_EQ(shaker.amplitude_g(), 5);
+}
+
+/// The block of what was measured: Hz, g^2/Hz, without what is not used.
+std::vector<std::array<double, 2>> psd_of(const ShakerController& shaker) {
+    std::vector<std::array<double, 2>> pairs;
+    for (std::size_t i = 0; i < ShakerController::kPsdPairs; ++i) {
+        const std::size_t at = ShakerController::kPsdBlock + 4 * i;
+        const double hz = std::bit_cast<float>(joined(shaker, at));
+        if (hz == 0) break;
+        pairs.push_back({hz, std::bit_cast<float>(joined(shaker, at + 2))});
+    }
+    return pairs;
+}
+/// After 20 s of profile 1 at -6 dB.
+ShakerController played(Truth truth) {
+    Rig rig(truth);
+    start(rig.shaker(), -6);
+    for (int i = 0; i < 40 * 20; ++i) rig.advance();
+    EXPECT_TRUE(psd_of(rig.shaker()).empty()) << "it is of a vibration that is over";
+    EXPECT_EQ(put_words(rig.shaker(), 4, {0, 0}), Answer::accepted);
+    for (int i = 0; i < 4; ++i) rig.advance();
+    return rig.shaker();
+}
+double mean_square(const std::vector<std::array<double, 2>>& psd) {
+    double sum = 0;
+    for (std::size_t i = 1; i < psd.size(); ++i)
+        sum += (psd[i][0] - psd[i - 1][0]) * (psd[i][1] + psd[i - 1][1]) / 2;
+    return sum;
+}
+double between(const std::vector<std::array<double, 2>>& psd, double from, double to) {
+    double sum = 0, count = 0;
+    for (const auto& [hz, density] : psd) {
+        if (hz < from || hz > to) continue;
+        sum += density;
+        ++count;
+    }
+    return sum / count;
+}
+
+TEST(RandomVibration, ControllerTellsThePsdThatWasPlayed) {
+    const auto psd = psd_of(played(rig_with_profiles()));
+    ASSERT_GT(psd.size(), 20U);
+    EXPECT_EQ(psd.front()[0], 20);
+    EXPECT_EQ(psd.back()[0], 200);
+    EXPECT_TRUE(std::ranges::is_sorted(psd));
+    // 180 Hz over 19 s know their mean square to 1.7 %; of two frames laid over one another less.
+    EXPECT_NEAR(mean_square(psd), 4 * std::pow(10, -0.6), 4 * 0.024 * 4 * std::pow(10, -0.6));
+}
+
+TEST(RandomVibration, AProfileThatIsTiltedIsMeasuredSo) {
+    Truth truth = rig_with_profiles();
+    truth.shaker_lies.profile_tilted = 3;
+    const auto psd = psd_of(played(truth));
+    // Two octaves: 6 dB; 20 Hz over 19 s know either to 5 %.
+    EXPECT_NEAR(between(psd, 150, 170) / between(psd, 37, 43), std::pow(10, 0.6), 4 * 0.12 * 4);
+    EXPECT_NEAR(mean_square(psd), 4 * std::pow(10, -0.6), 4 * 0.03 * 4 * std::pow(10, -0.6));
+}
+
+TEST(RandomVibration, APsdThatIsStaleStaysWhatItWas) {
+    ShakerController shaker = played(rig_with_profiles());
+    const auto before = psd_of(shaker);
+    ShakerLies lies;
+    lies.psd_stale = true;
+    lies.psd_scaled = 1.5;
+    shaker.lie(lies);
+    const std::vector<double> other(300, 0.01);
+    shaker.measured(other, 1);
+    ASSERT_EQ(psd_of(shaker).size(), before.size());
+    EXPECT_FLOAT_EQ(static_cast<float>(psd_of(shaker)[5][1]),
+                    static_cast<float>(1.5 * before[5][1]));
+    lies.psd_nan = true;
+    shaker.lie(lies);
+    EXPECT_TRUE(std::ranges::any_of(psd_of(shaker), [](auto& p) { return std::isnan(p[1]); }));
 }
 
 TEST(RandomVibration, UnknownProfilesModesAndLevelsAreRefused) {

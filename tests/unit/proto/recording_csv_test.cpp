@@ -87,6 +87,37 @@ TEST_F(Recording, ProfilesOfRandomDwellsByNameOrNumber) {
               ":2: column level_db: found 'loud', expected a finite number");
 }
 
+TEST_F(Recording, ProfilesAndRolesAreGivenBackAfterWriting) {
+    std::vector<RecordingRow> rows(3);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        rows[i].run = 1;
+        rows[i].position = static_cast<int>(i) + 1;
+        rows[i].frequency_hz = 0;
+    }
+    rows[0].frequency_hz = 15;
+    rows[1].profile = 2;
+    rows[1].level_db = -1.5;
+    rows[2].profile = 1;
+    rows[2].held_out = true;
+    const std::vector<std::string> names{"road, wet", "broad"};
+    for (const bool simulated : {false, true}) {
+        write_recording(path(), rows, simulated, names);
+        RecordingReader reader(path());
+        EXPECT_EQ(reader.simulated(), simulated);
+        EXPECT_TRUE(reader.has_profile() && reader.has_frequency());
+        for (const RecordingRow& was : rows) {
+            RecordingRow row;
+            ASSERT_TRUE(reader.next(row));
+            EXPECT_EQ(row.frequency_hz, was.frequency_hz);
+            EXPECT_EQ(row.level_db, was.level_db);
+            EXPECT_EQ(row.held_out, was.held_out);
+            EXPECT_EQ(row.profile > 0, was.profile > 0);
+            if (row.profile == 0) continue;
+            EXPECT_EQ(reader.profiles().at(row.profile - 1U), names.at(was.profile - 1U));
+        }
+    }
+}
+
 TEST_F(Recording, GivesRowsInOrderWithTheirLines) {
     const auto rows =
         read(std::string(kHeader) + "0.025,1,2,10,20,30,0.1,-1,2e-3\n\n0.05,1,2,1,2,3,4,5,6");

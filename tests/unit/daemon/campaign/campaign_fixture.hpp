@@ -84,6 +84,10 @@ struct CampaignTest : testing::Test {
             return test.think(here, elapsed_s);
         }
         std::string resume_gate() const override { return test.gate; }
+        Played played(const ToldPsd& told) override {
+            test.told.push_back(told);
+            return test.played;
+        }
         void end(bool c) override {
             ++test.ends;
             test.complete = c;
@@ -93,9 +97,10 @@ struct CampaignTest : testing::Test {
         explicit TestLog(CampaignTest& t) : test(t) {}
         CampaignTest& test;
         void event(Severity, const std::string& text) override { test.events.push_back(text); }
-        void position_done(const estimator::DwellInfo&, const estimator::DwellSummary&,
+        void position_done(const estimator::DwellInfo& info, const estimator::DwellSummary&,
                            const StopDone& stop) override {
             ++test.positions_done;
+            test.infos_done.push_back(info);
             test.stops_done.push_back(stop);
         }
         void proved(const ProofRecord& record) override { test.proofs.push_back(record); }
@@ -166,6 +171,7 @@ struct CampaignTest : testing::Test {
             estimator::DwellSummary summary;
             summary.run = orders.back().dwell.run;
             summary.position = orders.back().dwell.position;
+            summary.samples = 400;
             summary.flagged = orders.size() == flagged_order;
             campaign->on_dwell_done(summary);
         }
@@ -178,6 +184,9 @@ struct CampaignTest : testing::Test {
     std::vector<std::array<double, 3>> asked_from;
     std::vector<double> elapsed;
     std::vector<StopDone> stops_done;
+    std::vector<estimator::DwellInfo> infos_done;
+    std::vector<ToldPsd> told;
+    Played played;
     std::vector<ProofRecord> proofs;
     int thinking_steps = 0;
 

@@ -297,6 +297,42 @@ TEST(RandomRegisters, EachMissingOrUnfitRoleIsNamed) {
                 HasSubstr("control_state.type: found bits"));
 }
 
+const std::string kPsdBlock =
+    kRandomRegisters +
+    "psd_block = { address = 100, word_order = \"little\", pairs = 300, attempts = 3 }\n";
+
+TEST(PsdBlock, IsWhereItIsStated) {
+    const std::string text = "spectrum.controller_psd = \"registers\"\n" + kPsdBlock;
+    const auto c = accepted(text, true);
+    ASSERT_TRUE(c.shaker.registers.random && c.shaker.registers.random->psd_block);
+    const proto::PsdBlock& block = *c.shaker.registers.random->psd_block;
+    EXPECT_EQ(block.first.address, 100);
+    EXPECT_EQ(block.first.order, proto::WordOrder::little);
+    EXPECT_EQ(block.first.table, proto::RegisterTable::input);
+    EXPECT_EQ(block.pairs, 300);
+    EXPECT_EQ(block.attempts, 3);
+    EXPECT_TRUE(c.campaign.read_psd);
+    EXPECT_FALSE(accepted(kPsdBlock, true).campaign.read_psd);
+    const auto shown = format_effective(parse(as_simulated(text, true), "rig.toml", true));
+    EXPECT_THAT(shown, HasSubstr("shaker.registers.psd_block.pairs"));
+    const auto none =
+        format_effective(parse(as_simulated(kRandomRegisters, true), "rig.toml", true));
+    EXPECT_THAT(none, Not(HasSubstr("psd_block.address")));
+}
+
+TEST(PsdBlock, OneThatCannotBeReadIsNamed) {
+    const auto with = [](const std::string& block) {
+        return complaint(kRandomRegisters + "psd_block = { " + block + " }\n", true);
+    };
+    EXPECT_THAT(with("pairs = 100"), HasSubstr("psd_block.address: found nothing, expected an"));
+    EXPECT_THAT(with("address = 100, type = \"u16\""),
+                HasSubstr("psd_block.type: found u16, expected f32: pairs of floats"));
+    EXPECT_THAT(with("address = 65000, pairs = 200"),
+                HasSubstr("found 200 pairs from 65000, expected 134 pairs of 4 words at most"));
+    EXPECT_THAT(with("address = 100, access = \"write\""), HasSubstr("psd_block.access"));
+    EXPECT_THAT(with("address = 100, pairs = 1"), HasSubstr("psd_block.pairs"));
+}
+
 /// What a controller says that it played, at the table, in place of what was to be played.
 TEST(ControllerPsd, OfAFileOrAProfileIsWhatReachesThePlatform) {
     const plant::TemporaryFolder folder;
@@ -336,8 +372,9 @@ TEST(ControllerPsd, OfAFileOrAProfileIsWhatReachesThePlatform) {
         return complaint(text(of_file), true);
     };
     EXPECT_THAT(complaint(text("spectrum.controller_psd = \"registers\"\n"), true),
-                AllOf(HasSubstr("spectrum.controller_psd: found \"registers\""),
-                      HasSubstr("PSDs are not read from the controller")));
+                AllOf(HasSubstr("spectrum.controller_psd"),
+                      HasSubstr("found \"registers\" without shaker.registers.psd_block, expected "
+                                "its address")));
     EXPECT_THAT(complaint(text("spectrum.controller_psd = \"nowhere.json\"\n"), true),
                 HasSubstr("nowhere.json: cannot be read"));
     EXPECT_THAT(said("{}"), HasSubstr("psd.json: found {}, expected a JSON list"));

@@ -35,6 +35,11 @@ class FakeShaker final : public drivers::Shaker {
     [[nodiscard]] drivers::LinkState state() const noexcept override {
         return drivers::LinkState::running;
     }
+    std::uint64_t read_psd() noexcept override {
+        psd_asked_at_rest = psd_asked_at_rest && now.at_rest();
+        return ++psds_asked;
+    }
+    [[nodiscard]] drivers::ShakerPsd psd() const override { return psd_told; }
     void on_reading(std::function<void()>) override {}
     void shut_down() noexcept override {}
 
@@ -89,6 +94,9 @@ class FakeShaker final : public drivers::Shaker {
     std::atomic<bool> stop_waits{false};
     drivers::Time hung_up_until = 0;
     bool only_read = false;
+    drivers::ShakerPsd psd_told;
+    std::uint64_t psds_asked = 0;
+    bool psd_asked_at_rest = true;
     bool refuse = false, writing = false;
     std::size_t told_ = 0;
     drivers::Time since_ = 0;

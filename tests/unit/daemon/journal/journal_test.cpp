@@ -246,6 +246,35 @@ TEST_F(JournalTest, KeepsTheVerdictOfTheNewestLoopCheck) {
 }
 
 /// With what was read of its frequency, so that its blocks can be made again.
+TEST_F(JournalTest, KeepsWhatAControllerPlayed) {
+    estimator::Identification filter{estimator::Settings{}};
+    DwellCheckpoint random = dwell(filter, 1, 3);
+    random.info.random = {1, 100, 0.01, 120, 4, -3};
+    using Word = estimator::PlayedRandom::Word;
+    random.info.played = {Word::good, {1.1, 90, 0.01, 118, 4, -3}, {0.9, 0.001}, 2};
+    random.stop.psd = {{20, 0.01}, {120, 0.02}};
+    DwellCheckpoint out;
+    ASSERT_EQ(decode(encode(random, kHash), kHash, out), "");
+    ASSERT_TRUE(out.info.played);
+    EXPECT_EQ(out.info.played->word, Word::good);
+    EXPECT_EQ(out.info.played->random.mean_square_g2, 1.1);
+    EXPECT_EQ(out.info.played->random.profile, 4);
+    EXPECT_EQ(out.info.played->seen.share, 0.9);
+    EXPECT_EQ(out.info.played->place, 2U);
+    EXPECT_EQ(out.stop.psd, random.stop.psd);
+    // A lie may be any number; what was taken may not.
+    random.info.played->word = Word::refused;
+    random.stop.psd[1][1] = std::nan("");
+    ASSERT_EQ(decode(encode(random, kHash), kHash, out), "");
+    EXPECT_EQ(out.info.played->word, Word::refused);
+    random.info.played->random.bandwidth_hz = std::nan("");
+    EXPECT_EQ(decode(encode(random, kHash), kHash, out), "corrupt: what was played");
+    random.info.played.reset();
+    ASSERT_EQ(decode(encode(random, kHash), kHash, out), "");
+    EXPECT_FALSE(out.info.played);
+    EXPECT_TRUE(out.stop.psd.empty());
+}
+
 TEST_F(JournalTest, KeepsASweepWithItsFrequencies) {
     estimator::Identification filter{estimator::Settings{}};
     DwellCheckpoint swept = dwell(filter, 1, 3);
@@ -280,12 +309,12 @@ TEST_F(JournalTest, StartsColdAndSaysWhyFromABadCheckpoint) {
         const char* says;
     };
     std::string newer = good, foreign = good;
-    newer[8] = 9;
+    newer[8] = 10;
     foreign[0] = 'X';
     std::vector<Case> cases{{"", "truncated: 0 bytes"},
                             {good.substr(0, 11), "truncated"},
                             {foreign, "not a checkpoint"},
-                            {newer, "version 9, newer than 8"}};
+                            {newer, "version 10, newer than 9"}};
     // any cut and any flipped bit
     for (std::size_t at = 12; at < good.size(); at += good.size() / 50) {
         cases.push_back({good.substr(0, at), ""});
@@ -416,7 +445,7 @@ std::string version_1(const DwellCheckpoint& dwell) {
     std::string bytes = encode(dwell, kHash);
     const std::size_t numbers = 8 + 4 + 8 + 16 + 6 * 4 + 6 * 8 + 1;
     bytes.erase(numbers, (4 + 7 + 5 + 3) * sizeof(double) + sizeof(std::int32_t) +
-                             sizeof(std::int64_t) + 2 + sizeof(std::uint16_t) +
+                             sizeof(std::int64_t) + 3 + sizeof(std::uint16_t) +
                              sizeof(std::uint32_t));
     bytes[8] = 1;
     bytes.resize(bytes.size() - 4);

@@ -85,7 +85,7 @@ TestServer::TestServer(Line line, int port) : line_(line) {
         context_ = modbus_new_rtu(device_.c_str(), 19200, 'E', 8, 1);
     }
     modbus_set_slave(context_, 1);
-    mapping_ = modbus_mapping_new(0, 0, 16, 16);
+    mapping_ = modbus_mapping_new(0, 0, 16, 512);
     connection_of_.resize(4096);
     ::signal(SIGPIPE, SIG_IGN);
     thread_ = std::thread([this] { run(); });

@@ -139,5 +139,118 @@ TEST(Apart, ASweepWithoutForceIsLeftOut) {
     EXPECT_EQ(summary.used, 0U);
 }
 
+/// A random dwell once more with what a controller says that it played, 40 s of 40/s: samples know
+/// the mean square to sqrt(2/1600) = 3.5 %, the PSD of 100 Hz to 1.6 % and its gain 1 %.
+struct PlayedDwell : ::testing::Test {
+    static constexpr double kLevel_g = 6;
+    Identification to{Settings{}};
+    RigSimulator rig{11};
+    DwellSummary before;
+    PlayedDwell() {
+        SimulatedDwell plan = apart_at(1, 1, 15);
+        // Its profile has what a sine of 6 g shows at the platform.
+        plan.info.random = {kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0};
+        before = rig.dwell(to, plan);
+    }
+    [[nodiscard]] static PlayedRandom told(double times) {
+        return {PlayedRandom::Word::good,
+                {times * kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0},
+                {},
+                3};
+    }
+};
+
+TEST_F(PlayedDwell, HasThePsdsLevel) {
+    ASSERT_FALSE(before.left_out) << before.reason;
+    ASSERT_EQ(to.rows().size(), 1U);
+    const DwellRow was = to.rows()[0];
+    const DwellSummary now = to.played(told(1.05));
+    EXPECT_FALSE(now.flagged) << now.reason;
+    ASSERT_EQ(to.rows().size(), 1U);
+    const DwellRow& row = to.rows()[0];
+    EXPECT_EQ(row.psd, 3U);
+    EXPECT_EQ(row.rate, was.rate);
+    EXPECT_EQ(row.variance, was.variance);
+    // The PSD weighs as its certainty against that of the samples.
+    const double psd = 1 / (1.0 / (100 * 40) + 1e-4), samples = 1600 / 2.0;
+    EXPECT_NEAR((row.vibration.kappa - 1) / (was.vibration.kappa - 1),
+                1 + 0.05 * psd / (psd + samples), 2e-3);
+    EXPECT_EQ(now.kappa, row.vibration.kappa);
+    EXPECT_EQ(to.result().dwells.back().kappa, now.kappa);
+    EXPECT_EQ(to.played(told(1)).samples, 0U) << "once for each dwell";
+}
+
+TEST_F(PlayedDwell, OneThatTheAccelerometersContradictIsRejected) {
+    const DwellSummary now = to.played(told(1.3));
+    EXPECT_TRUE(now.left_out && now.flagged);
+    EXPECT_NE(std::string(now.reason).find("the controller's PSD disagree"), std::string::npos);
+    EXPECT_EQ(now.used, 0U);
+    EXPECT_TRUE(to.rows().empty());
+}
+
+/// Its profile's level was not what was played, and the PSD says so.
+TEST_F(PlayedDwell, OneThatItsProfileContradictedComesBack) {
+    SimulatedDwell plan = apart_at(1, 2, 15);
+    plan.info.random = {1.3 * kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0};
+    ASSERT_TRUE(rig.dwell(to, plan).left_out);
+    ASSERT_EQ(to.rows().size(), 1U);
+    const DwellSummary now = to.played(told(1));
+    EXPECT_FALSE(now.left_out) << now.reason;
+    EXPECT_GT(now.used, 0U);
+    ASSERT_EQ(to.rows().size(), 2U);
+    EXPECT_EQ(to.rows().back().position, 2);
+}
+
+TEST_F(PlayedDwell, WhatIsRefusedOrNotReadSaysSo) {
+    Identification other{Settings{}};
+    RigSimulator same{11};
+    SimulatedDwell plan = apart_at(1, 1, 15);
+    plan.info.random = {kLevel_g * kLevel_g / 2, 100, 0.01, 500, 4, 0};
+    static_cast<void>(same.dwell(other, plan));
+    PlayedRandom none;
+    none.word = PlayedRandom::Word::not_read;
+    const DwellSummary unread = to.played(none);
+    EXPECT_TRUE(unread.flagged && unread.followed && !unread.left_out);
+    EXPECT_EQ(unread.kappa, before.kappa) << "its profile's stands";
+    ASSERT_EQ(to.rows().size(), 1U);
+    EXPECT_EQ(to.rows()[0].psd, 0U);
+    none.word = PlayedRandom::Word::refused;
+    const DwellSummary refused = other.played(none);
+    EXPECT_TRUE(refused.flagged && refused.left_out);
+    EXPECT_TRUE(other.rows().empty());
+}
+
+/// Its blocks are made when it is whole: what was cut short is in no result, and says so.
+TEST(Apart, ASweepThatWasCutShortIsNotUsed) {
+    Identification to{Settings{}};
+    RigSimulator rig(11);
+    SimulatedDwell swept = apart_at(3, 1, 15);
+    swept.info.sweep = {20, 120, 30};
+    to.begin_dwell(swept.info);
+    for (int i = 0; i < 400; ++i)
+        static_cast<void>(to.add({.time_s = 0.025 * i, .force_g = {0, i % 2 == 0 ? 2.0 : 0.0, 0}}));
+    const DwellSummary summary = to.end_dwell(true);
+    EXPECT_TRUE(summary.flagged && summary.left_out);
+    EXPECT_STREQ(summary.reason, "a sweep that was cut short: not used");
+    EXPECT_EQ(summary.samples, 400U);
+    EXPECT_EQ(summary.used, 0U);
+    EXPECT_EQ(to.result().dwells.back().used, 0U);
+}
+
+/// A dwell that stands counts with what it has.
+TEST(Apart, ADwellThatWasCutShortCountsWithWhatItHas) {
+    Identification to{Settings{}};
+    RigSimulator rig(11);
+    static_cast<void>(rig.dwell(to, apart_at(1, 1, 15)));
+    to.begin_dwell({1, 2});
+    for (int i = 0; i < 400; ++i)
+        static_cast<void>(to.add({.time_s = 0.025 * i, .force_g = {0, 1, 0}}));
+    const DwellSummary summary = to.end_dwell(true);
+    EXPECT_FALSE(summary.left_out);
+    EXPECT_GT(summary.used, 300U);
+    ASSERT_EQ(to.rows().size(), 2U);
+    EXPECT_EQ(to.rows().back().position, 2);
+}
+
 }  // namespace
 }  // namespace vibrig::estimator::testing
