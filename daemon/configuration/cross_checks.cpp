@@ -354,7 +354,8 @@ void CrossCheck::limits() {
     // Each level at its frequency, once.
     std::vector<std::pair<double, double>> asked;
     for (const auto& stop : c_.campaign.stops) {
-        if (stop.random) continue;  // its peaks are the profile's
+        // A profile's peaks are its own, and a sweep is looked at all along it.
+        if (stop.random || stop.sweep.any()) continue;
         const std::pair one{stop.table_g,
                             stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz};
         if (std::find(asked.begin(), asked.end(), one) == asked.end()) asked.push_back(one);
