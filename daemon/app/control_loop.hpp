@@ -108,44 +108,46 @@ class ControlLoop {
     void watch_device(drivers::Time now);
     [[nodiscard]] std::string device_not_known() const;
 
-    // What commissioning asks, tells and records (control_commission.cpp).
+    // What commissioning asks and tells (control_commission.cpp).
     void commission(WaitingCommand waiting, drivers::Time now);
     [[nodiscard]] CommandReply do_commission(const CommandRequest& request,
                                              const commission::Json& what, drivers::Time now);
-    [[nodiscard]] CommandReply enter_in_record(const CommandRequest& request,
-                                               const commission::Json& what, drivers::Time now);
     [[nodiscard]] CommandReply begin_commissioning(const CommandRequest& request,
                                                    const commission::Json& what, drivers::Time now);
     [[nodiscard]] commission::Progress progress() const;
     void keep_commissioned(journal::Commissioned row);
-    void keep_voided();
-    void keep_trials();
     void end_procedure(drivers::Time now);
-    void void_gyros(const std::string& why);
     [[nodiscard]] bool first_shaking() const;
-    [[nodiscard]] std::string registers_not_tried() const;
     void take_increments();
+    [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
+    /// Returns when to be called next at the latest.
+    [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);
+
+    // The record, which arming demands (control_record.cpp).
+    [[nodiscard]] CommandReply enter_in_record(const CommandRequest& request,
+                                               const commission::Json& what, drivers::Time now);
     [[nodiscard]] CommandReply accept_commissioning(const CommandRequest& request,
                                                     const std::string& second,
                                                     const commission::Json& confirmed_bits,
                                                     const configuration::Loaded& file);
-    [[nodiscard]] CommandReply sign_record(const CommandRequest& request,
-                                           const commission::Json& what);
     [[nodiscard]] CommandReply record_parts(const CommandRequest& request,
                                             const std::string& second,
                                             const std::vector<commission::Part>& parts,
                                             const commission::Json& evidence,
                                             const configuration::Loaded& as);
+    [[nodiscard]] CommandReply sign_record(const CommandRequest& request,
+                                           const commission::Json& what);
+    void take_proof();
     [[nodiscard]] commission::ShakerParts shaker_parts(
         const commission::AmplitudeWitness& witness) const;
-    void take_proof();
     [[nodiscard]] std::string enter_shaker_parts(const std::string& by,
                                                  const commission::AmplitudeWitness& witness);
     [[nodiscard]] CommandReply state_units(const CommandRequest& request,
                                            const commission::Json& what);
-    [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
-    /// Returns when to be called next at the latest.
-    [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);
+    [[nodiscard]] std::string registers_not_tried() const;
+    void keep_trials();
+    void keep_voided();
+    void void_gyros(const std::string& why);
 
     Parts& parts_;
     journal::Latches& latches_;

@@ -1,6 +1,8 @@
 // Valid bits, loop_closed, ready, fault: a bit that never changes proves nothing.
 #include "daemon/commission/bus_bits.hpp"
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -8,9 +10,36 @@
 
 #include "daemon/commission/record.hpp"
 #include "daemon/journal/latches.hpp"
+#include "daemon/record/digest.hpp"
 #include "proto/durable_file.hpp"
 
 namespace vibrig::commission {
+
+namespace {
+
+std::string digest_of_dbc(const std::string& path) {
+    return path.empty() ? record::sha256_of_text(std::string(proto::rig_dbc_text()))
+                        : record::sha256_of_file(path);
+}
+
+bool says_a_state(const std::string& key) {
+    constexpr std::array<const char*, 4> kStates{"can.signals.loop_closed",
+                                                 "can.signals.gyros_at_speed", "can.signals.ready",
+                                                 "can.signals.fault"};
+    return key.starts_with("can.signals.") &&
+           (key.ends_with("_valid") || std::ranges::find(kStates, key) != kStates.end());
+}
+
+}  // namespace
+
+int length_of(const proto::Dbc& dbc, const std::string& name) {
+    const auto dot = name.find('.');
+    const auto* const message = dbc.find(std::string_view(name).substr(0, dot));
+    const auto* const signal = message == nullptr || dot == std::string::npos
+                                   ? nullptr
+                                   : message->find(std::string_view(name).substr(dot + 1));
+    return signal == nullptr ? 0 : static_cast<int>(signal->length);
+}
 
 BitWatch::BitWatch(const proto::Dbc& dbc, const std::string& name) {
     for (const auto& message : dbc.messages)
@@ -51,6 +80,9 @@ BitBook::BitBook(const std::string& folder, std::string dbc_sha256)
     : path_((std::filesystem::path(folder) / "bus_bits.json").string()),
       dbc_sha256_(std::move(dbc_sha256)) {}
 
+BitBook::BitBook(const configuration::Configuration& c)
+    : BitBook(c.commission.folder, digest_of_dbc(c.dbc)) {}
+
 BitBook::Json BitBook::bits() const {
     std::ifstream file(path_);
     const Json all = file ? Json::parse(file, nullptr, false) : Json();
@@ -70,6 +102,29 @@ void BitBook::keep(const std::vector<BitProof>& bits, std::int64_t utc_ns) {
     proto::write_durably(
         path_, Json{{"version", 1}, {"dbc_sha256", dbc_sha256_}, {"bits", all}}.dump(1) + "\n",
         0644);
+}
+
+std::vector<std::string> unproven_bits(const configuration::Loaded& loaded, const proto::Dbc& dbc) {
+    const auto proven = BitBook(loaded.configuration).bits();
+    std::vector<std::string> names;
+    for (const auto& value : loaded.effective) {
+        if (!says_a_state(value.key)) continue;
+        const auto text = BitBook::Json::parse(value.value, nullptr, false);
+        const std::string name = text.is_string() ? text.get<std::string>() : std::string();
+        if (length_of(dbc, name) == 1 && !proven.contains(name) &&
+            std::ranges::find(names, name) == names.end())
+            names.push_back(name);
+    }
+    return names;
+}
+
+BitBook::Json with_confirmed(BitBook::Json bits, const BitBook::Json& names,
+                             const std::vector<std::string>& by, std::int64_t utc_ns) {
+    for (const auto& name : names)
+        if (name.is_string() && !bits.contains(name.get<std::string>()))
+            bits[name.get<std::string>()] = {
+                {"proven", "confirmed"}, {"by", by}, {"utc", instant_of(utc_ns)}};
+    return bits;
 }
 
 }  // namespace vibrig::commission

@@ -6,9 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "daemon/configuration/configuration.hpp"
 #include "proto/dbc.hpp"
 
 namespace vibrig::commission {
+
+/// Bits of "Message.Signal"; 0: the DBC has none of that name.
+[[nodiscard]] int length_of(const proto::Dbc& dbc, const std::string& name);
 
 /// A bit that somebody changes once, and back: of it alone is known that it says what it says.
 class BitWatch {
@@ -47,6 +51,9 @@ class BitBook {
 
     /// Of a DBC by the SHA-256 of its file: bits of another one do not count.
     BitBook(const std::string& folder, std::string dbc_sha256);
+    /// Of the configuration's DBC. Throws std::runtime_error that names the file: it cannot be
+    /// read.
+    explicit BitBook(const configuration::Configuration& c);
     /// In place of what was said of these bits. Throws std::runtime_error that names the file.
     void keep(const std::vector<BitProof>& bits, std::int64_t utc_ns);
     /// As it is kept, by the bits' names; empty: nothing of this DBC.
@@ -55,5 +62,13 @@ class BitBook {
   private:
     std::string path_, dbc_sha256_;
 };
+
+/// Valid bits, loop closed, gyros at speed, ready and fault of the configuration, "Message.Signal",
+/// of which nobody knows whether they say what they are called.
+[[nodiscard]] std::vector<std::string> unproven_bits(const configuration::Loaded& loaded,
+                                                     const proto::Dbc& dbc);
+/// What two persons confirm of bits that never changed, beside those that did.
+[[nodiscard]] BitBook::Json with_confirmed(BitBook::Json bits, const BitBook::Json& names,
+                                           const std::vector<std::string>& by, std::int64_t utc_ns);
 
 }  // namespace vibrig::commission

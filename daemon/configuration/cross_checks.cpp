@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "daemon/configuration/value.hpp"
-#include "estimator/spectrum/sampling.hpp"
 #include "estimator/uncertainty/budget.hpp"
 
 namespace vibrig::configuration {
@@ -352,24 +351,39 @@ void CrossCheck::limits() {
     }
     if (!sound({"campaign.table_g", "campaign.plan"})) return;
     // Each level at its frequency, once.
-    std::vector<std::pair<double, double>> asked;
+    struct Asked {
+        double g, hz;
+        std::size_t dwell = 0;  ///< of the plan, from 1; 0: by campaign.table_g
+    };
+    std::vector<Asked> asked;
     for (const auto& stop : c_.campaign.stops) {
+<<<<<<< HEAD
         // A profile's peaks are its own, and a sweep is looked at all along it.
         if (stop.random || stop.sweep.any()) continue;
         const std::pair one{stop.table_g,
                             stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz};
         if (std::find(asked.begin(), asked.end(), one) == asked.end()) asked.push_back(one);
+=======
+        if (stop.random) continue;  // its peaks are the profile's
+        const double hz = stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz;
+        const auto dwell = static_cast<std::size_t>(&stop - c_.campaign.stops.data()) + 1;
+        if (std::ranges::none_of(
+                asked, [&](const Asked& one) { return one.g == stop.table_g && one.hz == hz; }))
+            asked.push_back({stop.table_g, hz, dwell});
+>>>>>>> main
     }
     if (asked.empty()) {
-        for (const double g : c_.campaign.table_g) asked.emplace_back(g, c_.estimator.frequency_hz);
+        for (const double g : c_.campaign.table_g) asked.push_back({g, c_.estimator.frequency_hz});
     }
-    for (const auto& [a, f] : asked) {
+    for (const auto& [a, f, dwell] : asked) {
         const double omega = 2 * std::numbers::pi * f;
         const double mps2 = a * c_.estimator.gravity_mps2;
-        const std::string found = plain(a) + " g at " + plain(f) + " Hz";
+        const std::string found = (dwell > 0 ? "dwell " + std::to_string(dwell) + " with " : "") +
+                                  plain(a) + " g at " + plain(f) + " Hz";
         const auto check = [&](double value, double limit, const char* unit, const char* key) {
             if (value > limit) {
-                refuse({"campaign.table_g", "vibration.frequency_hz", key},
+                refuse({dwell > 0 ? "campaign.plan" : "campaign.table_g", "vibration.frequency_hz",
+                        key},
                        found + ", that is " + rounded(value) + " " + unit + " peak",
                        rounded(limit) + " " + unit + " at most (" + key + ")");
             }
@@ -378,53 +392,6 @@ void CrossCheck::limits() {
         check(mps2 / omega, c_.campaign.max_velocity_mps, "m/s", "shaker.limits.velocity_mps");
         check(mps2 / (omega * omega) * 1e3, c_.campaign.max_displacement_mm, "mm",
               "shaker.limits.displacement_mm");
-    }
-}
-
-void CrossCheck::frequency() {
-    if (!sound({"vibration.frequency_hz"}) || !sound({"campaign.table_g"})) {
-        return;
-    }
-    const bool vibrating = std::any_of(c_.campaign.table_g.begin(), c_.campaign.table_g.end(),
-                                       [](double g) { return g > 0; });
-    if (!vibrating) {
-        return;
-    }
-    const double f = c_.estimator.frequency_hz;
-    if (sound({"can.sample_rate_hz", "vibration.level_window_s"})) {
-        const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
-        const double margin = 2 / c_.estimator.level_window_s;
-        // f or 2 f aliases to zero frequency there, and no test on the data can tell. Faster
-        // vibration than the sample rate folds down: every multiple counts.
-        const double m = std::max(1.0, std::round(2 * f / rate));
-        if (std::abs(f - m * rate / 2) < margin) {
-            refuse({"vibration.frequency_hz", "can.sample_rate_hz"}, plain(f) + " Hz",
-                   "at least " + rounded(margin) + " Hz off " + rounded(m * rate / 2) +
-                       " Hz, where it aliases to zero at " + rounded(rate) +
-                       " samples/s; the nearest free one is " +
-                       plain(estimator::spectrum::nearest_free(
-                           f, rate, c_.estimator.level_window_s,
-                           estimator::spectrum::kHarmonicsPlanned)) +
-                       " Hz");
-        }
-    }
-    if (!sound({"vibration.transmission", "campaign.resonance_hz"})) {
-        return;
-    }
-    const double transmission = c_.estimator.transmission;
-    if (c_.campaign.resonance_hz > 0) {
-        const double lowest = std::numbers::sqrt2 * c_.campaign.resonance_hz;
-        if (f < lowest) {
-            refuse({"vibration.frequency_hz", "campaign.resonance_hz"}, plain(f) + " Hz",
-                   rounded(lowest) + " Hz at least, sqrt(2) times the isolators' resonance at " +
-                       plain(c_.campaign.resonance_hz) + " Hz, below which they amplify");
-        }
-    } else if (transmission > 1) {
-        // Above sqrt(2) f_n isolators attenuate; more than 1 means the resonance is near. Exactly
-        // 1: a rigid mount.
-        refuse({"vibration.transmission"}, plain(transmission) + " at " + plain(f) + " Hz",
-               "1 at most: isolators that amplify are near their resonance, and f must be above "
-               "sqrt(2) f_n");
     }
 }
 

@@ -15,6 +15,13 @@ namespace spectrum = estimator::spectrum;
 
 namespace {
 
+std::string another_frequency(double hz, double sample_hz, double window_s) {
+    return "another frequency: at " + rounded(sample_hz) +
+           " samples/s a harmonic of it falls on a multiple of the rate; the nearest free one is " +
+           rounded(spectrum::nearest_free(hz, sample_hz, window_s, spectrum::kHarmonicsPlanned)) +
+           " Hz";
+}
+
 /// A peak that a random vibration reaches 1 time in 400, and one that it hardly ever does.
 constexpr double kPeaks = 3, kHardlyEver = 5;
 /// Beyond it the interlock stops a random vibration.
@@ -50,6 +57,43 @@ std::optional<Motion> motion_of(const Configuration& c, const Configuration::Nam
 }
 
 }  // namespace
+
+void CrossCheck::frequency() {
+    if (!sound({"vibration.frequency_hz"}) || !sound({"campaign.table_g"})) {
+        return;
+    }
+    const bool vibrating = std::any_of(c_.campaign.table_g.begin(), c_.campaign.table_g.end(),
+                                       [](double g) { return g > 0; });
+    if (!vibrating) {
+        return;
+    }
+    const double f = c_.estimator.frequency_hz;
+    if (sound({"can.sample_rate_hz", "vibration.level_window_s"})) {
+        const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
+        // No test on the data can tell there.
+        if (estimator::spectrum::forbidden(f, rate, c_.estimator.level_window_s))
+            refuse({"vibration.frequency_hz", "can.sample_rate_hz"}, plain(f) + " Hz",
+                   another_frequency(f, rate, c_.estimator.level_window_s));
+    }
+    if (!sound({"vibration.transmission", "campaign.resonance_hz"})) {
+        return;
+    }
+    const double transmission = c_.estimator.transmission;
+    if (c_.campaign.resonance_hz > 0) {
+        const double lowest = std::numbers::sqrt2 * c_.campaign.resonance_hz;
+        if (f < lowest) {
+            refuse({"vibration.frequency_hz", "campaign.resonance_hz"}, plain(f) + " Hz",
+                   rounded(lowest) + " Hz at least, sqrt(2) times the isolators' resonance at " +
+                       plain(c_.campaign.resonance_hz) + " Hz, below which they amplify");
+        }
+    } else if (transmission > 1) {
+        // Above sqrt(2) f_n isolators attenuate; more than 1 means the resonance is near. Exactly
+        // 1: a rigid mount.
+        refuse({"vibration.transmission"}, plain(transmission) + " at " + plain(f) + " Hz",
+               "1 at most: isolators that amplify are near their resonance, and f must be above "
+               "sqrt(2) f_n");
+    }
+}
 
 void CrossCheck::mount() {
     const auto& s = c_.spectrum;
@@ -250,12 +294,7 @@ void CrossCheck::frequencies_of_plan() {
         };
         if (spectrum::forbidden(stop.frequency_hz, rate, window_s))
             return blame("can.sample_rate_hz",
-                         "another frequency: at " + rounded(rate) +
-                             " samples/s a harmonic of it falls on a multiple of the rate; the "
-                             "nearest free one is " +
-                             plain(spectrum::nearest_free(stop.frequency_hz, rate, window_s,
-                                                          spectrum::kHarmonicsPlanned)) +
-                             " Hz");
+                         another_frequency(stop.frequency_hz, rate, window_s));
         if (stop.frequency_hz < c_.spectrum.mount.lowest_hz())
             return blame("vibration.transmission", rounded(c_.spectrum.mount.lowest_hz()) +
                                                        " Hz at least: below it the isolators "

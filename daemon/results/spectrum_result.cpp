@@ -280,6 +280,8 @@ MatrixXd read_rows(const nlohmann::json& list) {
 Hypothesis read_hypothesis(const nlohmann::json& from) {
     Hypothesis one;
     one.weight = from.at("w").get<double>();
+    if (!(one.weight > 0 && one.weight <= 1))
+        throw std::runtime_error("w: found " + from.at("w").dump() + ", expected a weight to 1");
     const auto& hz = from.at("hz");
     const auto& damping = from.at("damping");
     if (hz.is_array()) {
@@ -292,8 +294,12 @@ Hypothesis read_hypothesis(const nlohmann::json& from) {
     one.covariance = read_rows(from.at("p"));
     const Index columns = kBase + kElastic * static_cast<Index>(one.resonances.size());
     if (one.x.size() != columns || one.covariance.rows() != one.covariance.cols())
-        throw std::runtime_error("found " + std::to_string(one.x.size()) +
-                                 " coefficients, expected " + std::to_string(columns));
+        throw std::runtime_error("found x of " + std::to_string(one.x.size()) + " and p of " +
+                                 std::to_string(one.covariance.rows()) + " x " +
+                                 std::to_string(one.covariance.cols()) + ", expected " +
+                                 std::to_string(columns) + " coefficients and a square");
+    if (!one.x.allFinite() || !one.covariance.allFinite())
+        throw std::runtime_error("x, p: found what is no number, expected numbers");
     one.linearised = one.covariance.rows() > one.x.size();
     return one;
 }
@@ -525,8 +531,18 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
     try {
         read_frame(member(spectrum, "platform", place), model.frame);
         for (std::size_t j = 0; j < 3; ++j) {
-            for (const auto& one : mixture.at(j)) model.mixture[j].push_back(read_hypothesis(one));
-            if (model.mixture[j].empty()) throw std::runtime_error("mixture: found it empty");
+            for (const auto& one : mixture.at(j)) {
+                try {
+                    model.mixture[j].push_back(read_hypothesis(one));
+                } catch (const std::runtime_error& error) {
+                    throw std::runtime_error(place + "mixture[" + std::to_string(j) + "][" +
+                                             std::to_string(model.mixture[j].size()) +
+                                             "]: " + error.what());
+                }
+            }
+            if (model.mixture[j].empty())
+                throw std::runtime_error(place + "mixture[" + std::to_string(j) +
+                                         "]: found it empty, expected hypotheses");
         }
         for (const auto& one : effects) {
             Effect effect{one.at("input").get<std::string>(), "", {}};
@@ -535,7 +551,7 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
                 const auto& heaviest = model.mixture[j].front();
                 if (effect.change[j].size() != heaviest.x.size())
                     throw std::runtime_error(
-                        "effects: found " + std::to_string(effect.change[j].size()) +
+                        place + "effects: found " + std::to_string(effect.change[j].size()) +
                         " numbers, expected " + std::to_string(heaviest.x.size()));
             }
             model.effects.push_back(std::move(effect));

@@ -21,6 +21,8 @@ Eigen::Matrix3d level_moment(const VibrationMoment& vibration) {
 }
 
 double Kind::hz() const noexcept {
+    if (profile.empty() && !bands.empty())
+        return std::ranges::max_element(bands, {}, &Band::share)->hz;
     double sum = 0;
     for (const Band& band : bands) sum += band.share * band.hz;
     return sum;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -47,6 +48,14 @@ std::string row_text(const char* format, Values... values) {
     return std::string(text.data()) + "\n";
 }
 
+nlohmann::json read_json(const std::string& path) {
+    std::ifstream file(path);
+    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
+    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
+    return root;
+}
+
 /// Dwells under the profile: what they showed, and where.
 struct Held {
     std::vector<Situation> situations;
@@ -61,13 +70,47 @@ bool under(const Profile& profile, const HeldOut& held) {
     constexpr double kSame = 0.02;
     const estimator::DwellRow& row = held.row;
     if (!(row.vibration.kappa > 1)) return false;
-    if (!profile.psd.empty()) return row.random && held.profile == profile.name;
-    return !row.random && (profile.sines.size() > 1 ||
-                           std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame);
+    if (!profile.psd.empty()) return row.random && held.kind.profile == profile.name;
+    if (row.random) return false;
+    if (profile.sines.size() == 1 && held.kind.bands.size() <= 1)
+        return std::abs(row.frequency_hz / profile.sines.front().first - 1) < kSame;
+    double all = 0;
+    for (const auto& [hz, peak] : profile.sines) all += peak * peak;
+    return held.kind.bands.size() == profile.sines.size() &&
+           std::ranges::all_of(profile.sines, [&](const auto& sine) {
+               return std::ranges::any_of(held.kind.bands, [&](const Band& band) {
+                   return std::abs(band.hz / sine.first - 1) < kSame &&
+                          std::abs(band.share - sine.second * sine.second / all) < kSame;
+               });
+           });
+}
+
+/// What a fit was made of proves nothing of it. `result`: of vibrig identify --json.
+void refuse_fitted(const nlohmann::json& result, const std::vector<HeldOut>& held,
+                   const std::string& recording) {
+    constexpr double kSameRate = 1e-9;  // deg/h; two dwells differ by their noise
+    const auto rows = result.find("dwell_rates");
+    if (rows == result.end() || !rows->is_array()) return;
+    for (const HeldOut& one : held) {
+        for (const auto& fitted : *rows) {
+            const auto rate = fitted.find("rate");
+            if (rate == fitted.end() || !rate->is_array() || rate->size() != 3) continue;
+            bool same = true;
+            for (std::size_t j = 0; same && j < 3; ++j)
+                same = (*rate)[j].is_number() &&
+                       std::abs((*rate)[j].get<double>() - one.row.rate[static_cast<Index>(j)]) <
+                           kSameRate;
+            if (same)
+                throw std::runtime_error(
+                    recording + ": found run " + std::to_string(one.row.run) + ", position " +
+                    std::to_string(one.row.position) +
+                    ", with which the result was fitted, expected dwells that it has not seen");
+        }
+    }
 }
 
 Held held_out(const std::string& recording, const std::string& config, const Profile& profile,
-              const AtPlatform& vibration) {
+              const AtPlatform& vibration, const nlohmann::json& result) {
     if (!profile.psd.empty() && !profile.sines.empty())
         throw std::runtime_error(
             "--verify: found a profile of psd and sines, expected one of them");
@@ -75,10 +118,12 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
     request.held_out = true;
     Identified found = identify_recording(recording, config, request);
     std::erase_if(found.held_out, [&](const HeldOut& one) { return !under(profile, one); });
+    refuse_fitted(result, found.held_out, recording);
     if (found.held_out.empty())
         throw std::runtime_error(
             recording + ": found no dwell " +
-            (profile.psd.empty() ? "at the profile's frequency"
+            (profile.psd.empty() ? profile.sines.size() > 1 ? "at the profile's frequencies"
+                                                            : "at the profile's frequency"
                                  : "under the profile '" + profile.name + "'") +
             " that can be used, expected one (in a campaign of role \"verify\")");
     Held held;
@@ -227,7 +272,8 @@ Predicted predict_for(const PredictOptions& options) {
         throw std::runtime_error("found no --profile, expected a JSON file or a name of --list");
     if (options.attitudes.empty() && options.recording.empty())
         throw std::runtime_error("found no --attitude, expected one or more, or --verify");
-    const Model model = read_model_file(options.result);
+    const nlohmann::json result = read_json(options.result);
+    const Model model = read_model(result, options.result);
     if (!model.refusal.empty() && !options.force)
         throw std::runtime_error(options.result + ": spectrum.refusal: found \"" + model.refusal +
                                  "\", expected a campaign that a model fits (or --force)");
@@ -248,7 +294,7 @@ Predicted predict_for(const PredictOptions& options) {
                               vibration.moment, vibration.bands, options.seconds});
     }
     if (!options.recording.empty()) {
-        out.held = held_out(options.recording, options.config, out.profile, vibration);
+        out.held = held_out(options.recording, options.config, out.profile, vibration, result);
         const Prediction of_held = predict(model, out.held.situations, how);
         out.verification =
             verify(of_held, out.held.rates, out.held.variances, out.held.relative_errors,

@@ -39,6 +39,12 @@ namespace {
 
 using proto::RecordingRow;
 
+std::string plain_number(double value) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%g", value);
+    return text.data();
+}
+
 /// A result, and what of the recording contradicts the configuration.
 struct Found {
     estimator::Result result;
@@ -239,10 +245,10 @@ DwellKinds kinds_of(const std::vector<Dwell>& dwells, const std::vector<std::str
 }
 
 /// A frequency of which a harmonic falls on a multiple of the sampling rate, where the recording
-/// itself names its frequencies: the level, and with it the row, would be wrong.
+/// or its spectra name its frequencies: the level, and with it the row, would be wrong.
 void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& rows,
-                      const estimator::Settings& settings, const std::string& file) {
-    if (rows.front().frequency_hz < 0) return;
+                      const estimator::Settings& settings, const std::string& file, bool spectra) {
+    if (rows.front().frequency_hz < 0 && !spectra) return;
     std::vector<double> times_s;
     for (std::size_t i = 0; i < std::min<std::size_t>(rows.size(), 1001); ++i)
         times_s.push_back(rows[i].time_s);
@@ -255,9 +261,10 @@ void refuse_forbidden(const DwellKinds& kinds, const std::vector<RecordingRow>& 
         if (!spectrum::forbidden(hz, 1 / period_s, window_s)) continue;
         std::array<char, 240> text{};
         std::snprintf(text.data(), text.size(),
-                      ": column frequency_hz: found %g Hz at %g samples/s, of which a harmonic "
+                      ": %s: found %g Hz at %g samples/s, of which a harmonic "
                       "falls on a multiple of the rate, expected another: the nearest is %g Hz",
-                      hz, 1 / period_s, spectrum::nearest_free(hz, 1 / period_s, window_s));
+                      spectra ? "--spectra" : "column frequency_hz", hz, 1 / period_s,
+                      spectrum::nearest_free(hz, 1 / period_s, window_s));
         throw std::runtime_error(file + text.data());
     }
 }
@@ -291,7 +298,7 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
     const DwellKinds kinds = kinds_of(dwells, profiles, rig, request, file);
     const auto reference = kinds.reference();
     if (reference) settings.frequency_hz = kinds.kinds()[*reference].hz();
-    refuse_forbidden(kinds, rows, settings, file);
+    refuse_forbidden(kinds, rows, settings, file, !request.spectra.empty());
     refuse_unseen(kinds, settings, file);
     const bool common_clock = has_common_clock(dwells);
     estimator::Identification identification(settings, dwells.size());
@@ -334,6 +341,14 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
                                          ": found a dwell at rest that vibrates by " +
                                          std::to_string(std::sqrt(2 * (row.vibration.kappa - 1))) +
                                          " g, expected its frequency");
+            // As rest, what shook unseen would be gravity's.
+            if (!shook && kind)
+                throw std::runtime_error(file + ":" + std::to_string(dwell.rows.front()->line) +
+                                         ": found a dwell in which nothing vibrates, expected " +
+                                         (random
+                                              ? "profile '" + kinds.kinds()[*kind].profile + "'"
+                                              : plain_number(kinds.kinds()[*kind].hz()) + " Hz") +
+                                         ", with which it is said to have shaken");
             found.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
         }
     }
@@ -431,7 +446,8 @@ bool is_campaign(const std::string& argument) {
 std::vector<HeldOut> held_out_of(const Found& found) {
     std::vector<HeldOut> list;
     for (const auto& dwell : found.spectral)
-        list.push_back({dwell.row, dwell.kind ? found.kinds[*dwell.kind].profile : ""});
+        list.push_back(
+            {dwell.row, dwell.kind ? found.kinds[*dwell.kind] : estimator::spectrum::Kind{}});
     return list;
 }
 
@@ -484,7 +500,10 @@ Identified identify_recording(const std::string& file, const std::string& config
         const auto profile = std::ranges::find_if(
             found.profiles, [&row](const auto& one) { return one.first == row.profile; });
         if (row.random && profile == found.profiles.end()) continue;
-        identified.held_out.push_back({row, row.random ? profile->second.profile : ""});
+        const double hz =
+            row.commanded_hz > 0 ? row.commanded_hz : identified.settings.frequency_hz;
+        identified.held_out.push_back(
+            {row, row.random ? profile->second : estimator::spectrum::Kind{"", {{hz, 1, 0}}}});
     }
     contradict(identified.assessed.verdict, found.contradiction);
     return identified;

@@ -14,7 +14,7 @@ namespace vibrig::tool {
 /// A dwell that a result is tried on, and the name of the profile that shook it; none: a sine.
 struct HeldOut {
     estimator::DwellRow row;
-    std::string profile;
+    estimator::spectrum::Kind kind;  ///< of what it shook with
 };
 
 /// What a recording gives: coefficients, and what can be believed of them.

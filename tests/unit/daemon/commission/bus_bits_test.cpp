@@ -64,5 +64,42 @@ TEST_F(Bits, AreKeptOfOneDbcAndNoOther) {
     EXPECT_TRUE(BitBook(folder.string(), "abd").bits().empty());
 }
 
+TEST_F(Bits, OfAConfigurationAreUnprovenUntilSomebodyHasThem) {
+    configuration::Loaded loaded;
+    loaded.configuration.commission.folder = folder.string();
+    const auto says = [&loaded](const char* key, const char* value) {
+        configuration::EffectiveValue one;
+        one.key = key;
+        one.value = value;
+        loaded.effective.push_back(one);
+    };
+    says("can.signals.outer_valid", R"("Resolvers.OuterValid")");
+    says("can.signals.inner_valid", R"("Resolvers.OuterValid")");
+    says("can.signals.fault", R"("Status.Nothing")");
+    says("can.signals.outer", R"("Resolvers.Outer")");
+    says("can.signals.ready", "not JSON");
+    EXPECT_THAT(unproven_bits(loaded, dbc), ElementsAre("Resolvers.OuterValid")) << "once";
+    BitBook book(loaded.configuration);
+    book.keep({{"Resolvers.OuterValid", true, {"Ada"}, 1}}, 0);
+    EXPECT_THAT(unproven_bits(loaded, dbc), IsEmpty());
+    loaded.configuration.dbc = "/nowhere/rig.dbc";
+    EXPECT_THROW(unproven_bits(loaded, dbc), std::runtime_error);
+}
+
+TEST_F(Bits, AConfirmationDoesNotReplaceAProof) {
+    const BitBook::Json proven{{"a.b", {{"proven", "changed once and back"}}}};
+    const auto all = with_confirmed(proven, BitBook::Json{"a.b", "c.d", 7}, {"Ada", "Bo"}, 0);
+    EXPECT_EQ(all["a.b"]["proven"], "changed once and back");
+    EXPECT_EQ(all["c.d"]["proven"], "confirmed");
+    EXPECT_EQ(all["c.d"]["by"][1], "Bo");
+    EXPECT_EQ(all.size(), 2U);
+}
+
+TEST_F(Bits, LengthIsTheSignalsOrNone) {
+    EXPECT_EQ(length_of(dbc, "Resolvers.OuterValid"), 1);
+    for (const char* name : {"", "Resolvers", "Resolvers.", ".OuterValid", "Nothing.OuterValid"})
+        EXPECT_EQ(length_of(dbc, name), 0) << name;
+}
+
 }  // namespace
 }  // namespace vibrig::commission

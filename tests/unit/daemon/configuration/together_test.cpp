@@ -186,20 +186,24 @@ TEST(Together, SetPointsBeyondTheShakerAreRefusedWithTheNumbers) {
 
 TEST(Together, FrequenciesThatAliasToZeroAreRefused) {
     const std::string no_stroke = "campaign.table_g = [1]\ncampaign.resonance_hz = 5\n";
-    // at 40 samples/s and a 10 s window: 20 and 40 Hz, 0.2 Hz to both sides
-    for (const char* f : {"19.9", "20", "20.15", "39.85", "40", "60"}) {
+    // at 40 samples/s and a 10 s window: f, or a harmonic of it to the fifth, within 0.4 Hz of a
+    // multiple of 40 Hz
+    for (const char* f : {"19.9", "20", "20.15", "39.85", "40", "60", "24", "56", "40.3", "39.7",
+                          "13.3", "10.05"}) {
         EXPECT_THAT(complaint(no_stroke + "vibration.frequency_hz = " + f, true),
-                    HasSubstr("aliases to zero"))
+                    HasSubstr("a harmonic of it falls on a multiple of the rate"))
             << f;
     }
-    for (const char* f : {"15", "19.7", "20.3", "39.7"}) {
+    EXPECT_THAT(complaint(no_stroke + "vibration.frequency_hz = 40.3", true),
+                HasSubstr("the nearest free one is 40.4 Hz"));
+    for (const char* f : {"15", "19.7", "20.3", "39.5"}) {
         EXPECT_EQ(complaint(no_stroke + "vibration.frequency_hz = " + f, true), "") << f;
     }
     // a shorter window has wider side bands
     EXPECT_THAT(complaint(no_stroke + "vibration.frequency_hz = 19.5\n"
                                       "vibration.level_window_s = 2",
                           true),
-                HasSubstr("at least 1 Hz off 20 Hz"));
+                HasSubstr("the nearest free one is"));
     EXPECT_EQ(complaint("vibration.frequency_hz = 20\ncampaign.table_g = [0]", true), "")
         << "at rest there is no frequency";
 }

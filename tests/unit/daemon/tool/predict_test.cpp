@@ -96,6 +96,14 @@ class Predict : public ::testing::Test {
     static void write(const std::string& name, const std::string& text) {
         std::ofstream(folder() / name, std::ios::binary) << text;
     }
+    /// The same of run 1 at all fourteen positions.
+    static std::string spectra_of(const std::string& lines) {
+        std::string list;
+        for (int p = 1; p <= 14; ++p)
+            list += (p > 1 ? ", " : "") + (R"({"run": 1, "position": )" + std::to_string(p)) +
+                    R"(, "lines": )" + lines + "}";
+        return "[" + list + "]";
+    }
     static PredictJson result() { return PredictJson::parse(content("result.json")); }
     static void write_without_elastic_part(const std::string& name,
                                            const char* of = "result.json") {
@@ -425,6 +433,62 @@ TEST_F(Predict, ForbiddenFrequencyIsRefusedAndTheNearestFreeOneNamed) {
     EXPECT_THAT(ended.error, HasSubstr("closed.csv: column frequency_hz: found 60 Hz at 40 "
                                        "samples/s"));
     EXPECT_THAT(ended.error, HasSubstr("the nearest is 60.2 Hz"));
+}
+
+TEST_F(Predict, SpectraThatCannotBeAreRefused) {
+    ASSERT_EQ(
+        plant("--truth truth.json --dwell 5 --table-g 6 --frequency 60 -o at60.csv").exit_code, 0);
+    write("closed.json", spectra_of("[[60, 6]]"));
+    Ended ended = run("identify at60.csv --spectra closed.json");
+    EXPECT_EQ(ended.exit_code, 2) << ended.out;
+    EXPECT_THAT(ended.error, HasSubstr("--spectra: found 60 Hz at 40 samples/s"));
+    // A dwell that is said to have shaken, and did not.
+    ASSERT_EQ(plant("--truth truth.json --dwell 5 --table-g 0 -o rest.csv").exit_code, 0);
+    write("shaken.json", spectra_of("[[15, 6]]"));
+    ended = run("identify rest.csv --spectra shaken.json");
+    EXPECT_EQ(ended.exit_code, 2) << ended.out;
+    EXPECT_THAT(ended.error, HasSubstr("found a dwell in which nothing vibrates, expected 15 Hz"));
+}
+
+TEST_F(Predict, HarmonicsOfASineAreLinesAndTheStrongestIsItsFrequency) {
+    ASSERT_EQ(plant("--truth truth.json --dwell 20 --table-g 6 -o sine.csv").exit_code, 0);
+    write("harmonic.json", spectra_of("[[30, 0.3], [15, 6]]"));
+    const Ended ended = run("identify sine.csv --spectra harmonic.json --json");
+    ASSERT_NE(ended.exit_code, 2) << ended.error;
+    const PredictJson rows = ended.json()["dwell_rates"];
+    EXPECT_EQ(rows.size(), 14U) << ended.error;
+    EXPECT_EQ(ended.json()["spectrum"]["frequencies"][0]["hz"], 15);
+}
+
+TEST_F(Predict, WhatWasFittedProvesNothing) {
+    write("p15.json", R"({"name": "15 Hz", "sines": [[15, 6]]})");
+    const Ended ended = run("predict result.json --profile p15.json --verify survey.csv");
+    EXPECT_EQ(ended.exit_code, 2) << ended.out;
+    EXPECT_THAT(ended.error, HasSubstr("with which the result was fitted, expected dwells"));
+}
+
+TEST_F(Predict, AProfileOfTwoSinesIsNotProvenByDwellsOfOne) {
+    write("two_sines.json", R"({"name": "two", "sines": [[55, 3], [90, 2]]})");
+    const Ended ended = run(
+        "predict result.json --profile two_sines.json --verify held_out.csv --config held.toml");
+    EXPECT_EQ(ended.exit_code, 2) << ended.out;
+    EXPECT_THAT(ended.error, HasSubstr("found no dwell at the profile's frequencies"));
+}
+
+TEST_F(Predict, ADamagedResultIsNamedByItsPlace) {
+    const auto damaged = [&](auto&& damage, const char* message) {
+        PredictJson of = result();
+        damage(of["spectrum"]["mixture"][1][0]);
+        write("damaged.json", of.dump());
+        const Ended ended = run("predict damaged.json --profile truck --attitude 0,0,0");
+        EXPECT_EQ(ended.exit_code, 2) << ended.out;
+        EXPECT_THAT(ended.error,
+                    HasSubstr(std::string("damaged.json: spectrum.mixture[1][0]: ") + message));
+    };
+    damaged([](PredictJson& one) { one["p"].erase(0); }, "found x of 16 and p of 15 x 16");
+    damaged([](PredictJson& one) { one["x"].erase(0); }, "found x of 15 and p of 16 x 16");
+    damaged([](PredictJson& one) { one["w"] = -0.5; }, "w: found -0.5");
+    damaged([](PredictJson& one) { one["w"] = 3; }, "w: found 3");
 }
 
 TEST_F(Predict, SpectraOfARecordingWithoutTheColumn) {
