@@ -188,7 +188,13 @@ TEST_F(SweepsCommand, WrongInputIsOneClearError) {
         {"--sweeps 20,60 --sweep-s 9 --config hard.toml", "--sweep-s"},
         {"--sweep-s 100 --config hard.toml", "--sweeps"},
         {"--sweeps 20,60 --evaluate p.json --config hard.toml", "--evaluate"},
-        {"--sweeps 20,60 --turntable", "--turntable"}};
+        {"--sweeps 20,60 --turntable", "--turntable"},
+        {"--about nothing.json", "nothing.json: cannot be read, expected a JSON file"},
+        {"--about empty.json", "empty.json: spectrum: found nothing, expected the result of"},
+        {"--about none.json", "none.json: found no JSON"},
+        {"--about empty.json --highest 100", "--about"}};
+    write("empty.json", "{}");
+    write("none.json", "no");
     for (const auto& [arguments, words] : told) {
         EXPECT_EQ(vibrig("plan " + arguments), 2) << arguments;
         EXPECT_NE(error.find(words), std::string::npos) << arguments << ": " << error;
