@@ -357,20 +357,13 @@ void CrossCheck::limits() {
     };
     std::vector<Asked> asked;
     for (const auto& stop : c_.campaign.stops) {
-<<<<<<< HEAD
         // A profile's peaks are its own, and a sweep is looked at all along it.
         if (stop.random || stop.sweep.any()) continue;
-        const std::pair one{stop.table_g,
-                            stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz};
-        if (std::find(asked.begin(), asked.end(), one) == asked.end()) asked.push_back(one);
-=======
-        if (stop.random) continue;  // its peaks are the profile's
         const double hz = stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz;
         const auto dwell = static_cast<std::size_t>(&stop - c_.campaign.stops.data()) + 1;
         if (std::ranges::none_of(
                 asked, [&](const Asked& one) { return one.g == stop.table_g && one.hz == hz; }))
             asked.push_back({stop.table_g, hz, dwell});
->>>>>>> main
     }
     if (asked.empty()) {
         for (const double g : c_.campaign.table_g) asked.push_back({g, c_.estimator.frequency_hz});
