@@ -8,7 +8,6 @@
 #include "daemon/campaign/stages/levelling.hpp"
 #include "daemon/campaign/stages/stop_proof.hpp"
 #include "daemon/campaign/stages/zeroing.hpp"
-#include "daemon/campaign/sweep_watch.hpp"
 #include "estimator/identification/result.hpp"
 
 namespace vibrig::campaign {
@@ -64,7 +63,7 @@ double Campaign::expected_stop_s() const {
     if (stops_.empty()) return nominal_stop_s();
     double slew_s = 0;  // and what sweeps take longer
     for (const auto& [stop, run, position] : stops_) {
-        if (stop.sweep.any()) slew_s += SweepWatch::dwell_s(stop.sweep) - settings_.dwell_s;
+        if (stop.sweep.any()) slew_s += settings_.dwell_s_of(stop) - settings_.dwell_s;
     }
     for (std::size_t i = 1; i < stops_.size(); ++i) {
         double farthest_deg = 0;

@@ -15,6 +15,7 @@
 #include "drivers/shaker/shaker.hpp"
 #include "estimator/filter/measurement.hpp"
 #include "estimator/filter/settings.hpp"
+#include "estimator/spectrum/sweep_bounds.hpp"
 
 namespace vibrig::campaign {
 
@@ -183,6 +184,13 @@ struct Settings {
     double max_velocity_mps = 1.5;
     double max_displacement_mm = 12.0;  ///< peak
     double resonance_hz = 0.0;          ///< of the isolators; 0: from frequency and transmission
+    estimator::spectrum::SweptBy swept_by;
+
+    /// How long its dwell takes, s; that of a sweep is as long as the latest honest one.
+    [[nodiscard]] double dwell_s_of(const Stop& one) const {
+        return one.sweep.any() ? estimator::spectrum::SweepBounds(one.sweep, swept_by).dwell_s()
+                               : dwell_s;
+    }
 };
 
 }  // namespace vibrig::campaign

@@ -10,24 +10,27 @@ using drivers::Time;
 
 namespace {
 
-// A register resolves 1 mHz; a controller's own measurement of it is less sure.
-constexpr double kResolved = 2e-3;
 // One second may be spoilt by a register that comes late.
 constexpr int kMostSpoilt = 2;
 
 }  // namespace
 
-double SweepWatch::dwell_s(const estimator::SweptSine& sweep) {
-    return kBegins_s + kLate_s + (1 + kLate) * sweep.seconds;
-}
-
-SweepWatch::SweepWatch(const estimator::Settings& rig, const rt::DwellOrder& order, Time at_level)
+SweepWatch::SweepWatch(const estimator::Settings& rig, const rt::DwellOrder& order, Time at_level,
+                       const estimator::spectrum::SweptBy& by)
     : of_(order.dwell.sweep),
+      bounds_(of_, by),
+      step_hz_(by.frequency_step_hz),
       octaves_(std::abs(std::log2(of_.to_hz / of_.from_hz))),
       from_(order.from),
       at_level_(at_level),
       zero_g_(order.zero_g),
       read_(rig, order.dwell.run, order.dwell.position) {}
+
+bool SweepWatch::moved() const {
+    constexpr double kRounding = 1 + 1e-6;
+    const auto& all = read_.readings();
+    return !all.empty() && std::abs(all.back()[1] - of_.from_hz) > kRounding * step_hz_;
+}
 
 std::optional<Time> SweepWatch::begun() const {
     if (!begins_s_) return {};
@@ -41,28 +44,29 @@ std::string SweepWatch::frequency(Time at, double hz) {
     const double time_s = drivers::to_seconds(at - from_);
     if (!(std::isfinite(hz) && hz > 0))
         return fmt::format("the controller says {:g} Hz, {}", hz, asked);
-    const double way = std::log(hz / of_.from_hz) / std::log(of_.to_hz / of_.from_hz);
-    const double slack = kResolved / std::abs(std::log(of_.to_hz / of_.from_hz));
-    if (way < -slack || way > 1 + slack)
+    // Hz past its beginning and its end, in the direction of the sweep.
+    const double direction = of_.to_hz > of_.from_hz ? 1 : -1;
+    const double gone_hz = direction * (hz - of_.from_hz), over_hz = direction * (hz - of_.to_hz);
+    if (gone_hz < -bounds_.off_hz() || over_hz > bounds_.off_hz())
         return fmt::format(
             "the controller is at {:.3f} Hz, {}: {}", hz, asked,
-            way < 0 ? "it goes the other way, or stands elsewhere" : "it goes beyond its end");
+            gone_hz < 0 ? "it goes the other way, or stands elsewhere" : "it goes beyond its end");
     read_.frequency(time_s, hz);
-    if (way <= slack && !began_s_) {
-        if (drivers::to_seconds(at - at_level_) <= kBegins_s) return contradicted();
-        return fmt::format("the controller stands still at {:.3f} Hz {:g} s after its level, {}",
-                           hz, kBegins_s, asked);
+    if (gone_hz <= bounds_.off_hz() && !began_s_) {
+        if (drivers::to_seconds(at - at_level_) <= bounds_.begins_s()) return contradicted();
+        return fmt::format("the controller stands still at {:.3f} Hz {:.1f} s after its level, {}",
+                           hz, bounds_.begins_s(), asked);
     }
+    const double way = std::log(hz / of_.from_hz) / std::log(of_.to_hz / of_.from_hz);
     const double begins_s = time_s - way * of_.seconds;
     if (!began_s_) began_s_ = begins_s;
-    const double lasted_s = std::max(0.0, time_s - *began_s_);
-    // At its end it stays.
-    const double late_s = begins_s - *began_s_;
-    const double may_s = kLate_s + kLate * std::min(lasted_s, of_.seconds);
-    if (late_s < -may_s || (late_s > may_s && way < 1 - slack))
+    const double lasted_s = time_s - *began_s_, late_s = begins_s - *began_s_;
+    const double may_s = bounds_.late_s(hz, lasted_s);
+    const bool there = over_hz >= -bounds_.off_hz();  // where it stays
+    if (late_s < -may_s || (late_s > may_s && !there))
         return fmt::format("the controller is at {:.3f} Hz {:.1f} s after it began, {}", hz,
                            lasted_s, asked);
-    if (way < 1 - slack) begins_s_ = begins_s;
+    if (!there) begins_s_ = begins_s;
     return contradicted();
 }
 

@@ -7,27 +7,28 @@
 #include "daemon/rt/dwell_order.hpp"
 #include "daemon/rt/stage_feed.hpp"
 #include "estimator/spectrum/read_sweep.hpp"
+#include "estimator/spectrum/sweep_bounds.hpp"
 
 namespace vibrig::campaign {
 
 /// Whether a sweep goes as it was asked for: by what the controller says of its frequency, and by
-/// what the accelerometers make of that. Makes its blocks on the way. Control thread only.
+/// what the accelerometers make of that. How far it may be off follows from the sweep, the
+/// registers and their polling, and what the controller states: estimator::spectrum::SweepBounds.
+/// Makes its blocks on the way. Control thread only.
 class SweepWatch {
   public:
-    /// The controller begins so long after the level is there, at the latest.
-    static constexpr double kBegins_s = 10;
-    /// A sweep is off by so much, and by so much of what it has lasted, at most.
-    static constexpr double kLate_s = 1.5, kLate = 0.05;
-    /// How long a dwell with this sweep takes, s.
-    [[nodiscard]] static double dwell_s(const estimator::SweptSine& sweep);
-
-    /// `at_level`: since when the level is there.
-    SweepWatch(const estimator::Settings& rig, const rt::DwellOrder& order, drivers::Time at_level);
+    /// `at_level`: since when the level is there; `by`: how the controller sweeps, and is read.
+    SweepWatch(const estimator::Settings& rig, const rt::DwellOrder& order, drivers::Time at_level,
+               const estimator::spectrum::SweptBy& by);
 
     /// What the controller says of its frequency. Why that is not what was asked for, else empty.
     [[nodiscard]] std::string frequency(drivers::Time at, double hz);
     void add(const rt::Motion& sample);
 
+    /// The newest reading says another frequency than the first one, by more than its register's
+    /// step: from here on what the accelerometers show is judged along the sweep, not at its
+    /// beginning.
+    [[nodiscard]] bool moved() const;
     /// When it began, as far as the newest reading knows; none: it has not yet.
     [[nodiscard]] std::optional<drivers::Time> begun() const;
     [[nodiscard]] double octaves_per_s() const { return octaves_ / of_.seconds; }
@@ -41,6 +42,8 @@ class SweepWatch {
     [[nodiscard]] std::string contradicted();
 
     estimator::SweptSine of_;
+    estimator::spectrum::SweepBounds bounds_;
+    double step_hz_;  ///< of the register
     double octaves_;
     drivers::Time from_, at_level_;
     std::array<double, 3> zero_g_;

@@ -424,6 +424,11 @@ Loaded parse(const std::string& text, const std::string& name, bool daemon) {
         static_cast<std::uint32_t>(std::max(1.0, std::round(0.1 / c.campaign.sample_s)));
 
     take_seen(c);
+    c.campaign.swept_by.poll_s = drivers::to_seconds(c.shaker.poll_period);
+    if (const auto& sweep = c.shaker.registers.sweep) {
+        c.campaign.swept_by.frequency_step_hz = sweep->actual_frequency.scale;
+        c.campaign.swept_by.rate_step = sweep->rate.scale;
+    }
     resolve(c.campaign.plan, std::filesystem::path(name).parent_path());
     if (!c.campaign.plan.empty()) {
         try {

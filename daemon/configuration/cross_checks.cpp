@@ -357,7 +357,8 @@ void CrossCheck::limits() {
     };
     std::vector<Asked> asked;
     for (const auto& stop : c_.campaign.stops) {
-        if (stop.random) continue;  // its peaks are the profile's
+        // A profile's peaks are its own, and a sweep is looked at all along it.
+        if (stop.random || stop.sweep.any()) continue;
         const double hz = stop.frequency_hz > 0 ? stop.frequency_hz : c_.estimator.frequency_hz;
         const auto dwell = static_cast<std::size_t>(&stop - c_.campaign.stops.data()) + 1;
         if (std::ranges::none_of(

@@ -288,6 +288,12 @@ void add_spectrum_keys(std::vector<Key>& keys) {
                           "of the mean square that the controller plays about a profile, relative, "
                           "1 sigma",
                           [](C& c) -> double& { return c.spectrum.controller_gain; }));
+    keys.push_back(number("spectrum.sweep_begins_s", "s", {0, 60},
+                          "that a controller lets pass between its level and its sweep, at most",
+                          [](C& c) -> double& { return c.campaign.swept_by.begins_s; }));
+    keys.push_back(number("spectrum.sweep_rate_tolerance", "", {0, 0.3},
+                          "of a controller's sweep rate, relative, at most",
+                          [](C& c) -> double& { return c.campaign.swept_by.rate_tolerance; }));
     keys.push_back(text(
         "spectrum.controller_psd", "\"nominal\", \"registers\", \"profile\" or a file",
         "how a random profile lies over frequency at the table: as stated; as the controller says "

@@ -233,6 +233,14 @@ void CrossCheck::sweeps_of_plan() {
                          "actual_frequency");
         if (!c_.spectrum.mixed)
             return blame("spectrum.mode", "", "spectrum.mode \"mixed\" for sweeps");
+        const double octaves_per_minute =
+            60 * std::abs(std::log2(sweep.to_hz / sweep.from_hz)) / sweep.seconds;
+        if (std::round(octaves_per_minute / c_.shaker.registers.sweep->rate.scale) < 1)
+            return blame("shaker.registers",
+                         " in " + plain(sweep.seconds) + " s, " + rounded(octaves_per_minute) +
+                             " octaves a minute",
+                         plain(c_.shaker.registers.sweep->rate.scale) +
+                             " at least, the step of shaker.registers.sweep_rate");
         if (!(stop.table_g > 0)) return blame("campaign.plan", " at 0 g", "a level");
         if (stop.verify)
             return blame("campaign.plan", " with role \"verify\"",

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <stdexcept>
@@ -567,6 +568,14 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
                                  ", expected the result of vibrig identify --json");
     }
     return model;
+}
+
+Model read_model_file(const std::string& path) {
+    std::ifstream file(path);
+    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
+    const nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
+    return read_model(root, path);
 }
 
 }  // namespace vibrig::tool

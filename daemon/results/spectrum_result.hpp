@@ -73,5 +73,7 @@ void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 /// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
                                                     const std::string& path);
+/// The same of a file of vibrig identify --json, or a campaign's result.json.
+[[nodiscard]] estimator::spectrum::Model read_model_file(const std::string& path);
 
 }  // namespace vibrig::tool

@@ -19,6 +19,13 @@ constexpr double kShakes = 100;  ///< of the noise's variance
 
 }  // namespace
 
+bool clear_of_samples(double from_hz, double to_hz, double sample_hz) noexcept {
+    const auto free = [sample_hz](double hz) {
+        return !forbidden(hz, sample_hz, SweepBlocks::kBlock_s);
+    };
+    return free(from_hz) && free((from_hz + to_hz) / 2) && free(to_hz);
+}
+
 SweepBlocks::SweepBlocks(const Settings& settings, int run, int position)
     : settings_(settings), kinematics_(settings_), sweep_{run, position, {}} {}
 
@@ -87,12 +94,6 @@ void SweepBlocks::end_block() {
     sum_ = {};
 }
 
-/// No harmonic of it falls near a multiple of the rate.
-bool SweepBlocks::clear(const SweepBlock& block, double rate_hz) const {
-    const auto free = [rate_hz](double hz) { return !forbidden(hz, rate_hz, kBlock_s); };
-    return free(block.from_hz) && free((block.from_hz + block.to_hz) / 2) && free(block.to_hz);
-}
-
 /// From its samples under a Hann window, gravity and the noise taken out.
 void SweepBlocks::take_moment(SweepBlock& block) {
     const std::size_t n = samples_.size();
@@ -132,7 +133,7 @@ void SweepBlocks::take_moment(SweepBlock& block) {
         shares_.push_back(1 - std::max(0.0, left.squaredNorm() / sum - 3 * noise) / power);
     }
     // What it is told apart from is there; how large it is is not.
-    if (!clear(block, static_cast<double>(n) / kBlock_s)) return;
+    if (!clear_of_samples(block.from_hz, block.to_hz, static_cast<double>(n) / kBlock_s)) return;
     moment -= noise * Eigen::Matrix3d::Identity();
     const double seen =
         settings_.accelerometer_response.power(std::sqrt(block.from_hz * block.to_hz));

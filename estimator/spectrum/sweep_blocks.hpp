@@ -9,6 +9,10 @@
 
 namespace vibrig::estimator::spectrum {
 
+/// No harmonic of a block's frequencies falls so near a multiple of the samples' rate that its
+/// second moment is wrong. All in Hz.
+[[nodiscard]] bool clear_of_samples(double from_hz, double to_hz, double sample_hz) noexcept;
+
 /// Makes the blocks of a sweep from its samples, one after the other.
 class SweepBlocks {
   public:
@@ -34,7 +38,6 @@ class SweepBlocks {
         bool force_good = false;
     };
     void end_block();
-    [[nodiscard]] bool clear(const SweepBlock& block, double rate_hz) const;
     void take_moment(SweepBlock& block);
 
     const Settings settings_;

@@ -8,6 +8,7 @@ usage: sweep_campaign.py PROGRAMS [--soak]     soak: sweeps of 300 s
 import csv
 import json
 import os
+import subprocess
 import sys
 import tempfile
 
@@ -40,6 +41,47 @@ def plan_of(folder, swept, standing, sweep_s):
     return path, len(runs)
 
 
+def vibrig_plan(checks, programs, folder, *arguments):
+    """A plan file by `vibrig plan` for this rig, and how many of its runs sweep; vibrigd takes it."""
+    configuration, positions = os.path.join(folder, "planned.toml"), os.path.join(folder, "positions.csv")
+    registers = {f"shaker.registers.{role}": keys for role, keys in REGISTERS.items()}
+    tables = {"spectrum": {"mount": "hard", "mode": "mixed"}, "can": {"sample_rate_hz": RATE_HZ},
+              "vibration": {"frequency_hz": 15.1}, "commission": {"simulated": True}, **registers}
+    with open(configuration, "w", encoding="utf-8") as file:
+        file.write(r.toml(tables))
+    with open(positions, "w", encoding="utf-8") as file:
+        print("alpha_deg,beta_deg,gamma_deg", *(",".join(map(str, p)) for p in STANDING), sep="\n", file=file)
+    path = os.path.join(folder, f"plan{len(os.listdir(folder))}.json")
+    made = survey_campaign.vibrig(programs, "plan", *arguments, "--positions", positions, "--config", configuration, "-o", path)
+    if not checks.equal((made.returncode, made.stderr), (0, ""), f"vibrig plan {arguments[0]} makes a plan"):
+        return None, 0, 0, ""
+    with open(configuration, "w", encoding="utf-8") as file:
+        file.write(r.toml({"campaign": {"plan": path}, **tables}))
+    checked = subprocess.run([os.path.join(programs, "vibrigd"), "--config", configuration, "--check"], capture_output=True,
+                             text=True, timeout=120, check=False)
+    checks.equal((checked.returncode, checked.stderr), (0, ""), f"vibrigd --check takes the plan of vibrig plan {arguments[0]}")
+    with open(path, encoding="utf-8") as file:
+        runs = [run for run in json.load(file)["runs"] for _ in range(run["count"])]
+    return path, len(runs), sum("sweep" in run for run in runs), made.stdout
+
+
+def about(checks, programs, folder, result):
+    """Fixed frequencies about what the sweeps found."""
+    path = os.path.join(folder, "found.json")
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump(result, file)
+    plan, *_, text = vibrig_plan(checks, programs, folder, "--about", path)
+    if plan is None:
+        return
+    with open(plan, encoding="utf-8") as file:
+        frequencies = {line["hz"]: line["dwells"] for line in json.load(file)["survey"]["frequencies"]}
+    found = [gyro["hz"] for gyro in result["spectrum"]["resonance"]]
+    # Damping 0.05: the two extremes of the in-phase response are at 56.9 and 62.9 Hz.
+    checks.check(all(any(hz - 6 < f < hz for f in frequencies) and any(hz < f < hz + 6 for f in frequencies) for hz in found) and
+                 all(dwells >= 6 for dwells in frequencies.values()),
+                 "plan --about has frequencies on both sides of each resonance that the sweeps found", text)
+
+
 def start(rig, planned, dwell_s, *plant):
     rig.start_plant("--seed", "3", "--truth", rig.truth_file(TRUTH), *plant)
     rig.configure({"name": "sweeps", "plan": planned[0], "dwell_s": dwell_s, "temperature_window_s": 5.0, "identify": "what-it-can"},
@@ -67,7 +109,10 @@ def named(checks, result, count, what):
 def honest(checks, programs, folder, sweep_s):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        planned = plan_of(folder, SWEPT, STANDING, sweep_s)
+        planned = vibrig_plan(checks, programs, folder, "--sweeps", f"{FROM_HZ:g},{TO_HZ:g}", "--sweep-s", f"{sweep_s:g}",
+                              "--frequencies", "15.1", "--order", "list")
+        if planned[0] is None:
+            return
         commands = start(rig, planned, 40.0)
         shown = rig.wait_for(lambda s: s["campaign"]["state"] == "recording", 120)
         last = rig.wait_for_state(ENDS, WALL_S)
@@ -83,8 +128,9 @@ def honest(checks, programs, folder, sweep_s):
     checks.check(f"sweep from {FROM_HZ:g} to {TO_HZ:g} Hz" in commands[0].stdout, "arming names the sweeps", commands[0].stdout)
     checks.equal((shown or {}).get("vibration", {}).get("kind"), "sweep", "the status says that it sweeps")
     result = json.loads(text)
-    checks.equal(len(result.get("dwell_rates", [])), 2 * len(STANDING), "a sweep is no row of the fit")
-    named(checks, result, 2 * len(SWEPT), "live")
+    checks.equal((planned[2], len(result.get("dwell_rates", []))), (6, planned[1] - 6), "a sweep is no row of the fit")
+    named(checks, result, planned[2], "live")
+    about(checks, programs, folder, result)
     recorded(checks, programs, rig, result)
 
 

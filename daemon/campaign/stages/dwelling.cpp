@@ -178,13 +178,11 @@ void Dwelling::watch_vibration(const rt::DwellOrder& order) {
     if (!watching_) return;
     ports_.rig.feed->order(rt::StageFeed::Mode::samples);
     if (!aim_.stop.sweep.any()) return;
-    sweep_.emplace(settings_.rig, order, excitation_.since());
+    sweep_.emplace(settings_.rig, order, excitation_.since(), settings_.swept_by);
     read_at_ = 0;
 }
 
-double Dwelling::dwell_s() const {
-    return aim_.stop.sweep.any() ? SweepWatch::dwell_s(aim_.stop.sweep) : settings_.dwell_s;
-}
+double Dwelling::dwell_s() const { return settings_.dwell_s_of(aim_.stop); }
 
 void Dwelling::trip(const std::string& why) {
     ports_.log.event(Severity::trip, why);
@@ -207,10 +205,9 @@ void Dwelling::follow_sweep(Time now) {
     const auto reading = ports_.rig.shaker.reading();
     if (reading.valid && reading.sweep && reading.time > std::exchange(read_at_, reading.time))
         other = sweep_->frequency(reading.time, reading.sweep->actual_hz);
-    if (const auto begun = sweep_->begun(); begun && other.empty()) {
+    if (const auto begun = sweep_->begun(); begun && other.empty())
         excitation_.follow(*begun, sweep_->octaves_per_s(), now);
-        watching_ = false;  // it is elsewhere already
-    }
+    if (sweep_->moved()) watching_ = false;  // it is elsewhere already
     if (other.empty()) return;
     ports_.rig.feed->order(rt::StageFeed::Mode::off);
     sweep_.reset();

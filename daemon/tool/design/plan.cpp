@@ -63,7 +63,8 @@ void check(Options& options) {
     if (options.ramp > 0) request.ramp_s = options.ramp;
     require((request.survey.mount.empty() && request.survey.attitudes.empty()) ||
                 request.survey.asked(),
-            "found --mount or --attitude alone", "--frequencies, --highest or --profile with it");
+            "found --mount or --attitude alone",
+            "--frequencies, --highest, --profile, --sweeps or --about with it");
     require(request.evaluate.empty() || (request.runs == 0 && request.targets.empty()),
             "found --evaluate with --runs or --targets", "one of them");
 }
@@ -136,9 +137,9 @@ void add_turntable(CLI::App& command, Options& options) {
             "split-86")
         ->needs(turntable)
         ->check(CLI::IsMember({"free", "both", "split-68", "split-86"}));
-    for (const char* of_the_rig :
-         {"--positions", "--levels", "--grid", "--evaluate", "--done", "--targets", "--config",
-          "--frequencies", "--highest", "--mount", "--profile", "--attitude"}) {
+    for (const char* of_the_rig : {"--positions", "--levels", "--grid", "--evaluate", "--done",
+                                   "--targets", "--config", "--frequencies", "--highest", "--mount",
+                                   "--profile", "--attitude", "--sweeps", "--sweep-s", "--about"}) {
         turntable->excludes(command.get_option(of_the_rig));
     }
 }
@@ -202,6 +203,22 @@ void add_survey(CLI::App& command, Options& options) {
                     "with --profile: ALPHA,BETA,GAMMA of the gimbals, deg; again for more (the "
                     "positions)")
         ->allow_extra_args(false);
+    CLI::Option* sweeps =
+        command
+            .add_option("--sweeps", survey.sweeps,
+                        "LOW,HIGH in Hz: sweeps between them first, up and down, at the three "
+                        "positions that see most of all six quadratic coefficients")
+            ->delimiter(',')
+            ->expected(2)
+            ->check(proto::finite(0.1, 20'000));
+    command.add_option("--sweep-s", survey.sweep_s, "s of each sweep (300)")
+        ->needs(sweeps)
+        ->check(proto::finite(10, 86'400));
+    command
+        .add_option("--about", survey.about,
+                    "JSON of vibrig identify, or result.json of vibrigd: frequencies below and "
+                    "above the resonances it names, each where it shows most")
+        ->excludes(command.get_option("--highest"));
 }
 
 void add_time(CLI::App& command, Options& options) {
@@ -262,6 +279,8 @@ void add_plan(CLI::App& app, int& exit_code) {
     command->footer(
         "Examples: vibrig plan --runs 20 --levels 0,6 -o plan.json --plot sphere.svg\n"
         "          vibrig plan --frequencies 15,25,35 --highest 125 --mount hard -o survey.json\n"
+        "          vibrig plan --sweeps 20,120 --frequencies 15 --config rig.toml -o sweeps.json\n"
+        "          vibrig plan --about result.json --config rig.toml -o about.json\n"
         "          vibrig plan --turntable --spheres 1,8 --runs 40 -o turntable.csv\n"
         "Exit codes: 0 done, 1 the plan does not determine all coefficients, misses its targets or "
         "asks for\nmore than the shaker's limits, 2 bad usage or input.");
@@ -269,6 +288,8 @@ void add_plan(CLI::App& app, int& exit_code) {
         command->get_option(other)->excludes(command->get_option("--frequencies"));
         command->get_option(other)->excludes(command->get_option("--highest"));
         command->get_option(other)->excludes(command->get_option("--profile"));
+        command->get_option(other)->excludes(command->get_option("--sweeps"));
+        command->get_option(other)->excludes(command->get_option("--about"));
     }
     const CLI::Option* order = command->get_option("--order");
     command->callback([options, order, &exit_code] {

@@ -18,6 +18,12 @@ std::size_t count_of(const PlanStudy& study) {
     return sum;
 }
 
+std::size_t sweeps_of(const PlanStudy& study) {
+    std::size_t sum = 0;
+    for (const PlanRun& run : study.runs) sum += run.sweep.any() ? run.count : 0;
+    return sum;
+}
+
 Json correlation(const planning::Evaluation& evaluation) {
     if (evaluation.correlation == 0) return nullptr;
     return {{"between",
@@ -39,10 +45,17 @@ Json survey_json(const Survey& of) {
     }
     for (const auto& [hz, share] : of.smallest_seen)
         seen[format("%g", hz)] = proto::number_or_null(share);
+    Json about = Json::array();
+    for (const auto& one : of.about)
+        about.push_back({{"gyro", std::string(1, "xyz"[one.gyro])},
+                         {"resonance_hz", one.resonance_hz},
+                         {"below_hz", one.below_hz},
+                         {"above_hz", one.above_hz}});
     return {{"mount", of.hard ? "hard" : "isolated"},
             {"frequencies", std::move(lines)},
             {"highest_hz", of.highest_hz},
             {"smallest_share_seen", std::move(seen)},
+            {"about", std::move(about)},
             {"profile", of.profile.empty() ? Json(nullptr) : Json(of.profile)},
             {"predicted_u_deg_h",
              of.predicted_u_deg_h ? proto::number_or_null(*of.predicted_u_deg_h) : Json(nullptr)}};
@@ -59,6 +72,9 @@ std::string survey_text(const Survey& of) {
                            : "",
                        line.limited ? ", the shaker's limit" : "");
     }
+    for (const auto& one : of.about)
+        text += format("about the resonance of gyro %c at %.4g Hz: %.6g and %.6g Hz\n",
+                       "xyz"[one.gyro], one.resonance_hz, one.below_hz, one.above_hz);
     text += "smallest elastic share of all quadratic coefficients that is seen with 90 %:";
     for (const auto& [hz, share] : of.smallest_seen)
         text += format("  %.3g %% at %g Hz", 100 * share, hz);
@@ -67,6 +83,50 @@ std::string survey_text(const Survey& of) {
         text += format("drift under %s: u %.4g deg/h, rms over resonances that may be\n",
                        of.profile.c_str(), *of.predicted_u_deg_h);
     return text;
+}
+
+std::string shaken(const PlanRun& run) {
+    if (run.sweep.any())
+        return format("  %.6g to %.6g Hz in %.6g s", run.sweep.from_hz, run.sweep.to_hz,
+                      run.sweep.seconds);
+    return run.frequency_hz > 0 ? format("  %.6g Hz", run.frequency_hz) : "";
+}
+
+constexpr std::array<const char*, 6> kProducts{"xx", "yy", "zz", "xy", "xz", "yz"};
+
+Json sweeps_json(const Sweeps& of) {
+    const auto usable = [](const auto& one) {
+        return Json{{"s", one.blocks},
+                    {"known_s", one.known},
+                    {"rates", one.rates},
+                    {"usable", one.share()}};
+    };
+    Json seen = Json::object();
+    for (std::size_t k = 0; k < kProducts.size(); ++k) seen[kProducts[k]] = of.seen[k];
+    return {{"from_hz", of.from_hz},
+            {"to_hz", of.to_hz},
+            {"s", of.seconds},
+            {"table_g", of.table_g},
+            {"level_g", {of.lowest_g, of.highest_g}},
+            {"up", usable(of.up)},
+            {"down", usable(of.down)},
+            {"products_seen", std::move(seen)}};
+}
+
+std::string sweeps_text(const Sweeps& of) {
+    std::string text = format(
+        "\nsweeps up and down between %.6g and %.6g Hz in %.6g s at three positions, "
+        "%.4g g at the table, %.4g to %.4g g at the platform\n",
+        of.from_hz, of.to_hz, of.seconds, of.table_g, of.lowest_g, of.highest_g);
+    for (const auto& [word, one] : {std::pair{"up", of.up}, std::pair{"down", of.down}})
+        text += format(
+            "  %-4s %.3g %% usable: %zu of %zu s are off the forbidden frequencies, with "
+            "%zu rates between neighbours\n",
+            word, 100 * one.share(), one.known, one.blocks, one.rates);
+    text += "  they see of the elastic part of a gyro (1: a whole sweep along that axis):";
+    for (std::size_t k = 0; k < kProducts.size(); ++k)
+        text += format(" %s %.3g", kProducts[k], of.seen[k]);
+    return text + "\n";
 }
 
 }  // namespace
@@ -79,6 +139,10 @@ std::string plan_json(const PlanStudy& study) {
                  {"table_g", run.table_g},
                  {"count", run.count}};
         if (run.frequency_hz > 0) one["frequency_hz"] = run.frequency_hz;
+        if (run.sweep.any())
+            one["sweep"] = {{"from_hz", run.sweep.from_hz},
+                            {"to_hz", run.sweep.to_hz},
+                            {"s", run.sweep.seconds}};
         if (run.verify) one["role"] = "verify";
         runs.push_back(std::move(one));
     }
@@ -118,6 +182,7 @@ std::string plan_json(const PlanStudy& study) {
               {"optimum_gap", study.optimum_gap},
               {"warnings", study.warnings}};
     if (study.survey) json["survey"] = survey_json(*study.survey);
+    if (study.sweeps) json["sweeps"] = sweeps_json(*study.sweeps);
     if (study.uncertainty) {
         const auto& merit = study.uncertainty->merit;
         json["order_inflation"] = {{"bias", proto::number_or_null(merit.bias)},
@@ -164,13 +229,15 @@ std::string plan_table(const PlanStudy& study) {
     for (const PlanRun& run : study.runs) {
         const auto p = to_attitude(study.rig, run.visit.position_deg);
         text += format("  %4zu %7.6g %6.6g %7.6g %8.4g g %7.4g g %6zu%s\n", number++, p[0], p[1],
-                       p[2], run.visit.level_g, run.table_g, run.count,
-                       run.frequency_hz > 0 ? format("  %.6g Hz", run.frequency_hz).c_str() : "");
+                       p[2], run.visit.level_g, run.table_g, run.count, shaken(run).c_str());
     }
     const planning::Evaluation& e = study.evaluation;
-    text += format("\n%zu runs of %g s, %.4g h: vibrating %.4g h, slewing %.4g h\n",
-                   count_of(study), study.dwell_s, study.duration.total_s / 3600,
-                   study.duration.vibrating_s / 3600, study.duration.slewing_s / 3600);
+    const std::size_t sweeps = sweeps_of(study);
+    text += format("\n%zu runs of %g s%s, %.4g h: vibrating %.4g h, slewing %.4g h\n",
+                   count_of(study) - sweeps, study.dwell_s,
+                   sweeps > 0 ? format(" and %zu sweeps", sweeps).c_str() : "",
+                   study.duration.total_s / 3600, study.duration.vibrating_s / 3600,
+                   study.duration.slewing_s / 3600);
     text += format("rank %zu of %zu", e.rank, e.coefficients);
     if (e.identifies_all()) {
         text +=
@@ -196,6 +263,7 @@ std::string plan_table(const PlanStudy& study) {
         }
         text += "  * against free directions at rest and at the highest level\n";
     }
+    if (study.sweeps) text += sweeps_text(*study.sweeps);
     if (study.survey) text += survey_text(*study.survey);
     text += '\n' + plan::forecast_table(study.forecast);
     if (study.uncertainty) {

@@ -81,6 +81,7 @@ class Study {
         find_runs();
         put_in_order();
         judge();
+        if (!swept_.empty()) put_sweeps_before(out_, swept_, timing_, c_.campaign.swept_by);
         return std::move(out_);
     }
 
@@ -99,6 +100,16 @@ class Study {
         for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
         return runs;
     }
+    /// Sweeps are no rows: they are set aside, and stand in front of what is judged.
+    void set_aside_sweeps() {
+        std::erase_if(given_, [this](const plan::PlannedRun& run) {
+            if (!(run.sweep_to_hz > 0)) return false;
+            PlanRun sweep{{run.position_deg, run.level_g}, run.table_g, 1};
+            sweep.sweep = {run.sweep_from_hz, run.sweep_to_hz, run.sweep_s};
+            swept_.insert(swept_.end(), run.count, sweep);
+            return true;
+        });
+    }
 
     [[nodiscard]] bool designs() const {
         return request_.evaluate.empty() && request_.given.empty() &&
@@ -112,6 +123,10 @@ class Study {
         for (const PlanRun& run : request_.given) levels_.push_back(run.visit.level_g);
         if (!request_.evaluate.empty()) {
             given_ = plan_in(request_.evaluate);
+            set_aside_sweeps();
+            if (given_.empty())
+                throw std::runtime_error(request_.evaluate +
+                                         ": found sweeps alone, expected dwells beside them");
             if (levels_.empty()) {
                 for (const auto& run : given_) levels_.push_back(run.level_g);
             }
@@ -244,6 +259,7 @@ class Study {
         if (request_.done.empty()) return {};
         planning::Effort effort(candidates_.visits.size(), 0.0);
         for (const auto& run : plan_in(request_.done)) {
+            if (run.sweep_to_hz > 0) continue;
             const planning::Point wanted = point({run.position_deg, run.level_g});
             std::size_t at = 0;
             for (; at < candidates_.problem.size(); ++at) {
@@ -438,6 +454,7 @@ class Study {
     std::vector<Vec3> listed_;
     std::vector<double> levels_;
     std::vector<plan::PlannedRun> given_;
+    std::vector<PlanRun> swept_;
     List candidates_;
     PlanStudy out_;
 };

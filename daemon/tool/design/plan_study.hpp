@@ -12,7 +12,10 @@
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/order.hpp"
 #include "estimator/plan/positions.hpp"
+#include "estimator/spectrum/about.hpp"
 #include "estimator/spectrum/survey.hpp"
+#include "estimator/spectrum/sweep_bounds.hpp"
+#include "estimator/spectrum/sweep_plan.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -32,9 +35,13 @@ struct SurveyRequest {
     std::string mount;                ///< "isolated", "hard"; empty: the configuration's
     std::string profile;              ///< file or name; empty: none
     std::vector<std::string> attitudes;
+    std::vector<double> sweeps;  ///< Hz, lowest and highest; empty: no sweeps
+    double sweep_s = 300;
+    std::string about;  ///< result file whose resonances are looked at; empty: none
 
     [[nodiscard]] bool asked() const {
-        return !frequencies.empty() || highest_hz > 0 || !profile.empty();
+        return !frequencies.empty() || highest_hz > 0 || !profile.empty() || !sweeps.empty() ||
+               !about.empty();
     }
 };
 
@@ -72,6 +79,8 @@ struct PlanRun {
     std::size_t count = 1;
     double frequency_hz = 0;  ///< 0: the configuration's
     bool verify = false;      ///< held out of the fit
+    estimator::SweptSine
+        sweep{};  ///< in place of the frequency; the visit's level: where it begins
 };
 
 /// A position list read for one choice of the platform axis that is vertical at zero gimbal angles.
@@ -91,6 +100,16 @@ struct Survey {
     double highest_hz = 0;                                 ///< that a flat verdict reaches to
     std::optional<double> predicted_u_deg_h;               ///< of the profile's drift
     std::string profile;
+    std::vector<estimator::spectrum::About> about;
+};
+
+/// What is said of sweeps in front of it.
+struct Sweeps {
+    double from_hz = 0, to_hz = 0, seconds = 0;  ///< upwards
+    double table_g = 0;
+    double lowest_g = 0, highest_g = 0;  ///< at the platform, along them
+    estimator::spectrum::UsableBlocks up, down;
+    std::array<double, 6> seen{};  ///< estimator::spectrum::products_seen()
 };
 
 struct PlanStudy {
@@ -110,6 +129,7 @@ struct PlanStudy {
     bool beyond_limits = false;  ///< a level asks for more than the shaker's limits
     std::string refusal;         ///< empty: the plan determines everything
     std::optional<Survey> survey;
+    std::optional<Sweeps> sweeps;
     double transmission = 0, frequency_hz = 0, dwell_s = 0;
     estimator::Settings rig;
 };
@@ -121,6 +141,9 @@ struct PlanStudy {
 /// Throws std::runtime_error for bad input.
 [[nodiscard]] PlanStudy study(const PlanRequest& request);
 
+/// Runs that sweep, in front of its runs, with the time that they take.
+void put_sweeps_before(PlanStudy& study, const std::vector<PlanRun>& sweeps,
+                       const planning::Timing& timing, const estimator::spectrum::SweptBy& by);
 /// A plan over frequency: see SurveyRequest. Throws std::runtime_error for bad input.
 [[nodiscard]] PlanStudy survey_study(const PlanRequest& request);
 

@@ -5,8 +5,10 @@
 #include <stdexcept>
 
 #include "daemon/configuration/configuration.hpp"
+#include "daemon/results/spectrum_result.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/design/plan_study.hpp"
+#include "daemon/tool/design/plan_sweeps.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/identification/crlb.hpp"
 #include "estimator/spectrum/sampling.hpp"
@@ -52,6 +54,8 @@ class SurveyPlan {
                 "the standard errors of the 30 coefficients are those of coefficients that do not "
                 "depend on the frequency");
         tell(out);
+        if (!request_.survey.sweeps.empty())
+            PlannedSweeps(request_, c_, mount_, level(), positions_).put_before(out, timing_);
         return out;
     }
 
@@ -144,10 +148,36 @@ class SurveyPlan {
         return hz;
     }
 
+    /// Frequencies about those that a result names.
+    void add_resonances(std::vector<double>& listed) {
+        const std::string& path = request_.survey.about;
+        if (path.empty()) return;
+        about_ = spectrum::about_resonances(read_model_file(path).mixture,
+                                            {1 / period(), c_.estimator.level_window_s}, listed);
+        for (const double hz : spectrum::frequencies_of(about_)) {
+            if (std::ranges::find(listed, hz) == listed.end()) listed.push_back(hz);
+        }
+    }
+
+    /// g at the platform that are asked for.
+    [[nodiscard]] double level() const {
+        if (request_.levels_g.empty()) return kLevel;
+        const double level = *std::max_element(request_.levels_g.begin(), request_.levels_g.end());
+        for (const double other : request_.levels_g) {
+            if (other != 0 && other != level)
+                throw std::runtime_error("--levels: found " + short_number(other) + " and " +
+                                         short_number(level) +
+                                         " g, expected one level with --frequencies");
+        }
+        if (!(level > 0)) throw std::runtime_error("--levels: found 0 g, expected a level above 0");
+        return level;
+    }
+
     void choose_lines() {
         const SurveyRequest& asked = request_.survey;
         std::vector<double> listed = asked.frequencies;
         if (listed.empty()) listed = {c_.estimator.frequency_hz};
+        add_resonances(listed);
         leave_out_unseen(listed);
         double highest = asked.highest_hz;
         const double last = *std::max_element(listed.begin(), listed.end());
@@ -159,18 +189,7 @@ class SurveyPlan {
                                     " Hz (spectrum.highest_hz): what lies beyond is not measured");
         }
         highest = seen_up_to(highest, last);
-        double level = kLevel;
-        if (!request_.levels_g.empty()) {
-            level = *std::max_element(request_.levels_g.begin(), request_.levels_g.end());
-            for (const double other : request_.levels_g) {
-                if (other != 0 && other != level)
-                    throw std::runtime_error("--levels: found " + short_number(other) + " and " +
-                                             short_number(level) +
-                                             " g, expected one level with --frequencies");
-            }
-            if (!(level > 0))
-                throw std::runtime_error("--levels: found 0 g, expected a level above 0");
-        }
+        const double level = this->level();
         const spectrum::TableLimits limits{
             c_.campaign.max_acceleration_g, c_.campaign.max_velocity_mps,
             c_.campaign.max_displacement_mm, c_.estimator.gravity_mps2};
@@ -298,6 +317,7 @@ class SurveyPlan {
         survey.smallest_seen = flat.smallest_seen;
         survey.highest_hz = flat.highest_hz;
         survey.profile = profile_.name;
+        survey.about = about_;
         if (!situations_.empty()) survey.predicted_u_deg_h = predicted_u_;
         out.survey = std::move(survey);
         out.transmission = task_.lines.front().transmission;
@@ -313,6 +333,7 @@ class SurveyPlan {
     spectrum::Profile profile_;
     double profile_top_ = 0, predicted_u_ = 0;
     std::vector<spectrum::Situation> situations_;
+    std::vector<spectrum::About> about_;
     std::vector<PlanRun> runs_;
     std::vector<Vec3> up_of_;
     std::vector<std::string> warnings_;

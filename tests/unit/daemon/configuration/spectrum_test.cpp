@@ -508,6 +508,8 @@ TEST(SpectrumKeys, APlanWithASweepNeedsRegistersRateAndLimits) {
                 HasSubstr("at 6 g, expected 3.0917 g at most, at 8 Hz"));
     EXPECT_THAT(said(R"("from_hz":120,"to_hz":5,"s":300)", 2, whole), HasSubstr("g at most, at"));
     EXPECT_THAT(said(up, 0, whole), HasSubstr("at 0 g, expected a level"));
+    EXPECT_THAT(said(R"("from_hz":20,"to_hz":120,"s":80000)", 6, whole),
+                HasSubstr("in 80000 s, 0.0019387 octaves a minute, expected 0.01 at least"));
     EXPECT_THAT(said(up, 6, whole + "accelerometer.bandwidth_hz = 60\n"),
                 HasSubstr("expected frequencies of which they see half of the power at least"));
     EXPECT_THAT(said(up, 6, whole + "estimator.method = \"two-step\"\n"),

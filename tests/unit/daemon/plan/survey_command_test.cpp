@@ -1,66 +1,20 @@
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
-#include <sstream>
 
 #include "daemon/plan/plan_file.hpp"
 #include "estimator/spectrum/sampling.hpp"
+#include "tests/unit/daemon/plan/survey_command.hpp"
 
 namespace {
 
-using SurveyJson = nlohmann::json;
+using vibrig::plan::testing::SurveyCommand;
+using vibrig::plan::testing::SurveyJson;
 namespace spectrum = vibrig::estimator::spectrum;
-
-/// Runs the real program in a folder of its own.
-class SurveyCommand : public ::testing::Test {
-  protected:
-    SurveyCommand() {
-        std::string name = (std::filesystem::temp_directory_path() / "vibrig-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    ~SurveyCommand() override { std::filesystem::remove_all(folder_); }
-
-    int vibrig(const std::string& arguments) {
-        const std::string command =
-            "cd '" + folder_.string() + "' && '" VIBRIG "' >out 2>error </dev/null " + arguments;
-        const int status = std::system(command.c_str());
-        out = text_of("out");
-        error = text_of("error");
-        return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    }
-    SurveyJson json() const { return SurveyJson::parse(out); }
-    std::string path(const std::string& name) const { return (folder_ / name).string(); }
-    void write(const std::string& name, const std::string& text) const {
-        std::ofstream(folder_ / name, std::ios::binary) << text;
-    }
-    std::string text_of(const std::string& name) const {
-        std::ostringstream text;
-        text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
-        return text.str();
-    }
-    bool refuses(const std::string& plan, const std::string& words) {
-        write("bad.json", plan);
-        try {
-            static_cast<void>(vibrig::plan::read_plan(path("bad.json"), 1));
-        } catch (const vibrig::plan::PlanFileError& refusal) {
-            error = refusal.what();
-            return error.find(words) != std::string::npos;
-        }
-        return false;
-    }
-
-    std::filesystem::path folder_;
-    std::string out;
-    std::string error;
-};
 
 TEST_F(SurveyCommand, PlansTheSurveyOf63Dwells) {
     // WHEN a survey is planned for the hard mount
@@ -139,7 +93,7 @@ TEST_F(SurveyCommand, BadInputIsNamed) {
         {"plan --frequencies 15,35 --levels 2,6", "expected one level with --frequencies"},
         {"plan --frequencies 15,35 --runs 25 --mount hard", "--runs: found 25"},
         {"plan --frequencies 15,15.1 --mount hard", "2 % above"},
-        {"plan --mount hard", "--frequencies, --highest or --profile with it"},
+        {"plan --mount hard", "--frequencies, --highest, --profile, --sweeps or --about with it"},
         {"plan --frequencies 15,nan", "expected a finite number"},
         {"plan --frequencies 15,35 --evaluate plan.json", "--evaluate"}};
     for (const auto& [arguments, words] : told) {

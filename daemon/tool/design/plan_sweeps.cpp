@@ -1,0 +1,191 @@
+#include "daemon/tool/design/plan_sweeps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "estimator/spectrum/sweep_plan.hpp"
+
+namespace vibrig::tool::planner {
+
+namespace {
+
+namespace spectrum = estimator::spectrum;
+using planning::Vec3;
+
+/// Below it vibrigd --check refuses a sweep.
+constexpr double kLeastRate_hz = 100;
+/// Where fewer of its seconds can be used, dwells beside the forbidden frequencies tell more in the
+/// same time.
+constexpr double kLeastUsable = 0.5;
+constexpr double kLeastRatio = 1.1;  ///< of a plan file's ends
+constexpr double kLeast_g = 0.1;     ///< less is hardly a vibration
+
+std::string in_short(double value) { return format("%.6g", value); }
+
+/// 65 frequencies as vibrigd --check has them, and those at which the transmission was measured.
+std::vector<double> along(const std::array<double, 2>& ends, const spectrum::Mount& mount) {
+    constexpr int kSteps = 64;
+    const auto [low, high] = ends;
+    std::vector<double> hz;
+    for (int k = 0; k <= kSteps; ++k) hz.push_back(low * std::pow(high / low, k / double{kSteps}));
+    for (const auto& [at, ratio] : mount.measured) {
+        if (at > low && at < high) hz.push_back(at);
+    }
+    return hz;
+}
+
+}  // namespace
+
+PlannedSweeps::PlannedSweeps(const PlanRequest& request, const configuration::Configuration& c,
+                             const spectrum::Mount& mount, double level_g,
+                             const std::vector<Vec3>& positions_deg)
+    : asked_(request.survey), c_(c), mount_(mount) {
+    check_range();
+    choose_level(level_g);
+    const auto [low, high] = std::array{asked_.sweeps[0], asked_.sweeps[1]};
+    std::vector<Vec3> ups;
+    for (const Vec3& position : positions_deg)
+        ups.push_back(planning::up_at(c.estimator, position));
+    const auto places = spectrum::sweep_places(ups);
+    told_.seen = spectrum::products_seen(ups, places);
+    for (const std::size_t place : places) {
+        for (const auto& ends : {std::pair{low, high}, std::pair{high, low}}) {
+            PlanRun run;
+            run.sweep = {ends.first, ends.second, asked_.sweep_s};
+            run.table_g = told_.table_g;
+            run.visit = {positions_deg[place],
+                         told_.table_g * mount_.transmission(ends.first).value_or(1)};
+            runs_.push_back(run);
+        }
+    }
+    if (!request.config.empty() && !(c.shaker.registers.sweep && c.spectrum.mixed))
+        warnings_.emplace_back(
+            "sweeps: the configuration has not the registers for them (shaker.registers.mode, "
+            "sweep_from, sweep_to, sweep_rate, actual_frequency) with spectrum.mode \"mixed\": "
+            "vibrigd --check will refuse this plan");
+}
+
+void PlannedSweeps::check_range() const {
+    const auto refuse = [](const std::string& found, const std::string& expected) {
+        throw std::runtime_error("--sweeps: found " + found + ", expected " + expected);
+    };
+    const double low = asked_.sweeps[0], high = asked_.sweeps[1];
+    const std::string range = in_short(low) + " to " + in_short(high) + " Hz";
+    if (!(high >= kLeastRatio * low))
+        refuse(range, "LOW,HIGH in Hz, the second 10 % above the first at least");
+    if (low < mount_.lowest_hz())
+        refuse(range,
+               in_short(mount_.lowest_hz()) + " Hz at least: below it the isolators amplify");
+    for (const double hz : along({low, high}, mount_)) {
+        if (!mount_.transmission(hz))
+            refuse(range, "frequencies within " + in_short(mount_.measured.front().first) + " to " +
+                              in_short(mount_.measured.back().first) +
+                              " Hz, where spectrum.transmission is known");
+        const double seen = c_.estimator.accelerometer_response.power(hz);
+        if (seen < estimator::kLeastSeen)
+            refuse(range, "frequencies of which the accelerometers see half of the power: at " +
+                              in_short(hz) + " Hz they see " + in_short(seen));
+    }
+    const double octaves_per_minute = 60 * std::log2(high / low) / asked_.sweep_s;
+    if (const auto& told = c_.shaker.registers.sweep;
+        told && std::round(octaves_per_minute / told->rate.scale) < 1)
+        refuse(range + " in " + in_short(asked_.sweep_s) + " s, " + in_short(octaves_per_minute) +
+                   " octaves a minute",
+               in_short(told->rate.scale) +
+                   " at least, the step of shaker.registers.sweep_rate: a shorter sweep");
+    const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
+    for (const auto& ends : {std::pair{low, high}, std::pair{high, low}}) {
+        const auto usable =
+            spectrum::usable_blocks({ends.first, ends.second, asked_.sweep_s}, rate);
+        const std::string of = format(
+            "%s at %.6g samples/s: with %zu of %zu s harmonics up to the 5th are off "
+            "multiples of the rate, and %zu rates between neighbours (%.3g %%)",
+            range.c_str(), rate, usable.known, usable.blocks, usable.rates, 100 * usable.share());
+        if (rate < kLeastRate_hz)
+            refuse(of, in_short(kLeastRate_hz) + " samples/s at least (can.sample_rate_hz)");
+        if (usable.share() < kLeastUsable)
+            refuse(of, "half of them at least: more samples/s, a longer sweep, or another range");
+    }
+}
+
+/// What no frequency of the sweep forbids; the table keeps its amplitude all along.
+void PlannedSweeps::choose_level(double level_g) {
+    const std::array<double, 2> ends{asked_.sweeps[0], asked_.sweeps[1]};
+    const spectrum::TableLimits limits{c_.campaign.max_acceleration_g, c_.campaign.max_velocity_mps,
+                                       c_.campaign.max_displacement_mm, c_.estimator.gravity_mps2};
+    const double range_g = c_.estimator.accelerometer_range_g;
+    const double at_platform = range_g > 0 ? std::min(level_g, range_g - 1) : level_g;
+    double table_g = 1e9, tightest_hz = ends[0];
+    bool by_table = false;
+    const auto all = along(ends, mount_);
+    for (const double hz : all) {
+        const double ratio = mount_.transmission(hz).value_or(1);
+        if (at_platform / ratio < table_g) {
+            table_g = at_platform / ratio;
+            tightest_hz = hz;
+            by_table = false;
+        }
+        if (limits.table_g(hz) < table_g) {
+            table_g = limits.table_g(hz);
+            tightest_hz = hz;
+            by_table = true;
+        }
+    }
+    // Three decimals, rounded down: what is written out stays within the limit.
+    if (by_table || at_platform < level_g) table_g = std::floor(table_g * 1e3) / 1e3;
+    if (!(table_g >= kLeast_g))
+        throw std::runtime_error("--sweeps: found " + in_short(table_g) +
+                                 " g at the table left by the limits at " + in_short(tightest_hz) +
+                                 " Hz, expected " + in_short(kLeast_g) + " g at least");
+    told_.table_g = table_g;
+    told_.from_hz = ends[0];
+    told_.to_hz = ends[1];
+    told_.seconds = asked_.sweep_s;
+    told_.lowest_g = 1e9;
+    for (const double hz : all) {
+        const double there = table_g * mount_.transmission(hz).value_or(1);
+        told_.lowest_g = std::min(told_.lowest_g, there);
+        told_.highest_g = std::max(told_.highest_g, there);
+    }
+    const double rate = 1e9 / static_cast<double>(c_.assembler.sample_period);
+    told_.up = spectrum::usable_blocks({ends[0], ends[1], asked_.sweep_s}, rate);
+    told_.down = spectrum::usable_blocks({ends[1], ends[0], asked_.sweep_s}, rate);
+    if (by_table)
+        warnings_.push_back("sweeps: the shaker's limits leave " + in_short(table_g) +
+                            " g at the table, at " + in_short(tightest_hz) + " Hz");
+    else if (at_platform < level_g)
+        warnings_.push_back("sweeps: accelerometer.range_g leaves " + in_short(at_platform) +
+                            " g of " + in_short(level_g) + " g at the platform");
+}
+
+void PlannedSweeps::put_before(PlanStudy& study, const planning::Timing& timing) const {
+    put_sweeps_before(study, runs_, timing, c_.campaign.swept_by);
+    study.warnings.insert(study.warnings.end(), warnings_.begin(), warnings_.end());
+    study.sweeps = told_;
+}
+
+void put_sweeps_before(PlanStudy& study, const std::vector<PlanRun>& sweeps,
+                       const planning::Timing& timing, const spectrum::SweptBy& by) {
+    Vec3 here{};
+    const Vec3 first = study.runs.empty() ? here : study.runs.front().visit.position_deg;
+    planning::Duration& all = study.duration;
+    all.slewing_s -= planning::slew_s(here, first, timing);
+    all.total_s -= planning::slew_s(here, first, timing);
+    const auto slew = [&](const Vec3& to) {
+        all.slewing_s += planning::slew_s(here, to, timing);
+        all.total_s += planning::slew_s(here, to, timing);
+        here = to;
+    };
+    for (const PlanRun& run : sweeps) {
+        slew(run.visit.position_deg);
+        const double shaking_s =
+            spectrum::SweepBounds(run.sweep, by).dwell_s() + timing.settle_s + 2 * timing.ramp_s;
+        all.total_s += timing.look_s + shaking_s;
+        all.vibrating_s += shaking_s;
+    }
+    slew(first);
+    study.runs.insert(study.runs.begin(), sweeps.begin(), sweeps.end());
+}
+
+}  // namespace vibrig::tool::planner
