@@ -18,7 +18,7 @@ using Products = Eigen::Matrix<double, 1, 6>;
 
 constexpr std::array<const char*, 6> kProductNames{"xx", "yy", "zz", "xy", "xz", "yz"};
 /// Of a product that is 0 but for rounding, and of a determinant that is.
-constexpr double kNothing = 1e-9;
+constexpr double kNoPart = 1e-9;
 constexpr std::size_t kMostSwept = 200;  ///< all threes of them are looked at: a second
 
 Products products(const plan::Vec3& u) {
@@ -37,8 +37,8 @@ double merit(const std::vector<Products>& rows, const std::array<std::size_t, 3>
         of.row(static_cast<Index>(k)) = rows[at[k]];
     }
     constexpr double kPenalty = -1e3;
-    const bool apart = (of * of.transpose()).determinant() > kNothing;
-    return (seen.array() + kNothing).log().sum() + (apart ? 0 : kPenalty);
+    const bool apart = (of * of.transpose()).determinant() > kNoPart;
+    return (seen.array() + kNoPart).log().sum() + (apart ? 0 : kPenalty);
 }
 
 }  // namespace
@@ -82,7 +82,7 @@ Places sweep_places(const std::vector<plan::Vec3>& ups) {
         for (std::size_t b = a + 1; b < rows.size(); ++b) {
             for (std::size_t c = b + 1; c < rows.size(); ++c) {
                 const double value = merit(rows, {a, b, c});
-                if (!best.empty() && value <= most + kNothing) continue;
+                if (!best.empty() && value <= most + kNoPart) continue;
                 most = value;
                 best = {a, b, c};
             }
@@ -96,14 +96,14 @@ Places sweep_places(const std::vector<plan::Vec3>& ups) {
                               expected);
     const auto seen = products_seen(ups, best);
     for (std::size_t k = 0; k < seen.size(); ++k) {
-        if (!(seen[k] > kNothing))
+        if (!(seen[k] > kNoPart))
             throw plan::PlanError("--sweeps: found no positions in which " +
                                   std::string(kProductNames[k]) + " (platform axes) is shaken" +
                                   expected);
     }
     MatrixXd of(static_cast<Index>(kSweptPositions), 6);
     for (std::size_t k = 0; k < best.size(); ++k) of.row(static_cast<Index>(k)) = rows[best[k]];
-    const auto rank = linear_algebra::rank(of * of.transpose(), kNothing);
+    const auto rank = linear_algebra::rank(of * of.transpose(), kNoPart);
     if (rank < static_cast<Index>(kSweptPositions))
         throw plan::PlanError("--sweeps: found positions of rank " + std::to_string(rank) +
                               expected);

@@ -352,7 +352,11 @@ Found identify(const std::vector<RecordingRow>& rows, const std::vector<std::str
                                               ? "profile '" + kinds.kinds()[*kind].profile + "'"
                                               : plain_number(kinds.kinds()[*kind].hz()) + " Hz") +
                                          ", with which it is said to have shaken");
-            found.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
+            if (row.held_out)
+                found.kept_out.push_back(
+                    {row, shook ? kinds.kinds()[*kind] : estimator::spectrum::Kind{}});
+            else
+                found.spectral.push_back({row, shook ? kind : std::nullopt, row.relative_error});
         }
     }
     if (!request.held_out) plan.tell();
