@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Unmodified programs on a real vcan0 in virtual time: the full campaign, a shorter one twice with equal estimates, and sweeps.
+"""Unmodified programs on a real vcan0 in virtual time: the full campaign, and a shorter one twice with equal estimates.
 
 usage: virtual_time_campaign.py PROGRAMS                     boots two machines at a time
        virtual_time_campaign.py PROGRAMS --inside NAME DIR   one campaign, inside; its result.json goes to DIR
@@ -17,7 +17,6 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
-import sweep_campaign as sweeping  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 # A Modbus request is an event, and events are what virtual time costs.
@@ -76,53 +75,6 @@ def inside(programs, name, results):
     return checks.end()
 
 
-def sweeps(programs, results):
-    """Sweeps up and down beside dwells at 15.1 Hz, followed and recorded; and one that stands still, stopped in its time."""
-    checks = r.Checks()
-    for name, fault in (("sweeps", None), ("standing", "sweep-rate-scaled=0")):
-        begin = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            rig = r.Rig(programs, "vcan0", "real", folder, poll_s=2)
-            rig.results = os.path.join(results, name)
-            os.makedirs(rig.results)
-            try:
-                last, text = one_with_sweeps(rig, name, fault)
-                log = rig.daemon.text()
-            finally:
-                rig.stop()
-        checks.note(f"{name}: {time.monotonic() - begin:.0f} s of virtual time")
-        state = last["campaign"]["state"] if last else "nothing"
-        if fault:
-            checks.equal(state, "tripped", "a sweep that stands still is stopped")
-            checks.check("the controller stands still" in log and "s after its level" in log, "within its time", log[-2000:])
-            continue
-        if not checks.check(state == "finished" and text, "sweeps on a real bus run to the end", f"{r.state_of(last)}\n{log[-3000:]}"):
-            continue
-        sweeping.named(checks, json.loads(text), 2, "real bus")
-        path = glob.glob(os.path.join(results, name, "sweeps-*", "campaign.h5"))[0]
-        again = subprocess.run([os.path.join(programs, "vibrig"), "identify", path, "--json"], capture_output=True, text=True,
-                               check=False)
-        same = json.loads(again.stdout) if again.stdout else {}
-        checks.equal((same.get("spectrum") or {}).get("resonance"), json.loads(text)["spectrum"]["resonance"],
-                     "identify over its recording gives the same resonances to the last bit")
-    return checks.end()
-
-
-def one_with_sweeps(rig, name, fault):
-    planned, _ = sweeping.plan_of(rig.folder, [[45, 0, 90]], sweeping.STANDING[:6], 60.0)
-    rig.start_plant("--seed", "3", "--truth", rig.truth_file(sweeping.TRUTH), *(("--fault", fault) if fault else ()))
-    rig.configure({"name": name, "plan": planned, "dwell_s": 20.0, "temperature_window_s": 5.0, "identify": "what-it-can"},
-                  spectrum={"mount": "hard", "mode": "mixed"}, can={"sample_rate_hz": sweeping.RATE_HZ},
-                  vibration={"frequency_hz": 15.1}, shaker=SHAKER, threads=THREADS,
-                  **{f"shaker.registers.{role}": keys for role, keys in sweeping.REGISTERS.items()})
-    rig.start_daemon()
-    rig.wait_for(r.measuring, 60)
-    for command in ("arm", "start"):
-        rig.tool(command, "--by", "tester")
-    last = rig.wait_for_state(sweeping.ENDS, 3000)
-    return last, rig.result()[1]
-
-
 class Boot(threading.Thread):
     """One machine in virtual time that runs one campaign."""
 
@@ -176,8 +128,7 @@ def judge(checks, programs, path, text):
 def main():
     programs = r.programs_from_command_line(__doc__)
     if "--inside" in sys.argv:
-        name, results = sys.argv[-2:]
-        return sweeps(programs, results) if name == "sweeps" else inside(programs, name, results)
+        return inside(programs, *sys.argv[-2:])
     checks = r.Checks()
     with tempfile.TemporaryDirectory() as folder:
         full = Boot(programs, "full", os.path.join(folder, "full"))
@@ -187,10 +138,6 @@ def main():
             same_samples(checks, folders)
             checks.check(results[0] == results[1], "the short campaign gives equal estimates twice, byte for byte",
                          f"{results[0][:2000]}\n{results[1][:2000]}")
-        swept = Boot(programs, "sweeps", os.path.join(folder, "sweeps"))
-        swept.join()
-        checks.adopt(swept.ended.stdout)
-        checks.note(f"{swept.took_s:.0f} s on this machine's clock")
         path, text = full.result(checks)
         if text:
             judge(checks, programs, path, text)
