@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "daemon/campaign/campaign.hpp"
 #include "daemon/campaign/loop_check.hpp"
@@ -44,6 +45,19 @@ std::string profiles_text(const Stops& stops) {
             stop.random->name, point.profile, point.checksum, highest_g, 3 * highest_g);
     }
     return profiles;
+}
+
+/// " at 15, 85.1 Hz"; of a campaign that shakes with no sine nothing.
+template <typename Stops>
+std::string frequencies_text(const Stops& stops, double reference_hz) {
+    std::set<double> told;
+    for (const auto& [stop, run, position] : stops) {
+        if (stop.random || stop.sweep.any() || stop.table_g <= 0) continue;
+        told.insert(stop.frequency_hz > 0 ? stop.frequency_hz : reference_hz);
+    }
+    std::string text;
+    for (const double hz : told) text += fmt::format("{}{:g}", text.empty() ? " at " : ", ", hz);
+    return text.empty() ? text : text + " Hz";
 }
 
 /// Likewise the sweeps.
@@ -139,8 +153,13 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
                                  : std::string("until its targets are met")
                            : "about " + duration_text(left_s + times_.opening_s + times_.closing_s);
     return fmt::format(
-        "{}, plan \"{}\" ({}), up to {:g} g at the table{}, {}; to be started within {}", unit,
-        settings_.name, plan, highest_level(), profiles_text(stops_) + sweeps_text(stops_), lasts,
+        "{}, plan \"{}\" ({}), up to {:g} g at the table{}{}, platform {}, {}; to be started "
+        "within "
+        "{}",
+        unit, settings_.name, plan, highest_level(),
+        frequencies_text(stops_, settings_.frequency_hz),
+        profiles_text(stops_) + sweeps_text(stops_),
+        settings_.hard_mount ? "bolted hard to it" : "on isolators", lasts,
         duration_text(settings_.arming_valid_s));
 }
 

@@ -158,6 +158,7 @@ struct Settings {
     LoopCheckSettings loop;
     estimator::Settings rig;     ///< [site], [platform], [accelerometer], [noise]
     double frequency_hz = 15.0;  ///< [vibration] frequency_hz
+    bool hard_mount = false;     ///< [spectrum] mount: the platform is bolted to the table
     double dwell_s = 100.0;
     double settle_s = 3.0;  ///< after the ramp, 2 s at least
     double ramp_s = 2.0;

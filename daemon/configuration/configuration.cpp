@@ -228,6 +228,7 @@ void take_mount(Configuration& c, const std::map<std::string, Place>& places) {
     // Nothing between them lets the platform lag.
     if (s.hard && !places.contains("selftest.phase_deg")) c.campaign.loop.phase_deg = 0;
     s.mount = {s.hard || (!s.mount_stated && c.estimator.transmission >= 1), {}, s.transmission};
+    c.campaign.hard_mount = s.mount.hard;
     if (!s.mount.hard)
         s.mount.pads = estimator::spectrum::pads_with(
             c.estimator.frequency_hz, std::min(c.estimator.transmission, 0.999), s.pads_damping);

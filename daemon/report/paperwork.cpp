@@ -3,19 +3,13 @@
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/configuration/configuration.hpp"
-
 namespace vibrig::report {
-
-namespace {
 
 configuration::Configuration configuration_of(const record::Campaign& campaign) {
     return configuration::parse(record::identification_sections(campaign.head.configuration),
                                 "configuration in " + campaign.path, false)
         .configuration;
 }
-
-}  // namespace
 
 double coverage_of(const record::Campaign& campaign) {
     return configuration_of(campaign).estimator.uncertainty.coverage;

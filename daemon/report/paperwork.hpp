@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/settings.hpp"
 
@@ -13,6 +14,8 @@ inline constexpr const char* kDriftModel =
     "D = D_F + D_I aI + D_O aO + D_S aS + D_II aI^2 + D_OO aO^2 + D_SS aS^2 + D_IO aI aO + D_IS aI "
     "aS + D_OS aO aS; a: specific force along input, output and spin axis of the gyro, g; under "
     "vibration the squares are means over it";
+/// What of the campaign's configuration its identification depends on.
+[[nodiscard]] configuration::Configuration configuration_of(const record::Campaign& campaign);
 /// What the campaign's configuration states of unit and instruments.
 [[nodiscard]] record::Paperwork paperwork_of(const record::Campaign& campaign);
 /// Coverage probability of U, 0 to 1.

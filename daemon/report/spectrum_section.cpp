@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "daemon/plot/chart.hpp"
+#include "daemon/report/paperwork.hpp"
 #include "estimator/spectrum/elastic.hpp"
 
 namespace vibrig::report {
@@ -27,28 +29,61 @@ std::string shown(const SpectrumJson& value, const char* precision = "{:.5f}") {
     return value.is_number() ? fmt::format(fmt::runtime(precision), value.get<double>()) : "-";
 }
 
-void add_evidence(Page& page, const SpectrumJson& spectrum) {
-    const SpectrumJson& flat = spectrum.at("flat");
+/// "15 Hz", or the profile's name.
+std::string name_of_group(const SpectrumJson& at) {
+    const auto profile = at.find("profile");
+    return profile != at.end() && profile->is_string()
+               ? profile->get<std::string>()
+               : fmt::format("{:g} Hz", at.at("hz").get<double>());
+}
+
+bool at_random(const SpectrumJson& at) {
+    return at.contains("profile") && at.at("profile").is_string();
+}
+
+void add_flatness(Page& page, const SpectrumJson& flat) {
+    if (flat.is_null())
+        return page.paragraph(
+            "Whether one set of quadratic coefficients holds for all frequencies was not tested: "
+            "the dwells shook at one; of a resonance the sweeps alone tell.");
     page.paragraph(
         fmt::format("One set of quadratic coefficients for all frequencies: chi-square {} on "
                     "{} degrees of freedom, p = {}.",
                     shown(flat.at("chi_square"), "{:.1f}"), flat.at("dof").get<int>(),
                     shown(flat.at("p"), "{:.2g}")));
+}
+
+void add_sweeps(Page& page, const SpectrumJson& sweeps) {
+    if (!sweeps.is_array() || sweeps.empty()) return;
+    std::vector<std::vector<std::string>> rows{{"sweep: run, position", "from", "to", "s", "used"}};
+    for (const SpectrumJson& one : sweeps)
+        rows.push_back(
+            {fmt::format("{}, {}", one.at("run").get<int>(), one.at("position").get<int>()),
+             shown(one.at("from_hz"), "{:.4g} Hz"), shown(one.at("to_hz"), "{:.4g} Hz"),
+             shown(one.at("seconds"), "{:g}"), shown(one.at("used"), "{:g}")});
+    page.table(rows);
+}
+
+void add_evidence(Page& page, const SpectrumJson& spectrum) {
+    add_flatness(page, spectrum.at("flat"));
     std::vector<std::vector<std::string>> rows{
         {"gyro", "log odds", "resonance, Hz", "95 %", "damping", "95 %"}};
     for (std::size_t j = 0; j < 3; ++j) {
-        const SpectrumJson& of = spectrum.at("resonance").at(j);
-        std::vector<std::string> row{std::string(1, "xyz"[j]),
-                                     shown(spectrum.at("log_odds").at(j), "{:.1f}")};
-        for (const char* key : {"hz", "damping"}) {
-            const bool known = of.is_object() && spectrum.at("model") == "resonance";
-            row.push_back(known ? shown(of.at(key), "{:.3f}") : "-");
-            const SpectrumJson& band =
-                known ? of.at(std::string(key) + "_interval") : SpectrumJson();
-            row.push_back(known ? shown(band.at(0), "{:.3f}") + " to " + shown(band.at(1), "{:.3f}")
-                                : "-");
+        // One, several, or none that is told.
+        SpectrumJson list = spectrum.at("resonance").at(j);
+        if (list.is_object()) list = SpectrumJson::array({list});
+        if (!list.is_array() || spectrum.at("model") != "resonance") list = SpectrumJson::array();
+        const std::string gyro(1, "xyz"[j]), odds = shown(spectrum.at("log_odds").at(j), "{:.1f}");
+        if (list.empty()) rows.push_back({gyro, odds, "-", "-", "-", "-"});
+        for (const SpectrumJson& of : list) {
+            std::vector<std::string> row{gyro, odds};
+            for (const char* key : {"hz", "damping"}) {
+                const SpectrumJson& band = of.at(std::string(key) + "_interval");
+                row.push_back(shown(of.at(key), "{:.3f}"));
+                row.push_back(shown(band.at(0), "{:.3f}") + " to " + shown(band.at(1), "{:.3f}"));
+            }
+            rows.push_back(std::move(row));
         }
-        rows.push_back(row);
     }
     page.table(rows);
 }
@@ -57,8 +92,8 @@ void add_evidence(Page& page, const SpectrumJson& spectrum) {
 void add_groups(Page& page, const SpectrumJson& frequencies) {
     std::vector<std::vector<std::string>> rows{{"coefficient"}};
     for (const SpectrumJson& at : frequencies)
-        rows.front().push_back(fmt::format("{:g} Hz ({} dwells)", at.at("hz").get<double>(),
-                                           at.at("dwells").get<int>()));
+        rows.front().push_back(
+            fmt::format("{} ({} dwells)", name_of_group(at), at.at("dwells").get<int>()));
     for (std::size_t i = 0; i < 18; ++i) {
         std::vector<std::string> row{fmt::format("D_{}{}", kTerms[i % 6], "xyz"[i / 6])};
         for (const SpectrumJson& at : frequencies)
@@ -120,9 +155,14 @@ tool::plot::Curve curve_of(const SpectrumJson& mixture, std::size_t term, double
 void add_charts(Page& page, const SpectrumJson& spectrum) {
     const SpectrumJson& frequencies = spectrum.at("frequencies");
     double low = 1e9, high = 0;
-    for (const SpectrumJson& at : frequencies) {
-        low = std::min(low, at.at("hz").get<double>());
-        high = std::max(high, at.at("hz").get<double>());
+    const auto include = [&](const SpectrumJson& hz) {
+        low = std::min(low, hz.get<double>());
+        high = std::max(high, hz.get<double>());
+    };
+    for (const SpectrumJson& at : frequencies) include(at.at("hz"));
+    for (const SpectrumJson& one : spectrum.value("sweeps", SpectrumJson::array())) {
+        include(one.at("from_hz"));
+        include(one.at("to_hz"));
     }
     if (!(high > low)) return;
     for (std::size_t j = 0; j < 3; ++j) {
@@ -138,6 +178,7 @@ void add_charts(Page& page, const SpectrumJson& spectrum) {
             dwells.name = "dwells of one frequency, 95 %";
             dwells.look = tool::plot::Look::dots;
             for (const SpectrumJson& at : frequencies) {
+                if (at_random(at)) continue;  // a mean over its band is no point of the curve
                 const double value = at.at("coefficients").at(6 * j + term).get<double>();
                 const double wide = kNinetyFive * at.at("sigma").at(6 * j + term).get<double>();
                 dwells.x.push_back(at.at("hz").get<double>());
@@ -149,6 +190,42 @@ void add_charts(Page& page, const SpectrumJson& spectrum) {
             page.figure(chart.svg(), chart.title);
         }
     }
+}
+
+/// Where the power of the profiles lies, beside the frequencies of the sines.
+void add_profiles(Page& page, const SpectrumJson& frequencies, const record::Campaign& campaign) {
+    if (std::ranges::none_of(frequencies, at_random)) return;
+    tool::plot::Chart chart;
+    chart.title = "Profiles under which it shook";
+    chart.x = tool::plot::Axis("Hz", true);
+    chart.y = tool::plot::Axis("g^2/Hz", true);
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& one : configuration_of(campaign).profiles) {
+        if (std::ranges::none_of(frequencies, [&](const SpectrumJson& at) {
+                return at_random(at) && at.at("profile") == one.profile.name;
+            }))
+            continue;
+        tool::plot::Curve curve;
+        curve.name = one.profile.name;
+        for (const auto& [hz, density] :
+             one.controller_psd.empty() ? one.profile.psd : one.controller_psd) {
+            curve.x.push_back(hz);
+            curve.y.push_back(density);
+            least = std::min(least, density);
+        }
+        chart.curves.push_back(std::move(curve));
+    }
+    if (chart.curves.empty()) return;
+    tool::plot::Curve sines;
+    sines.name = "sines, at the foot";
+    sines.look = tool::plot::Look::dots;
+    for (const SpectrumJson& at : frequencies) {
+        if (at_random(at)) continue;
+        sines.x.push_back(at.at("hz").get<double>());
+        sines.y.push_back(least);
+    }
+    if (!sines.x.empty()) chart.curves.push_back(std::move(sines));
+    page.figure(chart.svg(), chart.title);
 }
 
 /// Measured over what the coefficients foretell, all gyros; what the fit has not seen apart.
@@ -215,17 +292,29 @@ void add_spectrum(Page& page, const record::Campaign& campaign) {
     try {
         const SpectrumJson& spectrum = root.at("spectrum");
         const bool resonates = spectrum.at("model") == "resonance";
+        const SpectrumJson& frequencies = spectrum.at("frequencies");
+        std::string with;
+        for (const SpectrumJson& at : frequencies)
+            with += (with.empty() ? "" : ", ") + name_of_group(at);
+        const std::string reach =
+            spectrum.at("flat").is_null()
+                ? "nothing is known"
+                : fmt::format(
+                      "an elastic part of 20 % would have been seen up to {} Hz; beyond it "
+                      "nothing is known",
+                      shown(spectrum.at("highest_hz"), "{:g}"));
         page.paragraph(fmt::format(
-            "The dwells shook at {} frequencies. The coefficients above are those at the reference "
-            "frequency; the result has {}. An elastic part of 20 % would have been seen up to {} "
-            "Hz; beyond it nothing is known.",
-            spectrum.at("frequencies").size(),
+            "The dwells shook with {}. The coefficients above are those at the reference "
+            "frequency; the result has {}. Of other frequencies {}.",
+            with,
             resonates ? "static quadratic coefficients and an elastic part" : "them as they are",
-            shown(spectrum.at("highest_hz"), "{:g}")));
+            reach));
+        add_sweeps(page, spectrum.value("sweeps", SpectrumJson::array()));
         add_evidence(page, spectrum);
         page.paragraph("Quadratic coefficients, deg/h/g^2, from the dwells of each frequency:");
-        add_groups(page, spectrum.at("frequencies"));
+        add_groups(page, frequencies);
         if (spectrum.at("model") != "groups") add_charts(page, spectrum);
+        add_profiles(page, frequencies, campaign);
         add_predicted(page, root);
         std::string limits = "What such a campaign does not tell:";
         for (const SpectrumJson& one : spectrum.value("not_told", SpectrumJson::array()))

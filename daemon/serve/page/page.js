@@ -309,7 +309,7 @@
     chart.hidden = psd.length < 2;
     byId('psd-note').hidden = chart.hidden;
     if (chart.hidden) return;
-    const words = `PSD of the profile at the ${v.psd_at} at this level, g²/Hz, ${psd[0].hz} to ${psd[psd.length - 1].hz} Hz; the controller gives none`;
+    const words = `PSD of the profile as configured, at the ${v.psd_at}, at this level, g²/Hz, ${psd[0].hz} to ${psd[psd.length - 1].hz} Hz`;
     chart.setAttribute('aria-label', words);
     set('psd-note', words);
     Draw.chart('psd', [psd.map(p => p.hz), psd.map(p => p.g2_hz)]);

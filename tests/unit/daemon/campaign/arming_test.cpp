@@ -37,13 +37,25 @@ TEST_F(ArmingTest, NamesUnitPlanHighestLevelAndDuration) {
     ASSERT_TRUE(reply.accepted) << reply.message;
     // 4 positions of 100 s, 3 s of settling and 2 ramps of 2 s each
     const char* const expected =
-        "IMU-7 0042, plan \"night\" (4 positions), up to 9 g at the table, about 8 min; to be "
-        "started within 10 min";
+        "IMU-7 0042, plan \"night\" (4 positions), up to 9 g at the table at 15 Hz, platform on "
+        "isolators, about 8 min; to be started within 10 min";
     EXPECT_EQ(reply.message, std::string("armed for ") + expected);
     EXPECT_EQ(status().armed_for, expected);
     EXPECT_EQ(status().arming_left_s, 600);
     ASSERT_FALSE(events.empty());
     EXPECT_EQ(events.back(), std::string("armed for ") + expected + " by Ada");
+}
+
+TEST_F(ArmingTest, NamesEachFrequencyOnceAndTheHardMount) {
+    settings.hard_mount = true;
+    settings.stops.assign(4, {});
+    for (std::size_t i = 0; i < 4; ++i) settings.stops[i].table_g = i == 3 ? 0 : 3;
+    settings.stops[0].frequency_hz = 85.1;
+    settings.stops[2].frequency_hz = 85.1;
+    settings.stops[3].frequency_hz = 55;
+    remake();
+    EXPECT_THAT(order(Kind::arm).message,
+                HasSubstr("up to 3 g at the table at 15, 85.1 Hz, platform bolted hard to it,"));
 }
 
 TEST_F(ArmingTest, SaysThatNoUnitIsStated) {

@@ -11,6 +11,7 @@ namespace vibrig::report {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using SectionJson = nlohmann::json;
 
 /// A result of two frequencies in which each number is its place: 18 by gyro and term of a
@@ -58,8 +59,9 @@ SectionJson result() {
               {"not_told", {"the first thing", "the second thing"}}}}};
 }
 
-std::string page_of(const SectionJson& root) {
+std::string page_of(const SectionJson& root, const std::string& configuration = "") {
     record::Campaign campaign;
+    campaign.head.configuration = configuration;
     campaign.result_json = root.dump();
     Page page;
     add_spectrum(page, campaign);
@@ -104,6 +106,53 @@ TEST(SpectrumSection, DwellsHeldOutStandBesideWhatWasForetold) {
     SectionJson earlier = result();
     earlier["spectrum"].erase("held_out");
     EXPECT_THAT(page_of(earlier), HasSubstr("No dwell was held out"));
+}
+
+TEST(SpectrumSection, OneFrequencyAndSweepsAreToldAsWhatTheyAre) {
+    SectionJson one = result();
+    one["spectrum"]["flat"] = nullptr;
+    one["spectrum"]["frequencies"].erase(1);
+    one["spectrum"]["log_odds"] = {nullptr, nullptr, nullptr};
+    one["spectrum"]["sweeps"] = SectionJson::array({{{"run", 3},
+                                                     {"position", 4},
+                                                     {"from_hz", 20.5},
+                                                     {"to_hz", 120},
+                                                     {"seconds", 300},
+                                                     {"used", 41}}});
+    const std::string html = page_of(one);
+    EXPECT_THAT(html, Not(HasSubstr("cannot be read")));
+    EXPECT_THAT(html, HasSubstr("was not tested"));
+    for (const char* cell : {"3, 4", "20.5 Hz", "120 Hz", "300", "41"})
+        EXPECT_THAT(html, HasSubstr(std::string("<td>") + cell + "</td>"));
+    EXPECT_THAT(html, HasSubstr("D_OOz over frequency")) << "the sweeps' range";
+}
+
+TEST(SpectrumSection, TwoResonancesOfAGyroHaveARowEach) {
+    SectionJson two = result();
+    SectionJson told = two["spectrum"]["resonance"][1], second = told;
+    second["hz"] = 95.5;
+    two["spectrum"]["resonance"][1] = SectionJson::array({told, second});
+    const std::string html = page_of(two);
+    EXPECT_THAT(html, HasSubstr("<td>95.500</td>"));
+    std::size_t rows = 0;
+    for (auto at = html.find("<td>60.000</td>"); at != std::string::npos;
+         at = html.find("<td>60.000</td>", at + 1))
+        ++rows;
+    EXPECT_EQ(rows, 3U);
+}
+
+TEST(SpectrumSection, AProfileIsNoFrequency) {
+    SectionJson random = result();
+    random["spectrum"]["frequencies"][1]["profile"] = "floor";
+    random["spectrum"]["frequencies"][1]["hz"] = 48.125;
+    const std::string html = page_of(
+        random,
+        "profile = [{ name = \"floor\", number = 1, psd = [[20.0, 0.01], [100.0, 0.01]] }]\n");
+    EXPECT_THAT(html, HasSubstr("floor (7 dwells)"));
+    EXPECT_THAT(html, HasSubstr("shook with 15 Hz, floor."));
+    EXPECT_THAT(html, Not(HasSubstr("48.125")));
+    EXPECT_THAT(html, HasSubstr("Profiles under which it shook"));
+    EXPECT_THAT(page_of(random), Not(HasSubstr("Profiles under which"))) << "of none that is known";
 }
 
 }  // namespace

@@ -386,6 +386,130 @@ TEST_F(PredictRandom, WhatARecordingSaysOfItsProfilesIsRefusedByPlaceAndValue) {
             "found no dwell under the profile 'band 3'");
 }
 
+TEST_F(Predict, ATestThatWouldSeeNothingIsCalledWeak) {
+    const auto word = [&](const std::string& tolerance) {
+        return run("predict result.json --profile sine.json --verify held_out.csv --config "
+                   "held.toml "
+                   "--json --tolerance " +
+                   tolerance)
+            .json()["prediction"]["verification"]["word"];
+    };
+    EXPECT_EQ(word("1"), "confirmed");
+    EXPECT_EQ(word("0.001"), "confirmed, but the test is weak");
+}
+
+TEST_F(Predict, WhatContradictsIsNamedByGyroAttitudeAndPart) {
+    write_without_elastic_part("broken.json");
+    const std::string command =
+        "predict broken.json --profile sine.json --verify held_out.csv --config held.toml";
+    const PredictJson verified = run(command + " --json").json()["prediction"]["verification"];
+    double largest = 0;
+    std::string where;
+    for (const PredictJson& dwell : verified["dwells"]) {
+        for (std::size_t j = 0; j < 3; ++j) {
+            const double z = dwell["z"][j];
+            if (std::abs(z) <= std::abs(largest)) continue;
+            largest = z;
+            std::array<char, 80> text{};
+            std::snprintf(text.data(), text.size(), "gyro %c at (%.1f, %.1f, %.1f)", "xyz"[j],
+                          dwell["angles"][0].get<double>(), dwell["angles"][1].get<double>(),
+                          dwell["angles"][2].get<double>());
+            where = text.data();
+        }
+    }
+    EXPECT_EQ(verified["largest_z"], largest);
+    EXPECT_THAT(run(command).out, HasSubstr(where + ": \"" + std::string(verified["part"]) + "\""));
+}
+
+TEST_F(Predict, TheSameAccelerometersTakeTheirCommonGainOut) {
+    const auto gain = [&](const std::string& more) {
+        return run("predict result.json --profile sine.json --attitude 45,0,90 --json" + more)
+            .json()["prediction"]["attitudes"][0]["budget"]["gain"][0]
+            .get<double>();
+    };
+    const double with = gain(""), without = gain(" --same-accelerometers");
+    PredictJson alone = result();
+    PredictJson& effects = alone["spectrum"]["effects"];
+    for (std::size_t i = effects.size(); i-- > 0;)
+        if (effects[i]["input"] != "accelerometer_gain") effects.erase(i);
+    ASSERT_EQ(effects.size(), 1U);
+    write("gain.json", alone.dump());
+    const double common = run("predict gain.json --profile sine.json --attitude 45,0,90 --json")
+                              .json()["prediction"]["attitudes"][0]["budget"]["gain"][0];
+    EXPECT_NEAR(without * without + common * common, with * with, 1e-12);
+    EXPECT_GT(common, 0);
+}
+
+/// Half width `elastic_beyond` of a rectangle over the static coefficients, of the power above.
+TEST_F(Predict, PowerBeyondWhatWasMeasuredWidensAndAFifthOfItIsTooMuch) {
+    const auto at = [&](const std::string& profile, const std::string& more = "") {
+        write("flat_psd.json", R"({"name": "flat", "psd": )" + profile + "}");
+        return run("predict result.json --profile flat_psd.json --attitude 45,0,90 --json" + more)
+            .json()["prediction"];
+    };
+    const double reach = result()["spectrum"]["highest_hz"];
+    const auto flat_to = [](double hz) {
+        return "[[20, 0.01], [" + std::to_string(hz) + ", 0.01]]";
+    };
+    for (const double share : {0.19, 0.21}) {
+        const auto seen = at(flat_to((reach - share * 20) / (1 - share)));
+        EXPECT_NEAR(seen["power_outside"].get<double>(), share, 2e-3) << "one band of 800 a decade";
+        EXPECT_EQ(seen["verdict"], share < 0.2 ? "covered" : "not covered");
+    }
+    const std::string wide = flat_to(2 * reach);
+    const double once = at(wide)["attitudes"][0]["budget"]["outside"][0],
+                 twice = at(wide, " --elastic-beyond 2")["attitudes"][0]["budget"]["outside"][0];
+    EXPECT_GT(once, 0);
+    EXPECT_NEAR(twice, 2 * once, 1e-12);
+    EXPECT_EQ(at(wide, " --elastic-beyond 0")["attitudes"][0]["budget"]["outside"][0], 0);
+    // Below the lowest frequency over 1.5, too.
+    const auto low = at("[[1, 0.01], [9, 0.01]]");
+    EXPECT_NEAR(low["power_outside"].get<double>(), 1, 1e-12);
+    EXPECT_EQ(low["verdict"], "not covered");
+    EXPECT_EQ(at("[[10.1, 0.01], [100, 0.01]]")["power_outside"], 0);
+}
+
+TEST_F(Predict, WhatIsForcedIsMarkedAndGroupsForetellNothing) {
+    const Ended groups = run("identify survey.csv --spectrum groups --json");
+    write("groups.json", groups.out);
+    const std::string command = "predict groups.json --profile truck --attitude 0,0,0";
+    const Ended refused = run(command);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.error, HasSubstr("groups know nothing between their frequencies"));
+    const Ended forced = run(command + " --force");
+    EXPECT_EQ(forced.exit_code, 1);
+    EXPECT_THAT(forced.out, HasSubstr("FORCED: coefficients in groups"));
+}
+
+/// A profile at the table comes through the pads by their |T|^2.
+TEST_F(Predict, PadsTakeTheirPartOfASine) {
+    write("pads.toml", "[vibration]\ntransmission = 0.667\n[spectrum]\nmount = \"isolated\"\n");
+    const auto drift = [&](const std::string& more) {
+        return run("predict result.json --profile sine.json --attitude 45,0,90 --json --config "
+                   "pads.toml" +
+                   more)
+            .json()["prediction"]["attitudes"][0];
+    };
+    write("still.json", R"({"name": "still", "sines": [[55, 0.0001]]})");
+    const double still = run("predict result.json --profile still.json --attitude 45,0,90 --json")
+                             .json()["prediction"]["attitudes"][0]["drift"][0];
+    const double full = drift("")["drift"][0], through = drift(" --at table")["drift"][0];
+    // 0.667 at 15 Hz with a damping of 0.2 is a natural frequency of 9.18 Hz.
+    const double r = 55 / 9.18, damped = 2 * 0.2 * r * 2 * 0.2 * r;
+    const double power = (1 + damped) / ((1 - r * r) * (1 - r * r) + damped);
+    EXPECT_NEAR((through - still) / (full - still) / power, 1, 4 * 0.005 / 9.18 + 1e-3);
+}
+
+TEST_F(Predict, WhatSuchACampaignDoesNotTellIsInTheResult) {
+    std::string all;
+    const PredictJson of = result();
+    for (const PredictJson& one : of["spectrum"]["not_told"]) all += std::string(one) + "\n";
+    for (const char* about : {"in step", "elliptic", "angular", "above the highest", "second",
+                              "shock", "fixture", "one frequency are not flat"})
+        EXPECT_THAT(all, HasSubstr(about));
+    EXPECT_THAT(run("identify survey.csv").out, HasSubstr("Not told either:"));
+}
+
 TEST_F(Predict, ListsItsProfiles) {
     const Ended ended = run("predict --list");
     EXPECT_EQ(ended.exit_code, 0);
