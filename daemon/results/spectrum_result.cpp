@@ -388,18 +388,17 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
     const Analysis& of = spectrum.analysis;
     tell_coefficients(of, assessed);
     assessed.rates = rates_of(spectrum);
-    if (!of.model.refusal.empty() && of.form == Form::resonance)
-        doubt(assessed.verdict, of.model.refusal);
     if (of.flat.alarm && of.form != Form::resonance)
         doubt(assessed.verdict, "quadratic coefficients depend on the frequency (p = " +
                                     std::to_string(of.flat.p) + " that they do not)");
+    if (!of.model.refusal.empty()) doubt(assessed.verdict, of.model.refusal);
 }
 
 void add_spectrum(const SpectrumResult& of, Json& root) {
     const Analysis& a = of.analysis;
-    const bool still = a.form == Form::resonance;
     for (std::size_t i = 0; i < kParameters; ++i) {
         const std::size_t group = estimator::internal_of(i) / estimator::kGyros;
+        const bool still = a.gyros[estimator::internal_of(i) % estimator::kGyros].resonant();
         // Bias and linear terms know no frequency.
         root["parameters"][i]["at_hz"] =
             group < estimator::kDii || still ? Json(0.0) : number_or_null(of.reference_hz);

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
@@ -20,6 +22,8 @@ using Eigen::VectorXd;
 
 constexpr Index kFewestForTwo = 40;
 constexpr double kOneFrequencyReach = 1.5;
+constexpr double kUsualHz =
+    60;  ///< a second resonance is looked for beside it where none is likely
 
 MatrixXd prior_sigmas(const Settings& settings) {
     const ParameterArray sigma = prior_sigma(settings);
@@ -163,28 +167,48 @@ void settle(const SpectralTable& table, std::size_t j, const GyroProblem& proble
                                             std::max(1, of.degrees));
     };
     out.lack_of_fit[j] = tail(mixture);
-    if (out.lack_of_fit[j] >= kAlarm || table.dwells() < kFewestForTwo || !mixture.resonant())
-        return;
-    Mixture two = two_resonances(table, j, problem, mixture.list.front().resonances[0].hz);
+    if (out.lack_of_fit[j] >= kAlarm || table.dwells() < kFewestForTwo) return;
+    const auto likeliest = std::ranges::find_if(
+        mixture.list, [](const Hypothesis& one) { return !one.resonances.empty(); });
+    Mixture two =
+        two_resonances(table, j, problem,
+                       likeliest == mixture.list.end() ? kUsualHz : likeliest->resonances[0].hz);
+    // What neither model explains is no reason to leave the likelier one.
+    if (!mixture.resonant() && tail(two) < kAlarm) return;
     two.log_odds = mixture.log_odds;
     mixture = std::move(two);
     out.second[j] = true;
     out.lack_of_fit[j] = tail(mixture);
 }
 
-/// Mean and covariance of the ten static coefficients over a mixture.
-void put_together(Analysis& out, const MatrixXd& declared_effect) {
+/// From a hypothesis' coefficients to the ten static ones, or, where no resonance is the likelier,
+/// to what they are under `bands`: 10 x the covariance's columns.
+MatrixXd to_ten(const Hypothesis& one, bool resonant, std::span<const Band> bands) {
+    MatrixXd out = MatrixXd::Identity(kBase, one.covariance.cols());
+    if (resonant) return out;
+    for (std::size_t r = 0; r < one.resonances.size(); ++r)
+        out.block<kElastic, kElastic>(kBase - kElastic, kBase + kElastic * static_cast<Index>(r)) =
+            elastic_weight(bands, one.resonances[r]) *
+            Eigen::Matrix<double, kElastic, kElastic>::Identity();
+    return out;
+}
+
+/// Mean and covariance of the ten coefficients over a mixture.
+void put_together(const SpectralTable& table, const MatrixXd& declared_effect, Analysis& out) {
+    const std::span<const Band> lowest =
+        table.kinds().empty() ? std::span<const Band>() : table.kinds().front().bands;
     const auto all = static_cast<Index>(kParameters);
     out.value = VectorXd::Zero(all);
     out.covariance_a = MatrixXd::Zero(all, all);
     for (Index j = 0; j < 3; ++j) {
-        const auto& list = out.gyros[static_cast<std::size_t>(j)].list;
+        const Mixture& gyro = out.gyros[static_cast<std::size_t>(j)];
         VectorXd mean = VectorXd::Zero(kBase);
         MatrixXd square = MatrixXd::Zero(kBase, kBase);
-        for (const Hypothesis& one : list) {
-            const VectorXd x = one.x.head(kBase);
+        for (const Hypothesis& one : gyro.list) {
+            const MatrixXd ten = to_ten(one, gyro.resonant(), lowest);
+            const VectorXd x = ten.leftCols(one.x.size()) * one.x;
             mean += one.weight * x;
-            square += one.weight * (one.covariance.topLeftCorner(kBase, kBase) + x * x.transpose());
+            square += one.weight * (ten * one.covariance * ten.transpose() + x * x.transpose());
         }
         square -= mean * mean.transpose();
         for (Index a = 0; a < kBase; ++a) {
@@ -217,6 +241,35 @@ MatrixXd add_effects(const SpectralTable& table, const std::array<GyroProblem, 3
     return on_all;
 }
 
+std::string lack_of_fit_text(const Mixture& gyro, bool second, Index dwells) {
+    if (second) return "more than two resonances";
+    const std::string one = gyro.resonant()
+                                ? "one resonance does not fit"
+                                : "flat coefficients do not fit, one resonance is no likelier";
+    if (dwells >= kFewestForTwo) return one + ", and two do not fit either";
+    return one + ", and there are too few dwells for two (" + std::to_string(dwells) + ", " +
+           std::to_string(kFewestForTwo) + " are needed)";
+}
+
+/// Every gyro that does not fit and why; empty: all fit.
+std::string lack_of_fit_text(const Analysis& of, Index dwells) {
+    std::vector<std::pair<std::string, std::string>> why;  // why, and whose
+    for (std::size_t j = 0; j < 3; ++j) {
+        if (!(of.lack_of_fit[j] < kAlarm)) continue;
+        const std::string text = lack_of_fit_text(of.gyros[j], of.second[j], dwells);
+        const auto known =
+            std::ranges::find(why, text, &std::pair<std::string, std::string>::first);
+        if (known == why.end())
+            why.emplace_back(text, std::string(1, "xyz"[j]));
+        else
+            known->second += std::string(", ") + "xyz"[j];
+    }
+    std::string out;
+    for (const auto& [text, whose] : why)
+        out += (out.empty() ? "gyro " : "; gyro ") + whose + ": " + text;
+    return out;
+}
+
 void set_reach(const Settings& settings, const SpectralTable& table, Analysis& out) {
     Model& model = out.model;
     model.frame = settings;
@@ -229,13 +282,7 @@ void set_reach(const Settings& settings, const SpectralTable& table, Analysis& o
         model.highest_hz = std::max(out.flat.highest_hz, kOneFrequencyReach * alone);
         if (table.kinds().size() > 1) model.highest_hz = std::max(out.flat.highest_hz, alone);
     }
-    for (std::size_t j = 0; j < 3; ++j) {
-        if (out.lack_of_fit[j] < kAlarm)
-            model.refusal = std::string("gyro ") + "xyz"[j] +
-                            (out.second[j] ? ": more than two resonances"
-                                           : ": one resonance does not fit, and there are too few "
-                                             "dwells for two (40)");
-    }
+    model.refusal = lack_of_fit_text(out, table.dwells());
     if (out.form == Form::groups)
         model.refusal = "coefficients in groups know nothing between their frequencies";
 }
@@ -296,7 +343,7 @@ Analysis analyse(const Settings& settings, const SpectralTable& table, Form form
     for (std::size_t j = 0; j < 3; ++j)
         settle(table, j, problems[j], of_gyro(declared.rates, static_cast<Index>(j)), form, out);
     out.form = form == Form::groups ? Form::groups : out.resonant() ? Form::resonance : Form::flat;
-    put_together(out, add_effects(table, problems, declared, out));
+    put_together(table, add_effects(table, problems, declared, out), out);
     set_reach(settings, table, out);
     if (form == Form::flat && out.flat.alarm)
         out.model.refusal = "quadratic coefficients depend on the frequency, and are taken as flat";

@@ -20,6 +20,9 @@ constexpr double kWorse = 12;  ///< so much less likely a maximum does not count
 constexpr int kScanned = 90, kDampings = 5;
 constexpr std::size_t kMaxima = 3;
 constexpr int kReach = 3;  ///< nodes either way, one standard deviation apart
+/// Of the intervals: cells of half a standard deviation out to 3.75, each of 4 x 4 points.
+constexpr int kCells = 7, kInCell = 4;
+constexpr double kTail = 0.025;
 
 double log_sum(double a, double b) {
     const double most = std::max(a, b);
@@ -278,10 +281,75 @@ void add_nodes(const Likelihood& likelihood, const Point& top, std::vector<Node>
     }
 }
 
+/// Where a share `tail` of the weights lies below.
+double quantile(std::vector<std::pair<double, double>> value_weight, double tail) {
+    std::sort(value_weight.begin(), value_weight.end());
+    double all = 0, below = 0;
+    for (const auto& [value, weight] : value_weight) all += weight;
+    for (const auto& [value, weight] : value_weight) {
+        below += weight;
+        if (below >= tail * all) return value;
+    }
+    return value_weight.back().first;
+}
+
+/// The intervals of a resonance. The mixture's own nodes are a standard deviation apart, too coarse
+/// for a quantile: of a normal distribution its 2.5 % would lie 8 to 13 % too far out. So the
+/// density is taken at twice as many along each axis, even within a cell, and nothing of a cell
+/// counts that lies outside the prior.
+void set_intervals(const Likelihood& likelihood, const std::vector<Point>& tops, Mixture& out) {
+    struct Cell {
+        double log_weight;
+        Point middle;
+        Eigen::Matrix2d sides;
+    };
+    std::vector<Cell> cells;
+    double most = -1e300;
+    for (const Point& top : tops) {
+        const Eigen::Matrix2d sides = axes(likelihood, top) / 2;
+        const double log_area = std::log(std::abs(sides.determinant()));
+        for (int a = -kCells; a <= kCells; ++a) {
+            for (int b = -kCells; b <= kCells; ++b) {
+                const Point middle = top + sides * Point(a, b);
+                const double height = likelihood(middle);
+                if (!(height > kOutside)) continue;
+                cells.push_back({height + log_area, middle, sides});
+                most = std::max(most, cells.back().log_weight);
+            }
+        }
+    }
+    std::vector<std::pair<double, double>> hz, damping;
+    for (const Cell& cell : cells) {
+        const double weight = std::exp(cell.log_weight - most);
+        if (weight < 1e-9) continue;
+        for (int i = 0; i < kInCell * kInCell; ++i) {
+            const Point within((i % kInCell + 0.5) / kInCell - 0.5,
+                               (i / kInCell + 0.5) / kInCell - 0.5);
+            const Resonance one = at(cell.middle + cell.sides * within);
+            if (one.hz < kLowestResonance || one.hz > kHighestResonance) continue;
+            hz.emplace_back(one.hz, weight);
+            damping.emplace_back(one.damping, weight);
+        }
+    }
+    if (hz.empty()) return;
+    out.hz = {quantile(hz, kTail), quantile(hz, 1 - kTail)};
+    out.damping = {quantile(damping, kTail), quantile(damping, 1 - kTail)};
+}
+
+/// By all that the one model weighs and the other: a resonance's weight lies on many nodes.
+void put_likelier_first(Mixture& of) {
+    const bool resonant = of.log_odds > 0;
+    const auto likelier = [resonant](const Hypothesis& one) {
+        return one.resonances.empty() != resonant;
+    };
+    std::stable_sort(of.list.begin(), of.list.end(), [&](const auto& a, const auto& b) {
+        return likelier(a) != likelier(b) ? likelier(a) : a.weight > b.weight;
+    });
+}
+
 void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
             Mixture& out) {
-    std::stable_sort(out.list.begin(), out.list.end(),
-                     [](const auto& a, const auto& b) { return a.weight > b.weight; });
+    put_likelier_first(out);
     const Hypothesis& best = out.list.front();
     const VectorXd left = problem.rate - design(table, gyro, best.resonances) * best.x;
     out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
@@ -339,7 +407,8 @@ Hypothesis without_resonance(const SpectralTable& table, std::size_t gyro,
 Mixture one_resonance(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem) {
     const Likelihood likelihood(table, gyro, problem);
     std::vector<Node> nodes;
-    for (const Point& top : scan(likelihood)) add_nodes(likelihood, top, nodes);
+    const std::vector<Point> tops = scan(likelihood);
+    for (const Point& top : tops) add_nodes(likelihood, top, nodes);
     Solved flat = likelihood.flat();
     double most = flat.log_evidence;
     for (const Node& node : nodes) most = std::max(most, node.log_weight);
@@ -365,6 +434,7 @@ Mixture one_resonance(const SpectralTable& table, std::size_t gyro, const GyroPr
         keep(std::move(node.what), weight);
     }
     for (Hypothesis& one : out.list) one.weight /= kept;
+    set_intervals(likelihood, tops, out);
     finish(table, gyro, problem, out);
     return out;
 }
@@ -400,14 +470,18 @@ std::vector<Told> tell(const Mixture& mixture) {
         mean /= all;
         square /= all;
         Told told;
-        const auto spread = [](double m, double s) {
+        const bool linearised = mixture.list.front().linearised;
+        const auto spread = [linearised](double m, double s, const Interval& between) {
             const double sigma = std::sqrt(std::max(0.0, s - m * m));
-            // On a logarithmic scale: neither goes below zero.
+            if (!linearised) return Spread{m, sigma, between.low, between.high};
+            // On a logarithmic scale, where it is normal.
             const double factor = std::exp(1.96 * sigma / m);
             return Spread{m, sigma, m / factor, m * factor};
         };
-        told.hz = spread(mean[0], square[0]);
-        told.damping = spread(mean[1], square[1]);
+        told.hz = spread(mean[0], square[0], mixture.hz);
+        told.hz.low = std::max(told.hz.low, kLowestResonance);
+        told.hz.high = std::min(told.hz.high, kHighestResonance);
+        told.damping = spread(mean[1], square[1], mixture.damping);
         told.elastic = value / all;
         told.sigma = (squares / all - told.elastic.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
         out.push_back(told);

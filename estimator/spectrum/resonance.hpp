@@ -29,14 +29,22 @@ struct Hypothesis {
     bool linearised = false;
 };
 
+struct Interval {
+    double low = 0, high = 0;
+};
+
 /// What the rates of a gyro leave of its elastic part.
 struct Mixture {
-    std::vector<Hypothesis> list;  ///< the heaviest first, weights of sum 1
-    double log_odds = 0;           ///< of one resonance against none
-    double chi_square = 0;         ///< of the heaviest hypothesis, on `covariance`
+    /// Weights of sum 1. Those of the likelier model, none or one resonance, come first, whatever
+    /// one of them alone weighs; within a model the heaviest first.
+    std::vector<Hypothesis> list;
+    double log_odds = 0;    ///< of one resonance against none
+    double chi_square = 0;  ///< of the first hypothesis, on `covariance`
     int degrees = 0;
+    Interval hz, damping;  ///< of one resonance: quantiles of 2.5 and 97.5 % where there is one
 
     [[nodiscard]] bool named() const { return log_odds > 4; }
+    /// The likelier model has a resonance.
     [[nodiscard]] bool resonant() const { return !list.front().resonances.empty(); }
 };
 
@@ -61,7 +69,8 @@ struct Mixture {
 [[nodiscard]] Eigen::MatrixXd gain(const SpectralTable& table, std::size_t gyro,
                                    const GyroProblem& problem, const Hypothesis& of);
 
-/// Mean, standard deviation and 95 % interval of a resonance over a mixture's resonant part.
+/// Mean, standard deviation and 95 % interval of a resonance over a mixture's resonant part; the
+/// interval has 2.5 % of it on either side, and no frequency outside the prior's.
 struct Spread {
     double mean = 0, sigma = 0, low = 0, high = 0;
 };
@@ -69,7 +78,7 @@ struct Told {
     Spread hz, damping;
     Eigen::Matrix<double, kElastic, 1> elastic, sigma;
 };
-/// One for each resonance of the heaviest hypothesis.
+/// One for each resonance of the likelier model.
 [[nodiscard]] std::vector<Told> tell(const Mixture& mixture);
 
 /// Prior of ln damping, and of an elastic coefficient in deg/h/g^2, half each.

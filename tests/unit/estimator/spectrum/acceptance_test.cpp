@@ -22,15 +22,6 @@ namespace {
 using Eigen::Index;
 using namespace testing;
 
-Analysis campaign(const Settings& settings, const Truth& truth, std::vector<PlannedDwell> plan,
-                  unsigned seed, bool mixed = true, Form form = Form::automatic) {
-    std::mt19937_64 random(seed);
-    if (mixed) shuffle(plan, random);
-    Dwells dwells = dwells_of(settings, truth, plan);
-    add_noise(dwells, random);
-    return analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), form);
-}
-
 std::vector<Situation> attitudes_of(const Profile& profile) {
     std::vector<Situation> out;
     for (const auto& deg : eight_attitudes()) out.push_back(situation_of(profile, deg));
@@ -93,8 +84,10 @@ void expect_survey_predicts(unsigned campaigns, double slack) {
     }
 }
 
-TEST(SpectrumAcceptance, SurveyPredictsTheSixProfiles) { expect_survey_predicts(3, 1.25); }
-TEST(SpectrumAcceptance, SoakSurveyPredictsTheSixProfiles) { expect_survey_predicts(20, 1); }
+TEST(SpectrumAcceptance, SurveyPredictsTheSixProfiles) {
+    constexpr unsigned kCampaigns = in_every_run(20, 3);
+    expect_survey_predicts(kCampaigns, kCampaigns < 20 ? 1.25 : 1);
+}
 
 /// Twenty campaigns, each of which says so of all six.
 TEST(SpectrumAcceptance, CampaignsAtOneFrequencyAreWrongAndSayThatItIsNotCovered) {
@@ -140,19 +133,66 @@ void expect_flat(unsigned campaigns) {
     // Scatter that the rates do not exclude takes 8 %, slow drift 2 % (the same rates: little of
     // the spread of T is left in the ratio).
     EXPECT_NEAR(sum / of_noise, 0.91, 0.04 * std::sqrt(30 / n));
-    EXPECT_LE(alarms, 1U);
+    // One of 30 at most.
+    EXPECT_LE(alarms, at_most(campaigns, kAlarm));
     EXPECT_EQ(named, 0U);
 }
-TEST(SpectrumAcceptance, FlatRigsRaiseNoAlarm) { expect_flat(4); }
+TEST(SpectrumAcceptance, FlatRigsRaiseNoAlarm) { expect_flat(in_every_run(20, 4)); }
 TEST(SpectrumAcceptance, SoakFlatRigsRaiseNoAlarm) { expect_flat(30); }
 
+/// Shares at 40, 60, 120, 300, 1000 Hz as they are published to two digits; 0: not there. They
+/// follow from the noncentral chi-square of the test, whose covariance is wider here by the drift.
+void expect_shares(const Settings& settings, const std::vector<PlannedDwell>& plan,
+                   const std::array<double, 5>& published) {
+    const Flatness flat = campaign(settings, {}, plan, 1, true, Form::flat).flat;
+    for (std::size_t i = 0; i < published.size(); ++i) {
+        const auto& [hz, share] = flat.smallest_seen[i];
+        std::printf("%7.4f", share);
+        if (published[i] > 0) {
+            EXPECT_NEAR(share / published[i], 1, 0.35) << hz;
+        }
+    }
+    std::printf("\n");
+}
+
 TEST(SpectrumAcceptance, SharesSeenAreThePublishedOnes) {
-    const Analysis found = campaign(undeclared(), {}, survey(), 1);
-    // 40, 60, 120, 300, 1000 Hz.
-    constexpr std::array<double, 5> kPublished{0.006, 0.006, 0.006, 0.17, 2.2};
-    for (std::size_t i = 0; i < kPublished.size(); ++i) {
-        const auto& [hz, share] = found.flat.smallest_seen[i];
-        EXPECT_NEAR(share / kPublished[i], 1, 0.35) << hz;
+    expect_shares(undeclared(), survey(), {0.006, 0.006, 0.006, 0.17, 2.2});
+    expect_shares(undeclared(), survey(3), {0.023, 0.023, 0.022, 0.63, 8.2});
+    expect_shares(undeclared(), isolated_survey(pads_with(15, 2.0 / 3, 0.2), 6),
+                  {0.12, 0.31, 1.27, 0, 0});
+    // At two frequencies, rest at seven positions.
+    std::vector<PlannedDwell> at_35, at_65;
+    for (const PlannedDwell& one : survey()) {
+        if (one.hz <= 15) {
+            at_35.push_back(one);
+            at_65.push_back(one);
+        }
+        if (one.hz == 15) at_35.push_back({one.position, 35, 1, 6});
+        if (one.hz == 65) at_65.push_back(one);
+    }
+    expect_shares(undeclared(), at_35, {0.008, 0.048, 0.27, 1.86, 0});
+    expect_shares(undeclared(), at_65, {0.016, 0.0055, 0.074, 0.62, 7.25});
+}
+
+/// A gain that may be off by 0.5 % at each frequency moves all that vibrates there by 1 %, just as
+/// this share does by (rho - 1): the noncentrality of 78.6 that the test of 108 degrees needs for
+/// 90 % is had at 1 % sqrt(78.6 / sum (rho - mean)^2), beside what the noise lets it see.
+TEST(SpectrumAcceptance, SharesSeenWithTheGainDeclaredFollowFromItsUncertainty) {
+    constexpr std::array<double, 7> kHz{15, 25, 35, 45, 65, 85, 125};
+    const Flatness of_noise = campaign(undeclared(), {}, survey(), 1, true, Form::flat).flat;
+    const Flatness flat = campaign(gain_declared(), {}, survey(), 1, true, Form::flat).flat;
+    for (std::size_t i = 0; i < flat.smallest_seen.size(); ++i) {
+        double sum = 0, square = 0;
+        for (const double hz : kHz) {
+            const double weight = in_phase(hz, {flat.smallest_seen[i].first, 0.05});
+            sum += weight;
+            square += weight * weight;
+        }
+        const double of_gain = 0.01 * std::sqrt(78.6 / (square - sum * sum / kHz.size()));
+        EXPECT_NEAR(
+            flat.smallest_seen[i].second / std::hypot(of_gain, of_noise.smallest_seen[i].second), 1,
+            0.1)
+            << flat.smallest_seen[i].first;
     }
 }
 
@@ -170,21 +210,29 @@ unsigned alarms_of(const Truth& truth, const Settings& settings, double gain_sca
             if (!gains.contains(dwell.hz)) gains[dwell.hz] = 1 + gain_scatter * normal(random);
             dwell.gain = gains[dwell.hz];
         }
-        alarms += campaign(settings, truth, plan, seed).flat.alarm ? 1U : 0U;
+        alarms += campaign(settings, truth, plan, seed, true, Form::flat).flat.alarm ? 1U : 0U;
     }
     return alarms;
 }
 
-TEST(SpectrumAcceptance, GainScatterAlarmsUnlessDeclared) {
-    Settings declared = undeclared();
-    declared.uncertainty.gain_between_frequencies.u = 0.005;
-    EXPECT_EQ(alarms_of({}, declared, 0.005, 4), 0U);
-    EXPECT_GE(alarms_of({}, undeclared(), 0.02, 2), 2U);
-    EXPECT_EQ(alarms_of(Truth::common(0.02, kSixty), declared, 0, 3), 3U);
+TEST(SpectrumAcceptance, GainScatterThatIsNotDeclaredAlarmsInAQuarterToSixInTen) {
+    constexpr unsigned kCampaigns = in_every_run(20, 2);
+    const unsigned alarms = alarms_of({}, undeclared(), 0.005, kCampaigns);
+    std::printf("gain scatter not declared: %u of %u alarm\n", alarms, kCampaigns);
+    EXPECT_GE(alarms, at_least(kCampaigns, 0.25));
+    EXPECT_LE(alarms, at_most(kCampaigns, 0.60));
+}
+TEST(SpectrumAcceptance, GainScatterThatIsDeclaredRaisesNoAlarm) {
+    constexpr unsigned kCampaigns = in_every_run(20, 4);
+    EXPECT_LE(alarms_of({}, gain_declared(), 0.005, kCampaigns), at_most(kCampaigns, 1.0 / 30));
+}
+TEST(SpectrumAcceptance, AShareOfTwoPercentIsSeenWithTheGainDeclared) {
+    constexpr unsigned kCampaigns = in_every_run(20, 3);
+    EXPECT_GE(alarms_of(Truth::common(0.02, kSixty), gain_declared(), 0, kCampaigns),
+              at_least(kCampaigns, 0.9));
 }
 TEST(SpectrumAcceptance, SoakGainScatterAlarmsUnlessDeclared) {
-    Settings declared = undeclared();
-    declared.uncertainty.gain_between_frequencies.u = 0.005;
+    const Settings declared = gain_declared();
     EXPECT_LE(alarms_of({}, declared, 0.005, 30), 1U);
     const unsigned alarms = alarms_of({}, undeclared(), 0.005, 40);
     std::printf("gain scatter not declared: %u of 40 alarm\n", alarms);
@@ -195,16 +243,34 @@ TEST(SpectrumAcceptance, SoakGainScatterAlarmsUnlessDeclared) {
     EXPECT_LE(alarms_of({}, declared, 0, 30), 1U);
 }
 
-Truth two_resonances_of(double first_hz, double first_share, double second_hz,
-                        double second_share) {
-    Truth truth = Truth::common(first_share, {first_hz, 0.05});
-    const Truth more = Truth::common(second_share, {second_hz, 0.05});
-    for (std::size_t j = 0; j < 3; ++j) truth.elastic[j].push_back(more.elastic[j][0]);
-    return truth;
+/// Of each gyro the standard deviations of both frequencies, Hz, that the rates' noise leaves: from
+/// the information at the truth, without noise.
+std::array<std::pair<double, double>, 3> least_sigmas(const Truth& truth, double f1) {
+    const Dwells dwells = dwells_of(undeclared(), truth, survey());
+    const SpectralTable table(undeclared(), dwells.list, dwells.kinds);
+    std::array<std::pair<double, double>, 3> out;
+    for (std::size_t j = 0; j < 3; ++j) {
+        GyroProblem problem{Eigen::VectorXd(63), 4.891201e-5 * Eigen::MatrixXd::Identity(63, 63),
+                            Eigen::VectorXd::Constant(10, 10)};
+        problem.prior_sigma.tail(6).setConstant(1);
+        for (Index k = 0; k < 63; ++k)
+            problem.rate[k] =
+                dwells.list[static_cast<std::size_t>(k)].row.rate[static_cast<Index>(j)];
+        const auto told = tell(two_resonances(table, j, problem, f1));
+        const auto& [low, high] = std::minmax(told.at(0).hz, told.at(1).hz,
+                                              [](auto& a, auto& b) { return a.mean < b.mean; });
+        out[j] = {low.sigma, high.sigma};
+        std::printf("gyro %zu: %.2f +- %.2f and %.2f +- %.2f Hz\n", j, low.mean, low.sigma,
+                    high.mean, high.sigma);
+    }
+    return out;
 }
 
-/// Error of the predictions over u; every gyro has both resonances.
+/// Error of the predictions over u; every gyro has both resonances, and both within 5 Hz as often
+/// as the noise lets them.
 double error_with_two(const Truth& truth, double f1, double f2, unsigned campaigns) {
+    const auto theory = least_sigmas(truth, f1);
+    double within = 0, expected = 0, spread = 0;
     Errors errors;
     for (unsigned seed = 1; seed <= campaigns; ++seed) {
         const Analysis found = campaign(undeclared(), truth, survey(), seed);
@@ -217,10 +283,18 @@ double error_with_two(const Truth& truth, double f1, double f2, unsigned campaig
             if (told.size() != 2) continue;
             const auto& [low, high] = std::minmax(told[0].hz, told[1].hz,
                                                   [](auto& a, auto& b) { return a.mean < b.mean; });
-            EXPECT_NEAR(low.mean, f1, std::max(5.0, 3 * low.sigma));
-            EXPECT_NEAR(high.mean, f2, std::max(5.0, 3 * high.sigma));
+            for (const auto& [mean, is, sigma] : {std::array{low.mean, f1, theory[j].first},
+                                                  std::array{high.mean, f2, theory[j].second}}) {
+                EXPECT_NEAR(mean, is, std::max(5.0, 3.5 * sigma)) << "seed " << seed;
+                const double chance = std::erf(5 / (sigma * std::sqrt(2)));
+                within += std::abs(mean - is) < 5 ? 1 : 0;
+                expected += chance;
+                spread += chance * (1 - chance);
+            }
         }
     }
+    std::printf("within 5 Hz: %g of %u, %.1f expected\n", within, 6 * campaigns, expected);
+    EXPECT_GE(within, expected - 3.1 * std::sqrt(spread) - 0.5);
     std::printf("two resonances, %g and %g Hz: error/u %.2f\n", f1, f2, errors.rms_in_u());
     return errors.rms_in_u();
 }
@@ -230,35 +304,44 @@ void expect_two_resonances(unsigned campaigns, double most) {
         EXPECT_LT(error_with_two(two_resonances_of(f1, s1, f2, s2), f1, f2, campaigns), most);
 }
 // All predictions of a campaign share a few coefficients: one campaign strays by a third.
-TEST(SpectrumAcceptance, TwoResonancesInsideThePlanAreFound) { expect_two_resonances(1, 1.6); }
+TEST(SpectrumAcceptance, TwoResonancesInsideThePlanAreFound) {
+    constexpr unsigned kCampaigns = in_every_run(6, 1);
+    expect_two_resonances(kCampaigns, 1.2 + 0.4 / kCampaigns);
+}
 TEST(SpectrumAcceptance, SoakTwoResonancesInsideThePlanAreFound) { expect_two_resonances(20, 1.2); }
 
 TEST(SpectrumAcceptance, AThirdResonanceIsNotPredictedWith) {
     Truth truth = two_resonances_of(30, 0.4, 55, -0.4);
     for (std::size_t j = 0; j < 3; ++j)
         truth.elastic[j].push_back(Truth::common(0.4, {105, 0.05}).elastic[j][0]);
-    const Analysis found = campaign(undeclared(), truth, survey(), 1);
-    EXPECT_NE(found.model.refusal.find("more than two resonances"), std::string::npos)
-        << found.model.refusal;
+    for (unsigned seed = 1; seed <= in_every_run(20, 1); ++seed) {
+        const Analysis found = campaign(undeclared(), truth, survey(), seed);
+        EXPECT_NE(found.model.refusal.find("more than two resonances"), std::string::npos)
+            << "seed " << seed << ": " << found.model.refusal;
+    }
 }
 
 /// Biases that move are no spectrum.
-void expect_drift_is_no_spectrum(unsigned campaigns) {
+void expect_drift_is_no_spectrum(unsigned campaigns, bool mixed = true, bool seen = false) {
+    const Truth truth = seen ? Truth::common(0.02, kSixty) : Truth{};
     for (const int kind : {0, 1, 2}) {
+        // One frequency after the other, a step between two of them looks like theirs.
+        if (kind == 1 && !mixed && !seen) continue;
         unsigned alarms = 0;
         for (unsigned seed = 1; seed <= campaigns; ++seed) {
             auto plan = survey();
             std::mt19937_64 random(seed);
-            shuffle(plan, random);
-            Dwells dwells = dwells_of(undeclared(), {}, plan);
+            if (mixed) shuffle(plan, random);
+            Dwells dwells = dwells_of(undeclared(), truth, plan);
             add_noise(dwells, random);
             std::normal_distribution<double> normal;
+            const std::size_t step = 10 + random() % 44;
             Eigen::Vector3d walk = Eigen::Vector3d::Zero();
             for (std::size_t i = 0; i < dwells.list.size(); ++i) {
                 const double hours = 160.0 / 3600;
                 for (Index j = 0; j < 3; ++j)
                     walk[j] += kind == 0   ? 0.03 * std::sqrt(hours) * normal(random)
-                               : kind == 1 ? (i == 30 ? 0.1 : 0)
+                               : kind == 1 ? (i == step ? 0.1 : 0)
                                            : 0.05 * hours;
                 dwells.list[i].row.rate += walk;
             }
@@ -268,10 +351,31 @@ void expect_drift_is_no_spectrum(unsigned campaigns) {
                           ? 1U
                           : 0U;
         }
-        EXPECT_LE(alarms, 1U) << "drift " << kind;
+        std::printf("drift %d, %s%s: %u of %u alarm\n", kind, mixed ? "mixed" : "in order",
+                    seen ? ", share of 2 %" : "", alarms, campaigns);
+        if (seen)
+            EXPECT_GE(alarms, at_least(campaigns, 0.95)) << "drift " << kind;
+        else
+            EXPECT_LE(alarms, campaigns < 40 ? at_most(campaigns, 1.0 / 40) : 1U)
+                << "drift " << kind;
     }
 }
-TEST(SpectrumAcceptance, MovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(2); }
+TEST(SpectrumAcceptance, MovingBiasIsNoSpectrum) {
+    expect_drift_is_no_spectrum(in_every_run(20, 2));
+}
+TEST(SpectrumAcceptance, MovingBiasIsNoSpectrumWithTheFrequenciesInOrder) {
+    expect_drift_is_no_spectrum(in_every_run(6, 1), false);
+}
+TEST(SpectrumAcceptance, AShareOfTwoPercentIsSeenWhileTheBiasMoves) {
+    expect_drift_is_no_spectrum(in_every_run(6, 1), true, true);
+}
+TEST(SpectrumAcceptance, SoakMovingBiasIsNoSpectrumWithTheFrequenciesInOrder) {
+    expect_drift_is_no_spectrum(40, false);
+}
+TEST(SpectrumAcceptance, SoakAShareOfTwoPercentIsSeenWhileTheBiasMoves) {
+    expect_drift_is_no_spectrum(40, true, true);
+    expect_drift_is_no_spectrum(40, false, true);
+}
 TEST(SpectrumAcceptance, SoakMovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(40); }
 
 /// In each campaign: not covered, and no error beyond the allowance, which is 0.2 to 0.6 of it.
@@ -289,47 +393,45 @@ void expect_beyond_is_not_covered(unsigned campaigns) {
     }
     std::printf("300 Hz beyond 125 Hz, %u campaigns: error/u %.2f\n", campaigns, all.rms_in_u());
 }
-TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) { expect_beyond_is_not_covered(3); }
+TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) {
+    expect_beyond_is_not_covered(in_every_run(12, 3));
+}
 TEST(SpectrumAcceptance, SoakResonanceBeyondThePlanIsNotCovered) {
     expect_beyond_is_not_covered(20);
 }
 
-/// Each gyro its own resonance, or none.
-Truth random_rig(unsigned seed) {
-    std::mt19937_64 random(5000 + seed);
-    std::uniform_real_distribution<double> uniform;
-    std::normal_distribution<double> normal;
-    Truth truth = Truth::common(1, kSixty);
-    for (auto& gyro : truth.elastic) {
-        if (uniform(random) < 0.3) {
-            gyro.clear();
-            continue;
+/// How often the truth lies within the intervals of 95 %.
+struct Intervals {
+    unsigned hz = 0, damping = 0, all = 0;
+    void add(const Mixture& gyro, const std::vector<ElasticPart>& truth, unsigned seed) {
+        const auto holds = [](const Spread& told, double is) {
+            return told.low <= is && is <= told.high ? 1U : 0U;
+        };
+        const auto told = tell(gyro);
+        for (const Told& one : told) {
+            EXPECT_GE(one.hz.low, kLowestResonance) << "seed " << seed;
+            EXPECT_LE(one.hz.high, kHighestResonance) << "seed " << seed;
+            EXPECT_LE(one.hz.low, one.hz.high) << "seed " << seed;
+            EXPECT_GT(one.damping.low, 0) << "seed " << seed;
         }
-        gyro[0].resonance = {25 * std::pow(12, uniform(random)),
-                             0.015 * std::pow(10, uniform(random))};
-        for (double& e : gyro[0].coefficients) e = 0.3 * 0.03 * normal(random);
+        if (told.size() != 1 || truth.empty()) return;
+        ++all;
+        hz += holds(told[0].hz, truth[0].resonance.hz);
+        damping += holds(told[0].damping, truth[0].resonance.damping);
     }
-    return truth;
-}
-
-/// What the pads leave of 12 g at the table, and of 9 g at 15 Hz: the survey of a platform on them.
-std::vector<PlannedDwell> isolated_survey(const Resonance& pads) {
-    std::vector<PlannedDwell> plan = survey();
-    for (PlannedDwell& dwell : plan)
-        if (dwell.hz > 0)
-            dwell.amplitude_g = (dwell.hz > 15 ? 12 : 9) * std::sqrt(pads_power(dwell.hz, pads));
-    return plan;
-}
+};
 
 /// The study of coverage: bolted to the table with profiles at the platform; or on pads, at their
 /// table.
 void expect_coverage(unsigned campaigns, bool isolated = false) {
     const Resonance pads = pads_with(15, 2.0 / 3, 0.2);
     Errors errors;
+    Intervals intervals;
     for (unsigned seed = 1; seed <= campaigns; ++seed) {
         const Truth truth = random_rig(seed);
         const Analysis found =
             campaign(undeclared(), truth, isolated ? isolated_survey(pads) : survey(), seed);
+        for (std::size_t j = 0; j < 3; ++j) intervals.add(found.gyros[j], truth.elastic[j], seed);
         for (const Profile& profile : six_profiles()) {
             auto situations = attitudes_of(profile);
             if (isolated) {
@@ -351,11 +453,21 @@ void expect_coverage(unsigned campaigns, bool isolated = false) {
         EXPECT_LE(within, 0.98);
     }
     EXPECT_LT(errors.rms_in_u(), campaigns >= 20 ? 1.1 : 1.4);
+    std::printf("within 95 %%: frequency %u, damping %u, of %u resonances\n", intervals.hz,
+                intervals.damping, intervals.all);
+    EXPECT_GE(intervals.hz, at_least(intervals.all, 0.95));
+    EXPECT_GE(intervals.damping, at_least(intervals.all, 0.95));
 }
-TEST(SpectrumAcceptance, PredictionsCoverRandomRigs) { expect_coverage(5); }
-TEST(SpectrumAcceptance, PredictionsCoverRandomRigsOnPads) { expect_coverage(4, true); }
-TEST(SpectrumAcceptance, SoakPredictionsCoverRandomRigs) { expect_coverage(100); }
-TEST(SpectrumAcceptance, SoakPredictionsCoverRandomRigsOnPads) { expect_coverage(100, true); }
+TEST(SpectrumAcceptance, PredictionsAndIntervalsCoverRandomRigs) {
+    expect_coverage(in_every_run(25, 5));
+}
+TEST(SpectrumAcceptance, PredictionsAndIntervalsCoverRandomRigsOnPads) {
+    expect_coverage(in_every_run(20, 4), true);
+}
+TEST(SpectrumAcceptance, SoakPredictionsAndIntervalsCoverRandomRigs) { expect_coverage(100); }
+TEST(SpectrumAcceptance, SoakPredictionsAndIntervalsCoverRandomRigsOnPads) {
+    expect_coverage(100, true);
+}
 
 /// Slow samples of random dwells: 2.2 % of their level, in the budget or taken as exact.
 double error_of_random_dwells(bool budgeted, unsigned campaigns) {

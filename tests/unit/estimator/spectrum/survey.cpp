@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
@@ -33,6 +34,12 @@ Settings undeclared() {
     return settings;
 }
 
+Settings gain_declared() {
+    Settings declared = undeclared();
+    declared.uncertainty.gain_between_frequencies.u = 0.005;
+    return declared;
+}
+
 ParameterArray table2() {
     ParameterArray truth{};
     for (std::size_t i = 0; i < kParameters; ++i) truth[internal_of(i)] = kTable2[i];
@@ -58,6 +65,15 @@ std::vector<PlannedDwell> survey(double amplitude_g) {
     for (const double hz : {25., 35., 45., 65., 85., 125.}) {
         for (const int p : kSeven) plan.push_back({p, hz, 1, amplitude_g});
     }
+    return plan;
+}
+
+std::vector<PlannedDwell> isolated_survey(const Resonance& pads, double at_15_g) {
+    std::vector<PlannedDwell> plan = survey();
+    for (PlannedDwell& dwell : plan)
+        if (dwell.hz > 0)
+            dwell.amplitude_g =
+                (dwell.hz > 15 ? 12 : at_15_g) * std::sqrt(pads_power(dwell.hz, pads));
     return plan;
 }
 
@@ -141,6 +157,40 @@ void add_noise(Dwells& dwells, std::mt19937_64& random) {
     }
 }
 
+Analysis campaign(const Settings& settings, const Truth& truth, std::vector<PlannedDwell> plan,
+                  unsigned seed, bool mixed, Form form) {
+    std::mt19937_64 random(seed);
+    if (mixed) shuffle(plan, random);
+    Dwells dwells = dwells_of(settings, truth, plan);
+    add_noise(dwells, random);
+    return analyse(settings, SpectralTable(settings, dwells.list, dwells.kinds), form);
+}
+
+Truth random_rig(unsigned seed) {
+    std::mt19937_64 random(5000 + seed);
+    std::uniform_real_distribution<double> uniform;
+    std::normal_distribution<double> normal;
+    Truth truth = Truth::common(1, kSixty);
+    for (auto& gyro : truth.elastic) {
+        if (uniform(random) < 0.3) {
+            gyro.clear();
+            continue;
+        }
+        gyro[0].resonance = {25 * std::pow(12, uniform(random)),
+                             0.015 * std::pow(10, uniform(random))};
+        for (double& e : gyro[0].coefficients) e = 0.3 * 0.03 * normal(random);
+    }
+    return truth;
+}
+
+Truth two_resonances_of(double first_hz, double first_share, double second_hz,
+                        double second_share) {
+    Truth truth = Truth::common(first_share, {first_hz, 0.05});
+    const Truth more = Truth::common(second_share, {second_hz, 0.05});
+    for (std::size_t j = 0; j < 3; ++j) truth.elastic[j].push_back(more.elastic[j][0]);
+    return truth;
+}
+
 Situation situation_of(const Profile& profile, const std::array<double, 3>& deg) {
     return {Eigen::Vector3d(deg[0], deg[1], deg[2]) * kDegree, vertical(mean_square(profile)),
             bands_of(profile), 0};
@@ -166,5 +216,17 @@ std::vector<std::array<double, 3>> eight_attitudes() {
     return {{30, 10, -20}, {0, 0, 0},      {45, 0, 45},   {90, 20, 10},
             {-60, 0, 30},  {120, -15, 75}, {200, 5, 140}, {-30, 30, -100}};
 }
+
+unsigned at_least(unsigned of, double rate) {
+    double term = std::pow(1 - rate, of), below = 0;
+    for (unsigned k = 0; k <= of; ++k) {
+        below += term;
+        if (below > 1e-3) return k;
+        term *= (of - k) * rate / ((k + 1) * (1 - rate));
+    }
+    return of;
+}
+
+unsigned at_most(unsigned of, double rate) { return of - at_least(of, 1 - rate); }
 
 }  // namespace vibrig::estimator::spectrum::testing
