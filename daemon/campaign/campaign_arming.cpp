@@ -153,9 +153,8 @@ std::string Campaign::arming_text(const CommandRequest& request) const {
                                  : std::string("until its targets are met")
                            : "about " + duration_text(left_s + times_.opening_s + times_.closing_s);
     return fmt::format(
-        "{}, plan \"{}\" ({}), up to {:g} g at the table{}{}, platform {}, {}; to be started "
-        "within "
-        "{}",
+        "{}, plan \"{}\" ({}), up to {:g} g at the table{}{}, platform {}, {}; "
+        "to be started within {}",
         unit, settings_.name, plan, highest_level(),
         frequencies_text(stops_, settings_.frequency_hz),
         profiles_text(stops_) + sweeps_text(stops_),

@@ -121,8 +121,7 @@ std::vector<double> frequencies_of(const std::vector<About>& about) {
     std::vector<double> hz;
     for (const About& one : about) hz.insert(hz.end(), {one.below_hz, one.above_hz});
     std::ranges::sort(hz);
-    const auto twice = std::ranges::unique(hz);
-    hz.erase(twice.begin(), twice.end());
+    hz.erase(std::unique(hz.begin(), hz.end()), hz.end());
     return hz;
 }
 
