@@ -368,7 +368,9 @@ void CrossCheck::limits() {
     if (asked.empty()) {
         for (const double g : c_.campaign.table_g) asked.push_back({g, c_.estimator.frequency_hz});
     }
-    for (const auto& [a, f, dwell] : asked) {
+    for (const Asked& one : asked) {
+        const double a = one.g, f = one.hz;
+        const std::size_t dwell = one.dwell;
         const double omega = 2 * std::numbers::pi * f;
         const double mps2 = a * c_.estimator.gravity_mps2;
         const std::string found = (dwell > 0 ? "dwell " + std::to_string(dwell) + " with " : "") +

@@ -84,8 +84,8 @@ struct CampaignTest : testing::Test {
             return test.think(here, elapsed_s);
         }
         std::string resume_gate() const override { return test.gate; }
-        Played played(const ToldPsd& told) override {
-            test.told.push_back(told);
+        Played played(const ToldPsd& psd) override {
+            test.told.push_back(psd);
             return test.played;
         }
         void end(bool c) override {

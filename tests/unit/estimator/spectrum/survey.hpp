@@ -72,7 +72,8 @@ void add_noise(Dwells& dwells, std::mt19937_64& random);
                                       double second_share);
 
 /// Campaigns of a rate in every run: instrumented code takes its time.
-[[nodiscard]] constexpr unsigned in_every_run(unsigned campaigns, [[maybe_unused]] unsigned few) {
+[[nodiscard]] constexpr unsigned in_every_run([[maybe_unused]] unsigned campaigns,
+                                              [[maybe_unused]] unsigned few) {
 #ifdef VIBRIG_SANITIZED
     return few;
 #else
