@@ -109,7 +109,9 @@ TEST(ShakerPsd, SilenceEndsInHalfAFeedsPeriod) {
     // Twice 0.2 s, not twice the 5 s of a response; what is left is a busy machine's.
     EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(3));
     EXPECT_NE(bench.shaker->psd().why_not, "");
-    EXPECT_EQ(bench.shaker->counters().reconnects, 2U);
+    // The second time after it has said so.
+    EXPECT_TRUE(bench.eventually([&] { return bench.shaker->counters().reconnects == 2; }))
+        << bench.shaker->counters().reconnects;
     ASSERT_TRUE(bench.reaches(LinkState::running));
 }
 
@@ -125,7 +127,8 @@ TEST(ShakerPsd, AStopDoesNotWaitForIt) {
     const auto from = std::chrono::steady_clock::now();
     bench.shaker->stop_now();
     ASSERT_TRUE(server.saw([](const Request& r) { return r.writes_run(); }));
-    EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::milliseconds(500));
+    // Not after the 4 s for which a part is waited for; what is left is a busy machine's.
+    EXPECT_LT(std::chrono::steady_clock::now() - from, std::chrono::seconds(2));
 }
 
 }  // namespace
