@@ -415,7 +415,7 @@ def by_row(checks, rig, path):
     """Every row of the CSV against the sample it comes from, and every good sample of a dwell against a row."""
     with h5py().File(path, "r") as file:
         samples = {name: file["samples/" + name][:] for name in ("time_ns", "angle_rad", "force_g", "quality")}
-        orders = {name: file["orders/" + name][:] for name in ("from_ns", "to_ns", "run", "position", "zero_g", "cancel")}
+        orders = {name: file["orders/" + name][:] for name in ("from_ns", "to_ns", "run", "position", "zero_g", "cancel", "begin_s")}
     with open(os.path.join(rig.folder, "x.csv"), encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     at = worst = 0
@@ -425,7 +425,8 @@ def by_row(checks, rig, path):
         for k in inside.nonzero()[0]:
             row = rows[at] if at < len(rows) else {}
             at += 1
-            expected = [(samples["time_ns"][k] - orders["from_ns"][i]) * 1e-9, orders["run"][i], orders["position"][i],
+            # On the campaign's clock, which goes on from dwell to dwell.
+            expected = [orders["begin_s"][i] + (samples["time_ns"][k] - orders["from_ns"][i]) * 1e-9, orders["run"][i], orders["position"][i],
                         *(samples["angle_rad"][k] * 180 / math.pi), *(samples["force_g"][k] - orders["zero_g"][i])]
             found = [float(row.get(name, "nan")) for name in ("time_s", "run", "position", "alpha_deg", "beta_deg", "gamma_deg",
                                                               "ax_g", "ay_g", "az_g")]
