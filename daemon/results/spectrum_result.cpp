@@ -569,12 +569,12 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
     return model;
 }
 
-Model read_model_file(const std::string& path) {
+nlohmann::json read_result(const std::string& path) {
     std::ifstream file(path);
     if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    const nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
     if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
-    return read_model(root, path);
+    return root;
 }
 
 }  // namespace vibrig::tool

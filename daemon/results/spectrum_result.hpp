@@ -73,7 +73,8 @@ void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 /// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
                                                     const std::string& path);
-/// The same of a file of vibrig identify --json, or a campaign's result.json.
-[[nodiscard]] estimator::spectrum::Model read_model_file(const std::string& path);
+/// A file of vibrig identify --json, or a campaign's result.json, for read_model(). Throws
+/// std::runtime_error that names it.
+[[nodiscard]] nlohmann::json read_result(const std::string& path);
 
 }  // namespace vibrig::tool

@@ -11,7 +11,7 @@ namespace {
 
 using Pairs = std::span<const std::array<double, 2>>;
 
-constexpr double kSigmas = 4;    ///< spectrum.md 3.3
+constexpr double kSigmas = 4;    ///< docs/theory/spectrum.md
 constexpr double kBands_db = 3;  ///< beyond it the interlock stops a random vibration
 constexpr double kLeastAlike = 0.5;
 constexpr double kNothing = 1e-9;  ///< of the largest density

@@ -32,9 +32,9 @@ struct PsdTaken {
 /// two lines, no power at all; the same to the last bit as after the dwell before, which a measured
 /// spectrum never is; ends that leave out more of the profile's power than four gain errors; a mean
 /// square that is further from the controller's own than four standard errors of both (each
-/// 1/sqrt(B_e T) and the gain, spectrum.md 3.3); an rms 3 dB off the profile's; and a shape of
-/// which less than half lies where the profile's does, which no spectrum within 3 dB of it reaches.
-/// A density of 0 is taken as 1e-9 of the largest.
+/// 1/sqrt(B_e T) and the gain, docs/theory/spectrum.md); an rms 3 dB off the profile's; and a shape
+/// of which less than half lies where the profile's does, which no spectrum within 3 dB of it
+/// reaches. A density of 0 is taken as 1e-9 of the largest.
 [[nodiscard]] PsdTaken take_controller_psd(std::span<const std::array<double, 2>> pairs,
                                            const PsdExpected& expected);
 

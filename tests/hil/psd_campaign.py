@@ -74,16 +74,7 @@ def resumed(checks, programs, folder):
         if not checks.check(status is not None and status["campaign"]["state"] == "recording", "killed: in a random dwell",
                             f"{r.state_of(status)}\n{rig.logs()}"):
             return
-        again.time.sleep(1)   # what is older than a second has to be on disk
-        again.kill(rig)
-        known = rig.positions_done()
-        status = again.restart(checks, rig, "killed")
-        checks.check(f"{known} of {count} positions done" in status["campaign"]["resume_offer"], "it offers to go on from there",
-                     status["campaign"]["resume_offer"])
-        again.at_rest(checks, rig, "killed")
-        again.clear(rig)
-        rig.tool("arm", "--by", "Grace")
-        rig.tool("resume", "--by", "Grace")
+        again.take_up(checks, rig, "killed", count)
         last = rig.wait_for_state(random.ENDS, 240)
         _, text = rig.result()
         if not checks.check(last and last["campaign"]["state"] == "finished" and text, "resumed, it finishes",

@@ -155,17 +155,7 @@ def resumed(checks, programs, folder):
             if not checks.check(status is not None and status["campaign"]["state"] == "recording",
                                 f"killed after {done}: in a random dwell", f"{r.state_of(status)}\n{rig.logs()}"):
                 return
-            again.time.sleep(1)   # what is older than a second has to be on disk
-            again.kill(rig)
-            known = rig.positions_done()
-            status = again.restart(checks, rig, f"killed after {done}")
-            checks.check(f"{known} of {count} positions done" in status["campaign"]["resume_offer"], "it offers to go on from there",
-                         status["campaign"]["resume_offer"])
-            again.at_rest(checks, rig, f"killed after {done}")
-            again.clear(rig)
-            rig.tool("arm", "--by", "Grace")
-            on = rig.tool("resume", "--by", "Grace")
-            checks.check(on.returncode == 0 and f"{known} of {count}" in on.stdout, "armed, it resumes on command", on.stdout + on.stderr)
+            again.take_up(checks, rig, f"killed after {done}", count)
         last = rig.wait_for_state(ENDS, 240)
         path, text = rig.result()
         if not checks.check(last and last["campaign"]["state"] == "finished" and text, "the random campaign finishes",

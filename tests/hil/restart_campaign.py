@@ -71,6 +71,21 @@ def clear(rig):
         rig.tool("ack", "trip", "--by", "tester")
 
 
+def take_up(checks, rig, what, count):
+    """Killed, started again and resumed on command: what was done of so many positions is offered, and goes on."""
+    time.sleep(1)   # what is older than a second has to be on disk
+    kill(rig)
+    known = rig.positions_done()
+    status = restart(checks, rig, what)
+    checks.check(f"{known} of {count} positions done" in status["campaign"]["resume_offer"], f"{what}: it offers to go on from there",
+                 status["campaign"]["resume_offer"])
+    at_rest(checks, rig, what)
+    clear(rig)
+    rig.tool("arm", "--by", "Grace")
+    on = rig.tool("resume", "--by", "Grace")
+    checks.check(on.returncode == 0 and f"{known} of {count}" in on.stdout, f"{what}: armed, it resumes on command", on.stdout + on.stderr)
+
+
 def killed_and_resumed(checks, programs, folder):
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:

@@ -177,17 +177,7 @@ def resumed(checks, programs, folder):
         status = rig.wait_for(lambda s: len(s["campaign"]["dwells"]) >= 1 and s["campaign"]["state"] == "recording", 120)
         if not checks.check(status is not None, "killed: in the second sweep", f"{r.state_of(status)}\n{rig.logs()}"):
             return
-        again.time.sleep(1)   # what is older than a second has to be on disk
-        again.kill(rig)
-        known = rig.positions_done()
-        status = again.restart(checks, rig, "killed in a sweep")
-        checks.check(f"{known} of {planned[1]} positions done" in status["campaign"]["resume_offer"], "it offers to go on from there",
-                     status["campaign"]["resume_offer"])
-        again.at_rest(checks, rig, "killed in a sweep")
-        again.clear(rig)
-        rig.tool("arm", "--by", "Grace")
-        on = rig.tool("resume", "--by", "Grace")
-        checks.check(on.returncode == 0, "armed, it resumes on command", on.stdout + on.stderr)
+        again.take_up(checks, rig, "killed in a sweep", planned[1])
         last = rig.wait_for_state(ENDS, 240)
         _, text = rig.result()
         if not checks.check(last and last["campaign"]["state"] == "finished" and text, "the campaign finishes",

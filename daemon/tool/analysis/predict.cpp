@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -46,14 +45,6 @@ std::string row_text(const char* format, Values... values) {
     std::array<char, 300> text{};
     std::snprintf(text.data(), text.size(), format, values...);
     return std::string(text.data()) + "\n";
-}
-
-nlohmann::json read_json(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
-    return root;
 }
 
 /// Dwells under the profile: what they showed, and where.
@@ -275,7 +266,7 @@ Predicted predict_for(const PredictOptions& options) {
         throw std::runtime_error("found no --profile, expected a JSON file or a name of --list");
     if (options.attitudes.empty() && options.recording.empty())
         throw std::runtime_error("found no --attitude, expected one or more, or --verify");
-    const nlohmann::json result = read_json(options.result);
+    const nlohmann::json result = read_result(options.result);
     const Model model = read_model(result, options.result);
     if (!model.refusal.empty() && !options.force)
         throw std::runtime_error(options.result + ": spectrum.refusal: found \"" + model.refusal +

@@ -1,6 +1,7 @@
 // `vibrig plan --frequencies`: a plan over frequency, for coefficients that may depend on it.
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <stdexcept>
 
@@ -152,7 +153,7 @@ class SurveyPlan {
     void add_resonances(std::vector<double>& listed) {
         const std::string& path = request_.survey.about;
         if (path.empty()) return;
-        about_ = spectrum::about_resonances(read_model_file(path).mixture,
+        about_ = spectrum::about_resonances(read_model(read_result(path), path).mixture,
                                             {1 / period(), c_.estimator.level_window_s}, listed);
         for (const double hz : spectrum::frequencies_of(about_)) {
             if (std::ranges::find(listed, hz) == listed.end()) listed.push_back(hz);
