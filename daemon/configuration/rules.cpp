@@ -9,6 +9,7 @@ namespace vibrig::configuration {
 
 namespace {
 
+constexpr std::size_t kShortText = 120;
 constexpr std::size_t kSocketPath = 107;    // sizeof(sockaddr_un::sun_path) - 1
 constexpr std::size_t kInterfaceName = 15;  // IFNAMSIZ - 1
 constexpr std::size_t kHostName = 253;      // RFC 1035
@@ -94,6 +95,13 @@ std::string line_rule(const std::string& text) {
                           return (c >= 0 && c < 0x20) || c == 0x7F;
                       });
     return good ? "" : "one line, 256 bytes at most";
+}
+
+std::string short_text_rule(const std::string& text) {
+    for (const char c : text) {
+        if (static_cast<unsigned char>(c) < 0x20) return "one line of text";
+    }
+    return text.size() <= kShortText ? "" : "at most 120 bytes";
 }
 
 std::string binding_rule(const std::string& text) {

@@ -23,6 +23,8 @@ namespace vibrig::configuration {
 [[nodiscard]] std::string host_or_empty_rule(const std::string& text);
 /// No control characters, 256 bytes at most.
 [[nodiscard]] std::string line_rule(const std::string& text);
+/// No control characters, 120 bytes at most.
+[[nodiscard]] std::string short_text_rule(const std::string& text);
 /// "Message.Signal", or empty for not bound.
 [[nodiscard]] std::string binding_rule(const std::string& text);
 /// A C identifier, as DBC files name messages and signals.

@@ -1,6 +1,7 @@
 #include <set>
 
 #include "daemon/configuration/key.hpp"
+#include "daemon/configuration/rules.hpp"
 #include "daemon/configuration/value.hpp"
 
 namespace vibrig::configuration {
@@ -8,19 +9,11 @@ namespace vibrig::configuration {
 namespace {
 
 constexpr std::size_t kMostInstruments = 50;
-constexpr std::size_t kLongestText = 120;
 // A date has no type of its own in JSON.
 constexpr const char* kInstrumentSchema =
     R"({"type":"array","maxItems":50,"items":{"type":"object","required":["name"],)"
     R"("additionalProperties":false,"properties":{"name":{"type":"string"},)"
     R"("serial":{"type":"string"},"certificate":{"type":"string"},"uncertainty":{"type":"string"},"due":{}}}})";
-
-std::string short_text_rule(const std::string& text) {
-    for (const char c : text) {
-        if (static_cast<unsigned char>(c) < 0x20) return "one line of text";
-    }
-    return text.size() <= kLongestText ? "" : "at most 120 bytes";
-}
 
 std::string date_text(const toml::date& date) {
     std::array<char, 24> text{};
