@@ -1,4 +1,6 @@
 #include <array>
+#include <initializer_list>
+#include <optional>
 #include <utility>
 
 #include "daemon/configuration/key.hpp"
@@ -15,6 +17,7 @@ using proto::Access;
 using proto::Register;
 using proto::RegisterTable;
 using proto::RegisterType;
+using proto::ShakerRegisters;
 using proto::WordOrder;
 
 void add_link_keys(std::vector<Key>& keys) {
@@ -120,49 +123,46 @@ void add_register_keys(std::vector<Key>& keys, const std::string& role, const st
         [at](C& c, int value) { at(c).mask = static_cast<std::uint16_t>(value); }));
 }
 
-/// Leaves a key out of --check while there is no watchdog register (or, inverted, while there is
-/// one).
-void show_if_watchdog(Key& key, bool present) {
-    key.write = [write = std::move(key.write), present](C& c) {
-        return c.shaker.registers.watchdog.has_value() == present ? write(c) : std::string();
-    };
+/// Leaves the keys from `first` on out of --check while `shown` says that there is nothing to them.
+void show_only(std::vector<Key>& keys, std::size_t first, bool (*shown)(const ShakerRegisters&)) {
+    for (std::size_t i = first; i < keys.size(); ++i)
+        keys[i].write = [write = std::move(keys[i].write), shown](C& c) {
+            return shown(c.shaker.registers) ? write(c) : std::string();
+        };
 }
 
 void add_watchdog_keys(std::vector<Key>& keys) {
-    Key none{"shaker.registers.watchdog",
-             "boolean or table",
-             "",
-             "false or a register",
-             "false: the controller has none, and vibrigd refuses to run",
-             [](const toml::node& node, C& c, Problems& problems) {
-                 const auto* value = node.as_boolean();
-                 if (value == nullptr) {
-                     problems.add(place_of(node.source()), "shaker.registers.watchdog",
-                                  describe(node), "a table (the register) or false (none)");
-                 } else if (!value->get()) {
-                     c.shaker.registers.watchdog.reset();
-                 }
-             },
-             [](C&) { return std::string("false"); },
-             R"({"const":false})"};
-    show_if_watchdog(none, false);
-    keys.push_back(std::move(none));
+    const std::size_t none = keys.size();
+    keys.push_back({"shaker.registers.watchdog", "boolean or table", "", "false or a register",
+                    "false: the controller has none, and vibrigd refuses to run",
+                    [](const toml::node& node, C& c, Problems& problems) {
+                        const auto* value = node.as_boolean();
+                        if (value == nullptr) {
+                            problems.add(place_of(node.source()), "shaker.registers.watchdog",
+                                         describe(node), "a table (the register) or false (none)");
+                        } else if (!value->get()) {
+                            c.shaker.registers.watchdog.reset();
+                        }
+                    },
+                    [](C&) { return std::string("false"); }, R"({"const":false})"});
+    show_only(keys, none, [](const ShakerRegisters& map) { return !map.watchdog; });
     const std::size_t first = keys.size();
     add_register_keys(keys, "watchdog", "", "any changed value feeds it",
                       [](C& c) -> Register& { return *c.shaker.registers.watchdog; });
-    for (std::size_t i = first; i < keys.size(); ++i) {
-        show_if_watchdog(keys[i], true);
-    }
+    show_only(keys, first, [](const ShakerRegisters& map) { return map.watchdog.has_value(); });
+}
+
+/// What a controller has or has not: what states a part of it has it.
+template <class T>
+T& made(std::optional<T>& part) {
+    return part ? *part : part.emplace();
 }
 
 /// Of one that says what it measured, too.
 void add_psd_keys(std::vector<Key>& keys) {
     const std::size_t first = keys.size();
     const auto block = [](C& c) -> proto::PsdBlock& {
-        auto& random = c.shaker.registers.random;
-        if (!random) random.emplace();
-        if (!random->psd_block) random->psd_block.emplace();
-        return *random->psd_block;
+        return made(made(c.shaker.registers.random).psd_block);
     };
     add_register_keys(keys, "psd_block", "g^2/Hz",
                       "what was measured at the table in the last random dwell, and is kept until "
@@ -175,42 +175,46 @@ void add_psd_keys(std::vector<Key>& keys) {
     keys.push_back(integer("shaker.registers.psd_block.attempts", "", 1, 5,
                            "how often it is tried after each random dwell",
                            [block](C& c) -> int& { return block(c).attempts; }));
-    for (std::size_t i = first; i < keys.size(); ++i)
-        keys[i].write = [write = std::move(keys[i].write)](C& c) {
-            const auto& random = c.shaker.registers.random;
-            return random && random->psd_block ? write(c) : std::string();
-        };
+    show_only(keys, first,
+              [](const ShakerRegisters& map) { return map.random && map.random->psd_block; });
 }
 
-/// Of a controller that plays random vibration too: what states one of them has them all, and
-/// --check shows none where there are none.
+template <class Registers>
+struct Role {
+    const char *name, *unit, *doc;
+    Register Registers::*member;
+};
+
+/// Registers of which a controller has all or none.
+template <class Registers>
+void add_group(std::vector<Key>& keys, std::optional<Registers> ShakerRegisters::*group,
+               std::initializer_list<Role<Registers>> roles) {
+    for (const Role<Registers>& role : roles)
+        add_register_keys(keys, role.name, role.unit, role.doc,
+                          [group, member = role.member](C& c) -> Register& {
+                              return made(c.shaker.registers.*group).*member;
+                          });
+}
+
+/// Of a controller that plays random vibration too.
 void add_random_keys(std::vector<Key>& keys) {
     using proto::RandomRegisters;
     const std::size_t first = keys.size();
-    const auto add = [&keys](const char* role, const char* unit, const char* doc,
-                             Register RandomRegisters::*member) {
-        add_register_keys(keys, role, unit, doc, [member](C& c) -> Register& {
-            auto& random = c.shaker.registers.random;
-            if (!random) random.emplace();
-            return (*random).*member;
-        });
-    };
-    add("profile_number", "", "of the profile that the controller is to play",
-        &RandomRegisters::profile_number);
-    add("profile_level_db", "dB", "level about the profile; a type with a sign",
-        &RandomRegisters::profile_level_db);
-    add("profile_checksum", "",
-        "CRC-32 of the profile in force, over Hz and g^2/Hz of each point as big-endian floats",
-        &RandomRegisters::profile_checksum);
-    add("measured_g_rms", "g", "measured rms at the table", &RandomRegisters::measured_g_rms);
-    add("control_state", "",
-        "low four bits 0 idle, 1 levelling, 2 at level, 3 aborted; 0x10: its abort bands are "
-        "armed; high byte: why it aborted",
-        &RandomRegisters::control_state);
-    for (std::size_t i = first; i < keys.size(); ++i)
-        keys[i].write = [write = std::move(keys[i].write)](C& c) {
-            return c.shaker.registers.random ? write(c) : std::string();
-        };
+    add_group<RandomRegisters>(
+        keys, &ShakerRegisters::random,
+        {{"profile_number", "", "of the profile that the controller is to play",
+          &RandomRegisters::profile_number},
+         {"profile_level_db", "dB", "level about the profile; a type with a sign",
+          &RandomRegisters::profile_level_db},
+         {"profile_checksum", "",
+          "CRC-32 of the profile in force, over Hz and g^2/Hz of each point as big-endian floats",
+          &RandomRegisters::profile_checksum},
+         {"measured_g_rms", "g", "measured rms at the table", &RandomRegisters::measured_g_rms},
+         {"control_state", "",
+          "low four bits 0 idle, 1 levelling, 2 at level, 3 aborted; 0x10: its abort bands are "
+          "armed; high byte: why it aborted",
+          &RandomRegisters::control_state}});
+    show_only(keys, first, [](const ShakerRegisters& map) { return map.random.has_value(); });
     add_psd_keys(keys);
 }
 
@@ -218,23 +222,15 @@ void add_random_keys(std::vector<Key>& keys) {
 void add_sweep_keys(std::vector<Key>& keys) {
     using proto::SweepRegisters;
     const std::size_t first = keys.size();
-    const auto add = [&keys](const char* role, const char* unit, const char* doc,
-                             Register SweepRegisters::*member) {
-        add_register_keys(keys, role, unit, doc, [member](C& c) -> Register& {
-            auto& sweep = c.shaker.registers.sweep;
-            if (!sweep) sweep.emplace();
-            return (*sweep).*member;
-        });
-    };
-    add("sweep_from", "Hz", "where a sweep begins; for plans with sweeps, as the three that follow",
-        &SweepRegisters::from);
-    add("sweep_to", "Hz", "where it ends, and stays", &SweepRegisters::to);
-    add("sweep_rate", "octaves/min", "how fast it goes, either way", &SweepRegisters::rate);
-    add("actual_frequency", "Hz", "where it is; read", &SweepRegisters::actual_frequency);
-    for (std::size_t i = first; i < keys.size(); ++i)
-        keys[i].write = [write = std::move(keys[i].write)](C& c) {
-            return c.shaker.registers.sweep ? write(c) : std::string();
-        };
+    add_group<SweepRegisters>(
+        keys, &ShakerRegisters::sweep,
+        {{"sweep_from", "Hz",
+          "where a sweep begins; for plans with sweeps, as the three that follow",
+          &SweepRegisters::from},
+         {"sweep_to", "Hz", "where it ends, and stays", &SweepRegisters::to},
+         {"sweep_rate", "octaves/min", "how fast it goes, either way", &SweepRegisters::rate},
+         {"actual_frequency", "Hz", "where it is; read", &SweepRegisters::actual_frequency}});
+    show_only(keys, first, [](const ShakerRegisters& map) { return map.sweep.has_value(); });
 }
 
 /// Which of the two, or neither.
@@ -243,38 +239,31 @@ void add_mode_keys(std::vector<Key>& keys) {
     add_register_keys(keys, "mode", "",
                       "0 sine, 1 random, 2 sweep; with registers of profiles or sweeps",
                       [](C& c) -> Register& { return c.shaker.registers.mode; });
-    for (std::size_t i = first; i < keys.size(); ++i)
-        keys[i].write = [write = std::move(keys[i].write)](C& c) {
-            const auto& map = c.shaker.registers;
-            return map.random || map.sweep ? write(c) : std::string();
-        };
+    show_only(keys, first, [](const ShakerRegisters& map) { return map.random || map.sweep; });
 }
 
 }  // namespace
 
 void add_shaker_keys(std::vector<Key>& keys) {
+    const auto add = [&keys](const char* role, const char* unit, const char* doc,
+                             Register ShakerRegisters::*member) {
+        add_register_keys(keys, role, unit, doc,
+                          [member](C& c) -> Register& { return c.shaker.registers.*member; });
+    };
     add_link_keys(keys);
-    add_register_keys(keys, "frequency", "Hz", "set-point of the frequency",
-                      [](C& c) -> Register& { return c.shaker.registers.frequency; });
-    add_register_keys(keys, "amplitude", "amplitude_unit",
-                      "set-point of the amplitude at the table",
-                      [](C& c) -> Register& { return c.shaker.registers.amplitude; });
-    add_register_keys(keys, "ramp_time", "s", "time of a ramp",
-                      [](C& c) -> Register& { return c.shaker.registers.ramp_time; });
-    add_register_keys(keys, "run", "", "1 runs, 0 stops",
-                      [](C& c) -> Register& { return c.shaker.registers.run; });
+    add("frequency", "Hz", "set-point of the frequency", &ShakerRegisters::frequency);
+    add("amplitude", "amplitude_unit", "set-point of the amplitude at the table",
+        &ShakerRegisters::amplitude);
+    add("ramp_time", "s", "time of a ramp", &ShakerRegisters::ramp_time);
+    add("run", "", "1 runs, 0 stops", &ShakerRegisters::run);
     add_watchdog_keys(keys);
-    add_register_keys(keys, "watchdog_timeout", "s", "the controller stops when not fed so long",
-                      [](C& c) -> Register& { return c.shaker.registers.watchdog_timeout; });
-    add_register_keys(keys, "state", "", "0 idle, 1 ramping, 2 running, 3 stopping, 4 fault",
-                      [](C& c) -> Register& { return c.shaker.registers.state; });
-    add_register_keys(keys, "fault", "", "fault bits",
-                      [](C& c) -> Register& { return c.shaker.registers.fault; });
-    add_register_keys(keys, "emergency_stop", "", "1: the chain is open",
-                      [](C& c) -> Register& { return c.shaker.registers.emergency_stop; });
-    add_register_keys(keys, "measured_amplitude", "amplitude_unit",
-                      "measured amplitude at the table",
-                      [](C& c) -> Register& { return c.shaker.registers.measured_amplitude; });
+    add("watchdog_timeout", "s", "the controller stops when not fed so long",
+        &ShakerRegisters::watchdog_timeout);
+    add("state", "", "0 idle, 1 ramping, 2 running, 3 stopping, 4 fault", &ShakerRegisters::state);
+    add("fault", "", "fault bits", &ShakerRegisters::fault);
+    add("emergency_stop", "", "1: the chain is open", &ShakerRegisters::emergency_stop);
+    add("measured_amplitude", "amplitude_unit", "measured amplitude at the table",
+        &ShakerRegisters::measured_amplitude);
     add_mode_keys(keys);
     add_random_keys(keys);
     add_sweep_keys(keys);
