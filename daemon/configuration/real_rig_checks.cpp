@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/register_roles.hpp"
 #include "daemon/configuration/value.hpp"
 #include "daemon/configuration/warnings.hpp"
 #include "estimator/filter/settings_check.hpp"
@@ -32,38 +33,9 @@ void CrossCheck::real_rig() {
 }
 
 void CrossCheck::registers_stated() {
-    struct Role {
-        const char* name;
-        const proto::Register* reg;
-        bool quantity;
-    };
     if (!sound({"shaker.registers"}) || !c_.shaker.registers.watchdog) return;
     const proto::ShakerRegisters& r = c_.shaker.registers;
-    std::vector<Role> roles{{"frequency", &r.frequency, true},
-                            {"amplitude", &r.amplitude, true},
-                            {"ramp_time", &r.ramp_time, true},
-                            {"run", &r.run, false},
-                            {"watchdog", &*r.watchdog, false},
-                            {"watchdog_timeout", &r.watchdog_timeout, true},
-                            {"state", &r.state, false},
-                            {"fault", &r.fault, false},
-                            {"emergency_stop", &r.emergency_stop, false},
-                            {"measured_amplitude", &r.measured_amplitude, true}};
-    if (const auto& random = r.random)
-        roles.insert(roles.end(), {{"profile_number", &random->profile_number, false},
-                                   {"profile_level_db", &random->profile_level_db, true},
-                                   {"profile_checksum", &random->profile_checksum, false},
-                                   {"measured_g_rms", &random->measured_g_rms, true},
-                                   {"control_state", &random->control_state, false}});
-    if (r.random && r.random->psd_block)
-        roles.push_back({"psd_block", &r.random->psd_block->first, true});
-    if (const auto& sweep = r.sweep)
-        roles.insert(roles.end(), {{"sweep_from", &sweep->from, true},
-                                   {"sweep_to", &sweep->to, true},
-                                   {"sweep_rate", &sweep->rate, true},
-                                   {"actual_frequency", &sweep->actual_frequency, true}});
-    if (r.random || r.sweep) roles.push_back({"mode", &r.mode, false});
-    for (const Role& role : roles) {
+    for (const RegisterRole& role : roles_of(r)) {
         const std::string key = std::string("shaker.registers.") + role.name;
         const auto stated = [&](const char* part) { return places_.contains(key + "." + part); };
         const auto miss = [&](const std::string& what) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/configuration/cross_checks.hpp"
+#include "daemon/configuration/register_roles.hpp"
 #include "daemon/configuration/value.hpp"
 
 namespace vibrig::configuration {
@@ -15,48 +16,6 @@ using proto::Access;
 using proto::Register;
 using proto::RegisterTable;
 using proto::RegisterType;
-
-struct Role {
-    const char* name;
-    const Register* reg;
-    bool written;  ///< by the daemon
-};
-
-std::vector<Role> roles_of(const proto::ShakerRegisters& r) {
-    std::vector<Role> roles{{"frequency", &r.frequency, true},
-                            {"amplitude", &r.amplitude, true},
-                            {"ramp_time", &r.ramp_time, true},
-                            {"run", &r.run, true},
-                            {"watchdog_timeout", &r.watchdog_timeout, true},
-                            {"state", &r.state, false},
-                            {"fault", &r.fault, false},
-                            {"emergency_stop", &r.emergency_stop, false},
-                            {"measured_amplitude", &r.measured_amplitude, false}};
-    if (r.watchdog) {
-        roles.push_back({"watchdog", &*r.watchdog, true});
-    }
-    if (const auto& random = r.random)
-        roles.insert(roles.end(), {{"profile_number", &random->profile_number, true},
-                                   {"profile_level_db", &random->profile_level_db, true},
-                                   {"profile_checksum", &random->profile_checksum, false},
-                                   {"measured_g_rms", &random->measured_g_rms, false},
-                                   {"control_state", &random->control_state, false}});
-    if (r.random && r.random->psd_block)
-        roles.push_back({"psd_block", &r.random->psd_block->first, false});
-    if (const auto& sweep = r.sweep)
-        roles.insert(roles.end(), {{"sweep_from", &sweep->from, true},
-                                   {"sweep_to", &sweep->to, true},
-                                   {"sweep_rate", &sweep->rate, true},
-                                   {"actual_frequency", &sweep->actual_frequency, false}});
-    if (r.random || r.sweep) roles.push_back({"mode", &r.mode, true});
-    return roles;
-}
-
-int words_of(const Register& reg) {
-    const bool two = reg.type == RegisterType::u32 || reg.type == RegisterType::i32 ||
-                     reg.type == RegisterType::f32;
-    return two ? 2 : 1;
-}
 
 std::string name_of(const Register& reg) {
     switch (reg.type) {
@@ -96,14 +55,42 @@ double largest(RegisterType type) {
 
 }  // namespace
 
+std::vector<RegisterRole> roles_of(const proto::ShakerRegisters& r) {
+    std::vector<RegisterRole> roles{{"frequency", &r.frequency, true, true},
+                                    {"amplitude", &r.amplitude, true, true},
+                                    {"ramp_time", &r.ramp_time, true, true},
+                                    {"run", &r.run, true, false},
+                                    {"watchdog_timeout", &r.watchdog_timeout, true, true},
+                                    {"state", &r.state, false, false},
+                                    {"fault", &r.fault, false, false},
+                                    {"emergency_stop", &r.emergency_stop, false, false},
+                                    {"measured_amplitude", &r.measured_amplitude, false, true}};
+    if (r.watchdog) roles.push_back({"watchdog", &*r.watchdog, true, false});
+    if (const auto& random = r.random)
+        roles.insert(roles.end(), {{"profile_number", &random->profile_number, true, false},
+                                   {"profile_level_db", &random->profile_level_db, true, true},
+                                   {"profile_checksum", &random->profile_checksum, false, false},
+                                   {"measured_g_rms", &random->measured_g_rms, false, true},
+                                   {"control_state", &random->control_state, false, false}});
+    if (r.random && r.random->psd_block)
+        roles.push_back({"psd_block", &r.random->psd_block->first, false, true});
+    if (const auto& sweep = r.sweep)
+        roles.insert(roles.end(), {{"sweep_from", &sweep->from, true, true},
+                                   {"sweep_to", &sweep->to, true, true},
+                                   {"sweep_rate", &sweep->rate, true, true},
+                                   {"actual_frequency", &sweep->actual_frequency, false, true}});
+    if (r.random || r.sweep) roles.push_back({"mode", &r.mode, true, false});
+    return roles;
+}
+
 void CrossCheck::registers() {
     if (!sound({"shaker.registers"})) {
         return;
     }
-    for (const Role& role : roles_of(c_.shaker.registers)) {
+    for (const RegisterRole& role : roles_of(c_.shaker.registers)) {
         const std::string key = std::string("shaker.registers.") + role.name;
         const Register& reg = *role.reg;
-        if (reg.address + words_of(reg) > 65'536) {
+        if (reg.address + reg.words() > 65'536) {
             refuse({key + ".address", key + ".type"}, std::to_string(reg.address) + " for 2 words",
                    "65534 at most");
         }
@@ -200,13 +187,13 @@ void CrossCheck::sweep_registers() {
 }
 
 void CrossCheck::writable_registers_apart() {
-    const std::vector<Role> roles = roles_of(c_.shaker.registers);
+    const std::vector<RegisterRole> roles = roles_of(c_.shaker.registers);
     for (std::size_t i = 0; i < roles.size(); ++i) {
         for (std::size_t j = i + 1; j < roles.size(); ++j) {
             const Register& a = *roles[i].reg;
             const Register& b = *roles[j].reg;
-            const bool apart = a.table != b.table || a.address + words_of(a) <= b.address ||
-                               b.address + words_of(b) <= a.address;
+            const bool apart = a.table != b.table || a.address + a.words() <= b.address ||
+                               b.address + b.words() <= a.address;
             // What is only read may share a register (state and its bits); what is written must
             // not.
             if (apart || !(roles[i].written || roles[j].written)) {
