@@ -36,6 +36,7 @@ void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
     const auto transmission = proof_.transmission();
     if (!transmission) return;
     ports_.rig.transmission(*transmission);
+    excitation_.measured(settings_.frequency_hz, *transmission);
     ports_.log.event(Severity::info,
                      fmt::format("transmission {:.4g}, as the loop check of the newest "
                                  "proof measured it",
