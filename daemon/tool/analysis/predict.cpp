@@ -132,10 +132,11 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
         const HeldOut& one = found.held_out[static_cast<std::size_t>(k)];
         const estimator::DwellRow& row = one.row;
         // What happened, not what was asked for.
-        held.situations.push_back(
-            {row.angles, level_moment(row.vibration),
-             row.psd > 0 && !one.kind.bands.empty() ? one.kind.bands : vibration.bands,
-             row.duration_s, true});
+        held.situations.push_back({row.angles, level_moment(row.vibration),
+                                   row.psd > 0 && !one.kind.bands.empty()
+                                       ? one.kind.bands
+                                       : bands_of(found.settings, row, vibration.bands),
+                                   row.duration_s, true});
         held.rates.row(k) = row.rate;
         held.variances.push_back(row.variance);
         held.relative_errors.push_back(row.relative_error);
