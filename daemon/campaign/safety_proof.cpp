@@ -67,6 +67,51 @@ std::string changes(const std::string& then, const std::string& now) {
     return text;
 }
 
+/// Its numbers beside the frequency: none is below 0.
+constexpr std::array<std::pair<const char*, double estimator::InStep::*>, 6> kInStep{
+    {{"platform_g", &estimator::InStep::platform_g},
+     {"motion_arcsec_g", &estimator::InStep::motion_arcsec_g},
+     {"motion_sigma", &estimator::InStep::motion_sigma},
+     {"cross_share", &estimator::InStep::cross_share},
+     {"cross_sigma", &estimator::InStep::cross_sigma},
+     {"distortion", &estimator::InStep::distortion}}};
+
+struct Damaged {
+    std::string why;
+};
+
+/// Throws Damaged.
+double number_of(const Json& row, std::size_t at, const char* key, bool zero) {
+    const auto found = row.is_object() ? row.find(key) : row.end();
+    const bool there = row.is_object() && found != row.end();
+    const double value = there && found->is_number() ? found->get<double>() : std::nan("");
+    if (std::isfinite(value) && (zero ? value >= 0 : value > 0)) return value;
+    throw Damaged{fmt::format("in_step[{}].{}: found {}, expected a number {} 0", at, key,
+                              there ? found->dump() : "nothing", zero ? "from" : "above")};
+}
+
+std::vector<FoundInStep> in_step_of(const Json& list) {
+    if (!list.is_array())
+        throw Damaged{fmt::format("in_step: found {}, expected a list", list.dump())};
+    std::vector<FoundInStep> out;
+    for (const Json& row : list) {
+        FoundInStep& one = out.emplace_back();
+        one.hz = number_of(row, out.size() - 1, "hz", false);
+        for (const auto& [key, member] : kInStep)
+            one.found.*member = number_of(row, out.size() - 1, key, true);
+    }
+    return out;
+}
+
+Json in_step_json(const std::vector<FoundInStep>& list) {
+    Json rows = Json::array();
+    for (const FoundInStep& one : list) {
+        Json& row = rows.emplace_back(Json{{"hz", one.hz}});
+        for (const auto& [key, member] : kInStep) row[key] = one.found.*member;
+    }
+    return rows;
+}
+
 constexpr const char* kRemedy = ": prove it anew (vibrig selftest --by NAME)";
 
 }  // namespace
@@ -125,13 +170,14 @@ std::string to_json(const ProofRecord& r) {
                   {"damping", r.pads_damping}}},
                 {"transmission", r.transmission},
                 {"transmissions", r.transmissions},
+                {"in_step", in_step_json(r.in_step)},
                 {"keys", r.keys},
                 {"keys_sha256", r.keys_sha256},
                 {"device", r.device}}
         .dump();
 }
 
-std::optional<ProofRecord> proof_from_json(const std::string& text) {
+std::optional<ProofRecord> proof_from_json(const std::string& text, std::string* why) {
     try {
         const Json json = Json::parse(text);
         ProofRecord r;
@@ -152,13 +198,18 @@ std::optional<ProofRecord> proof_from_json(const std::string& text) {
         r.transmission = json.value("transmission", 0.0);  // earlier records have none
         if (const auto further = json.find("transmissions"); further != json.end())
             r.transmissions = further->get<decltype(r.transmissions)>();
+        if (const auto in_step = json.find("in_step"); in_step != json.end())
+            r.in_step = in_step_of(*in_step);
         r.keys = json.at("keys");
         r.keys_sha256 = json.at("keys_sha256");
         r.device = json.value("device", "");
         return r;
-    } catch (const nlohmann::json::exception&) {
-        return std::nullopt;
+    } catch (const nlohmann::json::exception& error) {
+        if (why != nullptr) *why = error.what();
+    } catch (const Damaged& damaged) {
+        if (why != nullptr) *why = damaged.why;
     }
+    return std::nullopt;
 }
 
 SafetyProof::SafetyProof(ProofSettings settings)
@@ -367,6 +418,11 @@ std::optional<double> SafetyProof::transmission() const {
 std::vector<std::pair<double, double>> SafetyProof::transmissions() const {
     const ProofRecord* newest = newest_of_these_keys();
     return newest == nullptr ? std::vector<std::pair<double, double>>{} : newest->transmissions;
+}
+
+std::vector<FoundInStep> SafetyProof::in_step() const {
+    const ProofRecord* newest = newest_of_these_keys();
+    return newest == nullptr ? std::vector<FoundInStep>{} : newest->in_step;
 }
 
 PadRingDown SafetyProof::pads() const {

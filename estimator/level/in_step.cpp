@@ -10,7 +10,7 @@
 namespace vibrig::estimator {
 namespace {
 
-constexpr double kLeast_g = 0.05;  // below, a share means nothing
+constexpr double kLeast_g = 0.005;  // below, nothing vibrates
 constexpr double kArcsec = kPi / 180 / 3600;
 // Beyond this many sigmas once in 1e9, in six and in four dimensions.
 constexpr double kChanceOfSix = 7.304, kChanceOfFour = 6.919;

@@ -26,7 +26,7 @@ struct InStep {
 /// SyncMotion of the readings' angles less their straight line, and loop_response_at(), at `hz`;
 /// docs/theory/spectrum.md, growth since the loop check. An encoder's noise is taken as what is
 /// left beside line and sine, and as what `settings` say at least. Readings as for loop_response();
-/// unknown where the platform does less than 0.05 g.
+/// unknown where the platform does less than 0.005 g.
 [[nodiscard]] InStep in_step(std::span<const LoopReading> readings, double hz,
                              const Settings& settings);
 

@@ -46,6 +46,15 @@ TEST(FaultSpec, ReadsNameChannelValueAndTimes) {
     EXPECT_EQ(parse_fault("lose:0.25", 0).value, 0.25);
     EXPECT_EQ(parse_fault("nan:x", 0).kind, FaultKind::out_of_range);
     EXPECT_EQ(parse_fault("gyro-noise=8", 0).value, 8);
+    fault = parse_fault("sync_growth=4,25.1@30", 0);
+    EXPECT_EQ(fault.kind, FaultKind::sync_growth);
+    EXPECT_EQ(fault.value, 4);
+    EXPECT_EQ(fault.hz, 25.1);
+    EXPECT_EQ(fault.from_s, 30);
+    EXPECT_TRUE(fault.at(25.1));
+    EXPECT_FALSE(fault.at(15));
+    EXPECT_TRUE(parse_fault("cross-growth=4", 0).at(15));
+    EXPECT_EQ(parse_fault("distorted=0.2,65.1", 0).hz, 65.1);
     EXPECT_EQ(parse_fault("ack_without_stop@3", 0).kind, FaultKind::ack_without_stop);
     EXPECT_EQ(parse_fault("timeout-register=0", 0).value, 0);
 }
@@ -58,6 +67,8 @@ TEST(FaultSpec, SaysWhatIsWrong) {
     expect("", "unknown fault");
     expect("loose=1", "unknown fault \"loose\"");
     expect("lose", "no value");
+    expect("sync-growth=4,often", "expected a frequency from 0.1 to 2000 Hz");
+    expect("distorted=0.7", "expected a share from 0 to 0.5");
     expect("lose=2", "rate from 0 to 1");
     expect("lose=nan", "rate from 0 to 1");
     expect("lose=", "rate from 0 to 1");

@@ -129,7 +129,7 @@ TEST(InStep, SaysHowWellItIsKnown) {
 }
 
 TEST(InStep, SaysNothingWhereNothingVibratesOrTooLittleCame) {
-    EXPECT_EQ(seen_of({.platform_g = 0.04}).platform_g, 0);
+    EXPECT_EQ(seen_of({.platform_g = 0.004}).platform_g, 0);
     EXPECT_EQ(seen_of({.seconds = 0.2}).platform_g, 0);
     EXPECT_EQ(in_step({}, 15, {}).platform_g, 0);
 }
