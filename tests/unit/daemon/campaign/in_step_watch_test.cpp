@@ -295,14 +295,14 @@ TEST_F(InStepDwellTest, EachDwellIsWatchedAndSaysItsOwn) {
     make_with({proof_with(0)});
     run();
     // Four windows of 5 s, the last of which may be cut, and the end, of each of two dwells.
-    EXPECT_EQ(std::ranges::count(grown, std::nullopt), 2);
+    EXPECT_EQ(std::ranges::count(grown, false, [](const auto& one) { return one.has_value(); }), 2);
     EXPECT_GE(grown.size(), 8U);
     EXPECT_EQ(count("at 15 Hz 0.06 of the motion along the vertical goes across it, expected 0.01"),
               2)
         << "once a dwell";
     EXPECT_GT((*grown.front())[1], 3);
     EXPECT_LT((*grown.front())[0], 3);
-    EXPECT_EQ(grown.back(), std::nullopt);
+    EXPECT_FALSE(grown.back());
 }
 
 TEST_F(InStepDwellTest, WhatIsAsItWasIsNotSaid) {

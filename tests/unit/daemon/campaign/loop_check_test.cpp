@@ -101,8 +101,8 @@ TEST(LoopCheck, DistortionOrMotionAcrossAtAFurtherFrequencyKeepsACampaignFromBei
         EXPECT_NEAR(found.in_step.distortion, second, 1e-3);
         shake(loop, 15, 0.5, 0.5);
         loop.finish(0.5);
-        EXPECT_THAT(loop.refusal(), HasSubstr(across > 0 ? "at 25.1 Hz cross-axis share 0.15"
-                                                         : "at 25.1 Hz distortion 0.07"));
+        EXPECT_THAT(loop.refusal(), HasSubstr(across > 0 ? "at 25.1 Hz cross-axis share"
+                                                         : "at 25.1 Hz distortion"));
         // AND the reference frequency, which was well, does not make it good
         EXPECT_THAT(loop.refusal(), ::testing::Not(HasSubstr("; distortion")));
     }

@@ -348,9 +348,10 @@ TEST(InterlockTable, GrowthIsAnAlarmUntilTheDwellIsOver) {
     EXPECT_EQ(rig.interlock->tripped(), Trip::none) << "the dwell goes on";
     rig.interlock->no_growth();
     EXPECT_TRUE(raised().empty());
-    for (std::size_t i = 0; i < rig.interlock->rows(); ++i)
-        if (rig.interlock->row(i).rule->name == "motion_in_step")
-            EXPECT_TRUE(std::isnan(rig.interlock->row(i).present)) << "not looked for";
+    for (std::size_t i = 0; i < rig.interlock->rows(); ++i) {
+        if (rig.interlock->row(i).rule->name != "motion_in_step") continue;
+        EXPECT_TRUE(std::isnan(rig.interlock->row(i).present)) << "not looked for";
+    }
 }
 
 TEST(InterlockTable, AllConditionsAreTried) {
