@@ -49,11 +49,11 @@ TEST_F(RandomDwellTest, IsArmedForTheLoudestOfEachProfileAndItsThreeSigma) {
     settings.stops = {{{0, 0, 0}, 5}};
     const auto add = [&](std::uint16_t profile, const char* name, double rms_g, double decibels) {
         settings.stops.push_back({{0, 0, 90}, rms_g, 0, false, 0.5});
-        settings.stops.back().random = RandomStop{{profile, decibels, 0x89abcdef},
-                                                  {rms_g * rms_g / 4, 100, 0.01, 500, profile,
-                                                   decibels},
-                                                  1,
-                                                  name};
+        settings.stops.back().random =
+            RandomStop{{profile, decibels, 0x89abcdef},
+                       {rms_g * rms_g / 4, 100, 0.01, 500, profile, decibels},
+                       1,
+                       name};
     };
     add(4, "broad", 1, -6);
     add(4, "broad", 2, 0);
