@@ -183,13 +183,15 @@ def grown(checks, programs, folder, what, fault=None, row=None, says=()):
             rig.order(f"fault {fault}")
         checks.equal(rig.tool("arm", "--by", "Ada").returncode, 0, f"{what}: it is armed")
         rig.tool("start", "--by", "Ada")
-        raised = [set(), set()]
+        raised, present = [set(), set()], {"motion_in_step": [], "cross_axis_growth": []}
 
         def ended(status):
             recording = status["campaign"]["state"] == "recording"
             for one in status["interlock"]["rows"]:
                 if one.get("raised"):
                     raised[recording].add(one["name"])
+                if one["name"] in present and "present" in one:
+                    present[one["name"]].append(one["present"])
             return status["campaign"]["state"] in ("finished", "aborted", "tripped")
 
         rig.poll_s = 0.01
@@ -198,6 +200,8 @@ def grown(checks, programs, folder, what, fault=None, row=None, says=()):
                      r.state_of(status) + rig.logs())
         seen = {name for name in raised[1] if name in ("motion_in_step", "cross_axis_growth")}
         checks.equal(seen, {row} if row else set(), f"{what}: raised while it records")
+        checks.check(all(times and (max(times) < 3) == (name != row) for name, times in present.items()),
+                     f"{what}: how many times it is shows in the status", present)
         if row is None:
             checks.check("as at the loop check" not in rig.daemon.text(), f"{what}: nothing is said", rig.logs())
             return

@@ -235,6 +235,26 @@ TEST(ProofInStep, ADamagedOneIsNamedByPlaceValueAndExpectation) {
     EXPECT_EQ(why, "in_step[0].motion_arcsec_g: found null, expected a number from 0");
 }
 
+TEST(InStepWatch, ReadsSamplesOfWhoseComingNobodyIsTold) {
+    struct Control final : drivers::Waiter {
+        int told = 0;
+        void notify() noexcept override { ++told; }
+        bool wait_until(Time) noexcept override { return false; }
+    } control;
+    const proto::Dbc dbc = proto::parse_dbc(proto::rig_dbc_text(), "rig.dbc");
+    rt::StageFeed feed(dbc, {}, &control);
+    drivers::Sample sample;
+    sample.quality.fill(drivers::Quality::good);
+    int came = 0;
+    for (const auto mode : {rt::StageFeed::Mode::samples, rt::StageFeed::Mode::watched}) {
+        feed.order(mode);
+        for (int i = 0; i < 10; ++i) feed.take(sample);
+        for (rt::Motion motion; feed.pop(motion);) came += motion.good ? 1 : 0;
+    }
+    EXPECT_EQ(came, 20);
+    EXPECT_EQ(control.told, 10);
+}
+
 /// A campaign of two sines, on samples that a test makes.
 struct InStepDwellTest : CampaignTest {
     struct GrownRig final : Rig {
