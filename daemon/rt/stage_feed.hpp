@@ -59,6 +59,7 @@ struct StageFeedSettings {
 /// stage asks for them. In the acquisition thread it neither allocates, locks, logs nor formats.
 class StageFeed {
   public:
+    static constexpr std::size_t kCapacity = 1024;  ///< of what was not taken yet
     /// watched: samples, of whose coming the control thread is not told.
     enum class Mode : std::uint8_t { off, force, increments, samples, watched };
 
@@ -99,7 +100,7 @@ class StageFeed {
     const proto::Signal* torque_echo_ = nullptr;
 
     std::atomic<std::uint32_t> order_{0};  ///< generation << kModeBits | mode
-    Ring<Motion> ring_{1024};
+    Ring<Motion> ring_{kCapacity};
     Snapshot<TorqueView> torque_;
     Snapshot<IncrementCounters> counts_;
 

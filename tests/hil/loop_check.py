@@ -16,7 +16,7 @@ import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "checked", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [9.0],
             "dwell_s": 10.0}
-ROWS = ["transmission", "frequency", "distortion", "cross-axis share", "phase"]
+ROWS = ["transmission", "frequency", "distortion", "cross-axis share", "motion in step", "phase"]
 
 
 def ready(status):

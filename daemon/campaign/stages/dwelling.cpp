@@ -104,7 +104,13 @@ StageStep Dwelling::settled_or_recording(Time now) {
         return StageStep::done();
     }
     if (now > to_ + kDoneGrace) return StageStep::failed("samples ceased during the dwell");
-    return StageStep::going_on(std::min(now < to_ ? to_ : now + kStagePoll, now + kStagePoll));
+    return StageStep::going_on(std::min(now < to_ ? to_ : now + poll(), now + poll()));
+}
+
+/// Nobody tells of samples that are watched: they are fetched before half of their room is full.
+Time Dwelling::poll() const {
+    constexpr double kHalf = rt::StageFeed::kCapacity / 2.0;
+    return in_step_ ? std::min(kStagePoll, from_seconds(kHalf * settings_.sample_s)) : kStagePoll;
 }
 
 StageStep Dwelling::order(Time now) {

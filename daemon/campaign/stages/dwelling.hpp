@@ -65,6 +65,7 @@ class Dwelling : public Stage {
 
     [[nodiscard]] StageStep settled_or_recording(drivers::Time now);
     [[nodiscard]] StageStep order(drivers::Time now);
+    [[nodiscard]] drivers::Time poll() const;
     void take_over_origin();
     /// Why it may not, else empty; `may` once it may.
     [[nodiscard]] std::string vibration_may_change(drivers::Time now, bool& may) const;

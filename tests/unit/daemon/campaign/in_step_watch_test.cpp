@@ -332,6 +332,15 @@ TEST_F(InStepDwellTest, WhatIsAsItWasIsNotSaid) {
     EXPECT_GE(grown.size(), 8U);
 }
 
+TEST_F(InStepDwellTest, FastSamplesAreFetchedBeforeTheirRoomIsFull) {
+    settings.sample_s = 1e-4;
+    make_with({proof_with(0)});
+    while (status().state != CampaignState::recording && drivers::to_seconds(now) < 200) run_rig();
+    ASSERT_EQ(status().state, CampaignState::recording);
+    EXPECT_LE(drivers::to_seconds(campaign->step(now) - now) / settings.sample_s,
+              static_cast<double>(rt::StageFeed::kCapacity) / 2);
+}
+
 TEST_F(InStepDwellTest, AnotherLimitIsKeptTo) {
     across = 0.06;
     limits = {3, 20};
