@@ -101,7 +101,8 @@ void Campaign::next_position(Time now) {
                   dwelling_->swept_hz(),
                   {}};
     if (psd_due_) {
-        unread_ = Unread{info, std::move(stop), dwelling_->measured_g_rms(), 0, 0};
+        unread_ = Unread{info, std::move(stop), dwelling_->measured_g_rms(),
+                         excitation_.power_ratio(*here().stop.random)};
     } else {
         ports_.log.position_done(info, dwells_.back(), stop);
     }

@@ -34,6 +34,7 @@ struct ToldPsd {
     std::vector<std::array<double, 2>> pairs;  ///< Hz and g^2/Hz at the table, as they came
     std::string why_not;                       ///< why there are none
     double measured_g_rms = 0;  ///< by the controller over the dwell; 0: it did not say
+    double power_ratio = 1;     ///< at the platform, of what is configured: Excitation
 };
 /// And what the dwell is with it; a summary without samples: as it was.
 struct Played {

@@ -155,10 +155,17 @@ estimator::DwellInfo Dwelling::info() const {
             power_lost_ && !aim_.first,
             aim_.stop.frequency_hz,
             aim_.stop.verify,
-            aim_.stop.random ? aim_.stop.random->at_platform : estimator::RandomVibration{},
+            random_at_platform(),
             {},
             aim_.stop.sweep,
             {}};
+}
+
+estimator::RandomVibration Dwelling::random_at_platform() const {
+    if (!aim_.stop.random) return {};
+    auto there = aim_.stop.random->at_platform;
+    there.mean_square_g2 *= excitation_.power_ratio(*aim_.stop.random);
+    return there;
 }
 
 void Dwelling::leave() {

@@ -49,6 +49,8 @@ class Dwelling : public Stage {
     /// The gyros were seen run down since the dwell before.
     void lost_power() { power_lost_ = true; }
     [[nodiscard]] estimator::DwellInfo info() const;
+    /// By the transmission as measured.
+    [[nodiscard]] estimator::RandomVibration random_at_platform() const;
     /// Of a sweep what the controller said of its frequency, s since the dwell began and Hz.
     [[nodiscard]] const std::vector<std::array<double, 2>>& swept_hz() const { return swept_hz_; }
     /// Of random vibration, by the controller's readings while it recorded; 0: there were none.

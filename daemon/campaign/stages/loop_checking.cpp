@@ -198,6 +198,7 @@ StageStep LoopChecking::measured() {
     if (loop.out_of_band().empty()) {
         proof.record().transmission = loop.transmission();
         level_.ports.rig.transmission(loop.transmission());
+        level_.excitation.measured(level_.settings.frequency_hz, loop.transmission());
         proof.record().found(level_.settings.frequency_hz, loop.in_step());
     }
     proof.row("loop check in band", loop.out_of_band().empty());

@@ -73,6 +73,30 @@ TEST_F(RandomDwellTest, IsArmedForTheLoudestOfEachProfileAndItsThreeSigma) {
     EXPECT_EQ(ramps.front().armed_g, 9);
 }
 
+/// Isolators that let more through than is configured do so under a random vibration, too.
+TEST_F(RandomDwellTest, TakesTheTransmissionThatTheLoopCheckMeasured) {
+    settings.rig.transmission = 0.6;
+    settings.stops.push_back({{0, 0, 0}, 9, 25.1, false, 0.3});
+    settings.stops[1].random->bands = {{10, 0.5, 1}, {100, 0.5, 1}};
+    settings.read_psd = true;
+    make();
+    ProofRecord proof;
+    proof.table_g = 0.5;
+    proof.keys_sha256 = sha256(settings.proof.keys);
+    proof.transmission = 0.6 * 1.02;
+    proof.transmissions = {{25.1, 0.3 * 1.04}};
+    campaign->take_over_proofs({proof});
+    static_cast<void>(begin());
+    shaker.psd_told = {1, {{20, 0.01}, {120, 0.01}}, ""};
+    played.summary.samples = 400;
+    ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    // Below 15 Hz as at 15, above 25.1 as there; half the power each.
+    const double ratio = (1.02 * 1.02 + 1.04 * 1.04) / 2;
+    EXPECT_NEAR(orders[1].dwell.random.mean_square_g2, ratio, 1e-12);
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_NEAR(told[0].power_ratio, ratio, 1e-12);
+}
+
 TEST_F(RandomDwellTest, DoesNotBeginUntilTheControllerIsAtLevel) {
     shaker.levelled = RandomReading::State::levelling;
     static_cast<void>(begin());
