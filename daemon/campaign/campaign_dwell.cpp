@@ -54,7 +54,11 @@ Time Campaign::slew(Time now) {
 }
 
 void Campaign::begin_dwell(Time now) {
-    dwelling_->aim({here().stop, here().run, here().position, positions_done_ == 0}, zeros());
+    const double hz =
+        here().stop.frequency_hz > 0 ? here().stop.frequency_hz : settings_.frequency_hz;
+    dwelling_->aim({here().stop, here().run, here().position, positions_done_ == 0,
+                    found_at(proof_.in_step(), hz, settings_.rig)},
+                   zeros());
     begin(*dwelling_, State::ramping, now);
 }
 

@@ -83,6 +83,10 @@ class Rig {
     virtual void uncommanded() {}
     /// It moves otherwise than asked for.
     virtual void wrong_vibration() {}
+    /// Motion in step and motion across, times what the loop check found; none: not looked for.
+    virtual void grown(std::optional<std::array<double, 2>>) {}
+    /// How many times is too much, of each.
+    [[nodiscard]] virtual std::array<double, 2> grown_limits() const { return {3, 3}; }
     /// What is being proved by making it happen.
     virtual void proving(Proving) {}
 };
