@@ -54,6 +54,7 @@ std::string CampaignDwells::take_psd(const campaign::ToldPsd& told,
                "not reach, expected those of the profile";
     played.word = Word::good;
     played.random = there->random;
+    played.random.mean_square_g2 *= told.power_ratio;
     played.random.profile = asked.profile;
     played.random.level_db = asked.level_db;
     played.seen = there->seen;

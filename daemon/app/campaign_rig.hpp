@@ -45,6 +45,16 @@ class CampaignRig final : public campaign::Rig {
         interlock_.wrong_vibration(true);
         interlock_.wrong_vibration(false);  // seen once, before a dwell
     }
+    void grown(std::optional<std::array<double, 2>> times) override {
+        if (times)
+            interlock_.growth((*times)[0], (*times)[1]);
+        else
+            interlock_.no_growth();
+    }
+    [[nodiscard]] std::array<double, 2> grown_limits() const override {
+        return {interlock_.least_limit(rt::Trip::motion_in_step),
+                interlock_.least_limit(rt::Trip::cross_growth)};
+    }
     void proving(campaign::Proving what) override;
 
     /// Any thread: the campaign is between ramp and rest.

@@ -121,10 +121,12 @@ void ControlLoop::take_over() {
     book_.expect_signed(journal_->recovery().signed_parts);
     std::vector<campaign::ProofRecord> proofs;
     for (const auto& text : journal_->recovery().proofs) {
-        if (auto record = campaign::proof_from_json(text)) {
+        std::string why;
+        if (auto record = campaign::proof_from_json(text, &why)) {
             proofs.push_back(std::move(*record));
         } else {
-            log(Severity::warning, "journal", "a proof of the safe state cannot be read: left out");
+            log(Severity::warning, "journal",
+                "a proof of the safe state cannot be read, left out: " + why);
         }
     }
     campaign_.take_over_proofs(std::move(proofs));

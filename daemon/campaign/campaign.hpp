@@ -314,7 +314,7 @@ class Campaign {
     struct Unread {
         estimator::DwellInfo info;
         StopDone stop;
-        double measured_g_rms = 0;
+        double measured_g_rms = 0, power_ratio = 1;
         std::uint64_t request = 0;  ///< of the shaker; 0: not asked yet
         drivers::Time until = 0;
     };

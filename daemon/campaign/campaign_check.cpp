@@ -36,6 +36,11 @@ void Campaign::take_over_proofs(std::vector<ProofRecord> history) {
     const auto transmission = proof_.transmission();
     if (!transmission) return;
     ports_.rig.transmission(*transmission);
+    excitation_.measured(settings_.frequency_hz, *transmission);
+    if (proof_.in_step().empty())
+        ports_.log.event(Severity::info,
+                         "the newest proof is of a time when no motion in step was measured: its "
+                         "growth is not watched before the next one");
     ports_.log.event(Severity::info,
                      fmt::format("transmission {:.4g}, as the loop check of the newest "
                                  "proof measured it",

@@ -54,7 +54,11 @@ Time Campaign::slew(Time now) {
 }
 
 void Campaign::begin_dwell(Time now) {
-    dwelling_->aim({here().stop, here().run, here().position, positions_done_ == 0}, zeros());
+    const double hz =
+        here().stop.frequency_hz > 0 ? here().stop.frequency_hz : settings_.frequency_hz;
+    dwelling_->aim({here().stop, here().run, here().position, positions_done_ == 0,
+                    found_at(proof_.in_step(), hz, settings_.rig)},
+                   zeros());
     begin(*dwelling_, State::ramping, now);
 }
 
@@ -97,7 +101,8 @@ void Campaign::next_position(Time now) {
                   dwelling_->swept_hz(),
                   {}};
     if (psd_due_) {
-        unread_ = Unread{info, std::move(stop), dwelling_->measured_g_rms(), 0, 0};
+        unread_ = Unread{info, std::move(stop), dwelling_->measured_g_rms(),
+                         excitation_.power_ratio(*here().stop.random)};
     } else {
         ports_.log.position_done(info, dwells_.back(), stop);
     }

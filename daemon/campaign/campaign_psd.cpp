@@ -25,7 +25,7 @@ bool Campaign::asks_for_psd(const estimator::DwellSummary& summary) const {
 bool Campaign::psd_told(Time now) {
     if (!unread_) return true;
     drivers::Shaker& shaker = ports_.rig.shaker;
-    ToldPsd told{{}, {}, unread_->measured_g_rms};
+    ToldPsd told{{}, {}, unread_->measured_g_rms, unread_->power_ratio};
     if (unread_->request == 0) {
         unread_->request = shaker.read_psd();
         unread_->until = now + kPsdPatience;

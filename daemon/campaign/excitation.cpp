@@ -2,10 +2,13 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "daemon/campaign/rig_frame.hpp"
+#include "estimator/spectrum/mount.hpp"
 
 namespace vibrig::campaign {
 
@@ -42,8 +45,25 @@ void Excitation::from_rest(const Stop& stop, Time now) {
     const auto measured = measured_.find(stop.frequency_hz);
     random_ = stop.random;
     transmission_ = measured != measured_.end() && !random_ ? measured->second : stop.transmission;
+    if (random_) {
+        const double ratio = power_ratio(*random_);
+        random_->at_platform.mean_square_g2 *= ratio;
+        transmission_ *= std::sqrt(ratio);
+    }
     asked_g_ = 0;
     tell_ramp(0, now);
+}
+
+double Excitation::power_ratio(const RandomStop& of) const {
+    std::vector<std::pair<double, double>> ratios;
+    for (const auto& [hz, found] : measured_) {
+        const auto same = [hz = hz](const Stop& stop) { return stop.frequency_hz == hz; };
+        const auto stop = std::ranges::find_if(settings_.stops, same);
+        const bool stated = stop != settings_.stops.end() && stop->transmission > 0;
+        if (!stated && hz != settings_.frequency_hz) continue;  // of the loop check alone
+        ratios.emplace_back(hz, found / (stated ? stop->transmission : settings_.rig.transmission));
+    }
+    return estimator::spectrum::power_ratio(ratios, of.bands);
 }
 
 drivers::ShakerSetPoint Excitation::set_point(double table_g, bool run_at_zero) const {

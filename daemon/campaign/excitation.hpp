@@ -30,10 +30,13 @@ class Excitation {
     /// From rest, where the gimbals are (deg): what the table was told last is over, and no witness
     /// may hold it to that.
     void from_rest(const Stop& stop, drivers::Time now);
-    /// Platform over table at a frequency of the plan, as the loop check has measured it.
+    /// Platform over table at a frequency, as the loop check has measured it.
     void measured(double frequency_hz, double transmission) {
         measured_[frequency_hz] = transmission;
     }
+    /// What the mean square of a random vibration at the platform is of what the transmission makes
+    /// of it that is configured (docs/spectrum.md).
+    [[nodiscard]] double power_ratio(const RandomStop& of) const;
     /// Where the gimbals are while the table moves, deg as the encoders count.
     void place(const std::array<double, 3>& position_deg) { position_deg_ = position_deg; }
     [[nodiscard]] const std::array<double, 3>& position_deg() const { return position_deg_; }
@@ -101,7 +104,7 @@ class Excitation {
     estimator::SweptSine sweep_{};
     rt::Sweep follows_{};                ///< as the witnesses were told of it
     double transmission_ = 0;            ///< see Stop
-    std::map<double, double> measured_;  ///< transmissions by frequency
+    std::map<double, double> measured_;  ///< transmissions by frequency, as measured
     double highest_g_ = 0;
     bool campaign_ = true;
     drivers::Time since_ = 0;

@@ -17,6 +17,8 @@ constexpr double kGravityTolerance = 0.05;  // of 1 g, at rest
 constexpr double kStill = 0.05;             // g, at rest
 constexpr double kDecibel = rt::AmplitudeWitness::kDecibel;
 constexpr double kMostBad = 0.1;  // of the samples
+constexpr const char* kMotionInStep = "motion in step";
+constexpr const char* kArcsecPerG = "arcsec/g";
 }  // namespace
 
 LoopCheck::LoopCheck(const LoopCheckSettings& settings, const estimator::Settings& rig)
@@ -70,7 +72,7 @@ void LoopCheck::add(const rt::Motion& motion) {
     }
     angle_rad_ = motion.angle;
     readings_.push_back({drivers::to_seconds(motion.time), frame_.force(motion.force, 1),
-                         motion.table, motion.table_good});
+                         motion.table, motion.table_good, motion.angle});
 }
 
 std::string LoopCheck::look(std::array<double, 3>& position_deg) const {
@@ -248,11 +250,17 @@ void LoopCheck::row(const char* name, const char* unit, double value, double low
     status_.rows.push_back(judged(name, unit, value, low, high, ""));
 }
 
+/// A platform that turns with the vibration has gravity go across its vertical, 1 g times the
+/// angle.
+double LoopCheck::most_in_step() const {
+    return settings_.cross_share * 180 * 3600 / std::numbers::pi;
+}
+
 LoopCheck::AtFrequency LoopCheck::finish_at(double hz, double low, double high) {
     const auto found = estimator::loop_response(readings_, hz);
     const double table_g = found.table_known ? found.table_g : settings_.table_g;
     const std::string at = fmt::format("at {:g} Hz ", hz);
-    AtFrequency out{hz, table_g > 0 ? found.platform_g / table_g : 0, {}};
+    AtFrequency out{hz, table_g > 0 ? found.platform_g / table_g : 0, {}, {}};
     const auto row = [&](const char* name, const char* unit, double value, double from, double to) {
         out.rows.push_back(judged(name, unit, value, from, to, at));
     };
@@ -263,6 +271,9 @@ LoopCheck::AtFrequency LoopCheck::finish_at(double hz, double low, double high) 
         hz + settings_.frequency_tolerance_hz);
     row("distortion", "", found.distortion, 0, settings_.distortion);
     row("cross-axis share", "", found.cross_share, 0, settings_.cross_share);
+    out.in_step = estimator::in_step(readings_, found.frequency_hz, rig_);
+    if (out.in_step.platform_g > 0)
+        row(kMotionInStep, kArcsecPerG, out.in_step.motion_arcsec_g, 0, most_in_step());
     return out;
 }
 
@@ -283,6 +294,9 @@ void LoopCheck::finish(double shaker_g) {
         rig_.frequency_hz + settings_.frequency_tolerance_hz);
     row("distortion", "", found.distortion, 0, settings_.distortion);
     row("cross-axis share", "", found.cross_share, 0, settings_.cross_share);
+    in_step_ = estimator::in_step(readings_, found.frequency_hz, rig_);
+    if (in_step_.platform_g > 0)
+        row(kMotionInStep, kArcsecPerG, in_step_.motion_arcsec_g, 0, most_in_step());
     if (found.table_known) {
         // The nearest to the middle of the band of all that are the same phase.
         row("phase", "deg",

@@ -9,6 +9,7 @@
 #include "daemon/campaign/settings.hpp"
 #include "daemon/rt/stage_feed.hpp"
 #include "daemon/status/status.hpp"
+#include "estimator/level/in_step.hpp"
 #include "estimator/level/loop_response.hpp"
 
 namespace vibrig::campaign {
@@ -67,6 +68,7 @@ class LoopCheck {
     struct AtFrequency {
         double hz = 0, transmission = 0;  ///< of the vibration as it was asked for; as measured
         std::vector<LoopCheckStatus::Row> rows;
+        estimator::InStep in_step;
     };
     [[nodiscard]] AtFrequency finish_at(double hz, double low, double high);
     /// Likewise, to `transmission` within the configured tolerance.
@@ -86,6 +88,8 @@ class LoopCheck {
     [[nodiscard]] const LoopCheckStatus& status() const { return status_; }
     /// Platform over table as measured; over the command where the table has no accelerometer.
     [[nodiscard]] double transmission() const { return transmission_; }
+    /// At the reference frequency.
+    [[nodiscard]] const estimator::InStep& in_step() const { return in_step_; }
     /// Frequencies of a plan's dwells apart from the reference one, each once, as stops.
     [[nodiscard]] static std::vector<Stop> further_frequencies(const Settings& settings);
     /// The shaker's limit that the level exceeds at any frequency; empty: none.
@@ -94,6 +98,7 @@ class LoopCheck {
   private:
     /// What moves: of the table where it is known throughout, else of the platform; less its mean.
     [[nodiscard]] std::vector<double> motion() const;
+    [[nodiscard]] double most_in_step() const;  ///< arcsec per g at the platform
     void row(const char* name, const char* unit, double value, double low, double high);
     /// Judges a row; `at` stands before its name where it is out of band.
     LoopCheckStatus::Row judged(const char* name, const char* unit, double value, double low,
@@ -108,6 +113,7 @@ class LoopCheck {
     Noise at_rest_;
     bool passed_ = false;
     double transmission_ = 0;
+    estimator::InStep in_step_;
     std::string out_of_band_;  ///< of the newest that was completed
     std::string found_wrong_;  ///< of the one under way
     LoopCheckStatus status_;

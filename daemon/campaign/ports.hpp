@@ -34,6 +34,7 @@ struct ToldPsd {
     std::vector<std::array<double, 2>> pairs;  ///< Hz and g^2/Hz at the table, as they came
     std::string why_not;                       ///< why there are none
     double measured_g_rms = 0;  ///< by the controller over the dwell; 0: it did not say
+    double power_ratio = 1;     ///< at the platform, of what is configured: Excitation
 };
 /// And what the dwell is with it; a summary without samples: as it was.
 struct Played {
@@ -82,6 +83,10 @@ class Rig {
     virtual void uncommanded() {}
     /// It moves otherwise than asked for.
     virtual void wrong_vibration() {}
+    /// Motion in step and motion across, times what the loop check found; none: not looked for.
+    virtual void grown(std::optional<std::array<double, 2>>) {}
+    /// How many times is too much, of each.
+    [[nodiscard]] virtual std::array<double, 2> grown_limits() const { return {3, 3}; }
     /// What is being proved by making it happen.
     virtual void proving(Proving) {}
 };

@@ -99,68 +99,6 @@ std::string sha256(const std::string& text) {
     return hex;
 }
 
-std::string to_json(const ProofRecord& r) {
-    Json rows = Json::array();
-    for (const ProofRow& row : r.rows) {
-        rows.push_back({{"name", row.name},
-                        {"unit", row.unit},
-                        {"value", row.value},
-                        {"low", row.low},
-                        {"high", row.high},
-                        {"passed", row.passed()}});
-    }
-    return Json{{"by", r.by},
-                {"utc_ns", r.utc_ns},
-                {"table_g", r.table_g},
-                {"passed", r.passed},
-                {"emergency_stop", r.emergency_stop},
-                {"button", r.button},
-                {"message", r.message},
-                {"rows", rows},
-                {"pads",
-                 {{"level_g", r.pads.level_g},
-                  {"time_s", r.pads.time_s},
-                  {"rate_per_s", r.pads.rate_per_s},
-                  {"frequency_hz", r.pads_hz},
-                  {"damping", r.pads_damping}}},
-                {"transmission", r.transmission},
-                {"transmissions", r.transmissions},
-                {"keys", r.keys},
-                {"keys_sha256", r.keys_sha256},
-                {"device", r.device}}
-        .dump();
-}
-
-std::optional<ProofRecord> proof_from_json(const std::string& text) {
-    try {
-        const Json json = Json::parse(text);
-        ProofRecord r;
-        r.by = json.at("by");
-        r.utc_ns = json.at("utc_ns");
-        r.table_g = json.at("table_g");
-        r.passed = json.at("passed");
-        r.emergency_stop = json.at("emergency_stop");
-        r.button = json.value("button", "");  // earlier records have none
-        r.message = json.at("message");
-        for (const Json& row : json.at("rows"))
-            r.rows.push_back(
-                {row.at("name"), row.at("unit"), row.at("value"), row.at("low"), row.at("high")});
-        const Json& pads = json.at("pads");
-        r.pads = {pads.at("level_g"), pads.at("time_s"), pads.at("rate_per_s")};
-        r.pads_hz = pads.at("frequency_hz");
-        r.pads_damping = pads.at("damping");
-        r.transmission = json.value("transmission", 0.0);  // earlier records have none
-        if (const auto further = json.find("transmissions"); further != json.end())
-            r.transmissions = further->get<decltype(r.transmissions)>();
-        r.keys = json.at("keys");
-        r.keys_sha256 = json.at("keys_sha256");
-        r.device = json.value("device", "");
-        return r;
-    } catch (const nlohmann::json::exception&) {
-        return std::nullopt;
-    }
-}
-
 SafetyProof::SafetyProof(ProofSettings settings)
     : settings_(std::move(settings)), keys_sha256_(sha256(settings_.keys)) {}
 
@@ -367,6 +305,11 @@ std::optional<double> SafetyProof::transmission() const {
 std::vector<std::pair<double, double>> SafetyProof::transmissions() const {
     const ProofRecord* newest = newest_of_these_keys();
     return newest == nullptr ? std::vector<std::pair<double, double>>{} : newest->transmissions;
+}
+
+std::vector<FoundInStep> SafetyProof::in_step() const {
+    const ProofRecord* newest = newest_of_these_keys();
+    return newest == nullptr ? std::vector<FoundInStep>{} : newest->in_step;
 }
 
 PadRingDown SafetyProof::pads() const {

@@ -10,6 +10,7 @@
 #include "daemon/interlock/rest_monitor.hpp"
 #include "daemon/status/status.hpp"
 #include "drivers/shaker/shaker.hpp"
+#include "estimator/level/in_step.hpp"
 
 namespace vibrig::campaign {
 
@@ -30,6 +31,12 @@ struct ProofRow {
     [[nodiscard]] bool passed() const { return value >= low && value <= high; }
 };
 
+/// What the loop check found at one frequency of the plan, against which dwells there are held.
+struct FoundInStep {
+    double hz = 0;  ///< of the vibration as it was asked for
+    estimator::InStep found;
+};
+
 /// One proof, as the journal keeps it.
 struct ProofRecord {
     std::string by;
@@ -45,14 +52,21 @@ struct ProofRecord {
     double transmission = 0;  ///< platform over table, of a loop check in band; 0: not measured
     /// The same at further frequencies of the plan, Hz first.
     std::vector<std::pair<double, double>> transmissions;
-    std::string keys, keys_sha256;  ///< as in ProofSettings
-    std::string device;             ///< who the shaker's controller says it is; empty: not asked
+    std::vector<FoundInStep> in_step;  ///< of those in band; earlier records have none
+    std::string keys, keys_sha256;     ///< as in ProofSettings
+    std::string device;                ///< who the shaker's controller says it is; empty: not asked
+
+    /// What is not known is left out.
+    void found(double hz, const estimator::InStep& one) {
+        if (one.platform_g > 0) in_step.push_back({hz, one});
+    }
 };
 
 /// As the journal and people's tools keep it.
 [[nodiscard]] std::string to_json(const ProofRecord& record);
-/// Nothing if it is no such text.
-[[nodiscard]] std::optional<ProofRecord> proof_from_json(const std::string& text);
+/// Nothing if it is no such text; `why` then says so, what was found where, and what was expected.
+[[nodiscard]] std::optional<ProofRecord> proof_from_json(const std::string& text,
+                                                         std::string* why = nullptr);
 
 /// When each who can tell first said that a stop was done, s after the order; empty: not yet.
 class StopTimes {
@@ -123,6 +137,8 @@ class SafetyProof {
     [[nodiscard]] std::optional<double> transmission() const;
     /// Likewise at the plan's further frequencies.
     [[nodiscard]] std::vector<std::pair<double, double>> transmissions() const;
+    /// Likewise what went in step with the vibration at each frequency; empty: not measured.
+    [[nodiscard]] std::vector<FoundInStep> in_step() const;
     /// Of the newest that passed; a documented allowance without one.
     [[nodiscard]] PadRingDown pads() const;
 

@@ -15,6 +15,7 @@
 #include "drivers/shaker/shaker.hpp"
 #include "estimator/filter/measurement.hpp"
 #include "estimator/filter/settings.hpp"
+#include "estimator/spectrum/elastic.hpp"
 #include "estimator/spectrum/sweep_bounds.hpp"
 
 namespace vibrig::campaign {
@@ -30,6 +31,8 @@ struct RandomStop {
     estimator::RandomVibration at_platform;
     std::uint16_t place = 0;  ///< of its abort bands: rt::Ramp::random
     std::string name{};       ///< of the profile
+    /// At the platform, behind isolators whose transmission the loop check measures.
+    std::vector<estimator::spectrum::Band> bands{};
 };
 
 /// One dwell of a campaign.

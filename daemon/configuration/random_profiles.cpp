@@ -153,7 +153,8 @@ campaign::Stop random_stop(Configuration& rig, const plan::PlannedRun& run) {
         {platform_g * platform_g, found->platform_bandwidth_hz, rig.spectrum.controller_gain,
          found->highest_hz, number, run.level_db},
         0,
-        named.profile.name};
+        named.profile.name,
+        rig.spectrum.mount.hard ? std::vector<spectrum::Band>{} : found->at_platform};
     auto& numbers = rig.played_numbers;
     const auto known = std::ranges::find(numbers, number);
     stop.random->place = static_cast<std::uint16_t>(known - numbers.begin() + 1);

@@ -337,6 +337,14 @@ void Interlock::check(const drivers::ShakerReading& reading) noexcept {
     }
 }
 
+void Interlock::no_growth() noexcept {
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+        const Trip trip = rules_[i].condition;
+        if (trip == Trip::motion_in_step || trip == Trip::cross_growth)
+            judge_row(By::read_back, i, false, std::numeric_limits<double>::quiet_NaN(), 0);
+    }
+}
+
 /// It has lasted already: no row's dwell is waited for.
 void Interlock::uncommanded() noexcept {
     for (std::size_t i = 0; i < rules_.size(); ++i) {
@@ -402,6 +410,13 @@ bool Interlock::acknowledge_alarm(const std::string& name) noexcept {
             return states_[i].raised.exchange(false);
     }
     return false;
+}
+
+double Interlock::least_limit(Trip condition) const noexcept {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Rule& rule : rules_)
+        if (rule.condition == condition) least = std::min(least, rule.limit);
+    return least;
 }
 
 Interlock::RowState Interlock::row(std::size_t i) const noexcept {

@@ -140,6 +140,13 @@ class Interlock {
     void wrong_vibration(bool wrong) noexcept {
         judge(By::read_back, Trip::wrong_vibration, wrong, wall_clock());
     }
+    /// Control thread, which alone judges these two: over what the loop check found, allowances
+    /// in; both judged not wrong: none is looked for any more.
+    void growth(double motion_in_step, double across) noexcept {
+        judge(By::read_back, Trip::motion_in_step, motion_in_step, wall_clock());
+        judge(By::read_back, Trip::cross_growth, across, wall_clock());
+    }
+    void no_growth() noexcept;
     /// Any thread. The first cause stays.
     void trip(Trip cause) noexcept { trip(cause, 0, 0, drivers::kChannels); }
     /// Shaker thread: a stop was written and confirmed.
@@ -158,6 +165,8 @@ class Interlock {
 
     [[nodiscard]] std::size_t rows() const noexcept { return rules_.size(); }
     [[nodiscard]] RowState row(std::size_t i) const noexcept;
+    /// Of the rows of a condition; infinite without one.
+    [[nodiscard]] double least_limit(Trip condition) const noexcept;
     [[nodiscard]] ReactionHistogram::Counts reactions() const noexcept {
         return reactions_.counts();
     }

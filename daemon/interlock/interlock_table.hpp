@@ -41,9 +41,11 @@ enum class Trip : std::uint8_t {
     guard_stop,
     horn,
     wrong_vibration,
-    abort_bands
+    abort_bands,
+    motion_in_step,
+    cross_growth
 };
-inline constexpr std::size_t kTrips = 32;
+inline constexpr std::size_t kTrips = 34;
 
 /// How much is watched. Each level includes the one before.
 enum class Guard : std::uint8_t {
@@ -119,6 +121,12 @@ inline constexpr std::array<Condition, kTrips> kConditions{{
     {Trip::abort_bands, "abort_bands",
      "the controller plays random vibration without abort bands of its own", Guard::excitation,
      true},
+    {Trip::motion_in_step, "motion_in_step",
+     "motion in step with the vibration has grown since the loop check", Guard::excitation, false,
+     "times what it found", 3, 1000},
+    {Trip::cross_growth, "cross_axis_growth",
+     "motion across the vertical has grown since the loop check", Guard::excitation, false,
+     "times what it found", 3, 1000},
 }};
 [[nodiscard]] constexpr const Condition& condition_of(Trip trip) noexcept {
     return kConditions[static_cast<std::size_t>(trip)];
@@ -156,6 +164,8 @@ inline constexpr std::size_t kMostRules = 64;
     add("gimbal_not_in_position", Trip::gimbal_off, Reaction::abort, 10, 0.5, true);
     add("cross_axis_alarm", Trip::cross_axis, Reaction::alarm, 0.2, 2, false);
     add("cross_axis_abort", Trip::cross_axis, Reaction::abort, 1, 2, true);
+    add("motion_in_step", Trip::motion_in_step, Reaction::alarm, 3, 0, false);
+    add("cross_axis_growth", Trip::cross_growth, Reaction::alarm, 3, 0, false);
     add("tilt", Trip::tilt, Reaction::abort, 10, 1, true);
     add("temperature_alarm", Trip::temperature, Reaction::alarm, 75, 5, false);
     add("temperature_abort", Trip::temperature, Reaction::abort, 90, 5, true);

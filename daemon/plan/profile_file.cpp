@@ -10,6 +10,7 @@ namespace vibrig::plan {
 
 namespace {
 
+using estimator::spectrum::Breakpoints;
 using estimator::spectrum::Profile;
 
 nlohmann::json read_json(const std::string& path) {
@@ -20,12 +21,12 @@ nlohmann::json read_json(const std::string& path) {
     return root;
 }
 
-std::vector<std::pair<double, double>> read_pairs(const nlohmann::json& root, const char* key,
-                                                  const char* form, const std::string& path) {
-    std::vector<std::pair<double, double>> out;
+Breakpoints read_pairs(const nlohmann::json& root, const std::string& path, const char* key,
+                       const char* form) {
+    Breakpoints out;
     const auto found = root.find(key);
     if (found == root.end()) return out;
-    const std::string place = path + ": " + key;
+    const std::string place = path + key;
     if (!found->is_array())
         throw std::runtime_error(place + ": found " + found->dump() + ", expected [" + form +
                                  ", ..]");
@@ -39,13 +40,58 @@ std::vector<std::pair<double, double>> read_pairs(const nlohmann::json& root, co
 }
 
 void refuse_unknown(const nlohmann::json& root, const std::string& path) {
-    constexpr std::array<const char*, 6> kKnown{"name", "psd", "sines", "direction", "g_rms", "at"};
+    constexpr std::array<const char*, 7> kKnown{"name",      "psd",   "cross", "sines",
+                                                "direction", "g_rms", "at"};
+    if (root.contains("quadrature"))
+        throw std::runtime_error(
+            path +
+            ": quadrature: found cross-spectra with an imaginary part, expected real ones: "
+            "a campaign with one shaker does not excite what answers elliptic motion");
     for (const auto& [key, value] : root.items()) {
         if (std::find(kKnown.begin(), kKnown.end(), key) == kKnown.end())
             throw std::runtime_error(path + ": " + key +
-                                     ": found an unknown key, expected name, psd, sines, "
-                                     "direction (along one line), g_rms or at");
+                                     ": found an unknown key, expected name, psd, cross, sines, "
+                                     "direction, g_rms or at");
     }
+}
+
+/// Lists of pairs by the names of axes, or pairs of them.
+std::array<Breakpoints, 3> read_axes(const nlohmann::json& of,
+                                     const std::array<const char*, 3>& names,
+                                     const std::string& place) {
+    std::array<Breakpoints, 3> out;
+    const std::string known = std::string(names[0]) + ", " + names[1] + ", " + names[2];
+    if (!of.is_object() || of.empty())
+        throw std::runtime_error(place + ": found " + of.dump().substr(0, 60) +
+                                 ", expected an object with " + known);
+    for (const auto& [key, value] : of.items()) {
+        const auto name = std::ranges::find(names, key);
+        if (name == names.end())
+            throw std::runtime_error(place + "." + key + ": found an unknown axis, expected " +
+                                     known);
+        out[static_cast<std::size_t>(name - names.begin())] =
+            read_pairs(of, place + ".", *name, "[hz, g2_hz]");
+    }
+    return out;
+}
+
+/// Along one line, or along axes.
+void read_psd(const nlohmann::json& root, Profile& profile, const std::string& path) {
+    const auto psd = root.find("psd"), cross = root.find("cross");
+    const bool axes = psd != root.end() && psd->is_object();
+    if (cross != root.end() && !axes)
+        throw std::runtime_error(path + ": cross: found without a psd of several axes, expected " +
+                                 "psd {north, up, east}");
+    if (!axes) {
+        profile.psd = read_pairs(root, path + ": ", "psd", "[hz, g2_hz]");
+        return;
+    }
+    if (root.contains("direction") && !root.contains("sines"))
+        throw std::runtime_error(path + ": direction: found with a psd of several axes, expected " +
+                                 "it for sines, or psd [[hz, g2_hz], ..] along one line");
+    profile.axes.psd = read_axes(*psd, estimator::spectrum::kAxes, path + ": psd");
+    if (cross != root.end())
+        profile.axes.cross = read_axes(*cross, estimator::spectrum::kAxisPairs, path + ": cross");
 }
 
 }  // namespace
@@ -63,8 +109,8 @@ StatedProfile read_profile(const std::string& path) {
             throw std::runtime_error(path + ": name: found " + found->dump() + ", expected a text");
         profile.name = found->get<std::string>();
     }
-    profile.psd = read_pairs(root, "psd", "[hz, g2_hz]", path);
-    profile.sines = read_pairs(root, "sines", "[hz, g_peak]", path);
+    read_psd(root, profile, path);
+    profile.sines = read_pairs(root, path + ": ", "sines", "[hz, g_peak]");
     if (const auto found = root.find("direction"); found != root.end()) {
         if (!found->is_array() || found->size() != 3 ||
             !std::all_of(found->begin(), found->end(), [](auto& x) { return x.is_number(); }))
@@ -105,7 +151,7 @@ std::vector<Profile> read_controller_psd(const std::string& path) {
                                      ", expected an entry of " + kForm);
         Profile profile;
         profile.name = name->get<std::string>();
-        profile.psd = read_pairs(one, "psd", "[hz, g2_hz]", place);
+        profile.psd = read_pairs(one, place + ": ", "psd", "[hz, g2_hz]");
         if (profile.psd.empty())
             throw std::runtime_error(place + ".psd: found nothing, expected [[hz, g2_hz], ..]");
         check(profile, place + ".");

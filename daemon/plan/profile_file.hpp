@@ -13,8 +13,9 @@ struct StatedProfile {
     std::string at;  ///< "platform" or "table"; empty: not stated
 };
 
-/// JSON: psd [[hz, g2_hz], ..], sines [[hz, g_peak], ..], and optionally name, direction, g_rms,
-/// at. Throws std::runtime_error with file, key, value and what was expected.
+/// JSON: psd [[hz, g2_hz], ..] or {north, up, east} of such lists with the real cross-spectra cross
+/// {north_up, north_east, up_east}, sines [[hz, g_peak], ..], and optionally name, direction,
+/// g_rms, at. Throws std::runtime_error with file, key, value and what was expected.
 [[nodiscard]] StatedProfile read_profile(const std::string& path);
 
 /// What a controller played under profiles: JSON [{"profile": NAME, "psd": [[hz, g2_hz], ..]}, ..],

@@ -158,7 +158,9 @@ Json held_out_json(const SpectrumResult& of) {
     for (const auto& [row, kind] : of.held_out) {
         rates.row(static_cast<Index>(situations.size())) = row.rate;
         situations.push_back(
-            {row.angles, level_moment(row.vibration), kind.bands, row.duration_s, true});
+            {row.angles, level_moment(row.vibration),
+             estimator::spectrum::bands_of(of.analysis.model.frame, row, kind.bands),
+             row.duration_s, true});
         variances.push_back(row.variance);
         errors.push_back(row.relative_error);
     }
@@ -413,7 +415,7 @@ void add_spectrum(const SpectrumResult& of, Json& root) {
                 root["dwell_rates"][k]["profile"] = kind->profile;
             } else {
                 if (kind != nullptr) {
-                    for (const Band& band : kind->bands)
+                    for (const Band& band : dwell.bands.empty() ? kind->bands : dwell.bands)
                         lines.push_back({band.hz, std::sqrt(2 * moment * band.share)});
                 }
                 root["dwell_rates"][k]["lines"] = std::move(lines);

@@ -14,6 +14,7 @@ using drivers::Time;
 
 namespace {
 
+constexpr std::uint32_t kModeBits = 3;
 constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
 
 bool is(const proto::Message* message, const canfd_frame& frame) noexcept {
@@ -23,7 +24,7 @@ bool is(const proto::Message* message, const canfd_frame& frame) noexcept {
 }
 
 StageFeed::Mode mode_of(std::uint32_t order) noexcept {
-    return static_cast<StageFeed::Mode>(order & 3U);
+    return static_cast<StageFeed::Mode>(order & ((1U << kModeBits) - 1));
 }
 
 }  // namespace
@@ -81,13 +82,13 @@ void StageFeed::take_velocity(const drivers::ReceivedFrame& received) noexcept {
 }
 
 void StageFeed::order(Mode mode) noexcept {
-    const std::uint32_t generation = (order_.load() >> 2) + 1;
-    order_.store(generation << 2 | static_cast<std::uint32_t>(mode));
+    const std::uint32_t generation = (order_.load() >> kModeBits) + 1;
+    order_.store(generation << kModeBits | static_cast<std::uint32_t>(mode));
 }
 
 bool StageFeed::pop(Motion& motion) noexcept {
     const std::uint32_t order = order_.load();
-    const std::uint32_t generation = order >> 2;
+    const std::uint32_t generation = order >> kModeBits;
     bool found = false;
     while (!found && ring_.consume([&](const Motion& m) { motion = m; }, 1) == 1) {
         found = motion.generation == generation && mode_of(order) != Mode::off;
@@ -110,17 +111,17 @@ void StageFeed::take(const drivers::Sample& sample) noexcept {
     }
     const std::uint32_t order = order_.load();
     if (order != taken_order_) begin(order);
-    if (mode_of(order) == Mode::samples) {
+    if (mode_of(order) == Mode::samples || mode_of(order) == Mode::watched) {
         Motion one;
         one.time = sample.time;
         one.force = sample.force;
         one.angle = angle_;
-        one.generation = order >> 2;
+        one.generation = order >> kModeBits;
         one.good = sample.force_good() && sample.angles_good();
         one.table = sample.table_accel;
         one.table_good = sample.of(drivers::Channel::table_accel) == drivers::Quality::good;
         ring_.try_push(one);
-        if (control_ != nullptr) control_->notify();
+        if (control_ != nullptr && mode_of(order) == Mode::samples) control_->notify();
         return;
     }
     if (mode_of(order) != Mode::force) return;
@@ -133,7 +134,7 @@ void StageFeed::take(const drivers::Sample& sample) noexcept {
     for (double& force : block_.force) force /= good_in_block_ > 0 ? good_in_block_ : 1;
     block_.time = sample.time;
     block_.angle = angle_;
-    block_.generation = order >> 2;
+    block_.generation = order >> kModeBits;
     if (velocity_[0]) {
         block_.velocity = base_velocity_;
         const Time oldest = std::min(base_velocity_at_[0], base_velocity_at_[1]);
@@ -220,7 +221,7 @@ void StageFeed::pair(const Layout& layout, const canfd_frame& frame, Time arrive
     motion.turn = turn_;
     motion.angle = angle_;
     motion.good = good && angle_known_ && std::isfinite(turn_[0]);
-    motion.generation = taken_order_ >> 2;
+    motion.generation = taken_order_ >> kModeBits;
     ring_.try_push(motion);
     if (control_ != nullptr) control_->notify();
 }

@@ -59,7 +59,9 @@ struct StageFeedSettings {
 /// stage asks for them. In the acquisition thread it neither allocates, locks, logs nor formats.
 class StageFeed {
   public:
-    enum class Mode : std::uint8_t { off, force, increments, samples };
+    static constexpr std::size_t kCapacity = 1024;  ///< of what was not taken yet
+    /// watched: samples, of whose coming the control thread is not told.
+    enum class Mode : std::uint8_t { off, force, increments, samples, watched };
 
     /// Throws BindingError; the Dbc must outlive this.
     StageFeed(const proto::Dbc& dbc, const StageFeedSettings& settings, drivers::Waiter* control);
@@ -97,8 +99,8 @@ class StageFeed {
     const proto::Signal* torquing_ = nullptr;
     const proto::Signal* torque_echo_ = nullptr;
 
-    std::atomic<std::uint32_t> order_{0};  ///< generation << 2 | mode
-    Ring<Motion> ring_{1024};
+    std::atomic<std::uint32_t> order_{0};  ///< generation << kModeBits | mode
+    Ring<Motion> ring_{kCapacity};
     Snapshot<TorqueView> torque_;
     Snapshot<IncrementCounters> counts_;
 

@@ -6,6 +6,7 @@
 
 #include "estimator/filter/coefficients.hpp"
 #include "estimator/filter/vibration_moment.hpp"
+#include "estimator/level/harmonics.hpp"
 
 namespace vibrig::estimator {
 
@@ -35,7 +36,9 @@ struct DwellRow {
     Regression ramp_regressors = Regression::Zero();
     double nis_per_dof = 0, innovation_correlation = 0;
     std::uint32_t used = 0;
-    double sync_arcsec = 0;     ///< motion of the angles in step with the vibration
+    double sync_arcsec = 0;  ///< motion of the angles in step with the vibration
+    /// Of the vibration's mean square, as the accelerometers show it: harmonics of frequency_hz.
+    Harmonics::Shares harmonics{};
     bool flagged = false;       ///< and not merely followed
     double commanded_hz = 0;    ///< 0: nobody said
     bool held_out = false;      ///< as DwellInfo

@@ -22,6 +22,7 @@ bool Identification::Impl::row_of(const DwellSummary& summary, DwellRow& row) no
     row.apart = apart_;
     row.random = random_;
     row.profile = record_.info.random.profile;
+    row.harmonics = harmonics_.shares(record_.period_s);
     if (row.frequency_hz > 0)
         row.sync_arcsec =
             sync_.amplitude_arcsec(row.frequency_hz, noise.angle_arcsec * noise.angle_arcsec);

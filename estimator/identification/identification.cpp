@@ -135,6 +135,7 @@ void Identification::Impl::begin_dwell(const DwellInfo& dwell) noexcept {
     record_.seen = seen_of(dwell, hz);
     level_.nominal(hz);
     sync_.nominal(hz);
+    harmonics_.begin(random_ || swept_ ? 0 : hz, period_s_);
     active_ = filter_of(dwell.run);
     if (active_ == nullptr) {
         refused_run = true;
@@ -339,6 +340,7 @@ void Identification::Impl::to_level(const Reading& reading) noexcept {
         level_.add(force[1]);
         tensor_.add(force);
         if (random_) record_.random_level.add(force[1]);
+        harmonics_.add(reading.time_s - dwell_begin_s_, force[1]);
     } else {
         level_.add_missing();
         tensor_.add_missing();

@@ -14,6 +14,7 @@
 #include "estimator/identification/result.hpp"
 #include "estimator/identification/two_step.hpp"
 #include "estimator/level/growing_tensor.hpp"
+#include "estimator/level/harmonics.hpp"
 #include "estimator/level/paper_level.hpp"
 #include "estimator/level/saturation_detector.hpp"
 #include "estimator/level/stuck_detector.hpp"
@@ -110,6 +111,7 @@ struct Identification::Impl {
     VibrationLevel level_;
     GrowingTensor tensor_;
     SyncMotion sync_;
+    Harmonics harmonics_;        ///< of a sine
     VibrationMoment vibration_;  ///< as the filter takes it
     PaperLevel paper_;
     std::vector<PaperStart> paper_starts_;

@@ -69,15 +69,28 @@ double best_frequency(std::span<const LoopReading> readings, double middle_s, do
     return (low + high) / 2;
 }
 
+/// Span of the readings, s; 0: they are too few, or too short.
+double span_of(std::span<const LoopReading> readings, double hz) {
+    if (readings.size() < kFewestReadings || !(hz > kSearchHz)) return 0;
+    const double span_s = readings.back().time_s - readings.front().time_s;
+    return span_s * hz >= 1 ? span_s : 0;
+}
+
 }  // namespace
 
 LoopResponse loop_response(std::span<const LoopReading> readings, double nominal_hz) {
-    LoopResponse out;
-    if (readings.size() < kFewestReadings || !(nominal_hz > kSearchHz)) return out;
-    const double span_s = readings.back().time_s - readings.front().time_s;
-    if (!(span_s * nominal_hz >= 1)) return out;
+    const double span_s = span_of(readings, nominal_hz);
+    if (span_s == 0) return {};
     const double middle_s = readings.front().time_s + span_s / 2;
-    out.frequency_hz = best_frequency(readings, middle_s, span_s, nominal_hz);
+    return loop_response_at(readings, best_frequency(readings, middle_s, span_s, nominal_hz));
+}
+
+LoopResponse loop_response_at(std::span<const LoopReading> readings, double hz) {
+    const double span_s = span_of(readings, hz);
+    if (span_s == 0) return {};
+    const double middle_s = readings.front().time_s + span_s / 2;
+    LoopResponse out;
+    out.frequency_hz = hz;
     const Fit fit = fit_at(readings, middle_s, out.frequency_hz);
     const Eigen::Vector3d mean = fit.terms.row(0).head<3>().transpose();
     out.mean_force_g = mean.norm();
@@ -88,15 +101,20 @@ LoopResponse loop_response(std::span<const LoopReading> readings, double nominal
     out.platform_g = std::abs(along);
     out.cross_share =
         (motion - up.cast<std::complex<double>>() * along).norm() / std::max(out.platform_g, 1e-12);
-    double rest = 0;
+    double rest = 0, across = 0;
     for (const LoopReading& r : readings) {
         const Eigen::Vector3d basis = basis_at(r.time_s - middle_s, out.frequency_hz);
         const Eigen::Vector3d force(r.force_g[0], r.force_g[1], r.force_g[2]);
-        const double off = up.dot(force - fit.terms.leftCols<3>().transpose() * basis);
+        const Eigen::Vector3d left = force - fit.terms.leftCols<3>().transpose() * basis;
+        const double off = up.dot(left);
         rest += off * off;
+        across += left.squaredNorm() - off * off;
     }
-    out.distortion = std::sqrt(2 * rest / static_cast<double>(readings.size())) /
-                     std::max(out.platform_g, 1e-12);
+    // Two axes across, three terms each; a sine's amplitude of n readings is known to 2 v/n.
+    const auto n = static_cast<double>(readings.size());
+    out.cross_sigma =
+        std::sqrt(std::max(0.0, across) / (2 * (n - 3)) * 2 / n) / std::max(out.platform_g, 1e-12);
+    out.distortion = std::sqrt(2 * rest / n) / std::max(out.platform_g, 1e-12);
     out.table_known = std::ranges::all_of(readings, &LoopReading::table_good);
     if (out.table_known) {
         const std::complex<double> table = fit.phasor(kTable);

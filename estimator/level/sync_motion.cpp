@@ -53,29 +53,43 @@ void SyncMotion::merge() noexcept {
     block_s_ *= 2;
 }
 
-double SyncMotion::amplitude_arcsec(double frequency_hz, double variance) const noexcept {
+SyncMotion::Sums SyncMotion::sums(double frequency_hz) const noexcept {
     const double turn = 2.0 * kPi * (frequency_hz - nominal_hz_) * block_s_;
-    std::array<double, 3> re{}, im{};
-    double weights = 0, squares = 0;
+    Sums out;
     for (std::size_t b = 0; b < used_; ++b) {
         const double middle = static_cast<double>(b) + 0.5;
         const double half = std::sin(kPi * middle / static_cast<double>(used_));
         const double weight = half * half;
         const double c = std::cos(turn * middle), s = std::sin(turn * middle);
-        weights += weight * blocks_[b].samples;
-        squares += weight * weight * blocks_[b].samples;
+        out.weights += weight * blocks_[b].samples;
+        out.squares += weight * weight * blocks_[b].samples;
         for (std::size_t k = 0; k < 3; ++k) {
             const auto& [x, y] = blocks_[b].phasor[k];
-            re[k] += weight * (c * x + s * y);
-            im[k] += weight * (c * y - s * x);
+            out.re[k] += weight * (c * x + s * y);
+            out.im[k] += weight * (c * y - s * x);
         }
     }
+    return out;
+}
+
+double SyncMotion::amplitude_arcsec(double frequency_hz, double variance) const noexcept {
+    const auto [re, im, weights, squares] = sums(frequency_hz);
     if (!(weights > 0)) return 0;
     double sum = 0;
     for (std::size_t k = 0; k < 3; ++k) sum += re[k] * re[k] + im[k] * im[k];
     // White noise leaves 4 sigma^2 sum w^2 / (sum w)^2 in the square of each axis.
     const double square = 4.0 * (sum - 3.0 * variance * squares) / (weights * weights);
     return std::sqrt(std::max(0.0, square));
+}
+
+SyncMotion::Lines SyncMotion::lines(double frequency_hz) const noexcept {
+    const auto [re, im, weights, squares] = sums(frequency_hz);
+    Lines out;
+    if (!(weights > 0)) return out;
+    for (std::size_t k = 0; k < 3; ++k)
+        out.amplitude[k] = {2.0 * re[k] / weights, 2.0 * im[k] / weights};
+    out.noise_square = 4.0 * squares / (weights * weights);
+    return out;
 }
 
 }  // namespace vibrig::estimator

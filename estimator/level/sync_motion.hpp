@@ -21,6 +21,14 @@ class SyncMotion {
     /// Of the three axes together, arcsec; `variance`: of one innovation, arcsec^2, whose share is
     /// taken out.
     [[nodiscard]] double amplitude_arcsec(double frequency_hz, double variance) const noexcept;
+    /// The same axis by axis: what goes with the cosine and against the sine of the vibration's
+    /// phase from time 0, peak, arcsec, noise and all; white noise of variance 1 leaves
+    /// `noise_square` in the square of each axis on average.
+    struct Lines {
+        std::array<std::array<double, 2>, 3> amplitude{};
+        double noise_square = 0;
+    };
+    [[nodiscard]] Lines lines(double frequency_hz) const noexcept;
 
   private:
     static constexpr std::size_t kBlocks = 512;
@@ -28,6 +36,11 @@ class SyncMotion {
         double samples = 0;
         std::array<std::array<double, 2>, 3> phasor{};  ///< cosine, minus sine
     };
+    struct Sums {
+        std::array<double, 3> re{}, im{};
+        double weights = 0, squares = 0;
+    };
+    [[nodiscard]] Sums sums(double frequency_hz) const noexcept;
     void merge() noexcept;
 
     double nominal_hz_;

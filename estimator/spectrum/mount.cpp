@@ -8,6 +8,17 @@
 
 namespace vibrig::estimator::spectrum {
 
+namespace {
+
+/// Between two neighbours of what rises in frequency.
+double straight(const std::pair<double, double>& below, const std::pair<double, double>& above,
+                double hz) {
+    const double part = std::log(hz / below.first) / std::log(above.first / below.first);
+    return below.second * std::pow(above.second / below.second, part);
+}
+
+}  // namespace
+
 std::optional<double> Mount::transmission(double hz) const {
     if (hard) return 1.0;
     if (measured.empty()) return std::sqrt(pads_power(hz, pads));
@@ -16,9 +27,21 @@ std::optional<double> Mount::transmission(double hz) const {
     if (above == measured.end() || (above == measured.begin() && above->first > hz))
         return std::nullopt;
     if (above->first == hz) return above->second;
-    const auto& below = *(above - 1);
-    const double part = std::log(hz / below.first) / std::log(above->first / below.first);
-    return below.second * std::pow(above->second / below.second, part);
+    return straight(*(above - 1), *above, hz);
+}
+
+double power_ratio(std::span<const std::pair<double, double>> ratios, std::span<const Band> bands) {
+    if (ratios.empty() || bands.empty()) return 1;
+    double sum = 0;
+    for (const Band& band : bands) {
+        const auto above =
+            std::ranges::find_if(ratios, [&](const auto& point) { return point.first >= band.hz; });
+        const double ratio = above == ratios.begin() ? above->second
+                             : above == ratios.end() ? ratios.back().second
+                                                     : straight(*(above - 1), *above, band.hz);
+        sum += band.share * ratio * ratio;
+    }
+    return sum;
 }
 
 double Mount::lowest_hz() const noexcept {

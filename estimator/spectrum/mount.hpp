@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,12 @@ struct Mount {
     /// Below it isolators amplify: there a rig does not shake. 0: anywhere.
     [[nodiscard]] double lowest_hz() const noexcept;
 };
+
+/// What the mean square of a vibration with these shares at the platform becomes where the
+/// transmission is, at frequencies that rise, so many times what it was taken for: in between
+/// straight on logarithmic scales, beyond them as at the nearest. 1 where nothing is known.
+[[nodiscard]] double power_ratio(std::span<const std::pair<double, double>> ratios,
+                                 std::span<const Band> bands);
 
 /// Peaks of a sine that the table can do.
 struct TableLimits {

@@ -17,8 +17,7 @@ constexpr double kLowerReach = 1.5;  ///< below the lowest frequency a resonance
 
 /// What is the same for all hypotheses of a gyro.
 struct Columns {
-    std::vector<Attitude> at;
-    const std::vector<Situation>& situations;
+    std::vector<Exposure> at;
 
     /// m x (10 + 6 r).
     [[nodiscard]] MatrixXd of(std::size_t gyro, const std::vector<Resonance>& resonances) const {
@@ -26,10 +25,10 @@ struct Columns {
                    kBase + kElastic * static_cast<Index>(resonances.size()));
         for (std::size_t k = 0; k < at.size(); ++k) {
             const auto row = static_cast<Index>(k);
-            x.row(row).head(kBase) = at[k].base[gyro];
+            x.row(row).head(kBase) = at[k].base(gyro);
             for (std::size_t r = 0; r < resonances.size(); ++r)
                 x.row(row).segment(kBase + kElastic * static_cast<Index>(r), kElastic) =
-                    elastic_weight(situations[k].bands, resonances[r]) * at[k].vibration[gyro];
+                    at[k].elastic(gyro, resonances[r]);
         }
         return x;
     }
@@ -55,42 +54,13 @@ struct Columns {
     }
 };
 
-double share_outside(const Model& model, const Situation& in, bool above_only) {
+double share_outside(const Model& model, const Situation& in) {
     double share = 0;
     for (const Band& band : in.bands) {
-        if (band.hz > model.highest_hz || (!above_only && band.hz < model.lowest_hz / kLowerReach))
+        if (band.hz > model.highest_hz || band.hz < model.lowest_hz / kLowerReach)
             share += band.share;
     }
     return share;
-}
-
-/// Variance of the mean over the dwell: a band of a random vibration has 2 df T degrees of freedom.
-/// Of a realised mean square only how it lies over the bands varies.
-double realisation(const Situation& in, const Attitude& at, std::size_t gyro,
-                   const Hypothesis& of) {
-    if (!(in.duration_s > 0)) return 0;
-    const double still = at.vibration[gyro].dot(of.x.segment<kElastic>(kBase - kElastic));
-    std::vector<double> elastic;
-    for (std::size_t r = 0; r < of.resonances.size(); ++r)
-        elastic.push_back(at.vibration[gyro].dot(
-            of.x.segment<kElastic>(kBase + kElastic * static_cast<Index>(r))));
-    std::vector<double> drifts;
-    double mean = 0;
-    for (const Band& band : in.bands) {
-        double drift = still;
-        for (std::size_t r = 0; r < elastic.size(); ++r)
-            drift += elastic[r] * (in_phase(band.hz, of.resonances[r]) - 1);
-        drifts.push_back(drift);
-        mean += band.share * drift;
-    }
-    double sum = 0;
-    for (std::size_t b = 0; b < drifts.size(); ++b) {
-        const Band& band = in.bands[b];
-        if (!(band.width_hz > 0)) continue;
-        const double varies = drifts[b] - (in.realised ? mean : 0);
-        sum += varies * varies * band.share * band.share / (band.width_hz * in.duration_s);
-    }
-    return sum;
 }
 
 void add_blocks(MatrixXd& to, const MatrixXd& of, Index gyro) {
@@ -113,8 +83,9 @@ void average(const Model& model, const Columns& columns, std::size_t gyro, Predi
         within += one.weight * g * one.covariance * g.transpose();
         for (Index k = 0; k < m; ++k)
             out.realisation(k, j) +=
-                one.weight * realisation(columns.situations[static_cast<std::size_t>(k)],
-                                         columns.at[static_cast<std::size_t>(k)], gyro, one);
+                one.weight *
+                columns.at[static_cast<std::size_t>(k)].realisation(
+                    gyro, one.x.tail(one.x.size() - (kBase - kElastic)), one.resonances);
     }
     for (std::size_t h = 0; h < values.size(); ++h) {
         const VectorXd off = values[h] - mean;
@@ -152,24 +123,23 @@ void add_outside(const Model& model, const Columns& columns, const PredictionOpt
                  Prediction& out) {
     for (std::size_t k = 0; k < columns.at.size(); ++k) {
         const auto row = static_cast<Index>(k);
-        const Situation& in = columns.situations[k];
-        out.power_outside = std::max(out.power_outside, share_outside(model, in, false));
-        const double above = share_outside(model, in, true);
+        const Exposure& at = columns.at[k];
+        out.power_outside = std::max(out.power_outside, share_outside(model, at.situation()));
         for (std::size_t j = 0; j < 3; ++j) {
+            const Exposure::Row above = at.above(j, model.highest_hz);
             double still = 0, shaken = 0;
             for (const Hypothesis& one : model.mixture[j]) {
-                const double own =
-                    columns.at[k].vibration[j].dot(one.x.segment<kElastic>(kBase - kElastic));
-                still += one.weight * own;
-                double all = own;
+                const Exposure::Row own = one.x.segment<kElastic>(kBase - kElastic);
+                still += one.weight * above.dot(own);
+                double all = at.vibration(j).dot(own);
                 for (std::size_t r = 0; r < one.resonances.size(); ++r)
-                    all += elastic_weight(in.bands, one.resonances[r]) *
-                           columns.at[k].vibration[j].dot(
-                               one.x.segment<kElastic>(kBase + kElastic * static_cast<Index>(r)));
+                    all +=
+                        at.elastic(j, one.resonances[r])
+                            .dot(one.x.segment<kElastic>(kBase + kElastic * static_cast<Index>(r)));
                 shaken += one.weight * all;
             }
             out.outside(row, static_cast<Index>(j)) =
-                options.elastic_beyond * std::abs(above * still) / std::sqrt(3.0);
+                options.elastic_beyond * std::abs(still) / std::sqrt(3.0);
             out.vibration(row, static_cast<Index>(j)) = shaken;
         }
     }
@@ -184,9 +154,8 @@ double Prediction::u(Index situation, Index gyro) const {
 
 Prediction predict(const Model& model, const std::vector<Situation>& situations,
                    const PredictionOptions& options) {
-    Columns columns{{}, situations};
-    for (const Situation& in : situations)
-        columns.at.push_back(attitude(model.frame, in.gimbal_rad, in.moment));
+    Columns columns;
+    for (const Situation& in : situations) columns.at.emplace_back(model.frame, in);
     const auto m = static_cast<Index>(situations.size());
     Prediction out;
     out.covariance = MatrixXd::Zero(3 * m, 3 * m);

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "estimator/spectrum/exposure.hpp"
 #include "estimator/spectrum/resonance.hpp"
-#include "estimator/spectrum/table.hpp"
 
 namespace vibrig::estimator::spectrum {
 
@@ -25,15 +25,6 @@ struct Model {
     double lowest_hz = 0;   ///< of the campaign's vibrations
     double highest_hz = 0;  ///< up to which an elastic part would have been seen
     std::string refusal;    ///< why it predicts nothing; empty: it does
-};
-
-/// A platform at an attitude under a vibration along one line.
-struct Situation {
-    Eigen::Vector3d gimbal_rad{};
-    Eigen::Matrix3d moment;  ///< level frame, g^2
-    std::vector<Band> bands;
-    double duration_s = 0;  ///< of which the drift is the mean; 0: for ever
-    bool realised = false;  ///< `moment` is what happened: only the bands' shares in it vary
 };
 
 struct PredictionOptions {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/identification/identification.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -32,17 +34,93 @@ double power_between(const Breakpoint& from, const Breakpoint& to) {
     return from.second * from.first * log_ratio * shape;
 }
 
-void check_points(const std::vector<Breakpoint>& points, const std::string& place, bool sines) {
+/// Of a spectrum with either sign, between two of its points.
+double signed_density(const Breakpoint& from, const Breakpoint& to, double hz) {
+    const double both = from.second * to.second;
+    if (!(both > 0))
+        return from.second +
+               (to.second - from.second) * (hz - from.first) / (to.first - from.first);
+    return std::copysign(
+        density_at({from.first, std::abs(from.second)}, {to.first, std::abs(to.second)}, hz),
+        from.second);
+}
+
+/// From one frequency to another, between which there is no point of it.
+double signed_power(const Breakpoints& of, double low, double high) {
+    for (std::size_t i = 1; i < of.size(); ++i) {
+        if (low < of[i - 1].first || high > of[i].first) continue;
+        const Breakpoint a{low, signed_density(of[i - 1], of[i], low)},
+            b{high, signed_density(of[i - 1], of[i], high)};
+        if (!(a.second * b.second > 0)) return (a.second + b.second) / 2 * (high - low);
+        return std::copysign(power_between({low, std::abs(a.second)}, {high, std::abs(b.second)}),
+                             a.second);
+    }
+    return 0;
+}
+
+/// A part of a random vibration along more than one line.
+struct AxesBand {
+    double hz = 0, width_hz = 0;
+    Eigen::Matrix3d moment;
+};
+
+std::vector<AxesBand> bands_of(const AxesPsd& of, int per_decade) {
+    std::vector<double> edges;
+    for (const auto& list : {std::cref(of.psd), std::cref(of.cross)}) {
+        for (const Breakpoints& points : list.get())
+            for (const auto& point : points) edges.push_back(point.first);
+    }
+    std::ranges::sort(edges);
+    edges.erase(std::ranges::unique(edges).begin(), edges.end());
+    std::vector<AxesBand> out;
+    for (std::size_t i = 1; i < edges.size(); ++i) {
+        const double from = edges[i - 1], ratio = edges[i] / from;
+        const int count = std::max(1, static_cast<int>(std::ceil(std::log10(ratio) * per_decade)));
+        double low = from;
+        for (int b = 1; b <= count; ++b) {
+            const double high =
+                b < count ? from * std::pow(ratio, static_cast<double>(b) / count) : edges[i];
+            AxesBand band{std::sqrt(low * high), high - low, Eigen::Matrix3d::Zero()};
+            for (Eigen::Index k = 0; k < 3; ++k)
+                band.moment(k, k) = signed_power(of.psd[static_cast<std::size_t>(k)], low, high);
+            constexpr std::array<std::pair<int, int>, 3> kPairs{{{0, 1}, {0, 2}, {1, 2}}};
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto [a, c] = kPairs[k];
+                band.moment(a, c) = band.moment(c, a) = signed_power(of.cross[k], low, high);
+            }
+            if (band.moment.any()) out.push_back(band);
+            low = high;
+        }
+    }
+    return out;
+}
+
+/// No vibration has a spectral matrix with a negative power in some direction.
+void check_axes(const AxesPsd& of, const std::string& path) {
+    for (const AxesBand& band : bands_of(of, 200)) {
+        const double least = linear_algebra::symmetric_eigenvalues(band.moment)[0];
+        if (!(least >= -1e-9 * std::abs(band.moment.trace())))
+            throw SettingsError(path + "cross: found " + text_of(band.hz) +
+                                " Hz with more in common between axes than they have, expected "
+                                "cross-spectra of at most the root of both densities, and together "
+                                "those of a vibration");
+    }
+}
+
+enum class Points { density, cross, sine };
+
+void check_points(const Breakpoints& points, const std::string& place, Points what) {
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto& [hz, value] = points[i];
         const std::string at = place + "[" + std::to_string(i) + "]: ";
         if (!(hz > 0) || !std::isfinite(hz))
             throw SettingsError(at + "found " + text_of(hz) + " Hz, expected a frequency above 0");
-        if (!(value > 0) || !std::isfinite(value))
-            throw SettingsError(
-                at + "found " + text_of(value) +
-                (sines ? " g, expected a peak above 0" : " g^2/Hz, expected a density above 0"));
-        if (!sines && i > 0 && !(hz > points[i - 1].first))
+        if ((what != Points::cross && !(value > 0)) || !std::isfinite(value))
+            throw SettingsError(at + "found " + text_of(value) +
+                                (what == Points::sine      ? " g, expected a peak above 0"
+                                 : what == Points::density ? " g^2/Hz, expected a density above 0"
+                                                           : " g^2/Hz, expected a number"));
+        if (what != Points::sine && i > 0 && !(hz > points[i - 1].first))
             throw SettingsError(at + "found " + text_of(hz) + " Hz after " +
                                 text_of(points[i - 1].first) + " Hz, expected growing frequencies");
     }
@@ -50,14 +128,29 @@ void check_points(const std::vector<Breakpoint>& points, const std::string& plac
 
 }  // namespace
 
+bool AxesPsd::stated() const noexcept {
+    return std::ranges::any_of(psd, [](const auto& points) { return !points.empty(); }) ||
+           std::ranges::any_of(cross, [](const auto& points) { return !points.empty(); });
+}
+
 void check(const Profile& profile, const std::string& path) {
-    if (profile.psd.empty() && profile.sines.empty())
+    if (profile.psd.empty() && profile.sines.empty() && !profile.axes.stated())
         throw SettingsError(path +
                             "psd: found neither breakpoints nor sines, expected one of them");
-    if (profile.psd.size() == 1)
-        throw SettingsError(path + "psd: found 1 breakpoint, expected two or more");
-    check_points(profile.psd, path + "psd", false);
-    check_points(profile.sines, path + "sines", true);
+    const auto spectrum = [&](const Breakpoints& points, const std::string& key, Points what) {
+        if (points.size() == 1)
+            throw SettingsError(path + key + ": found 1 breakpoint, expected two or more");
+        check_points(points, path + key, what);
+    };
+    if (!profile.psd.empty() && profile.axes.stated())
+        throw SettingsError(path + "psd: found it along one line and along axes, expected either");
+    spectrum(profile.psd, "psd", Points::density);
+    check_points(profile.sines, path + "sines", Points::sine);
+    for (std::size_t k = 0; k < 3; ++k) {
+        spectrum(profile.axes.psd[k], std::string("psd.") + kAxes[k], Points::density);
+        spectrum(profile.axes.cross[k], std::string("cross.") + kAxisPairs[k], Points::cross);
+    }
+    check_axes(profile.axes, path);
     if (!(std::abs(profile.direction.norm() - 1) < 1e-6))
         throw SettingsError(path + "direction: found a length of " +
                             text_of(profile.direction.norm()) +
@@ -70,6 +163,9 @@ void check(const Profile& profile, const std::string& path) {
 
 double mean_square(const Profile& profile) {
     double sum = 0;
+    for (const Breakpoints& points : profile.axes.psd)
+        for (std::size_t i = 1; i < points.size(); ++i)
+            sum += power_between(points[i - 1], points[i]);
     for (std::size_t i = 1; i < profile.psd.size(); ++i)
         sum += power_between(profile.psd[i - 1], profile.psd[i]);
     for (const auto& [hz, peak] : profile.sines) sum += peak * peak / 2;
@@ -96,8 +192,21 @@ std::vector<Band> bands_of(const Profile& profile, int per_decade) {
             low = high;
         }
     }
+    for (const AxesBand& band : bands_of(profile.axes, per_decade))
+        bands.push_back({band.hz, band.moment.trace() / all, band.width_hz});
     for (const auto& [hz, peak] : profile.sines) bands.push_back({hz, peak * peak / 2 / all, 0});
     return bands;
+}
+
+std::vector<Eigen::Matrix3d> moments_of(const Profile& profile, int per_decade) {
+    const Eigen::Matrix3d along = profile.direction * profile.direction.transpose();
+    const double all = mean_square(profile);
+    std::vector<Eigen::Matrix3d> out;
+    for (const Band& band : bands_of(profile, per_decade))
+        out.emplace_back(band.share * all * along);
+    std::size_t k = 0;
+    for (const AxesBand& band : bands_of(profile.axes, per_decade)) out[k++] = band.moment;
+    return out;
 }
 
 double bandwidth_hz(std::span<const Band> bands) noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <string>
 #include <utility>
@@ -10,26 +11,42 @@
 
 namespace vibrig::estimator::spectrum {
 
-/// A vibration as a user states it: stationary, along one line.
+/// Hz and g^2/Hz, one-sided, straight between the points on logarithmic scales, 0 outside.
+using Breakpoints = std::vector<std::pair<double, double>>;
+
+/// A random vibration along more than one line: PSDs along north, up and east, and the real
+/// cross-spectra north-up, north-east and up-east. A cross-spectrum has either sign, and goes
+/// straight in Hz where it changes it or is 0.
+inline constexpr std::array<const char*, 3> kAxes{"north", "up", "east"},
+    kAxisPairs{"north_up", "north_east", "up_east"};
+struct AxesPsd {
+    std::array<Breakpoints, 3> psd, cross;
+    [[nodiscard]] bool stated() const noexcept;
+};
+
+/// A vibration as a user states it: stationary, along one line unless `axes` are stated.
 struct Profile {
     std::string name;
-    /// Hz and g^2/Hz, one-sided, straight between the points on logarithmic scales, 0 outside.
-    std::vector<std::pair<double, double>> psd;
+    Breakpoints psd;
     std::vector<std::pair<double, double>> sines;  ///< Hz and g peak
-    Eigen::Vector3d direction{0, 1, 0};            ///< level frame: north, up, east; of length 1
-    double g_rms = 0;                              ///< as stated; 0: not
+    /// Of psd and sines; level frame: north, up, east; of length 1.
+    Eigen::Vector3d direction{0, 1, 0};
+    double g_rms = 0;   ///< as stated; 0: not
+    AxesPsd axes = {};  ///< in place of psd
 };
 
 /// Throws SettingsError naming the element, what was found and what was expected. `path` stands
 /// before it, such as "profile.json: ".
 void check(const Profile& profile, const std::string& path = {});
 
-/// Of the whole profile, g^2.
+/// Of the whole profile, all axes together, g^2.
 [[nodiscard]] double mean_square(const Profile& profile);
 
 /// The bands of a profile, with their shares of its mean square: so many for each decade, each with
 /// its exact power, and the sines.
 [[nodiscard]] std::vector<Band> bands_of(const Profile& profile, int per_decade = 800);
+/// The second moment of each of those bands, level frame, g^2.
+[[nodiscard]] std::vector<Eigen::Matrix3d> moments_of(const Profile& profile, int per_decade = 800);
 
 /// B_e: the power of a time T strays by 1 / sqrt(B_e T) of it. Of sines alone 0: it does not.
 [[nodiscard]] double bandwidth_hz(std::span<const Band> bands) noexcept;

@@ -62,9 +62,8 @@ class Design {
         add(task, 0, 0, gyro);
         wanted_.resize(kColumns, static_cast<Index>(situations.size()));
         for (Index k = 0; k < wanted_.cols(); ++k) {
-            const Situation& in = situations[static_cast<std::size_t>(k)];
-            wanted_.col(k) = columns_of(attitude(task.settings, in.gimbal_rad, in.moment), gyro,
-                                        elastic_weight(in.bands, draw.resonance));
+            const Exposure at(task.settings, situations[static_cast<std::size_t>(k)]);
+            wanted_.col(k) << at.base(gyro), at.elastic(gyro, draw.resonance);
         }
         prior_ = VectorXd::Ones(kColumns);
         prior_.head<4>().setConstant(0.01);

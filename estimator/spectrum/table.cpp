@@ -28,6 +28,24 @@ double Kind::hz() const noexcept {
     return sum;
 }
 
+std::vector<Band> bands_of(const Settings& settings, const DwellRow& row,
+                           const std::vector<Band>& of_kind) {
+    if (of_kind.size() != 1 || row.random) return of_kind;
+    const double hz = of_kind.front().hz;
+    const AccelerometerResponse& response = settings.accelerometer_response;
+    std::vector<Band> out{{hz, 0, 0}};
+    double told = 0, all = 0;
+    for (std::size_t k = 0; k < row.harmonics.size(); ++k) {
+        const double of = static_cast<double>(k + 2) * hz;
+        if (row.harmonics[k] > 0) out.push_back({of, row.harmonics[k] / response.power(of), 0});
+        told += row.harmonics[k];
+    }
+    out.front().share = (1 - told) / response.power(hz);
+    for (const Band& band : out) all += band.share;
+    for (Band& band : out) band.share /= all;
+    return out;
+}
+
 Attitude attitude(const Settings& settings, const Eigen::Vector3d& gimbal_rad,
                   const Eigen::Matrix3d& moment) {
     const Pose pose = Kinematics(settings).pose(gimbal_rad);
@@ -70,6 +88,10 @@ SpectralTable::SpectralTable(const Settings& settings, std::vector<SpectralDwell
         SpectralDwell& dwell = dwells_[static_cast<std::size_t>(i)];
         if (dwell.kind) dwell.kind = now[*dwell.kind];
         rows_.push_back(dwell.row);
+        if (dwell.kind && dwell.bands.empty()) {
+            auto bands = bands_of(settings, dwell.row, kinds_[*dwell.kind].bands);
+            if (bands.size() > kinds_[*dwell.kind].bands.size()) dwell.bands = std::move(bands);
+        }
         const Attitude at = attitude(settings, dwell.row.angles, level_moment(dwell.row.vibration));
         for (std::size_t j = 0; j < kGyros; ++j) {
             base_[j].row(i) = dwell.row.regressors.row(static_cast<Index>(j));

@@ -27,9 +27,14 @@ struct SpectralDwell {
     DwellRow row;
     std::optional<std::size_t> kind = {};  ///< of SpectralTable::kinds
     double relative_error = 0;             ///< of the mean square of its vibration, 1 sigma
-    /// Of a random one whose PSD is known: in place of its kind's.
+    /// Of a random one whose PSD is known, and of a sine whose harmonics the samples tell: in place
+    /// of its kind's.
     std::vector<Band> bands = {};
 };
+
+/// What a dwell shook with: `of_kind`, and of a sine the harmonics that its samples tell.
+[[nodiscard]] std::vector<Band> bands_of(const Settings& settings, const DwellRow& row,
+                                         const std::vector<Band>& of_kind);
 
 /// Elastic and static columns of a gyro: the base model, and its quadratic part once more.
 inline constexpr Eigen::Index kBase = kGroups, kElastic = kGroups - kDii,

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "estimator/filter/parameters.hpp"
+#include "estimator/level/coning.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
 #include "estimator/uncertainty/distributions.hpp"
 #include "estimator/uncertainty/doubtful_levels.hpp"
@@ -253,10 +254,9 @@ void tell_sync(const DwellTable& table, Assessment& out) {
     for (const DwellRow& row : table.rows) {
         const double a0_square = 2 * (row.vibration.kappa - 1);
         if (!(a0_square > 0) || !(row.frequency_hz > 0)) continue;
-        const double a = row.sync_arcsec / kArcsecPerRad;
         out.sync_arcsec = std::max(out.sync_arcsec, row.sync_arcsec);
-        out.sync_bound = std::max(out.sync_bound,
-                                  2 * kPi * row.frequency_hz * a * a * kArcsecPerRad / a0_square);
+        out.sync_bound =
+            std::max(out.sync_bound, coning_bound(row.frequency_hz, row.sync_arcsec, a0_square));
     }
 }
 

@@ -16,7 +16,7 @@ import rig as r  # noqa: E402
 
 CAMPAIGN = {"name": "checked", "identify": "what-it-can", "positions_deg": [[0, 0, 0]], "table_g": [9.0],
             "dwell_s": 10.0}
-ROWS = ["transmission", "frequency", "distortion", "cross-axis share", "phase"]
+ROWS = ["transmission", "frequency", "distortion", "cross-axis share", "motion in step", "phase"]
 
 
 def ready(status):
@@ -162,6 +162,60 @@ def each_frequency(checks, programs, folder, what, says=None, change=None, plant
         rig.stop()
 
 
+def grown(checks, programs, folder, what, fault=None, row=None, says=()):
+    """Motion in step and across that a rig had at its loop check, and what it has in its dwells."""
+    plan = os.path.join(folder, "plan.json")
+    with open(plan, "w", encoding="utf-8") as file:
+        json.dump({"runs": [{"position": position, "level_g": 1, "table_g": 1, "count": 1, "frequency_hz": hz}
+                            for hz, position in ((15.0, [0, 0, 0]), (25.1, [45, 0, 90]))]}, file)
+    truth = {"isolator": {"hard": True, "cross_axis": [0.03, 0]}, "platform": {"rocking_arcsec_g": [0, 40, 0]}}
+    rig = make(checks, programs, folder, 20, truth,
+               {"name": "survey", "plan": plan, "identify": "what-it-can", "dwell_s": 20.0}, {"spectrum": {"mount": "hard"}})
+    try:
+        tested = rig.tool("selftest", "--by", "Ada", timeout=120)
+        checks.equal(tested.returncode, 0, f"{what}: in band")
+        rows = {row["name"]: row["value"] for row in rig.status()["proof"].get("rows", [])}
+        # 5 s of encoders with 5 arcsec at 0.5 g: 1.2 arcsec/g for each of six parts
+        checks.check(abs(rows.get("motion in step", 0) - 40) < 6 and abs(rows.get("25.1 Hz, motion in step", 0) - 40) < 6 and
+                     abs(rows.get("25.1 Hz, cross-axis share", 0) - 0.03) < 1e-3,
+                     f"{what}: motion in step and across as the rig has them, at each frequency", rows)
+        if fault:
+            rig.order(f"fault {fault}")
+        checks.equal(rig.tool("arm", "--by", "Ada").returncode, 0, f"{what}: it is armed")
+        rig.tool("start", "--by", "Ada")
+        raised, present = [set(), set()], {"motion_in_step": [], "cross_axis_growth": []}
+
+        def ended(status):
+            recording = status["campaign"]["state"] == "recording"
+            for one in status["interlock"]["rows"]:
+                if one.get("raised"):
+                    raised[recording].add(one["name"])
+                if one["name"] in present and "present" in one:
+                    present[one["name"]].append(one["present"])
+            return status["campaign"]["state"] in ("finished", "aborted", "tripped")
+
+        rig.poll_s = 0.01
+        status = rig.wait_for(ended, 90)
+        checks.check(status is not None and status["campaign"]["state"] == "finished", f"{what}: the campaign goes on to its end",
+                     r.state_of(status) + rig.logs())
+        seen = {name for name in raised[1] if name in ("motion_in_step", "cross_axis_growth")}
+        checks.equal(seen, {row} if row else set(), f"{what}: raised while it records")
+        checks.check(all(times and (max(times) < 3) == (name != row) for name, times in present.items()),
+                     f"{what}: how many times it is shows in the status", present)
+        if row is None:
+            checks.check("as at the loop check" not in rig.daemon.text(), f"{what}: nothing is said", rig.logs())
+            return
+        checks.check(rig.daemon.says(says[0]) and all(rig.daemon.says(word) for word in says) and
+                     rig.daemon.text().count("as at the loop check") == 1, f"{what}: said once, with its frequency and values",
+                     rig.logs())
+        checks.check(rig.daemon.says(f"{row}: over"), f"{what}: over with the dwell", rig.logs())
+        with sqlite3.connect(f"file:{rig.results}/journal.sqlite3?mode=ro", uri=True) as database:
+            told = [text for text, in database.execute("SELECT text FROM event WHERE text LIKE '%as at the loop check%'")]
+        checks.check(len(told) == 1 and told[0].startswith("at 25.1 Hz"), f"{what}: the journal has it", told)
+    finally:
+        rig.stop()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
@@ -172,9 +226,20 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             out_of_band(checks, programs, folder, what, change, says)
     for what, says, plant in (("frequencies of a plan", None, ()),
-                              ("frequency_ignored", "at 25.1 Hz frequency", ("--fault", "frequency-ignored"))):
+                              ("frequency_ignored", "at 25.1 Hz frequency", ("--fault", "frequency-ignored")),
+                              ("distorted at one", "at 25.1 Hz distortion", ("--fault", "distorted=0.2,25.1"))):
         with tempfile.TemporaryDirectory() as folder:
             each_frequency(checks, programs, folder, what, says, plant=plant)
+    with tempfile.TemporaryDirectory() as folder:
+        each_frequency(checks, programs, folder, "across at one", "at 65.1 Hz cross-axis share", {"cross_axis": [0.05, 0]},
+                       ("--fault", "cross-growth=4,65.1"))
+    for what, fault, row, says in (
+            ("honest", None, None, ()),
+            ("sync_growth", "sync-growth=4,25.1", "motion_in_step",
+             ("at 25.1 Hz the platform moves in step", " gimbal most", "expected ", "limit ")),
+            ("cross_growth", "cross-growth=4,25.1", "cross_axis_growth", ("at 25.1 Hz 0.12", "goes across it, expected 0.03"))):
+        with tempfile.TemporaryDirectory() as folder:
+            grown(checks, programs, folder, what, fault, row, says)
     return checks.end()
 
 

@@ -12,6 +12,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import loop_check  # noqa: E402
 import restart_campaign as again  # noqa: E402
 import rig as r  # noqa: E402
 import survey_campaign  # noqa: E402
@@ -64,14 +65,14 @@ def csv_plan_of(folder, sines):
     return path, count
 
 
-def start(rig, planned, dwell_s, *plant, truth=TRUTH, begin=True, spectrum=None, registers=None, **tables):
+def start(rig, planned, dwell_s, *plant, truth=TRUTH, begin=True, spectrum=None, registers=None, psd=None, **tables):
     plan, count = planned
     rig.start_plant("--seed", "3", "--truth", rig.truth_file(truth), *plant)
     rig.configure({"name": "random", "plan": plan, "dwell_s": dwell_s, "temperature_window_s": 5.0, "identify": "what-it-can"},
                   spectrum={"mount": "hard", "mode": "mixed", **(spectrum or {})},
                   **{f"shaker.registers.{role}": keys for role, keys in {**REGISTERS, **(registers or {})}.items()}, **tables)
     with open(rig.configuration, "a", encoding="utf-8") as file:
-        file.write(CONFIGURATION)
+        file.write(CONFIGURATION.replace(json.dumps(PSD), json.dumps(psd or PSD)))
     rig.start_daemon()
     rig.wait_for(r.measuring, 60)
     return count, [rig.tool(command, "--by", "tester") for command in ("arm", "start") if begin]
@@ -176,6 +177,52 @@ def resumed(checks, programs, folder):
     checks.check(all(abs(z) < 4 for row in held for z in row["z"]), "they are as foretold", [row["z"] for row in held])
 
 
+def through(hz, ratio_at_15, damping=0.2):
+    """Power that isolators let through, of which the ratio at 15 Hz is known."""
+    def power(f, natural):
+        r, damped = f / natural, 2 * damping * f / natural
+        return (1 + damped ** 2) / ((1 - r ** 2) ** 2 + damped ** 2)
+    low, high = 1.0, 15 / 2 ** 0.5
+    for _ in range(60):
+        natural = (low + high) / 2
+        low, high = (low, natural) if power(15, natural) > ratio_at_15 ** 2 else (natural, high)
+    return power(hz, low)
+
+
+def soft_isolators(checks, programs, folder):
+    """Isolators let 4 % more through than is configured: the loop check measures it, and levels of random dwells go by that. Of the mean
+    square it is 8 %, where slow samples know it to 2.2 % and the controller, through what is configured, says 1 %."""
+    stated, is_so, density = 0.667, 0.694, 0.02
+    psd = [[15, density], [45, density * 3 ** 4]]  # behind the isolators nearly flat
+    rig = r.Rig(programs, "seqpacket", "rig", folder)
+    try:
+        truth = {"isolator": {"transmission": is_so}, "shaker": {"profiles": [{"number": NUMBER, "psd": psd}]}}
+        start(rig, csv_plan_of(folder, len(POSITIONS)), 100.0, truth=truth, begin=False, psd=psd, spectrum={"mount": "isolated"},
+                         selftest={"required": True}, vibration={"transmission": stated})
+        rig.wait_for(loop_check.ready, 60)
+        tested = rig.tool("selftest", "--by", "tester", timeout=200)
+        if not checks.equal(tested.returncode, 0, "isolators within the loop check's tolerance pass it"):
+            checks.note(tested.stdout + tested.stderr)
+            return
+        commands = [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+        last = rig.wait_for_state(ENDS, 240)
+        _, text = rig.result()
+        if not checks.check(last and last["campaign"]["state"] == "finished" and text, "the campaign on soft isolators finishes",
+                            f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}"):
+            return
+    finally:
+        rig.stop()
+    steps = 3000
+    lines = [15 + (k + 0.5) * 30 / steps for k in range(steps)]
+    power = sum(through(f, is_so) * density * (f / 15) ** 4 for f in lines) * 30 / steps * 10 ** (LEVEL_DB / 10)
+    rows = [row for row in json.loads(text).get("dwell_rates", []) if row.get("profile") == "broad"]
+    found = [row["level"] ** 2 / 2 / power - 1 for row in rows]
+    # 100 s at 40/s: 2.2 % by samples; the profile 1 % and, of some 28 Hz, 1.9 % that the realisation strays. Four of the mean's.
+    allowed = 4 * sum(row["r_relative_error"] for row in rows) / max(len(rows), 1) ** 1.5
+    checks.check(len(rows) == len(POSITIONS) and abs(sum(found)) / len(rows) < allowed,
+                 f"levels of random dwells go by the measured transmission, within {allowed:.3f}", found)
+
+
 def lies(checks, programs, folder, fault, trips, says):
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
@@ -199,6 +246,8 @@ def main():
         honest(checks, programs, folder, 1800.0 if "--soak" in sys.argv else 60.0)
     with tempfile.TemporaryDirectory() as folder:
         resumed(checks, programs, folder)
+    with tempfile.TemporaryDirectory() as folder:
+        soft_isolators(checks, programs, folder)
     for fault, trips, says in (
             ("wrong-profile=5", ("read_back_mismatch",), "profile checksum reads back as"),
             ("profile-level-wrong=6", ("wrong_vibration", "amplitude_witness", "over_amplitude"), "g rms"),

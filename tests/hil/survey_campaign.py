@@ -43,13 +43,15 @@ def make_plan(programs, folder):
     return made.returncode, plan, surveyed, {run.get("frequency_hz", 0) for run in root["runs"]}
 
 
-def start(rig, plan, dwell_s, *plant):
+def start(rig, plan, dwell_s, checked, *plant):
+    """`checked`: after a loop check, so that each dwell is held against it."""
     rig.start_plant("--seed", "3", "--truth", rig.truth_file(TRUTH), *plant)
     rig.configure({"name": "survey", "plan": plan, "dwell_s": dwell_s, "temperature_window_s": 5.0},
                   spectrum={"mount": "hard"})
     rig.start_daemon()
     rig.wait_for(r.measuring, 60)
-    return [rig.tool(command, "--by", "tester") for command in ("arm", "start")]
+    return [rig.tool(command, "--by", "tester", timeout=120)
+            for command in ((("selftest",) if checked else ()) + ("arm", "start"))]
 
 
 def recording(rig):
@@ -62,7 +64,7 @@ def survey(checks, programs, folder, dwell_s):
     checks.equal((status, surveyed), (0, 63), "a survey of 63 dwells is planned")
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        commands = start(rig, plan, dwell_s)
+        commands = start(rig, plan, dwell_s, True)
         last = rig.wait_for_state(ENDS, WALL_S)
         path, text = rig.result()
         if not checks.check(last and last["campaign"]["state"] == "finished" and text,
@@ -91,6 +93,9 @@ def judge(checks, programs, rig, result, path, log, dwells, frequencies):
                  [spectrum.get(k) for k in ("model", "log_odds", "resonance")])
     checks.check(all(p["at_hz"] == 0 for p in result["parameters"] if p["unit"] == "deg/h/g^2"),
                  "the quadratic coefficients are static ones")
+    checks.check("loop check in band" in log, "a loop check looked at each frequency", log[:2000])
+    checks.check("as at the loop check" not in log and "motion_in_step" not in log and "cross_axis_growth" not in log,
+                 "what goes in step with the vibration has grown in no dwell", log[-2000:])
     checks.check("stop of the shaker" not in log, "the shaker was never stopped on the way", log[-2000:])
     profile = os.path.join(rig.folder, "sine.json")
     with open(profile, "w", encoding="utf-8") as file:
@@ -132,7 +137,7 @@ def ignored(checks, programs, folder):
     _, plan, _, _ = make_plan(programs, folder)
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        start(rig, plan, 20.0, "--fault", "frequency-ignored")
+        start(rig, plan, 20.0, False, "--fault", "frequency-ignored")
         last = rig.wait_for_state(ENDS, 180)
         rows = [d for d in last["campaign"]["dwells"] if d["used"] > 0] if last else []
         checks.check(last and last["campaign"]["state"] == "tripped" and

@@ -15,6 +15,8 @@ enum class Value : std::uint8_t {
     degrees,
     seconds,
     factor,
+    factor_at,
+    share_at,
     slowness,
     decibels,
     either_way,
@@ -30,7 +32,7 @@ struct Description {
     const char* help;
 };
 
-constexpr std::array<Description, 45> kDescriptions{{
+constexpr std::array<Description, 48> kDescriptions{{
     {FaultKind::lose, "lose", Value::rate, false, "lose=RATE             share of frames lost"},
     {FaultKind::stuck, "stuck", Value::none, true,
      "stuck[:CHANNEL]       the channel shows its last value for ever"},
@@ -61,6 +63,13 @@ constexpr std::array<Description, 45> kDescriptions{{
      "spike[:CHANNEL]=DEG,RATE  angles jump for one sample"},
     {FaultKind::gyro_noise, "gyro-noise", Value::factor, false,
      "gyro-noise=FACTOR     the gyros' random walk is FACTOR times as large"},
+    {FaultKind::sync_growth, "sync-growth", Value::factor_at, false,
+     "sync-growth=FACTOR[,HZ]  rocking in step with the vibration is FACTOR times the truth's,\n"
+     "                        where HZ is given at that frequency of the table alone"},
+    {FaultKind::cross_growth, "cross-growth", Value::factor_at, false,
+     "cross-growth=FACTOR[,HZ]  the same of the vibration across the vertical"},
+    {FaultKind::distorted, "distorted", Value::share_at, false,
+     "distorted=SHARE[,HZ]  the table's second harmonic, from its next change of frequency on"},
     {FaultKind::ack_without_stop, "ack-without-stop", Value::none, false,
      "ack-without-stop      run = 0 is acknowledged and read back, the table shakes on and the\n"
      "                        measured amplitude says so; the watchdog still works"},
@@ -172,6 +181,8 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
     const auto second = cut(first, ",");
     if (second && (d.value == Value::milliseconds || d.value == Value::degrees)) {
         fault.rate = number(spec, *second, "a rate from 0 to 1", 0, 1);
+    } else if (second && (d.value == Value::factor_at || d.value == Value::share_at)) {
+        fault.hz = number(spec, *second, "a frequency from 0.1 to 2000 Hz", 0.1, 2000);
     } else if (second) {
         fail(spec, "found \"," + std::string(*second) + "\", expected one value");
     }
@@ -190,6 +201,10 @@ void read_value(std::string_view spec, const Description& d, std::string_view te
         case Value::seconds:
             fault.to_s = fault.from_s + number(spec, first, "seconds from 0 to 1e9", 0, 1e9);
             break;
+        case Value::share_at:
+            fault.value = number(spec, first, "a share from 0 to 0.5", 0, 0.5);
+            break;
+        case Value::factor_at:
         case Value::factor:
             fault.value = number(spec, first, "a factor from 0 to 1000", 0, 1000);
             break;

@@ -33,6 +33,9 @@ enum class FaultKind : std::uint8_t {
     platform_fault,
     spike,
     gyro_noise,
+    sync_growth,
+    cross_growth,
+    distorted,
     ack_without_stop,
     timeout_ignored,
     timeout_scaled,
@@ -73,8 +76,15 @@ struct Fault {
     std::optional<std::size_t> channel;  ///< none: all
     double value = 0;                    ///< a rate, ms or deg, as the kind says
     double rate = 1;                     ///< share of samples hit, where `value` is something else
+    double hz = 0;                       ///< the table's, at which alone; 0: at each
     double from_s = 0;
     double to_s = std::numeric_limits<double>::infinity();
+
+    /// Whether it concerns a table that is set to this frequency.
+    [[nodiscard]] bool at(double table_hz) const noexcept { return at(hz, table_hz); }
+    [[nodiscard]] static bool at(double hz, double table_hz) noexcept {
+        return hz == 0 || (table_hz > hz - 0.01 && table_hz < hz + 0.01);
+    }
 };
 
 /// NAME[:CHANNEL][=VALUE[,RATE]][@FROM[..TO]], for instance "lose=0.01@100..200" or

@@ -65,6 +65,8 @@ class PlatformModel {
     void set_coefficients(const std::array<GyroCoefficients, 3>& all) noexcept {
         coefficients_ = all;
     }
+    /// Rocking and what goes across the vertical, over the truth's, from now on.
+    void grow(double rocking, double across) noexcept { shape_.grow(rocking, across); }
     /// Rate of the Earth in the reference frame, deg/h.
     [[nodiscard]] const Vec3& earth_rate() const noexcept { return earth_; }
     /// d angles / dt in rad/s; `extra` is a rate of the platform in its axes, deg/h (noise,

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "tests/plant/faults.hpp"
+
 namespace vibrig::plant {
 namespace {
 
@@ -131,8 +133,10 @@ void Rig::vibrate() {
     if (shaker_.sweeps() && before_hz != 0) {
         isolator_.retune((before_hz + frequency_hz_) / 2);
     } else if (frequency_hz_ != before_hz) {
-        isolator_.set_drive(frequency_hz_, {truth_.second_harmonic, truth_.third_harmonic,
-                                            truth_.fourth_harmonic, truth_.fifth_harmonic});
+        const auto [share, hz] = distorted_;
+        const double second = truth_.second_harmonic + (Fault::at(hz, frequency_hz_) ? share : 0);
+        isolator_.set_drive(frequency_hz_, {second, truth_.third_harmonic, truth_.fourth_harmonic,
+                                            truth_.fifth_harmonic});
     }
     if (truth_.frequency_drift_hz_per_h != 0)
         isolator_.retune(frequency_hz_ + truth_.frequency_drift_hz_per_h * shaking_s_ / 3600);

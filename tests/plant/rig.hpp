@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -28,6 +29,11 @@ class Rig {
     void torque(const Vec3& deg_per_h) noexcept { torque_ = deg_per_h; }
     /// The random walk of the gyros from now on, times that of the truth.
     void gyro_noise_times(double factor) noexcept { gyro_noise_times_ = factor; }
+    /// Rocking in step with the vibration and what goes across the vertical, over the truth's.
+    void grow(double rocking, double across) noexcept { platform_.grow(rocking, across); }
+    /// The table's second harmonic from its next change of frequency on, beside the truth's; `hz`:
+    /// at that frequency alone, 0: at each.
+    void distort(double share, double hz) noexcept { distorted_ = {share, hz}; }
     [[nodiscard]] ShakerController& shaker() noexcept { return shaker_; }
     [[nodiscard]] const ShakerController& shaker() const noexcept { return shaker_; }
 
@@ -82,6 +88,7 @@ class Rig {
     Drift drift_;
     Random gyro_noise_;
     double gyro_noise_times_ = 1;
+    std::array<double, 2> distorted_{};  ///< share, Hz
     Random slew_noise_;
     Vec3 torque_{};
     Vec3 commanded_deg_{};  ///< of the last slew, and its error

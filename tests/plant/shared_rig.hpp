@@ -22,6 +22,15 @@ struct SharedRig {
         const double now = now_s();
         const Fault* noise = faults.active(FaultKind::gyro_noise, now);
         rig.gyro_noise_times(noise == nullptr ? 1 : noise->value);
+        const double hz = rig.shaker().table_hz();
+        const auto times = [&](FaultKind kind) {
+            const Fault* fault = faults.active(kind, now);
+            return fault != nullptr && fault->at(hz) ? fault->value : 1;
+        };
+        rig.grow(times(FaultKind::sync_growth), times(FaultKind::cross_growth));
+        const Fault* distorted = faults.active(FaultKind::distorted, now);
+        rig.distort(distorted == nullptr ? 0 : distorted->value,
+                    distorted == nullptr ? 0 : distorted->hz);
         rig.shaker().lie(lies_at(now, rig.truth().shaker_lies, faults));
         rig.shaker().open_emergency_stop(emergency_stop_by_hand ||
                                          faults.active(FaultKind::estop, now) != nullptr);

@@ -21,9 +21,9 @@ VibrationShape::VibrationShape(const Truth& truth) noexcept {
     const Frame frame(truth);
     const Vec3 tilted = frame.up + std::tan(truth.tilt_deg[0] * kRadPerDeg) * frame.north +
                         std::tan(truth.tilt_deg[1] * kRadPerDeg) * frame.east;
-    along_ = (1 / std::sqrt(dot(tilted, tilted))) * tilted + truth.cross_axis[0] * frame.north +
-             truth.cross_axis[1] * frame.east;
-    quadrature_ =
+    straight_ = (1 / std::sqrt(dot(tilted, tilted))) * tilted;
+    across_ = truth.cross_axis[0] * frame.north + truth.cross_axis[1] * frame.east;
+    across_quadrature_ =
         truth.cross_axis_quadrature[0] * frame.north + truth.cross_axis_quadrature[1] * frame.east;
     platform_rocking_ = {kRadPerArcsec * truth.platform_rocking_arcsec_g,
                          kRadPerArcsec * truth.platform_rocking_quadrature_arcsec_g};
@@ -33,6 +33,7 @@ VibrationShape::VibrationShape(const Truth& truth) noexcept {
     };
     base_rocking_ = {base(truth.base_rocking_arcsec_g),
                      base(truth.base_rocking_quadrature_arcsec_g)};
+    grow(1, 1);
     platform_rocks_ = any(platform_rocking_);
     base_rocks_ = any(base_rocking_);
 }

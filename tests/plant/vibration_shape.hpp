@@ -18,17 +18,26 @@ class VibrationShape {
     }
     /// Small turn of the platform from where its loop holds it on average: platform axes, rad.
     [[nodiscard]] Vec3 platform_turn(const Shake& shake) const noexcept {
-        return shake.in_phase * platform_rocking_[0] + shake.quadrature * platform_rocking_[1];
+        return rocking_ *
+               (shake.in_phase * platform_rocking_[0] + shake.quadrature * platform_rocking_[1]);
     }
     /// Small turn of what carries the outer gimbal: reference frame, rad.
     [[nodiscard]] Vec3 base_turn(const Shake& shake) const noexcept {
-        return shake.in_phase * base_rocking_[0] + shake.quadrature * base_rocking_[1];
+        return rocking_ * (shake.in_phase * base_rocking_[0] + shake.quadrature * base_rocking_[1]);
+    }
+    /// Rocking and what goes across, over the truth's, from now on.
+    void grow(double rocking, double across) noexcept {
+        rocking_ = rocking;
+        along_ = straight_ + across * across_;
+        quadrature_ = across * across_quadrature_;
     }
     [[nodiscard]] bool platform_rocks() const noexcept { return platform_rocks_; }
     [[nodiscard]] bool base_rocks() const noexcept { return base_rocks_; }
 
   private:
+    Vec3 straight_{}, across_{}, across_quadrature_{};
     Vec3 along_{}, quadrature_{};
+    double rocking_ = 1;                                       ///< over the truth's
     std::array<Vec3, 2> platform_rocking_{}, base_rocking_{};  ///< rad/g
     bool platform_rocks_, base_rocks_;
 };

@@ -93,15 +93,24 @@ StageStep Dwelling::settled_or_recording(Time now) {
         look_at_vibration(now);
         if (now < from_) return StageStep::going_on(std::min(from_, now + kStagePoll));
         part_ = Part::record;
+        begin_in_step();
     }
     note_rms();
+    watch_in_step();
     if (done_) {
         ordered_ = power_lost_ = false;
+        end_in_step();
         end_sweep();
         return StageStep::done();
     }
     if (now > to_ + kDoneGrace) return StageStep::failed("samples ceased during the dwell");
-    return StageStep::going_on(std::min(now < to_ ? to_ : now + kStagePoll, now + kStagePoll));
+    return StageStep::going_on(std::min(now < to_ ? to_ : now + poll(), now + poll()));
+}
+
+/// Nobody tells of samples that are watched: they are fetched before half of their room is full.
+Time Dwelling::poll() const {
+    constexpr double kHalf = rt::StageFeed::kCapacity / 2.0;
+    return in_step_ ? std::min(kStagePoll, from_seconds(kHalf * settings_.sample_s)) : kStagePoll;
 }
 
 StageStep Dwelling::order(Time now) {
@@ -146,15 +155,23 @@ estimator::DwellInfo Dwelling::info() const {
             power_lost_ && !aim_.first,
             aim_.stop.frequency_hz,
             aim_.stop.verify,
-            aim_.stop.random ? aim_.stop.random->at_platform : estimator::RandomVibration{},
+            random_at_platform(),
             {},
             aim_.stop.sweep,
             {}};
 }
 
+estimator::RandomVibration Dwelling::random_at_platform() const {
+    if (!aim_.stop.random) return {};
+    auto there = aim_.stop.random->at_platform;
+    there.mean_square_g2 *= excitation_.power_ratio(*aim_.stop.random);
+    return there;
+}
+
 void Dwelling::leave() {
     if (std::exchange(watching_, false) || sweep_) ports_.rig.feed->order(rt::StageFeed::Mode::off);
     sweep_.reset();
+    end_in_step();
     if (std::exchange(ordered_, false)) {
         rt::DwellOrder cancel;
         cancel.cancel = true;
@@ -199,7 +216,7 @@ void Dwelling::follow_sweep(Time now) {
     while (ports_.rig.feed->pop(motion)) {
         if (watching_ && motion.good)
             shown_.push_back({drivers::to_seconds(motion.time), frame.force(motion.force, 1),
-                              motion.table, motion.table_good});
+                              motion.table, motion.table_good, motion.angle});
         sweep_->add(motion);
     }
     const auto reading = ports_.rig.shaker.reading();
@@ -227,6 +244,40 @@ void Dwelling::note_rms() {
     ++readings_;
 }
 
+/// Of a sine, once it records.
+void Dwelling::begin_in_step() {
+    if (!aim_.in_step || sweep_ || excitation_.random() || table_g() <= kAtRestG ||
+        ports_.rig.feed == nullptr)
+        return;
+    const double asked_hz = aim_.stop.frequency_hz;
+    in_step_.emplace(settings_.rig, settings_.sample_s, *aim_.in_step,
+                     asked_hz > 0 ? asked_hz : settings_.frequency_hz, ports_.rig.grown_limits());
+    ports_.rig.feed->order(rt::StageFeed::Mode::watched);
+}
+
+void Dwelling::watch_in_step() {
+    if (!in_step_) return;
+    const RigFrame frame(settings_.rig);
+    rt::Motion motion;
+    while (ports_.rig.feed->pop(motion)) {
+        if (!motion.good) continue;
+        const auto look =
+            in_step_->add({drivers::to_seconds(motion.time), frame.force(motion.force, 1),
+                           motion.table, motion.table_good, motion.angle});
+        if (!look) continue;
+        for (const auto& said : look->said) ports_.log.event(Severity::alarm, said);
+        ports_.rig.grown(look->times);
+    }
+}
+
+/// The next dwell begins anew.
+void Dwelling::end_in_step() {
+    if (!in_step_) return;
+    in_step_.reset();
+    ports_.rig.feed->order(rt::StageFeed::Mode::off);
+    ports_.rig.grown(std::nullopt);
+}
+
 void Dwelling::end_sweep() {
     if (!sweep_) return;
     ports_.rig.feed->order(rt::StageFeed::Mode::off);
@@ -243,7 +294,7 @@ void Dwelling::look_at_vibration(Time now) {
     while (ports_.rig.feed->pop(motion)) {
         if (motion.good)
             shown_.push_back({drivers::to_seconds(motion.time), frame.force(motion.force, 1),
-                              motion.table, motion.table_good});
+                              motion.table, motion.table_good, motion.angle});
     }
     if (now < from_ - kAhead) return;
     watching_ = false;

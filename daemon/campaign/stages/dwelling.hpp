@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/campaign/excitation.hpp"
+#include "daemon/campaign/in_step_watch.hpp"
 #include "daemon/campaign/stages/stage.hpp"
 #include "daemon/campaign/sweep_watch.hpp"
 #include "daemon/campaign/zero_calibration.hpp"
@@ -23,6 +24,8 @@ class Dwelling : public Stage {
         Stop stop;
         int run = 0, position = 0;
         bool first = false;  ///< no dwell of this campaign before it
+        /// What the loop check found at its frequency; none: it has not looked there.
+        std::optional<FoundInStep> in_step;
     };
 
     Dwelling(const Settings& settings, const Ports& ports, Excitation& excitation,
@@ -46,6 +49,8 @@ class Dwelling : public Stage {
     /// The gyros were seen run down since the dwell before.
     void lost_power() { power_lost_ = true; }
     [[nodiscard]] estimator::DwellInfo info() const;
+    /// By the transmission as measured.
+    [[nodiscard]] estimator::RandomVibration random_at_platform() const;
     /// Of a sweep what the controller said of its frequency, s since the dwell began and Hz.
     [[nodiscard]] const std::vector<std::array<double, 2>>& swept_hz() const { return swept_hz_; }
     /// Of random vibration, by the controller's readings while it recorded; 0: there were none.
@@ -62,6 +67,7 @@ class Dwelling : public Stage {
 
     [[nodiscard]] StageStep settled_or_recording(drivers::Time now);
     [[nodiscard]] StageStep order(drivers::Time now);
+    [[nodiscard]] drivers::Time poll() const;
     void take_over_origin();
     /// Why it may not, else empty; `may` once it may.
     [[nodiscard]] std::string vibration_may_change(drivers::Time now, bool& may) const;
@@ -69,6 +75,9 @@ class Dwelling : public Stage {
     void follow_sweep(drivers::Time now);
     void end_sweep();
     void note_rms();
+    void begin_in_step();
+    void watch_in_step();
+    void end_in_step();
     void trip(const std::string& why);
     [[nodiscard]] double dwell_s() const;
     void look_at_vibration(drivers::Time now);
@@ -92,6 +101,7 @@ class Dwelling : public Stage {
     bool watching_ = false;  ///< the accelerometers are to show it before the dwell
     std::vector<estimator::LoopReading> shown_;
     std::optional<SweepWatch> sweep_;
+    std::optional<InStepWatch> in_step_;
     drivers::Time read_at_ = 0;         ///< the controller's frequency or rms, last
     double square_ = 0, readings_ = 0;  ///< of that rms
     std::vector<std::array<double, 2>> swept_hz_;

@@ -187,6 +187,7 @@ void LoopChecking::measured_further() {
     if (!passed) return;
     level_.excitation.measured(found.hz, found.transmission);
     level_.proof.record().transmissions.emplace_back(found.hz, found.transmission);
+    level_.proof.record().found(found.hz, found.in_step);
 }
 
 StageStep LoopChecking::measured() {
@@ -197,6 +198,8 @@ StageStep LoopChecking::measured() {
     if (loop.out_of_band().empty()) {
         proof.record().transmission = loop.transmission();
         level_.ports.rig.transmission(loop.transmission());
+        level_.excitation.measured(level_.settings.frequency_hz, loop.transmission());
+        proof.record().found(level_.settings.frequency_hz, loop.in_step());
     }
     proof.row("loop check in band", loop.out_of_band().empty());
     for (const auto& row : loop.status().rows) {  // the ratios

@@ -100,8 +100,16 @@ void refuse_fitted(const nlohmann::json& result, const std::vector<HeldOut>& hel
     }
 }
 
+bool vertical(const Eigen::Matrix3d& moment) {
+    return moment.trace() - moment(1, 1) < 1e-6 * moment.trace();
+}
+
 Held held_out(const std::string& recording, const std::string& config, const Profile& profile,
               const AtPlatform& vibration, const nlohmann::json& result) {
+    if (profile.axes.stated())
+        throw std::runtime_error(
+            "--verify: found a profile along several axes, expected one along the vertical: one "
+            "shaker shakes along a line");
     if (!profile.psd.empty() && !profile.sines.empty())
         throw std::runtime_error(
             "--verify: found a profile of psd and sines, expected one of them");
@@ -124,10 +132,11 @@ Held held_out(const std::string& recording, const std::string& config, const Pro
         const HeldOut& one = found.held_out[static_cast<std::size_t>(k)];
         const estimator::DwellRow& row = one.row;
         // What happened, not what was asked for.
-        held.situations.push_back(
-            {row.angles, level_moment(row.vibration),
-             row.psd > 0 && !one.kind.bands.empty() ? one.kind.bands : vibration.bands,
-             row.duration_s, true});
+        held.situations.push_back({row.angles, level_moment(row.vibration),
+                                   row.psd > 0 && !one.kind.bands.empty()
+                                       ? one.kind.bands
+                                       : bands_of(found.settings, row, vibration.bands),
+                                   row.duration_s, true});
         held.rates.row(k) = row.rate;
         held.variances.push_back(row.variance);
         held.relative_errors.push_back(row.relative_error);
@@ -184,7 +193,7 @@ struct Predicted {
     std::vector<std::array<double, 3>> deg;
     std::optional<Verification> verification;
     Held held;
-    std::string refusal;
+    std::string refusal, note;
     [[nodiscard]] bool covered() const { return prediction.covered(); }
 };
 
@@ -208,6 +217,7 @@ std::string predicted_json(const Predicted& of) {
           {"g_rms", std::sqrt(mean_square(of.profile))},
           {"power_outside", of.prediction.power_outside},
           {"verdict", of.covered() ? "covered" : "not covered"},
+          {"note", of.note.empty() ? PredictionJson(nullptr) : PredictionJson(of.note)},
           {"refusal", of.refusal.empty() ? PredictionJson(nullptr) : PredictionJson(of.refusal)},
           {"attitudes", attitudes_json(of.prediction, of.deg)},
           {"verification", std::move(verification)}}}};
@@ -218,6 +228,7 @@ std::string predicted_text(const Predicted& of) {
     std::string text =
         row_text("%s: %.4g g rms", of.profile.name.c_str(), std::sqrt(mean_square(of.profile)));
     if (!of.refusal.empty()) text += "FORCED: " + of.refusal + "\n";
+    if (!of.note.empty()) text += "Note: " + of.note + "\n";
     text += row_text("%-24s %-4s %12s %10s   %s", "attitude, deg", "gyro", "drift deg/h", "u",
                      "of it coefficients, resonance, gain, realisation, outside");
     for (std::size_t k = 0; k < of.deg.size(); ++k) {
@@ -278,6 +289,10 @@ Predicted predict_for(const PredictOptions& options) {
     out.profile = stated.profile;
     const AtPlatform vibration =
         at_platform(out.profile, stated.at.empty() ? options.at : stated.at, rig);
+    if (vibration.behind_pads && !vertical(vibration.moment))
+        out.note =
+            "the isolators' transmission is measured along the vertical, and is taken for every "
+            "direction";
     const PredictionOptions how{options.elastic_beyond.value_or(rig.spectrum.elastic_beyond),
                                 options.same_accelerometers};
     std::vector<Situation> situations;
@@ -285,7 +300,8 @@ Predicted predict_for(const PredictOptions& options) {
         const auto deg = read_attitude(text);
         out.deg.push_back(deg);
         situations.push_back({Eigen::Vector3d(deg[0], deg[1], deg[2]) * (std::numbers::pi / 180),
-                              vibration.moment, vibration.bands, options.seconds});
+                              vibration.moment, vibration.bands, options.seconds, false,
+                              vibration.moments});
     }
     if (!options.recording.empty()) {
         out.held = held_out(options.recording, options.config, out.profile, vibration, result);
@@ -322,8 +338,9 @@ void add_predict(CLI::App& app, int& exit_code) {
         "predict", "Drift under a vibration profile, with its uncertainty, and held-out dwells");
     command->add_option("RESULT", options->result, "JSON of vibrig identify --json");
     command->add_option("--profile", options->profile,
-                        "JSON file {psd: [[hz, g2_hz], ..], sines: [[hz, g_peak], ..], direction, "
-                        "g_rms, at}, a name of --list, or of a [[profile]] of the configuration");
+                        "JSON file {psd: [[hz, g2_hz], ..] or {north, up, east}, cross: {north_up, "
+                        "..}, sines: [[hz, g_peak], ..], direction, g_rms, at}, a name of --list, "
+                        "or of a [[profile]] of the configuration");
     command
         ->add_option("--attitude", options->attitudes,
                      "ALPHA,BETA,GAMMA of the gimbals, deg; again for more")

@@ -30,26 +30,30 @@ plan::StatedProfile find_profile(const std::string& name, const configuration::C
 
 AtPlatform at_platform(const Profile& profile, const std::string& at,
                        const configuration::Configuration& rig) {
-    std::vector<Band> bands = bands_of(profile);
-    double power = mean_square(profile);
+    AtPlatform out{bands_of(profile), Eigen::Matrix3d::Zero()};
+    std::vector<Eigen::Matrix3d> moments = moments_of(profile);
     if (at == "table") {
         if (!rig.spectrum.mount_stated && !(rig.estimator.transmission < 1))
             throw std::runtime_error("vibration.transmission: found " +
                                      std::to_string(rig.estimator.transmission) +
                                      ", expected pads (below 1) for a profile at the table");
+        out.behind_pads = !rig.spectrum.mount.hard;
         double kept = 0;
-        for (Band& band : bands) {
+        for (std::size_t b = 0; b < moments.size(); ++b) {
+            Band& band = out.bands[b];
             const auto ratio = rig.spectrum.mount.transmission(band.hz);
             if (!ratio)
                 throw std::runtime_error("spectrum.transmission: found nothing at " +
                                          std::to_string(band.hz) +
                                          " Hz, expected the whole profile within it");
+            moments[b] *= *ratio * *ratio;
             kept += band.share *= *ratio * *ratio;
         }
-        for (Band& band : bands) band.share /= kept;
-        power *= kept;
+        for (Band& band : out.bands) band.share /= kept;
     }
-    return {bands, power * profile.direction * profile.direction.transpose()};
+    for (const Eigen::Matrix3d& moment : moments) out.moment += moment;
+    if (profile.axes.stated()) out.moments = std::move(moments);
+    return out;
 }
 
 std::array<double, 3> read_attitude(const std::string& text) {

@@ -19,7 +19,9 @@ namespace vibrig::tool {
 /// A profile as the platform has it.
 struct AtPlatform {
     std::vector<estimator::spectrum::Band> bands;
-    Eigen::Matrix3d moment;  ///< level frame, g^2
+    Eigen::Matrix3d moment;                     ///< level frame, g^2
+    std::vector<Eigen::Matrix3d> moments = {};  ///< of each band, where they are not along one line
+    bool behind_pads = false;
 };
 /// `at`: "platform" or "table". Throws std::runtime_error where nothing is known between them.
 [[nodiscard]] AtPlatform at_platform(const estimator::spectrum::Profile& profile,

@@ -198,7 +198,7 @@ void DwellKinds::add(const std::vector<const proto::RecordingRow*>& rows,
 void DwellKinds::add_random(const StatedSpectrum& of, const std::string& place) {
     const plan::StatedProfile stated = profile_of(of, rig_, place);
     const estimator::spectrum::Profile& profile = stated.profile;
-    if (std::abs(std::abs(profile.direction[1]) - 1) > 1e-6)
+    if (profile.axes.stated() || std::abs(std::abs(profile.direction[1]) - 1) > 1e-6)
         throw std::runtime_error(place + "profile: found '" + profile.name +
                                  "', which is not along the vertical, expected what a shaker "
                                  "under the platform plays");

@@ -4,6 +4,7 @@
 
 #include "daemon/tool/analysis/uncertainty_text.hpp"
 #include "daemon/tool/design/plan_study.hpp"
+#include "estimator/level/coning.hpp"
 #include "proto/json_number.hpp"
 
 namespace vibrig::tool::planner {
@@ -31,6 +32,14 @@ Json correlation(const planning::Evaluation& evaluation) {
             {"value", evaluation.correlation}};
 }
 
+/// Motion of the platform in step with the vibration for which its drift is told: what a good
+/// platform on isolators has.
+constexpr double kConingArcsec = 2;
+
+double coning_of(const estimator::spectrum::SurveyLine& line) {
+    return estimator::coning_bound(line.hz, kConingArcsec, line.level_g * line.level_g);
+}
+
 Json survey_json(const Survey& of) {
     Json lines = Json::array(), seen = Json::object();
     for (std::size_t k = 0; k < of.lines.size(); ++k) {
@@ -41,6 +50,7 @@ Json survey_json(const Survey& of) {
                          {"level_g", line.level_g},
                          {"table_g", line.table_g},
                          {"limited", line.limited},
+                         {"coning_bound_deg_h_per_g2", coning_of(line)},
                          {"dwells", of.dwells[k]}});
     }
     for (const auto& [hz, share] : of.smallest_seen)
@@ -53,6 +63,7 @@ Json survey_json(const Survey& of) {
                          {"above_hz", one.above_hz}});
     return {{"mount", of.hard ? "hard" : "isolated"},
             {"frequencies", std::move(lines)},
+            {"coning_arcsec", kConingArcsec},
             {"highest_hz", of.highest_hz},
             {"smallest_share_seen", std::move(seen)},
             {"about", std::move(about)},
@@ -65,13 +76,17 @@ std::string survey_text(const Survey& of) {
     std::string text = format("\nsurvey, %s mount\n", of.hard ? "hard" : "isolated");
     for (std::size_t k = 0; k < of.lines.size(); ++k) {
         const auto& line = of.lines[k];
-        text += format("  %8.6g Hz %7.4g g platform %7.4g g table %4zu dwells%s%s\n", line.hz,
-                       line.level_g, line.table_g, of.dwells[k],
+        text += format("  %8.6g Hz %7.4g g platform %7.4g g table %4zu dwells, coning %.1e%s%s\n",
+                       line.hz, line.level_g, line.table_g, of.dwells[k], coning_of(line),
                        line.hz != line.asked_hz
                            ? format(", for %.6g Hz, which is not free", line.asked_hz).c_str()
                            : "",
                        line.limited ? ", the shaker's limit" : "");
     }
+    text += format(
+        "coning: deg/h/g^2 at most, if the platform turns by %g arcsec in step with the "
+        "vibration\n",
+        kConingArcsec);
     for (const auto& one : of.about)
         text += format("about the resonance of gyro %c at %.4g Hz: %.6g and %.6g Hz\n",
                        "xyz"[one.gyro], one.resonance_hz, one.below_hz, one.above_hz);

@@ -113,9 +113,12 @@ class SurveyPlan {
             attitudes.push_back(Eigen::Vector3d(deg[0], deg[1], deg[2]) * (std::numbers::pi / 180));
         }
         for (const auto& attitude : attitudes)
-            situations_.push_back({attitude, there.moment, there.bands, 0});
+            situations_.push_back({attitude, there.moment, there.bands, 0, false, there.moments});
         for (const auto& band : there.bands) profile_top_ = std::max(profile_top_, band.hz);
         if (!profile_.psd.empty()) profile_top_ = profile_.psd.back().first;
+        for (const auto& axis : profile_.axes.psd) {
+            if (!axis.empty()) profile_top_ = std::max(profile_top_, axis.back().first);
+        }
     }
 
     [[nodiscard]] bool sees(double hz) const {

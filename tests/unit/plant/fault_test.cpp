@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
 
 #include "tests/plant/control.hpp"
 #include "tests/plant/faults.hpp"
+#include "tests/plant/shared_rig.hpp"
 
 namespace vibrig::plant {
 namespace {
@@ -46,6 +48,15 @@ TEST(FaultSpec, ReadsNameChannelValueAndTimes) {
     EXPECT_EQ(parse_fault("lose:0.25", 0).value, 0.25);
     EXPECT_EQ(parse_fault("nan:x", 0).kind, FaultKind::out_of_range);
     EXPECT_EQ(parse_fault("gyro-noise=8", 0).value, 8);
+    fault = parse_fault("sync_growth=4,25.1@30", 0);
+    EXPECT_EQ(fault.kind, FaultKind::sync_growth);
+    EXPECT_EQ(fault.value, 4);
+    EXPECT_EQ(fault.hz, 25.1);
+    EXPECT_EQ(fault.from_s, 30);
+    EXPECT_TRUE(fault.at(25.1));
+    EXPECT_FALSE(fault.at(15));
+    EXPECT_TRUE(parse_fault("cross-growth=4", 0).at(15));
+    EXPECT_EQ(parse_fault("distorted=0.2,65.1", 0).hz, 65.1);
     EXPECT_EQ(parse_fault("ack_without_stop@3", 0).kind, FaultKind::ack_without_stop);
     EXPECT_EQ(parse_fault("timeout-register=0", 0).value, 0);
 }
@@ -58,6 +69,8 @@ TEST(FaultSpec, SaysWhatIsWrong) {
     expect("", "unknown fault");
     expect("loose=1", "unknown fault \"loose\"");
     expect("lose", "no value");
+    expect("sync-growth=4,often", "expected a frequency from 0.1 to 2000 Hz");
+    expect("distorted=0.7", "expected a share from 0 to 0.5");
     expect("lose=2", "rate from 0 to 1");
     expect("lose=nan", "rate from 0 to 1");
     expect("lose=", "rate from 0 to 1");
@@ -177,6 +190,71 @@ TEST(Control, ExecutesLinesAndComplains) {
                              "table", "table -1", "table nan", "table 2 g"}) {
         EXPECT_EQ(control.execute(line).substr(0, 6), "error:") << line;
     }
+}
+
+/// Motion of the encoders about the azimuth axis and of the vibration to the north, peak.
+struct InStepOf {
+    double encoder_arcsec = 0, across_g = 0, second_g = 0;
+};
+InStepOf shaken(const char* spec, std::uint16_t hz) {
+    Truth truth;
+    truth.hard = true;
+    truth.resolver_arcsec = truth.accelerometer_g = truth.gyro_random_walk_deg_per_rt_h = 0;
+    truth.platform_rocking_arcsec_g = {0, 40, 0};
+    truth.cross_axis = {0.03, 0};
+    SharedRig shared(truth);
+    if (*spec != '\0') shared.faults.add(parse_fault(spec, 0));
+    shared.rig.slew_to({0, 0, 0});
+    const std::array<std::uint16_t, 6> words{
+        0, static_cast<std::uint16_t>(hz * 1000), 0, 10000, 100, 1};
+    EXPECT_EQ(shared.rig.shaker().write(0, words), ShakerController::Answer::accepted);
+    for (int i = 0; i < 1200; ++i) {
+        shared.apply_faults();
+        shared.rig.advance();
+        if (i == 400) shared.rig.release();
+    }
+    // Least squares of a line and a sine would know better; a mean square of differences does here.
+    InStepOf out;
+    constexpr int kReadings = 400;
+    const double turn = 2 * 3.14159265358979 * hz * 0.025;
+    double c = 0, s = 0, last = shared.rig.readings().encoder_deg[1], ac = 0, as = 0, bc = 0,
+           bs = 0;
+    for (int i = 0; i < kReadings; ++i) {
+        shared.apply_faults();
+        shared.rig.advance();
+        const auto& seen = shared.rig.readings();
+        const double step = std::remainder(seen.encoder_deg[1] - last, 360) * 3600;
+        last = seen.encoder_deg[1];
+        const double x = std::cos(turn * i), y = std::sin(turn * i);
+        c += step * x;
+        s += step * y;
+        ac += seen.raw_g[0] * x;
+        as += seen.raw_g[0] * y;
+        bc += seen.raw_g[1] * std::cos(2 * turn * i);
+        bs += seen.raw_g[1] * std::sin(2 * turn * i);
+    }
+    out.encoder_arcsec = 2 * std::hypot(c, s) / kReadings / (2 * std::abs(std::sin(turn / 2)));
+    out.across_g = 2 * std::hypot(ac, as) / kReadings;
+    out.second_g = 2 * std::hypot(bc, bs) / kReadings;
+    return out;
+}
+
+TEST(FaultGrowth, IsOfItsKindAndAtItsFrequency) {
+    // 400 readings at 40/s hold whole periods of 13 Hz, and of twice that.
+    const auto honest = shaken("", 13);
+    EXPECT_NEAR(honest.encoder_arcsec, 40, 1);
+    EXPECT_NEAR(honest.across_g, 0.03, 1e-3);
+    EXPECT_NEAR(honest.second_g, 0, 1e-3);
+    const auto rocks = shaken("sync-growth=4,13", 13);
+    EXPECT_NEAR(rocks.encoder_arcsec, 160, 4);
+    EXPECT_NEAR(rocks.across_g, 0.03, 1e-3);
+    EXPECT_NEAR(shaken("sync-growth=4,17", 13).encoder_arcsec, 40, 1);
+    EXPECT_NEAR(shaken("sync-growth=4@100", 13).encoder_arcsec, 40, 1) << "not before its time";
+    const auto across = shaken("cross-growth=4", 13);
+    EXPECT_NEAR(across.across_g, 0.12, 2e-3);
+    EXPECT_NEAR(across.encoder_arcsec, 40, 1);
+    EXPECT_NEAR(shaken("distorted=0.2,13", 13).second_g, 0.2, 5e-3);
+    EXPECT_NEAR(shaken("distorted=0.2,17", 13).second_g, 0, 1e-3);
 }
 
 }  // namespace

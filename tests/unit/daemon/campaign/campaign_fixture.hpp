@@ -41,6 +41,7 @@ struct CampaignTest : testing::Test {
     FakeShaker shaker;
     drivers::PlatformStatus platform;
     std::vector<rt::DwellOrder> orders;
+    std::vector<rt::Ramp> ramps;
     std::vector<std::string> events;
     rt::Guard guard = rt::Guard::idle;
     int ends = 0;
@@ -70,6 +71,7 @@ struct CampaignTest : testing::Test {
             return test.campaign ? test.second() : rt::MeanMotion{};
         }
         void guard(rt::Guard level) override { test.guard = level; }
+        void ramping(const rt::Ramp& ramp) override { test.ramps.push_back(ramp); }
         void proving(Proving what) override { test.proving = what; }
         void disobeyed(bool now_so) override { test.disobeyed = test.disobeyed || now_so; }
     } rig_port{*this};

@@ -13,13 +13,16 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// Five seconds of a table and of the platform over it at 40/s, upright.
-void shake(LoopCheck& loop, double hz, double table_g, double platform_g) {
+/// `second`: harmonic of the platform, `across`: the vertical, both of the motion along it.
+void shake(LoopCheck& loop, double hz, double table_g, double platform_g, double second = 0,
+           double across = 0) {
     loop.measure();
     for (int i = 0; i < 200; ++i) {
         const double t = i / 40.0, wave = std::sin(2 * std::numbers::pi * hz * t);
         rt::Motion motion;
         motion.time = drivers::from_seconds(100 + t);
-        motion.force = {0, 1 + platform_g * wave, 0};
+        const double twice = std::sin(4 * std::numbers::pi * hz * t);
+        motion.force = {across * platform_g * wave, 1 + platform_g * (wave + second * twice), 0};
         motion.table = table_g * wave;
         motion.table_good = motion.good = true;
         loop.add(motion);
@@ -84,6 +87,43 @@ TEST(LoopCheck, AFrequencyThatIsNotShownIsOutOfBand) {
             EXPECT_THAT(loop.out_of_band(), ::testing::Not(HasSubstr("25.1 Hz")));
         }
     }
+}
+
+TEST(LoopCheck, DistortionOrMotionAcrossAtAFurtherFrequencyKeepsACampaignFromBeingArmed) {
+    const Settings settings = survey();
+    for (const double across : {0.0, 0.15}) {
+        const double second = across > 0 ? 0 : 0.07;
+        LoopCheck loop(settings.loop, settings.rig);
+        loop.begin("Ada");
+        shake(loop, 25.1, 0.5, 0.5, second, across);
+        const auto found = loop.finish_at(25.1, 1);
+        EXPECT_NEAR(found.in_step.cross_share, across, 1e-3);
+        EXPECT_NEAR(found.in_step.distortion, second, 1e-3);
+        shake(loop, 15, 0.5, 0.5);
+        loop.finish(0.5);
+        EXPECT_THAT(loop.refusal(), HasSubstr(across > 0 ? "at 25.1 Hz cross-axis share"
+                                                         : "at 25.1 Hz distortion"));
+        // AND the reference frequency, which was well, does not make it good
+        EXPECT_THAT(loop.refusal(), ::testing::Not(HasSubstr("; distortion")));
+    }
+}
+
+TEST(LoopCheck, MotionInStepIsARowAtEachFrequency) {
+    const Settings settings = survey();
+    LoopCheck loop(settings.loop, settings.rig);
+    loop.begin("Ada");
+    shake(loop, 25.1, 0.5, 0.5);
+    const auto found = loop.finish_at(25.1, 1);
+    shake(loop, 15, 0.5, 0.5);
+    loop.finish(0.5);
+    const auto named = [](const auto& rows) {
+        return std::ranges::count(rows, std::string("motion in step"),
+                                  [](const auto& row) { return std::string(row.name); });
+    };
+    EXPECT_EQ(named(found.rows), 1);
+    EXPECT_EQ(named(loop.status().rows), 1);
+    EXPECT_GT(loop.in_step().platform_g, 0.49);
+    EXPECT_EQ(loop.in_step().motion_arcsec_g, 0);
 }
 
 TEST(LoopCheck, ATransmissionThatIsNotTheConfiguredOneIsOutOfBand) {

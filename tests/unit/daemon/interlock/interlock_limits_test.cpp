@@ -216,6 +216,12 @@ const Case kCases[] = {
     {"wrong_vibration", Trip::wrong_vibration, 0,
      [](Rig& rig, bool beyond) { rig.interlock->wrong_vibration(beyond); }, Guard::excitation,
      Guard::excitation, 0},
+    {"motion_in_step", Trip::motion_in_step, 3,
+     [](Rig& rig, bool beyond) { rig.interlock->growth(beyond ? 3.01 : 3, 1); }, Guard::excitation,
+     Guard::excitation, 0},
+    {"cross_axis_growth", Trip::cross_growth, 3,
+     [](Rig& rig, bool beyond) { rig.interlock->growth(1, beyond ? 3.01 : 3); }, Guard::excitation,
+     Guard::excitation, 0},
     {"abort_bands", Trip::abort_bands, 0,
      [](Rig& rig, bool beyond) {
          rig.shaker.now.running = true;
@@ -323,6 +329,30 @@ TEST_P(InterlockLimits, IsNotWatchedBelowItsLevel) {
 
 INSTANTIATE_TEST_SUITE_P(Every, InterlockLimits, testing::ValuesIn(kCases),
                          [](const auto& given) { return std::string(given.param.name); });
+
+TEST(InterlockTable, GrowthIsAnAlarmUntilTheDwellIsOver) {
+    Rig rig(default_interlock());
+    rig.interlock->guard(Guard::excitation);
+    const auto raised = [&] {
+        std::vector<std::string> names;
+        for (std::size_t i = 0; i < rig.interlock->rows(); ++i)
+            if (const auto row = rig.interlock->row(i); row.raised) names.push_back(row.rule->name);
+        return names;
+    };
+    EXPECT_EQ(rig.interlock->least_limit(Trip::motion_in_step), 3);
+    EXPECT_TRUE(std::isinf(rig.interlock->least_limit(Trip::none)));
+    rig.interlock->growth(4, 1);
+    EXPECT_EQ(raised(), std::vector<std::string>{"motion_in_step"});
+    rig.interlock->growth(1, 4);
+    EXPECT_EQ(raised(), std::vector<std::string>{"cross_axis_growth"});
+    EXPECT_EQ(rig.interlock->tripped(), Trip::none) << "the dwell goes on";
+    rig.interlock->no_growth();
+    EXPECT_TRUE(raised().empty());
+    for (std::size_t i = 0; i < rig.interlock->rows(); ++i) {
+        if (rig.interlock->row(i).rule->name != "motion_in_step") continue;
+        EXPECT_TRUE(std::isnan(rig.interlock->row(i).present)) << "not looked for";
+    }
+}
 
 TEST(InterlockTable, AllConditionsAreTried) {
     for (const Condition& condition : kConditions) {

@@ -69,6 +69,27 @@ TEST_F(SurveyCommand, SaysWhatIsMovedAndWhatTheLimitsLeave) {
     EXPECT_NE(error.find("found 10.3 Hz, expected 12.98"), std::string::npos) << error;
 }
 
+/// At 60 Hz behind isolators little shakes, and 2 arcsec in step with it are a large drift.
+TEST_F(SurveyCommand, TellsWhatMotionInStepMayDriftAtEachFrequency) {
+    const auto coning = [&](const std::string& mount) {
+        EXPECT_EQ(vibrig("plan --frequencies 15.1,65.1 --json --order list --mount " + mount), 0)
+            << error;
+        std::vector<double> list;
+        const SurveyJson survey = json()["survey"];
+        EXPECT_EQ(survey["coning_arcsec"], 2);
+        for (const auto& line : survey["frequencies"])
+            list.push_back(line["coning_bound_deg_h_per_g2"]);
+        return list;
+    };
+    const auto hard = coning("hard"), isolated = coning("isolated");
+    EXPECT_NEAR(hard[0], 2 * 3.14159265 * 15.1 * 4 / 206264.80625 / 36, 1e-9);
+    EXPECT_NEAR(hard[1] / hard[0], 65.1 / 15.1, 1e-6);
+    EXPECT_NEAR(isolated[1], 0.015, 0.001);
+    ASSERT_EQ(vibrig("plan --frequencies 15.1,65.1 --mount hard --order list"), 0);
+    EXPECT_NE(out.find("dwells, coning 5.1e-05"), std::string::npos) << out;
+    EXPECT_NE(out.find("turns by 2 arcsec in step"), std::string::npos) << out;
+}
+
 TEST_F(SurveyCommand, APlanForAProfileReachesItsHighestFrequencyOrSaysSo) {
     write("top.toml", "spectrum.highest_hz = 125\nspectrum.mount = \"hard\"\n");
     ASSERT_EQ(vibrig("plan --profile truck --attitude 45,0,90 --config top.toml --order list "

@@ -286,6 +286,36 @@ TEST_F(Predict, WhatSuchACampaignDoesNotTellIsInTheResult) {
     EXPECT_THAT(run("identify survey.csv").out, HasSubstr("Not told either:"));
 }
 
+TEST_F(Predict, AlongThreeAxesAtOnceEachHasItsPart) {
+    const auto drift = [&](const std::string& psd, const std::string& more = "") {
+        write("axes.json", R"({"psd": {)" + psd + "}}");
+        const Ended ended =
+            run("predict result.json --profile axes.json --attitude 45,0,90 --json " + more);
+        EXPECT_LE(ended.exit_code, 1) << ended.error;
+        return ended.json()["prediction"];
+    };
+    const std::string north = R"("north": [[20, 0.01], [120, 0.01]])",
+                      up = R"("up": [[10, 0.05], [90, 0.01]])",
+                      east = R"("east": [[30, 0.02], [125, 0.02]])";
+    const PredictJson n = drift(north), u = drift(up), e = drift(east),
+                      all = drift(north + ", " + up + ", " + east);
+    const double rest = drift(R"("up": [[20, 1e-12], [21, 1e-12]])")["attitudes"][0]["drift"][1];
+    const auto of = [&](const PredictJson& one) {
+        return one["attitudes"][0]["drift"][1].get<double>() - rest;
+    };
+    // What is not coherent adds its drifts and its powers.
+    EXPECT_NEAR(of(all), of(n) + of(u) + of(e), 1e-7);
+    EXPECT_NEAR(std::pow(all["g_rms"].get<double>(), 2),
+                std::pow(n["g_rms"].get<double>(), 2) + std::pow(u["g_rms"].get<double>(), 2) +
+                    std::pow(e["g_rms"].get<double>(), 2),
+                1e-9);
+    EXPECT_EQ(all["note"], nullptr);
+    write("pads.toml", "[vibration]\ntransmission = 0.667\n");
+    EXPECT_THAT(std::string(drift(north, "--at table --config pads.toml")["note"]),
+                HasSubstr("along the vertical, and is taken for every direction"));
+    EXPECT_EQ(drift(up, "--at table --config pads.toml")["note"], nullptr);
+}
+
 TEST_F(Predict, ListsItsProfiles) {
     const Ended ended = run("predict --list");
     EXPECT_EQ(ended.exit_code, 0);
@@ -313,6 +343,23 @@ TEST_F(Predict, BadInputIsNamedByPlaceAndValue) {
     profile(R"({"psd": [[20, 0.05], [40, 0.05]], "g_rms": 3})", "g_rms: found 3, expected");
     profile(R"({"psd": [[20, 0.05], [40]]})", "psd[1]: found [40], expected [hz, g2_hz]");
     profile(R"({"cross_spectra": []})", "cross_spectra: found an unknown key");
+    profile(R"({"psd": {"north": [[20, 0.1], [40, 0.1]]}, "quadrature": {}})",
+            "quadrature: found cross-spectra with an imaginary part");
+    profile(R"({"psd": {"down": [[20, 0.1], [40, 0.1]]}})",
+            "psd.down: found an unknown axis, expected north, up, east");
+    profile(R"({"psd": {"up": [[20, 0.1], [40]]}})", "psd.up[1]: found [40], expected [hz, g2_hz]");
+    profile(R"({"psd": {"up": [[20, 0.1], [40, "a"]]}})", "psd.up[1]: found [40,\"a\"]");
+    profile(R"({"psd": {}})", "psd: found {}, expected an object with north, up, east");
+    profile(R"({"psd": [[20, 0.1], [40, 0.1]], "cross": {}})",
+            "cross: found without a psd of several axes");
+    profile(R"({"psd": {"up": [[20, 0.1], [40, 0.1]]}, "direction": [1, 0, 0]})",
+            "direction: found with a psd of several axes");
+    profile(R"({"psd": {"up": [[20, 0.1], [40, 0.1]], "north": [[20, 0.1], [40, 0.1]]},
+                "cross": {"north_up": [[20, 0.2], [40, 0.2]]}})",
+            "cross: found 20.");
+    write("axes.json", R"({"psd": {"up": [[20, 0.1], [40, 0.1]]}})");
+    refused("result.json --profile axes.json --verify held_out.csv --config held.toml",
+            "--verify: found a profile along several axes");
     profile("{}", "psd: found neither");
     profile("nonsense", "found no JSON");
     refused("result.json --profile none.json --attitude 0,0,0", "--profile: found 'none.json'");
