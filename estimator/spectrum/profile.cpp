@@ -150,6 +150,9 @@ void check(const Profile& profile, const std::string& path) {
         spectrum(profile.axes.psd[k], std::string("psd.") + kAxes[k], Points::density);
         spectrum(profile.axes.cross[k], std::string("cross.") + kAxisPairs[k], Points::cross);
     }
+    constexpr double kMostRms = 1e4;  // g; nothing that is tested survives it
+    if (!(mean_square(profile) <= kMostRms * kMostRms))
+        throw SettingsError(path + "found more than 10000 g rms, expected a vibration");
     check_axes(profile.axes, path);
     if (!(std::abs(profile.direction.norm() - 1) < 1e-6))
         throw SettingsError(path + "direction: found a length of " +

@@ -349,6 +349,9 @@ TEST_F(Predict, BadInputIsNamedByPlaceAndValue) {
             "psd.down: found an unknown axis, expected north, up, east");
     profile(R"({"psd": {"up": [[20, 0.1], [40]]}})", "psd.up[1]: found [40], expected [hz, g2_hz]");
     profile(R"({"psd": {"up": [[20, 0.1], [40, "a"]]}})", "psd.up[1]: found [40,\"a\"]");
+    profile(R"({"psd": {"up": [[20, 1e308], [40, 1e308]]}})", "found more than 10000 g rms");
+    profile(R"({"psd": [[20, 1e308], [40, 1e308]]})", "found more than 10000 g rms");
+    profile(R"({"sines": [[20, 1e200]]})", "found more than 10000 g rms");
     profile(R"({"psd": {}})", "psd: found {}, expected an object with north, up, east");
     profile(R"({"psd": [[20, 0.1], [40, 0.1]], "cross": {}})",
             "cross: found without a psd of several axes");
