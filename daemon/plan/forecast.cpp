@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/parameters.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/positions.hpp"
 

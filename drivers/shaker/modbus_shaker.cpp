@@ -241,8 +241,7 @@ bool ModbusShaker::outranked() const noexcept {
     return quit_.load() || (stop_pending() && !stop_tried_);
 }
 
-template <typename Request>
-Reply ModbusShaker::transact(Request&& request) {
+Reply ModbusShaker::transact(const std::function<Reply()>& request) {
     in_flight_ = true;
     if (outranked()) {
         in_flight_ = false;

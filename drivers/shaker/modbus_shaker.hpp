@@ -69,8 +69,7 @@ class ModbusShaker final : public Shaker {
     void lose_link(const std::string& why);
     void close_link();
     [[nodiscard]] bool outranked() const noexcept;
-    template <typename Request>
-    [[nodiscard]] Reply transact(Request&& request);
+    [[nodiscard]] Reply transact(const std::function<Reply()>& request);
     [[nodiscard]] Reply write(const proto::Register& reg, std::span<const std::uint16_t> words);
     [[nodiscard]] Reply read(const proto::Register& reg, std::span<std::uint16_t> words);
 

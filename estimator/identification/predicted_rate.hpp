@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimator/filter/settings.hpp"
+#include "estimator/filter/vibration_moment.hpp"
 
 namespace vibrig::estimator {
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "estimator/filter/measurement.hpp"
+#include "estimator/filter/settings.hpp"
 
 namespace vibrig::estimator {
 

@@ -71,7 +71,7 @@ std::vector<AxesBand> bands_of(const AxesPsd& of, int per_decade) {
             for (const auto& point : points) edges.push_back(point.first);
     }
     std::ranges::sort(edges);
-    edges.erase(std::ranges::unique(edges).begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
     std::vector<AxesBand> out;
     for (std::size_t i = 1; i < edges.size(); ++i) {
         const double from = edges[i - 1], ratio = edges[i] / from;
