@@ -7,6 +7,7 @@
 
 #include "daemon/papers/reproduce_text.hpp"
 #include "daemon/plot/chart.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::tool::tang2009 {
 

@@ -43,7 +43,8 @@ plot::Chart response_chart(const Options& options, const levelling::LevellerSett
     return chart;
 }
 
-/// Of the start with the largest tilt and drift that the options allow, s.
+}  // namespace
+
 std::optional<double> declared_within(const Options& options,
                                       const levelling::LevellerSettings& loop) {
     check_samples("--settling", levelling::kPatience * loop.settling_s, loop.period_s);
@@ -61,8 +62,6 @@ std::optional<double> declared_within(const Options& options,
     return levelling::declared_within_s(loop, most_tilt + std::abs(options.step) * kArcmin,
                                         most_drift);
 }
-
-}  // namespace
 
 int run_design(const Options& options) {
     const levelling::LevellerSettings loop = settings_of(options);

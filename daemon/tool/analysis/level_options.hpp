@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,10 @@ levelling::LevellerSettings settings_of(const Options& options);
 
 /// Throws std::invalid_argument where that many samples would take for ever.
 void check_samples(const char* option, double duration_s, double period_s);
+
+/// Of the start with the largest tilt and drift that the options allow, s.
+std::optional<double> declared_within(const Options& options,
+                                      const levelling::LevellerSettings& loop);
 
 Json budget_json(const levelling::Leveller& loop);
 Json gains_json(const levelling::Gains& gains);

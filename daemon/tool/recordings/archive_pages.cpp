@@ -12,6 +12,7 @@
 #include "daemon/archive/trend.hpp"
 #include "daemon/plot/xml_text.hpp"
 #include "daemon/serve/api.hpp"
+#include "daemon/tool/recordings/archive_place.hpp"
 #include "daemon/tool/recordings/trend_output.hpp"
 #include "estimator/identification/identification.hpp"
 #include "proto/text.hpp"

@@ -10,6 +10,7 @@
 #include "daemon/results/exit_status.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/tool/recordings/archive_pages.hpp"
+#include "estimator/identification/identification.hpp"
 
 namespace vibrig::tool {
 
