@@ -1,4 +1,6 @@
 // What can be believed of a campaign, while it runs and in the end.
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
