@@ -11,6 +11,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import loop_check  # noqa: E402
 import rig as r  # noqa: E402
 
 # Half elastic, a resonance within the plan.
@@ -49,7 +50,7 @@ def start(rig, plan, dwell_s, checked, *plant):
     rig.configure({"name": "survey", "plan": plan, "dwell_s": dwell_s, "temperature_window_s": 5.0},
                   spectrum={"mount": "hard"})
     rig.start_daemon()
-    rig.wait_for(r.measuring, 60)
+    rig.wait_for(loop_check.ready, 60)
     return [rig.tool(command, "--by", "tester", timeout=120)
             for command in ((("selftest",) if checked else ()) + ("arm", "start"))]
 
