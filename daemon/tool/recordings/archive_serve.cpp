@@ -10,7 +10,7 @@
 #include "daemon/results/exit_status.hpp"
 #include "daemon/serve/status_server.hpp"
 #include "daemon/tool/recordings/archive_pages.hpp"
-#include "estimator/identification/identification.hpp"
+#include "estimator/identification/result.hpp"
 
 namespace vibrig::tool {
 
