@@ -61,7 +61,12 @@ double Excitation::power_ratio(const RandomStop& of) const {
         const auto stop = std::ranges::find_if(settings_.stops, same);
         const bool stated = stop != settings_.stops.end() && stop->transmission > 0;
         if (!stated && hz != settings_.frequency_hz) continue;  // of the loop check alone
-        ratios.emplace_back(hz, found / (stated ? stop->transmission : settings_.rig.transmission));
+        // As the accelerometers show it, which a stop's has in it.
+        const auto& rig = settings_.rig;
+        const double expected =
+            stated ? stop->transmission
+                   : rig.transmission * std::sqrt(rig.accelerometer_response.power(hz));
+        ratios.emplace_back(hz, found / expected);
     }
     return estimator::spectrum::power_ratio(ratios, of.bands);
 }

@@ -97,6 +97,24 @@ TEST_F(RandomDwellTest, TakesTheTransmissionThatTheLoopCheckMeasured) {
     EXPECT_NEAR(told[0].power_ratio, ratio, 1e-12);
 }
 
+/// What the accelerometers do not show at the reference frequency does not lack at the platform.
+TEST_F(RandomDwellTest, TransmissionIsMeasuredThroughTheAccelerometers) {
+    settings.rig.transmission = 0.6;
+    settings.rig.accelerometer_response.bandwidth_hz = 30;
+    const double seen = std::sqrt(settings.rig.accelerometer_response.power(settings.frequency_hz));
+    ASSERT_LT(seen, 0.95);
+    settings.stops[1].random->bands = {{10, 0.5, 1}, {100, 0.5, 1}};
+    make();
+    ProofRecord proof;
+    proof.table_g = 0.5;
+    proof.keys_sha256 = sha256(settings.proof.keys);
+    proof.transmission = 0.6 * seen;
+    campaign->take_over_proofs({proof});
+    static_cast<void>(begin());
+    ASSERT_TRUE(run_until(CampaignState::finished, 300)) << status().reason;
+    EXPECT_NEAR(orders[1].dwell.random.mean_square_g2, 1, 1e-12);
+}
+
 TEST_F(RandomDwellTest, DoesNotBeginUntilTheControllerIsAtLevel) {
     shaker.levelled = RandomReading::State::levelling;
     static_cast<void>(begin());
