@@ -50,13 +50,19 @@ std::map<std::size_t, std::vector<DwellRow>> rows_of(const plant::Truth& truth,
     return rows;
 }
 
-/// The simulated rig integrates the yielding mass in time; the model knows only its mean.
-TEST(SpectrumPlant, AgreesWithTheModelOverTheFrequencies) {
+/// Bolted to the table, half of every quadratic coefficient elastic at 60 Hz, without noise.
+plant::Truth half_elastic() {
     plant::Truth truth;
     truth.hard = true;
     truth.elastic_share = {0.5, 0.5, 0.5};
     truth.resolver_arcsec = truth.accelerometer_g = truth.gyro_random_walk_deg_per_rt_h = 0;
     truth.resolver_bits = 24;
+    return truth;
+}
+
+/// The simulated rig integrates the yielding mass in time; the model knows only its mean.
+TEST(SpectrumPlant, AgreesWithTheModelOverTheFrequencies) {
+    const plant::Truth truth = half_elastic();
     plant::CampaignPlan plan;
     plan.positions_deg = {{45, 0, 60}, {-60, 10, 20}};
     plan.frequency_hz = {15, 35, 45, 55, 65, 85, 101.3};
@@ -82,11 +88,7 @@ TEST(SpectrumPlant, AgreesWithTheModelOverTheFrequencies) {
 
 /// A second harmonic of 5 % lies on the resonance: its 0.25 % of the mean square count ten times.
 TEST(SpectrumPlant, HarmonicsThatTheSamplesTellAreInTheDrift) {
-    plant::Truth truth;
-    truth.hard = true;
-    truth.elastic_share = {0.5, 0.5, 0.5};
-    truth.resolver_arcsec = truth.accelerometer_g = truth.gyro_random_walk_deg_per_rt_h = 0;
-    truth.resolver_bits = 24;
+    plant::Truth truth = half_elastic();
     truth.second_harmonic = 0.05;
     truth.third_harmonic = 0.03;
     truth.sample_rate_hz = 400;
@@ -117,11 +119,7 @@ TEST(SpectrumPlant, HarmonicsThatTheSamplesTellAreInTheDrift) {
 
 /// Random vibration: the drift of the profile, but for what its realisation strays by in the time.
 TEST(SpectrumPlant, AgreesWithTheModelUnderRandomVibration) {
-    plant::Truth truth;
-    truth.hard = true;
-    truth.elastic_share = {0.5, 0.5, 0.5};
-    truth.resolver_arcsec = truth.accelerometer_g = truth.gyro_random_walk_deg_per_rt_h = 0;
-    truth.resolver_bits = 24;
+    plant::Truth truth = half_elastic();
     truth.limit_mm = 100;
     const auto profiles = six_profiles();
     constexpr std::array<std::size_t, 4> kPlayed{2, 3, 4, 5};  // 20-200 Hz, truck, integrity, 70-90
