@@ -310,12 +310,18 @@ std::vector<PlannedRun> runs_from_csv(const std::string& text, const std::string
 
 }  // namespace
 
-std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
-    auto runs = read_plan(path, [transmission](auto) { return std::optional(transmission); });
+void refuse_random(const std::vector<PlannedRun>& runs) {
     for (const PlannedRun& run : runs) {
         if (!run.profile.empty())
             refuse(run.profile_place, run.profile,
                    "a sine: random vibration is for vibrigd's campaigns");
+    }
+}
+
+std::vector<PlannedRun> read_plan(const std::string& path, double transmission) {
+    auto runs = read_plan(path, [transmission](auto) { return std::optional(transmission); });
+    refuse_random(runs);
+    for (const PlannedRun& run : runs) {
         if (run.sweep_to_hz > 0)
             refuse(run.profile_place, number(run.sweep_to_hz) + " Hz",
                    "a sine that stands: sweeps are for vibrigd's campaigns");

@@ -48,6 +48,9 @@ using TransmissionAt = std::function<std::optional<double>(std::optional<double>
 /// The same at every frequency; random vibration and sweeps are refused.
 [[nodiscard]] std::vector<PlannedRun> read_plan(const std::string& path, double transmission);
 
+/// Where a plan's rows are judged: a profile's levels in g are 0, as at rest. Throws PlanFileError.
+void refuse_random(const std::vector<PlannedRun>& runs);
+
 /// CSV with the columns alpha_deg, beta_deg, gamma_deg. Throws PlanFileError.
 [[nodiscard]] std::vector<std::array<double, 3>> read_positions(const std::string& path);
 

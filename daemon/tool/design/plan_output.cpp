@@ -91,6 +91,7 @@ std::string survey_text(const Survey& of) {
         text += format("about the resonance of gyro %c at %.4g Hz: %.6g and %.6g Hz\n",
                        "xyz"[one.gyro], one.resonance_hz, one.below_hz, one.above_hz);
     text += "smallest elastic share of all quadratic coefficients that is seen with 90 %:";
+    if (of.smallest_seen.empty()) text += "  none, at one frequency";
     for (const auto& [hz, share] : of.smallest_seen)
         text += format("  %.3g %% at %g Hz", 100 * share, hz);
     text += format("\na flat verdict reaches to %g Hz\n", of.highest_hz);

@@ -97,6 +97,7 @@ class Study {
                       : std::optional(c_.estimator.transmission);
         };
         auto runs = plan::read_plan(path, transmission);
+        plan::refuse_random(runs);
         for (auto& run : runs) run.position_deg = to_readings(c_.estimator, run.position_deg);
         return runs;
     }

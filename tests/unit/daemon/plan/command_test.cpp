@@ -160,6 +160,10 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
     write("bad.json", "{\"runs\":[{\"position\":[0,0],\"level_g\":6}]}");
     write("cut.json", "{\"runs\":[{\"posi");
     write("levels.json", "{\"runs\":[{\"position\":[0,0,0],\"level_g\":6,\"table_g\":6}]}");
+    write("random.json",
+          R"({"runs":[{"position":[0,0,0],"level_g":6,"table_g":9},
+                      {"position":[0,45,0],"profile":"road","level_db":-3}]})");
+    write("random.csv", "alpha_deg,beta_deg,gamma_deg,level_g,profile,level_db\n0,0,0,0,road,0\n");
     write("limit.toml", "shaker.limits.acceleration_g = 5\n");
     struct Case {
         const char* arguments;
@@ -174,6 +178,8 @@ TEST_F(PlanCommand, RefusesBadInputWithPlaceAndValue) {
           Case{"--positions empty.csv", "empty.csv"}, Case{"--positions none.csv", "none.csv"},
           Case{"--evaluate bad.json", "runs[0].position"}, Case{"--evaluate cut.json", "not JSON"},
           Case{"--evaluate levels.json", "transmission 0.6667"},
+          Case{"--evaluate random.json", "runs[1].profile: found road, expected a sine"},
+          Case{"--runs 12 --levels 0,6 --done random.csv", "random.csv:2"},
           Case{"--levels 0,6 --config limit.toml", "shaker.limits.acceleration_g"},
           Case{"--inner 30,20", "gimbal limits"},
           Case{"--outer 1,2 --azimuth 1,2", "leave no position"},
