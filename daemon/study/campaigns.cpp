@@ -1,6 +1,5 @@
 #include "daemon/study/campaigns.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -10,6 +9,7 @@
 #include "daemon/order/campaign_order.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/study/rig_keys.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/uncertainty/assessment.hpp"
 #include "tests/plant/recording.hpp"
 
@@ -222,10 +222,8 @@ configuration::Loaded load_settings(const std::vector<Setting>& settings, const 
 }
 
 double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& covariance) {
-    if (covariance.rows() != error.size() || !covariance.allFinite() || !error.allFinite())
-        return uncertainty::kNone;
-    const Eigen::LLT<Eigen::MatrixXd> root(covariance);
-    return root.info() == Eigen::Success ? error.dot(root.solve(error)) : uncertainty::kNone;
+    if (covariance.rows() != error.size()) return uncertainty::kNone;
+    return estimator::linear_algebra::squared_distance(covariance, error);
 }
 
 std::size_t combination_of(const Study& study, std::uint64_t point) {

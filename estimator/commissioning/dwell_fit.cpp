@@ -1,7 +1,6 @@
 // Rates of the angles = M (drift_sign h D - C (w_r + north, east)) at the middle of each dwell.
 #include "estimator/commissioning/dwell_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>

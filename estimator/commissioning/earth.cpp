@@ -2,7 +2,6 @@
 // of the sense in which it all turns.
 #include "estimator/commissioning/earth.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,6 @@
 // signed permutation that is nearly square and all 16 parameters with what is believed of them.
 #include "estimator/commissioning/gravity_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -71,7 +70,7 @@ Linear solve_linear(const Class& c, const Bend& bend, const GravitySettings& s) 
     for (int i = 0; i < 3; ++i) normal(i, i) += variance / (kFree * kFree);
     normal(3, 3) += variance / (s.zero_sigma_g * s.zero_sigma_g);
     Linear result;
-    result.solution = normal.ldlt().solve(right);
+    result.solution = linear_algebra::PivotedCholesky(normal).solve(right);
     const double rest = std::max(0.0, all - right.cwiseProduct(result.solution).sum());
     const double lean = bend[2] / (s.elevation_sigma_deg * kRad);
     result.cost = rest / variance + lean * lean;
@@ -142,10 +141,9 @@ std::pair<double, Bend> refine(const Class& c, Bend bend, const GravitySettings&
             static_cast<void>(residual(at, moved));
             j.col(k) = (moved - r) / kStep;
         }
-        const Matrix3d normal = j.transpose() * j;
-        Matrix3d damped = normal;
+        Matrix3d damped = linear_algebra::gram(j);
         damped.diagonal() *= 1 + damping;
-        const Bend step = damped.ldlt().solve(-(j.transpose() * r));
+        const Bend step = -linear_algebra::PivotedCholesky(damped).solve(j.transpose() * r);
         const double next = residual(bend + step, moved);
         if (!(next < cost)) {
             damping *= 10;

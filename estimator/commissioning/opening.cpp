@@ -2,7 +2,6 @@
 // upright u hardly changes from drift to drift: G matters where a wrong zero has turned it.
 #include "estimator/commissioning/opening.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

@@ -1,12 +1,12 @@
 // One gimbal alone turned against gravity: each accelerometer sees a cosine of the angle, all of
 // them together a circle, which only the right unit makes round.
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/commissioning/gravity.hpp"
 #include "estimator/filter/kinematics.hpp"
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::commissioning {
 
@@ -27,7 +27,8 @@ double score_of(const std::vector<Stop>& sweep, std::size_t channel, double degr
         right += row * force.transpose();
         all += force.squaredNorm();
     }
-    const Eigen::Matrix3d c = normal.ldlt().solve(right);  // rows: constant, cosine, sine
+    const Eigen::Matrix3d c =
+        linear_algebra::PivotedCholesky(normal).solve(right);  // rows: constant, cosine, sine
     const double rest = std::max(0.0, all - (right.cwiseProduct(c)).sum());
     const Eigen::Vector3d c1 = c.row(1), c2 = c.row(2);
     const double rho2 = std::max(c1.norm() * c2.norm(), 1e-12);

@@ -59,6 +59,16 @@ double squared_distance(MatrixIn covariance, const Vector& d) {
     return Cholesky::or_nan(covariance).whiten(d).squaredNorm();
 }
 
+Matrix padded_root(MatrixIn a) {
+    return Eigen::LLT<Matrix>(Matrix(a + 1e-12 * Matrix(a.diagonal().asDiagonal()))).matrixL();
+}
+
+Matrix semidefinite_root(MatrixIn a) {
+    const Eigen::LDLT<Matrix> factor(Matrix(a + 1e-12 * Matrix(a.diagonal().asDiagonal())));
+    const Vector d = factor.vectorD().cwiseMax(0.0).cwiseSqrt();
+    return factor.transpositionsP().transpose() * Matrix(Matrix(factor.matrixL()) * d.asDiagonal());
+}
+
 struct PivotedCholesky::Factor {
     Eigen::LDLT<Matrix> of;
 };
@@ -66,6 +76,16 @@ PivotedCholesky::PivotedCholesky(MatrixIn a)
     : factor_(std::make_unique<Factor>(Factor{Eigen::LDLT<Matrix>(a)})) {}
 PivotedCholesky::~PivotedCholesky() = default;
 Matrix PivotedCholesky::solve(MatrixIn b) const { return factor_->of.solve(b); }
+
+struct LowerUpper::Factor {
+    Eigen::PartialPivLU<Matrix> of;
+};
+LowerUpper::LowerUpper(MatrixIn a)
+    : factor_(std::make_shared<Factor>(Factor{Eigen::PartialPivLU<Matrix>(a)})) {}
+Matrix LowerUpper::solve(MatrixIn b) const { return factor_->of.solve(b); }
+double LowerUpper::log_det() const {
+    return factor_->of.matrixLU().diagonal().array().abs().log().sum();
+}
 
 Matrix orthogonal_factor(MatrixIn a) {
     return Eigen::ColPivHouseholderQR<Matrix>(a).householderQ();

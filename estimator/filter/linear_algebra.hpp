@@ -62,6 +62,12 @@ class Cholesky {
 /// d' covariance^-1 d; likewise.
 [[nodiscard]] double squared_distance(MatrixIn covariance, const Vector& d);
 
+/// L with L L' = A, a variance to which a 1e-12th is added: of inputs that depend on each other
+/// wholly it is singular.
+[[nodiscard]] Matrix padded_root(MatrixIn a);
+/// The same, no triangle, where some inputs may have no variance at all: their rows are zero.
+[[nodiscard]] Matrix semidefinite_root(MatrixIn a);
+
 /// Of a symmetric matrix that rounding may have made indefinite: A = P' L D L' P, pivoted.
 class PivotedCholesky {
   public:
@@ -74,6 +80,19 @@ class PivotedCholesky {
   private:
     struct Factor;
     std::unique_ptr<Factor> factor_;
+};
+
+/// Of a square matrix that may be indefinite: P A = L U.
+class LowerUpper {
+  public:
+    explicit LowerUpper(MatrixIn a);
+    [[nodiscard]] Matrix solve(MatrixIn b) const;
+    /// ln |det A|.
+    [[nodiscard]] double log_det() const;
+
+  private:
+    struct Factor;
+    std::shared_ptr<const Factor> factor_;
 };
 
 /// Orthogonal matrix Q, rows x rows: its first columns span those of `a`, the others are normal to

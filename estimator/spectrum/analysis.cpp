@@ -1,6 +1,5 @@
 #include "estimator/spectrum/analysis.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -92,9 +91,8 @@ Declared declared_of(const Settings& settings, const SpectralTable& table, const
             inputs.rates.col(static_cast<Index>(i)) = -2 * of_vibration;
     }
     const MatrixXd u = uncertainty::input_covariance(settings.uncertainty, inputs.list);
-    const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
     Declared out;
-    out.rates = inputs.rates * MatrixXd(root.matrixL());
+    out.rates = inputs.rates * linear_algebra::padded_root(u);
     for (const auto& input : inputs.list) out.names.emplace_back(input.input, input.element);
     const double between = settings.uncertainty.gain_between_frequencies.u;
     if (table.kinds().size() < 2 || !(between > 0)) return out;

@@ -1,11 +1,11 @@
 #include "estimator/spectrum/resonance.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
+
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::spectrum {
 namespace {
@@ -13,6 +13,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using linear_algebra::Cholesky;
 using Point = Eigen::Vector2d;  ///< ln hz, ln damping
 
 constexpr double kLeastWeight = 1e-4;
@@ -47,12 +48,12 @@ struct Solved {
 Solved solve(const MatrixXd& normal, const VectorXd& right, double square, const VectorXd& sigma) {
     MatrixXd information = normal;
     information.diagonal().array() += sigma.array().square().inverse();
-    const Eigen::LLT<MatrixXd> factor(information);
+    const auto factor = Cholesky::or_nan(information);
     Solved out;
     out.x = factor.solve(right);
-    out.covariance = factor.solve(MatrixXd::Identity(normal.rows(), normal.cols()));
-    out.log_evidence = -factor.matrixLLT().diagonal().array().log().sum() -
-                       sigma.array().log().sum() - 0.5 * (square - right.dot(out.x));
+    out.covariance = factor.inverse();
+    out.log_evidence =
+        -0.5 * factor.log_det() - sigma.array().log().sum() - 0.5 * (square - right.dot(out.x));
     return out;
 }
 
@@ -63,9 +64,9 @@ class Likelihood {
         : table_(table),
           gyro_(gyro),
           problem_(problem),
-          factor_(problem.covariance),
-          base_(factor_.matrixL().solve(table.base(gyro))),
-          rate_(factor_.matrixL().solve(problem.rate)) {
+          factor_(Cholesky::or_nan(problem.covariance)),
+          base_(factor_.whiten(table.base(gyro))),
+          rate_(factor_.whiten(problem.rate)) {
         Index n = rate_.size();
         for (const SweptRates& swept : problem.swept) n += swept.size();
         base_.conservativeResize(n, Eigen::NoChange);
@@ -76,7 +77,7 @@ class Likelihood {
             rate_.segment(n, swept.size()) = swept.rate();
             n += swept.size();
         }
-        base_normal_ = base_.transpose() * base_;
+        base_normal_ = linear_algebra::gram(base_);
     }
 
     struct Both {
@@ -122,7 +123,7 @@ class Likelihood {
     [[nodiscard]] MatrixXd whitened_elastic(const Resonance& of) const {
         MatrixXd out(rate_.size(), kElastic);
         Index n = table_.dwells();
-        out.topRows(n) = factor_.matrixL().solve(
+        out.topRows(n) = factor_.whiten(
             MatrixXd(table_.elastic_weights(of).asDiagonal() * table_.vibration(gyro_)));
         for (const SweptRates& swept : problem_.swept) {
             out.middleRows(n, swept.size()) = swept.elastic(of);
@@ -135,7 +136,7 @@ class Likelihood {
     const SpectralTable& table_;
     std::size_t gyro_;
     const GyroProblem& problem_;
-    Eigen::LLT<MatrixXd> factor_;
+    Cholesky factor_;
     MatrixXd base_;
     VectorXd rate_;
     MatrixXd base_normal_;
@@ -255,9 +256,9 @@ Eigen::Matrix2d axes(const Likelihood& likelihood, const Point& top) {
         inside ? std::clamp(-(corners[0] + corners[1] - corners[2] - corners[3]), -0.98, 0.98) : 0;
     Eigen::Matrix2d curvature;
     curvature << 1, mixed, mixed, 1;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(curvature);
-    Eigen::Matrix2d out = eigen.eigenvectors();
-    for (int k = 0; k < 2; ++k) out.col(k) /= std::sqrt(eigen.eigenvalues()[k]);
+    const auto eigen = linear_algebra::symmetric_eigen(curvature);
+    Eigen::Matrix2d out = eigen.vectors;
+    for (int k = 0; k < 2; ++k) out.col(k) /= std::sqrt(eigen.values[k]);
     return Eigen::Vector2d(of_hz, of_damping).asDiagonal() * out;
 }
 
@@ -352,7 +353,7 @@ void finish(const SpectralTable& table, std::size_t gyro, const GyroProblem& pro
     put_likelier_first(out);
     const Hypothesis& best = out.list.front();
     const VectorXd left = problem.rate - design(table, gyro, best.resonances) * best.x;
-    out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
+    out.chi_square = linear_algebra::squared_distance(problem.covariance, left);
     out.degrees = static_cast<int>(problem.rate.size() - best.x.size()) -
                   2 * static_cast<int>(best.resonances.size());
     if (problem.swept.empty()) return;
@@ -386,16 +387,16 @@ MatrixXd design(const SpectralTable& table, std::size_t gyro,
 MatrixXd gain(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem,
               const Hypothesis& of) {
     const MatrixXd x = design(table, gyro, of.resonances);
-    const Eigen::LLT<MatrixXd> factor(problem.covariance);
+    const MatrixXd of_x = Cholesky::or_nan(problem.covariance).solve(x);
     const VectorXd sigma =
         prior_of(problem.prior_sigma, of.resonances.size(), kElasticSizes.back());
-    MatrixXd information = x.transpose() * factor.solve(x);
+    MatrixXd information = x.transpose() * of_x;
     information.diagonal().array() += sigma.array().square().inverse();
     for (const SweptRates& swept : problem.swept) {
         const MatrixXd columns = swept_design(swept, of.resonances);
-        information += columns.transpose() * columns;
+        information += linear_algebra::gram(columns);
     }
-    return Eigen::LLT<MatrixXd>(information).solve(MatrixXd(factor.solve(x).transpose()));
+    return Cholesky::or_nan(information).solve(of_x.transpose());
 }
 
 Hypothesis without_resonance(const SpectralTable& table, std::size_t gyro,

@@ -1,9 +1,9 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/spectrum/resonance.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -13,6 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
+using linear_algebra::Cholesky;
 
 constexpr Index kLinearColumns = kBase + 2 * kElastic, kNonlinear = 4;
 
@@ -26,9 +27,9 @@ class TwoResonances {
     TwoResonances(const SpectralTable& table, std::size_t gyro, const GyroProblem& problem)
         : table_(table),
           gyro_(gyro),
-          factor_(problem.covariance),
+          factor_(Cholesky::or_nan(problem.covariance)),
           swept_(problem.swept),
-          rate_(factor_.matrixL().solve(problem.rate)),
+          rate_(factor_.whiten(problem.rate)),
           information_(kLinearColumns) {
         for (const SweptRates& swept : swept_) {
             rate_.conservativeResize(rate_.size() + swept.size());
@@ -46,9 +47,9 @@ class TwoResonances {
     };
     [[nodiscard]] At at(const Vector4d& p) const {
         At out{p, {}, whitened(p), 0};
-        MatrixXd normal = out.columns.transpose() * out.columns;
+        MatrixXd normal = linear_algebra::gram(out.columns);
         normal.diagonal() += information_;
-        out.x = Eigen::LLT<MatrixXd>(normal).solve(out.columns.transpose() * rate_);
+        out.x = Cholesky::or_nan(normal).solve(out.columns.transpose() * rate_);
         out.objective = (rate_ - out.columns * out.x).squaredNorm() +
                         out.x.cwiseAbs2().dot(information_) + off_prior(p).squaredNorm();
         return out;
@@ -64,7 +65,7 @@ class TwoResonances {
             j.col(kLinearColumns + i) =
                 (whitened(here.p + step) - whitened(here.p - step)) * here.x / (2 * kStep);
         }
-        MatrixXd all = j.transpose() * j;
+        MatrixXd all = linear_algebra::gram(j);
         all.diagonal().head(kLinearColumns) += information_;
         all.diagonal().tail(2).array() += std::pow(kDampingSpread, -2);
         VectorXd slope = j.transpose() * (rate_ - here.columns * here.x);
@@ -85,7 +86,7 @@ class TwoResonances {
         const auto resonances = resonances_at(p);
         MatrixXd out(rate_.size(), kLinearColumns);
         Index row = table_.dwells();
-        out.topRows(row) = factor_.matrixL().solve(design(table_, gyro_, resonances));
+        out.topRows(row) = factor_.whiten(design(table_, gyro_, resonances));
         for (const SweptRates& swept : swept_) {
             out.middleRows(row, swept.size()) = swept_design(swept, resonances);
             row += swept.size();
@@ -97,7 +98,7 @@ class TwoResonances {
     }
     const SpectralTable& table_;
     std::size_t gyro_;
-    Eigen::LLT<MatrixXd> factor_;
+    Cholesky factor_;
     const std::vector<SweptRates>& swept_;
     VectorXd rate_, information_;  ///< of the dwells, then of the sweeps; whitened
 };
@@ -109,7 +110,7 @@ TwoResonances::At descend(const TwoResonances& problem, const Vector4d& start) {
     for (int step = 0; step < 60 && damping < 1e8; ++step) {
         auto [normal, slope] = problem.normal(here);
         normal.diagonal().tail(kNonlinear) *= 1 + damping;
-        const VectorXd change = Eigen::LLT<MatrixXd>(normal).solve(slope);
+        const VectorXd change = Cholesky::or_nan(normal).solve(slope);
         const Vector4d p = here.p + change.tail<4>();
         std::optional<TwoResonances::At> next;
         if (change.tail<4>().cwiseAbs().maxCoeff() < 1 && TwoResonances::inside(p))
@@ -143,11 +144,9 @@ Mixture two_resonances(const SpectralTable& table, std::size_t gyro, const GyroP
     Mixture out;
     const MatrixXd normal = of.normal(*best).first;
     out.list.push_back(
-        {1, resonances_at(best->p), best->x,
-         Eigen::LLT<MatrixXd>(normal).solve(MatrixXd::Identity(normal.rows(), normal.cols())),
-         true});
+        {1, resonances_at(best->p), best->x, linear_algebra::positive_inverse(normal), true});
     const VectorXd left = problem.rate - design(table, gyro, out.list[0].resonances) * best->x;
-    out.chi_square = left.dot(Eigen::LLT<MatrixXd>(problem.covariance).solve(left));
+    out.chi_square = linear_algebra::squared_distance(problem.covariance, left);
     out.degrees = static_cast<int>(problem.rate.size() - kLinearColumns - kNonlinear);
     if (problem.swept.empty()) return out;
     // What sweeps determine takes nothing from the dwells' rates.

@@ -1,10 +1,10 @@
 #include "estimator/spectrum/sweep_blocks.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/spectrum/sampling.hpp"
 
 namespace vibrig::estimator::spectrum {
@@ -129,7 +129,8 @@ void SweepBlocks::take_moment(SweepBlock& block) {
     const double power = moment.trace() - 3 * noise;
     if (power > kShakes * 3 * noise) {
         const Eigen::MatrixXd of = weighted(columns);
-        const Eigen::MatrixXd left = moving - of * of.colPivHouseholderQr().solve(moving);
+        const Eigen::MatrixXd left =
+            moving - linear_algebra::product(of, linear_algebra::least_squares(of, moving));
         shares_.push_back(1 - std::max(0.0, left.squaredNorm() / sum - 3 * noise) / power);
     }
     // What it is told apart from is there; how large it is is not.

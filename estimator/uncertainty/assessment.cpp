@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/assessment.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -361,9 +360,8 @@ Assessment assess(const Settings& settings, const Result& result, Stage stage) {
         add_skew(table, model, inputs);
         out.inputs = std::move(inputs.list);
         const MatrixXd u = input_covariance(declared, out.inputs);
-        const Eigen::LLT<MatrixXd> root(MatrixXd(u + 1e-12 * MatrixXd(u.diagonal().asDiagonal())));
         MatrixXd scaled(inputs.rates.rows(), inputs.rates.cols() + freed.prior.cols());
-        scaled << inputs.rates * MatrixXd(root.matrixL()), freed.prior;
+        scaled << inputs.rates * linear_algebra::padded_root(u), freed.prior;
         declare(scaled, of.gyros);
         const NullFit fit(table, scaled, prior, freed.determined);
         const auto in_doubt = with_doubtful_levels(settings, table, model);

@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/balanced_order.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>

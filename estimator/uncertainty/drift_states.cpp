@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/drift_states.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 

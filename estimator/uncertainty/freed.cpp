@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/freed.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 

@@ -1,6 +1,5 @@
 #include "estimator/uncertainty/monte_carlo.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/filter/parameters.hpp"
 
 namespace vibrig::estimator::uncertainty {
@@ -20,22 +20,13 @@ using Eigen::VectorXd;
 constexpr int kFewestBlocks = 2, kForLinearity = 200;
 constexpr auto kTogether = static_cast<Index>(kParameters);
 
-/// L with L L' = c; a row of zeros where nothing is uncertain.
-MatrixXd root_of(const MatrixXd& c) {
-    const MatrixXd padded = c + 1e-12 * MatrixXd(c.diagonal().asDiagonal());
-    const Eigen::LDLT<MatrixXd> factor(padded);
-    const VectorXd d = factor.vectorD().cwiseMax(0.0).cwiseSqrt();
-    return factor.transpositionsP().transpose() *
-           MatrixXd(MatrixXd(factor.matrixL()) * d.asDiagonal());
-}
-
 /// Draws the inputs, in the units of their keys.
 class InputDraws {
   public:
     InputDraws(const Settings& settings, const Assessment& assessed)
         : list_(assessed.inputs),
           covariance_(input_covariance(settings.uncertainty, list_)),
-          root_(root_of(covariance_)) {
+          root_(linear_algebra::semidefinite_root(covariance_)) {
         MatrixXd off = covariance_;
         off.diagonal().setZero();
         correlated_ = off.cwiseAbs().rowwise().sum();
@@ -96,7 +87,7 @@ struct DrawModel {
 DrawModel model_of(const Settings& settings, const Assessment& assessed) {
     DrawModel m;
     m.sensitivity = assessed.sensitivity;
-    m.type_a = root_of(assessed.covariance_type_a);
+    m.type_a = linear_algebra::semidefinite_root(assessed.covariance_type_a);
     m.value = VectorXd::Zero(kTogether);
     for (Index g = 0; g < static_cast<Index>(kGroups); ++g) {
         for (Index j = 0; j < 3; ++j)

@@ -25,11 +25,8 @@ RatesCovariance::RatesCovariance(const VectorXd& noise, const VectorXd& elapsed,
 void RatesCovariance::add(const MatrixXd& columns, const MatrixXd& inverse_core) {
     if (columns.cols() == 0) return;
     columns_ = whitened(columns);
-    core_.compute(inverse_core + columns_.transpose() * columns_);
-    const auto log_of = [](const Eigen::PartialPivLU<MatrixXd>& factor) {
-        return factor.matrixLU().diagonal().array().abs().log().sum();
-    };
-    log_determinant_ += log_of(core_) - log_of(Eigen::PartialPivLU<MatrixXd>(inverse_core));
+    core_.emplace(inverse_core + linear_algebra::gram(columns_));
+    log_determinant_ += core_->log_det() - linear_algebra::LowerUpper(inverse_core).log_det();
 }
 
 MatrixXd RatesCovariance::whitened(const MatrixXd& x) const {
@@ -59,7 +56,7 @@ MatrixXd RatesCovariance::whitened_back(MatrixXd x) const {
 
 MatrixXd RatesCovariance::solve(const MatrixXd& x) const {
     MatrixXd white = whitened(x);
-    if (columns_.cols() > 0) white -= columns_ * core_.solve(columns_.transpose() * white);
+    if (columns_.cols() > 0) white -= columns_ * core_->solve(columns_.transpose() * white);
     return whitened_back(std::move(white));
 }
 
@@ -98,7 +95,7 @@ MatrixXd RatesCovariance::square(const MatrixXd& x) const {
     MatrixXd out = white.transpose() * white;
     if (columns_.cols() > 0) {
         const MatrixXd seen = columns_.transpose() * white;
-        out -= seen.transpose() * core_.solve(seen);
+        out -= seen.transpose() * core_->solve(seen);
     }
     return out;
 }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
+#include <optional>
+
+#include "estimator/filter/linear_algebra.hpp"
 
 namespace vibrig::estimator::uncertainty {
 
@@ -28,7 +30,7 @@ class RatesCovariance {
 
     Eigen::VectorXd gain_, deviation_;  ///< of the filter and its innovations
     Eigen::MatrixXd columns_;           ///< U, whitened; none: no columns
-    Eigen::PartialPivLU<Eigen::MatrixXd> core_;
+    std::optional<linear_algebra::LowerUpper> core_;
     double log_determinant_ = 0;
 };
 

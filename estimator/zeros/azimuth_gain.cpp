@@ -1,10 +1,10 @@
 #include "estimator/zeros/azimuth_gain.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/filter/linear_algebra.hpp"
 #include "estimator/zeros/units.hpp"
 
 namespace vibrig::estimator::zeros {
@@ -27,11 +27,11 @@ void AzimuthGain::add(const Point& point) {
     const Eigen::Vector4d h(read_, 1, point.time_s, point.rate);
     normal_ += h * h.transpose() / (kPoint * kPoint);
     right_ += h * ((point.turned - read_) / (kPoint * kPoint));
-    value_ = normal_.ldlt().solve(right_)[0];
+    value_ = linear_algebra::PivotedCholesky(normal_).solve(right_)(0);
 }
 
 void AzimuthGain::loosen(double turn) {
-    const Eigen::Vector4d mean = normal_.ldlt().solve(right_);
+    const Eigen::Vector4d mean = linear_algebra::PivotedCholesky(normal_).solve(right_);
     Eigen::Matrix4d covariance = normal_.inverse();
     covariance(1, 1) += turn * turn;
     normal_ = covariance.inverse();
