@@ -32,7 +32,7 @@ void add(Reproduction& table, const std::string& item, const std::string& publis
     table.rows.push_back({item, published, computed, theory == computed, {}, theory});
 }
 
-constexpr std::size_t kFaces = 6, kEdges = 12, kCorners = 8, kAll = 26;
+constexpr std::size_t kFaces = 6, kEdges = 12, kAll = 26;
 
 /// The 26 directions times a factor; faces, edges, corners in this order.
 std::vector<planning::Point> sphere(double radius) {

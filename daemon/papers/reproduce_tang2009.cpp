@@ -9,6 +9,7 @@
 #include "daemon/papers/reproduce_tang2009_theory.hpp"
 #include "daemon/papers/reproduce_text.hpp"
 #include "estimator/allan/edf.hpp"
+#include "estimator/filter/parameters.hpp"
 
 namespace vibrig::tool {
 

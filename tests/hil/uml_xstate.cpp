@@ -39,6 +39,7 @@ long set_extended_state(long pid, const iovec& given) {
 
 }  // namespace
 
+#pragma GCC diagnostic ignored "-Wvarargs"  // the C library's own signature
 extern "C" long ptrace(__ptrace_request request, ...) noexcept {
     va_list arguments;
     va_start(arguments, request);
