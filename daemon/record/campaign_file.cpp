@@ -14,7 +14,6 @@
 
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/hdf5.hpp"
-#include "daemon/record/replay.hpp"
 
 namespace vibrig::record {
 

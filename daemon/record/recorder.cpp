@@ -8,12 +8,12 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "daemon/dwells/anew.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/disk.hpp"
+#include "daemon/record/dwells_csv.hpp"
 
 namespace vibrig::record {
 
@@ -377,7 +377,7 @@ void Recorder::take(Head& head) {
     looked_around_at_ = 0;
     // What stands there is to be read by others while it is written.
     if (open_file()) commit(true);
-    if (settings_.raw && going_on > 0) append_dwells(fmt::format("{}{}\n", kRestartLine, going_on));
+    if (settings_.raw && going_on > 0) append_dwells(restart_line(going_on));
     if (settings_.raw)
         raw_ = std::make_unique<RawLog>(
             campaign_folder_, head_->interface, settings_, head_->utc_offset_ns,
@@ -387,29 +387,6 @@ void Recorder::take(Head& head) {
             },
             [this] { alive(); });
     committed_wall_ns_ = wall_ns();
-}
-
-/// Beside the raw log, in its times: which frames belong to which dwell.
-void Recorder::write_order_line(const Order& order) {
-    const auto us = [&](Time time) {
-        return (time + head_->utc_offset_ns) / drivers::kMicrosecond;
-    };
-    const auto seconds = [](std::int64_t t) {
-        return fmt::format("{}.{:06d}", t / 1'000'000, t % 1'000'000);
-    };
-    append_dwells(fmt::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-        order.run, order.position, order.table_g, order.cancel ? "" : seconds(us(order.from)),
-        order.cancel ? "" : seconds(us(order.to)), order.cancel ? seconds(us(order.announced)) : "",
-        head_->utc_offset_ns / drivers::kMicrosecond, order.zero_g[0], order.zero_g[1],
-        order.zero_g[2], order.level_sigma_g, order.noise.angle_arcsec,
-        order.noise.gyro_random_walk_deg_per_rt_h[0], order.noise.gyro_random_walk_deg_per_rt_h[1],
-        order.noise.gyro_random_walk_deg_per_rt_h[2],
-        std::isfinite(order.begin_s) ? fmt::format("{}", order.begin_s) : "",
-        order.power_lost ? 1 : 0, order.frequency_hz, order.held_out ? 1 : 0, order.random.profile,
-        order.random.level_db, order.random.mean_square_g2, order.random.bandwidth_hz,
-        order.random.gain_error, order.random.highest_hz, order.sweep.from_hz, order.sweep.to_hz,
-        order.sweep.seconds));
 }
 
 void Recorder::append_dwells(const std::string& line) {
@@ -424,7 +401,7 @@ void Recorder::append_dwells(const std::string& line) {
 void Recorder::take(const Order& order) {
     if (!head_) return;
     kept_.push_back(order);
-    if (raw_) write_order_line(order);
+    if (raw_) append_dwells(order_line(order, head_->utc_offset_ns));
 }
 
 void Recorder::take(const Dwell& dwell) {
@@ -438,37 +415,13 @@ void Recorder::take(const Swept& swept) {
     if (!head_) return;
     kept_.push_back(swept);
     if (!raw_ || swept.rows.empty()) return;
-    nlohmann::json readings = nlohmann::json::array();
-    for (const SweptRow& row : swept.rows)
-        readings.push_back({(row.time + head_->utc_offset_ns) / drivers::kMicrosecond,
-                            row.time % drivers::kMicrosecond, row.frequency_hz});
-    append_dwells(kSweptLine +
-                  nlohmann::json{swept.rows[0].run, swept.rows[0].position, readings}.dump() +
-                  "\n");
+    append_dwells(swept_line(swept, head_->utc_offset_ns));
 }
-
-namespace {
-
-/// JSON has no others: what a controller lies is in the HDF5 file.
-std::vector<std::array<double, 2>> finite_only(const std::vector<std::array<double, 2>>& lines) {
-    const bool finite = std::ranges::all_of(
-        lines, [](const auto& line) { return std::isfinite(line[0]) && std::isfinite(line[1]); });
-    return finite ? lines : std::vector<std::array<double, 2>>{};
-}
-
-}  // namespace
 
 void Recorder::take(const Played& played) {
     if (!head_) return;
     kept_.push_back(played);
-    if (!raw_) return;
-    const auto& [word, random, seen, place] = played.random;
-    append_dwells(kPlayedLine +
-                  nlohmann::json{played.run, played.position, static_cast<int>(word),
-                                 random.mean_square_g2, random.bandwidth_hz, random.gain_error,
-                                 random.highest_hz, seen.share, seen.error, finite_only(played.psd)}
-                      .dump() +
-                  "\n");
+    if (raw_) append_dwells(played_line(played));
 }
 
 void Recorder::take(const EventRecord& event) { kept_.push_back(event); }
@@ -560,7 +513,7 @@ void Recorder::take(const Ended& ended) {
     commit(true);
     if (raw_) raw_->close();
     const auto found = dwells::noise_found_in(ended.result_json);
-    if (settings_.raw && found) append_dwells(kAnewLine + dwells::noise_in_json(*found) + "\n");
+    if (settings_.raw && found) append_dwells(anew_line(*found));
     if (writer_) {
         try {
             Ended signed_end = ended;

@@ -121,7 +121,6 @@ class Recorder {
     [[nodiscard]] bool open_file();
     void refuse(const std::string& why);
     void write_gap(const Gap& gap);
-    void write_order_line(const Order& order);
     void append_dwells(const std::string& line);
     void write_kept();
     void keep_few();

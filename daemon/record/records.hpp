@@ -75,28 +75,6 @@ struct Played {
     std::vector<std::array<double, 2>> psd;
 };
 
-/// dwells.csv beside the raw log: orders in the log's times. Older ones end before profile,
-/// frequency_hz, power_lost or begin_s.
-inline constexpr const char* kDwellsHeader =
-    "run,position,table_g,from_s,to_s,cancelled_s,utc_offset_us,zero_x_g,zero_y_g,zero_z_g,"
-    "level_sigma_g,noise_angle_arcsec,noise_walk_x,noise_walk_y,noise_walk_z,begin_s,"
-    "power_lost,frequency_hz,held_out,profile,level_db,random_mean_square_g2,random_bandwidth_hz,"
-    "random_gain_error,random_highest_hz,sweep_from_hz,sweep_to_hz,sweep_s";
-/// In it, with a number: the daemon was started again and went on after so many dwells.
-inline constexpr const char* kRestartLine = "# restart after dwells: ";
-
-/// In it, with JSON [run, position, [[s since the dwell began, Hz], ..]]: what the controller said
-/// of a sweep's frequency.
-inline constexpr const char* kSweptLine = "# swept: ";
-
-/// In it, behind the order of a random dwell, with JSON [run, position, word, mean_square_g2,
-/// bandwidth_hz, gain_error, highest_hz, share seen, its error, [[Hz, g^2/Hz], ..]]: what the
-/// controller says that it played.
-inline constexpr const char* kPlayedLine = "# played: ";
-
-/// In it, at the end, with JSON: the result is not the live one, but identified anew.
-inline constexpr const char* kAnewLine = "# result: ";
-
 /// What the controller says of its frequency in a sweep.
 struct SweptRow {
     drivers::Time time = 0;

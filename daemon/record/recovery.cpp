@@ -6,9 +6,9 @@
 
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
+#include "daemon/record/candump_campaign.hpp"
 #include "daemon/record/disk.hpp"
 #include "daemon/record/hdf5.hpp"
-#include "daemon/record/replay.hpp"
 
 namespace vibrig::record {
 

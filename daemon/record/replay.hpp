@@ -64,16 +64,4 @@ void feed(estimator::Identification& identification, const Campaign& campaign,
 [[nodiscard]] ReplayResult replay(const Campaign& campaign, const estimator::Settings& settings,
                                   const ReplayOptions& options);
 
-/// Samples that the frames of the campaign's raw log make, with the campaign's own signals.
-/// `until`: time of the newest whole frame. Throws std::runtime_error.
-[[nodiscard]] std::vector<drivers::Sample> samples_from_raw(const Campaign& campaign,
-                                                            drivers::Time& until);
-
-/// A campaign from candump logs alone. Dwells come from `dwells` (CSV, as the recorder writes it
-/// beside its logs), signals from the configuration. Throws std::runtime_error.
-[[nodiscard]] Campaign campaign_from_candump(const std::vector<std::string>& logs,
-                                             const std::string& dwells,
-                                             const std::string& configuration,
-                                             const std::string& dbc);
-
 }  // namespace vibrig::record

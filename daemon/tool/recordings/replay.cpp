@@ -13,6 +13,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/record/campaign_file.hpp"
+#include "daemon/record/candump_campaign.hpp"
 #include "daemon/record/replay.hpp"
 #include "daemon/report/result_charts.hpp"
 #include "daemon/results/exit_status.hpp"
