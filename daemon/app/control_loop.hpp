@@ -13,6 +13,7 @@
 #include "daemon/app/outside.hpp"
 #include "daemon/app/parts.hpp"
 #include "daemon/app/supervisor.hpp"
+#include "daemon/commission/book.hpp"
 #include "daemon/commission/procedure.hpp"
 #include "daemon/commission/progress.hpp"
 #include "daemon/commission/shaker_parts.hpp"

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/commission/book.hpp"
 #include "daemon/commission/finding.hpp"
 
 namespace vibrig::commission {

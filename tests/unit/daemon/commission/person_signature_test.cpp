@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon/commission/record.hpp"
+#include "daemon/commission/book.hpp"
 #include "daemon/journal/signing_key.hpp"
 #include "daemon/serve/pki.hpp"
 

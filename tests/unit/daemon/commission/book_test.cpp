@@ -1,4 +1,4 @@
-#include "daemon/commission/record.hpp"
+#include "daemon/commission/book.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
