@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/results/assessment_json.hpp"
+#include "daemon/results/spectrum_json.hpp"
 #include "estimator/filter/instruction_set.hpp"
 #include "estimator/uncertainty/with_type.hpp"
 

@@ -3,14 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <numbers>
+#include <limits>
 #include <stdexcept>
 
-#include "daemon/results/assessment_json.hpp"
-#include "daemon/results/text_line.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/spectrum/prediction.hpp"
 
@@ -19,168 +14,10 @@ namespace vibrig::tool {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using estimator::kParameters;
 using namespace estimator::spectrum;
 namespace uncertainty = estimator::uncertainty;
-using Json = nlohmann::ordered_json;
-
-constexpr std::array<const char*, 3> kGyros{"x", "y", "z"};
-// Rates that tell nothing weigh about 0; one to seven says no.
-constexpr double kExcluded = -2;
-
-Json numbers_of(const VectorXd& values) {
-    Json list = Json::array();
-    for (const double value : values) list.push_back(number_or_null(value));
-    return list;
-}
-
-Json rows_of(const MatrixXd& matrix) {
-    Json rows = Json::array();
-    for (Index i = 0; i < matrix.rows(); ++i) rows.push_back(numbers_of(matrix.row(i)));
-    return rows;
-}
-
-std::string axis_text(const estimator::SignedAxis& axis) {
-    return std::string(axis.sign < 0 ? "-" : "+") + "xyz"[axis.axis];
-}
-
-/// What of a rig's frames the drift depends on.
-Json frame_json(const estimator::Settings& settings) {
-    Json gyros = Json::array();
-    for (const auto& gyro : settings.gyro_axes) {
-        Json axes = Json::array();
-        for (const auto& axis : gyro) axes.push_back(axis_text(axis));
-        gyros.push_back(std::move(axes));
-    }
-    return {{"up", axis_text(settings.up)},
-            {"gyro_axes", std::move(gyros)},
-            {"elevation_deg", settings.elevation_deg}};
-}
-
-Json groups_json(const SpectrumResult& of) {
-    Json list = Json::array();
-    for (std::size_t k = 0; k < of.table.kinds().size(); ++k) {
-        const Index begin = kBase - kElastic + kElastic * static_cast<Index>(k);
-        Json value = Json::array(), sigma = Json::array();
-        for (Index j = 0; j < 3; ++j) {
-            for (Index q = 0; q < kElastic; ++q) {
-                value.push_back(number_or_null(of.analysis.groups.value(begin + q, j)));
-                sigma.push_back(number_or_null(of.analysis.groups.sigma(begin + q, j)));
-            }
-        }
-        const std::string& profile = of.table.kinds()[k].profile;
-        list.push_back({{"hz", of.table.kinds()[k].hz()},
-                        {"profile", profile.empty() ? Json(nullptr) : Json(profile)},
-                        {"dwells", of.table.dwells_of(k)},
-                        {"coefficients", std::move(value)},
-                        {"sigma", std::move(sigma)}});
-    }
-    return list;
-}
-
-Json sweeps_json(const std::vector<Sweep>& sweeps) {
-    Json list = Json::array();
-    for (const Sweep& sweep : sweeps)
-        list.push_back({{"run", sweep.run},
-                        {"position", sweep.position},
-                        {"from_hz", sweep.blocks.front().from_hz},
-                        {"to_hz", sweep.blocks.back().to_hz},
-                        {"seconds", sweep.blocks.size()},
-                        {"used", sweep.known()}});
-    return list;
-}
-
-Json flat_json(const Flatness& flat) {
-    Json seen = Json::object();
-    for (const auto& [hz, share] : flat.smallest_seen)
-        seen[std::to_string(static_cast<int>(hz))] = number_or_null(share);
-    return {{"chi_square", number_or_null(flat.chi_square)},
-            {"dof", flat.degrees},
-            {"p", number_or_null(flat.p)},
-            {"alarm", flat.alarm},
-            {"smallest_share_seen", std::move(seen)}};
-}
-
-Json told_json(const Told& told) {
-    return {{"hz", told.hz.mean},
-            {"hz_interval", {told.hz.low, told.hz.high}},
-            {"damping", told.damping.mean},
-            {"damping_interval", {told.damping.low, told.damping.high}},
-            {"elastic", numbers_of(told.elastic)},
-            {"sigma", numbers_of(told.sigma)}};
-}
-
-/// One resonance as itself, two as a list, none as null.
-template <class List, class Each>
-Json one_or_list(const List& list, const Each& each) {
-    if (list.empty()) return nullptr;
-    if (list.size() == 1) return each(list.front());
-    Json out = Json::array();
-    for (const auto& one : list) out.push_back(each(one));
-    return out;
-}
-
-Json mixture_json(const std::vector<Hypothesis>& mixture) {
-    Json list = Json::array();
-    for (const Hypothesis& one : mixture)
-        list.push_back(
-            {{"w", one.weight},
-             {"hz", one_or_list(one.resonances, [](auto& r) { return Json(r.hz); })},
-             {"damping", one_or_list(one.resonances, [](auto& r) { return Json(r.damping); })},
-             {"x", numbers_of(one.x)},
-             {"p", rows_of(one.covariance)}});
-    return list;
-}
-
-Json effects_json(const std::vector<Effect>& effects) {
-    Json list = Json::array();
-    for (const Effect& effect : effects) {
-        Json change = Json::array();
-        for (const VectorXd& gyro : effect.change) change.push_back(numbers_of(gyro));
-        list.push_back({{"input", effect.input},
-                        {"element", effect.element.empty() ? Json(nullptr) : Json(effect.element)},
-                        {"change", std::move(change)}});
-    }
-    return list;
-}
-
-/// Rates of the dwells held out, those foretold for what happened in them, deg/h, and what is
-/// between the two in standard uncertainties of both.
-Json held_out_json(const SpectrumResult& of) {
-    Json list = Json::array();
-    if (of.held_out.empty()) return list;
-    std::vector<Situation> situations;
-    std::vector<Eigen::Matrix3d> variances;
-    std::vector<double> errors;
-    MatrixXd rates(static_cast<Index>(of.held_out.size()), 3);
-    for (const auto& [row, kind] : of.held_out) {
-        rates.row(static_cast<Index>(situations.size())) = row.rate;
-        situations.push_back(
-            {row.angles, level_moment(row.vibration),
-             estimator::spectrum::bands_of(of.analysis.model.frame, row, kind.bands),
-             row.duration_s, true});
-        variances.push_back(row.variance);
-        errors.push_back(row.relative_error);
-    }
-    const Prediction foretold = predict(of.analysis.model, situations);
-    const Verification verified = verify(foretold, rates, variances, errors);
-    for (Index k = 0; k < rates.rows(); ++k) {
-        const auto& [row, kind] = of.held_out[static_cast<std::size_t>(k)];
-        VectorXd u(3);
-        for (Index j = 0; j < 3; ++j) u[j] = foretold.u(k, j);
-        list.push_back({{"run", row.run},
-                        {"position", row.position},
-                        {"hz", kind.hz()},
-                        {"profile", kind.profile.empty() ? Json(nullptr) : Json(kind.profile)},
-                        {"rate", numbers_of(row.rate)},
-                        {"predicted", numbers_of(foretold.drift.row(k))},
-                        {"u", numbers_of(u)},
-                        {"z", numbers_of(verified.z.row(k))}});
-    }
-    return list;
-}
 
 /// The rates of all dwells, with what is left of them.
 std::vector<uncertainty::DwellRate> rates_of(const SpectrumResult& of) {
@@ -252,68 +89,17 @@ void doubt(uncertainty::Verdict& verdict, const std::string& text) {
     verdict.sentence = "doubtful, because " + text;
 }
 
-const nlohmann::json& member(const nlohmann::json& in, const char* key, const std::string& place) {
-    const auto found = in.find(key);
-    if (found == in.end())
-        throw std::runtime_error(place + key +
-                                 ": found nothing, expected the result of vibrig identify --json");
-    return *found;
-}
-
-estimator::SignedAxis read_axis(const std::string& text) {
-    const auto at = text.size() == 2 ? std::string("xyz").find(text[1]) : std::string::npos;
-    if (at == std::string::npos)
-        throw std::runtime_error("found '" + text + "', expected an axis such as +y");
-    return {static_cast<int>(at), text[0] == '-' ? -1 : 1};
-}
-
-VectorXd read_vector(const nlohmann::json& list) {
-    const auto values = list.get<std::vector<double>>();
-    return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
-}
-
-MatrixXd read_rows(const nlohmann::json& list) {
-    MatrixXd out(static_cast<Index>(list.size()), static_cast<Index>(list.at(0).size()));
-    for (std::size_t i = 0; i < list.size(); ++i)
-        out.row(static_cast<Index>(i)) = read_vector(list[i]);
-    return out;
-}
-
-Hypothesis read_hypothesis(const nlohmann::json& from) {
-    Hypothesis one;
-    one.weight = from.at("w").get<double>();
-    if (!(one.weight > 0 && one.weight <= 1))
-        throw std::runtime_error("w: found " + from.at("w").dump() + ", expected a weight to 1");
-    const auto& hz = from.at("hz");
-    const auto& damping = from.at("damping");
-    if (hz.is_array()) {
-        for (std::size_t r = 0; r < hz.size(); ++r)
-            one.resonances.push_back({hz[r].get<double>(), damping.at(r).get<double>()});
-    } else if (hz.is_number()) {
-        one.resonances = {{hz.get<double>(), damping.get<double>()}};
+/// With what a row shook; nothing: it is not known. No bands: at rest.
+std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator::DwellRow& row,
+                            const NumberedKinds& profiles) {
+    if (row.random) {
+        const auto profile =
+            std::ranges::find(profiles, row.profile, &NumberedKinds::value_type::first);
+        return profile == profiles.end() ? std::nullopt : std::optional(profile->second);
     }
-    one.x = read_vector(from.at("x"));
-    one.covariance = read_rows(from.at("p"));
-    const Index columns = kBase + kElastic * static_cast<Index>(one.resonances.size());
-    if (one.x.size() != columns || one.covariance.rows() != one.covariance.cols())
-        throw std::runtime_error("found x of " + std::to_string(one.x.size()) + " and p of " +
-                                 std::to_string(one.covariance.rows()) + " x " +
-                                 std::to_string(one.covariance.cols()) + ", expected " +
-                                 std::to_string(columns) + " coefficients and a square");
-    if (!one.x.allFinite() || !one.covariance.allFinite())
-        throw std::runtime_error("x, p: found what is no number, expected numbers");
-    one.linearised = one.covariance.rows() > one.x.size();
-    return one;
-}
-
-void read_frame(const nlohmann::json& frame, estimator::Settings& settings) {
-    settings.up = read_axis(frame.at("up").get<std::string>());
-    for (std::size_t j = 0; j < 3; ++j) {
-        for (std::size_t k = 0; k < 3; ++k)
-            settings.gyro_axes[j][k] =
-                read_axis(frame.at("gyro_axes").at(j).at(k).get<std::string>());
-    }
-    settings.elevation_deg = frame.at("elevation_deg").get<double>();
+    if (!(row.vibration.kappa > 1)) return Kind{};
+    const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
+    return Kind{"", {{hz, 1, 0}}};
 }
 
 }  // namespace
@@ -332,23 +118,6 @@ SpectrumResult spectrum_of(const estimator::Settings& settings, std::vector<Spec
     const double hz = table.kinds().empty() ? 0 : table.kinds().front().hz();
     return {std::move(analysis), std::move(table), hz, {}, std::move(sweeps)};
 }
-
-namespace {
-
-/// With what a row shook; nothing: it is not known. No bands: at rest.
-std::optional<Kind> kind_of(const estimator::Settings& settings, const estimator::DwellRow& row,
-                            const NumberedKinds& profiles) {
-    if (row.random) {
-        const auto profile =
-            std::ranges::find(profiles, row.profile, &NumberedKinds::value_type::first);
-        return profile == profiles.end() ? std::nullopt : std::optional(profile->second);
-    }
-    if (!(row.vibration.kappa > 1)) return Kind{};
-    const double hz = row.commanded_hz > 0 ? row.commanded_hz : settings.frequency_hz;
-    return Kind{"", {{hz, 1, 0}}};
-}
-
-}  // namespace
 
 std::optional<SpectrumResult> spectrum_of(const estimator::Settings& settings,
                                           const std::vector<estimator::DwellRow>& rows, Form form,
@@ -394,189 +163,6 @@ void adopt(const SpectrumResult& spectrum, const estimator::Settings&,
         doubt(assessed.verdict, "quadratic coefficients depend on the frequency (p = " +
                                     std::to_string(of.flat.p) + " that they do not)");
     if (!of.model.refusal.empty()) doubt(assessed.verdict, of.model.refusal);
-}
-
-void add_spectrum(const SpectrumResult& of, Json& root) {
-    const Analysis& a = of.analysis;
-    for (std::size_t i = 0; i < kParameters; ++i) {
-        const std::size_t group = estimator::internal_of(i) / estimator::kGyros;
-        const bool still = a.gyros[estimator::internal_of(i) % estimator::kGyros].resonant();
-        // Bias and linear terms know no frequency.
-        root["parameters"][i]["at_hz"] =
-            group < estimator::kDii || still ? Json(0.0) : number_or_null(of.reference_hz);
-    }
-    if (of.several()) {
-        for (std::size_t k = 0; k < of.table.list().size(); ++k) {
-            const SpectralDwell& dwell = of.table.list()[k];
-            Json lines = Json::array();
-            const double moment = dwell.row.vibration.kappa - 1;
-            const Kind* kind = dwell.kind ? &of.table.kinds()[*dwell.kind] : nullptr;
-            if (kind != nullptr && !kind->profile.empty()) {
-                root["dwell_rates"][k]["profile"] = kind->profile;
-            } else {
-                if (kind != nullptr) {
-                    for (const Band& band : dwell.bands.empty() ? kind->bands : dwell.bands)
-                        lines.push_back({band.hz, std::sqrt(2 * moment * band.share)});
-                }
-                root["dwell_rates"][k]["lines"] = std::move(lines);
-            }
-            root["dwell_rates"][k]["r_relative_error"] = dwell.relative_error;
-        }
-    }
-    Json odds = Json::array(), resonance = Json::array(), mixture = Json::array();
-    Json lack = Json::array();
-    for (std::size_t j = 0; j < 3; ++j) {
-        const Mixture& gyro = a.gyros[j];
-        odds.push_back(of.several() ? number_or_null(gyro.log_odds) : Json(nullptr));
-        resonance.push_back(one_or_list(tell(gyro), told_json));
-        mixture.push_back(mixture_json(gyro.list));
-        lack.push_back(of.several() ? number_or_null(a.lack_of_fit[j]) : Json(nullptr));
-    }
-    root["spectrum"] = {
-        {"model", name_of(a.form)},
-        {"frequencies", groups_json(of)},
-        {"sweeps", sweeps_json(of.sweeps)},
-        {"flat", of.table.kinds().size() > 1 ? flat_json(a.flat) : Json(nullptr)},
-        {"log_odds", std::move(odds)},
-        {"resonance", std::move(resonance)},
-        {"mixture", std::move(mixture)},
-        {"lack_of_fit", std::move(lack)},
-        {"lowest_hz", a.model.lowest_hz},
-        {"highest_hz", a.model.highest_hz},
-        {"held_out", held_out_json(of)},
-        {"refusal", a.model.refusal.empty() ? Json(nullptr) : Json(a.model.refusal)},
-        {"not_told", not_told()},
-        {"effects", effects_json(a.model.effects)},
-        {"platform", frame_json(a.model.frame)}};
-}
-
-std::span<const char* const> not_told() {
-    static constexpr std::array kStatements{
-        "motion of the platform in step with the vibration is drift (coning), and in random "
-        "vibration it is not seen by slow samples",
-        "elliptic motion, vibration in quadrature between two axes, is not excited by a shaker "
-        "along one line",
-        "angular vibration is not in a linear test",
-        "resonances above the highest frequency are not found",
-        "terms beyond the second order weigh otherwise in random vibration than in a sine; two "
-        "levels at one frequency are the only guard, and of a resonance that depends on the level "
-        "too",
-        "the shape of a random vibration at the platform is its profile's: slow samples have it "
-        "aliased",
-        "profiles that are not stationary, shock and temperature are not in the model",
-        "coefficients at one frequency are not flat because nothing contradicts",
-        "a resonance of the fixture between accelerometers and gyros is taken for the gyro's"};
-    return kStatements;
-}
-
-std::string spectrum_text(const SpectrumResult& of) {
-    if (!of.several()) return "";
-    const Analysis& a = of.analysis;
-    std::string text = "\nOver frequency: ";
-    for (std::size_t k = 0; k < of.table.kinds().size(); ++k) {
-        const Kind& kind = of.table.kinds()[k];
-        text += (k > 0 ? ", " : "") + std::to_string(of.table.dwells_of(k)) + " dwells " +
-                (kind.profile.empty() ? "at " + line("%.4g Hz", kind.hz()).substr(0, 20)
-                                      : "under " + kind.profile);
-    }
-    std::erase(text, '\n');
-    text = "\n" + text + "\n";
-    for (const Sweep& sweep : of.sweeps)
-        text += line("run %d position %d: sweep from %.4g to %.4g Hz, %zu of %zu seconds used",
-                     sweep.run, sweep.position, sweep.blocks.front().from_hz,
-                     sweep.blocks.back().to_hz, sweep.known(), sweep.blocks.size());
-    if (of.table.kinds().size() > 1)
-        text +=
-            line("flat: chi-square %.1f of %d, p = %.2g%s", a.flat.chi_square, a.flat.degrees,
-                 a.flat.p, a.flat.alarm ? ": quadratic coefficients depend on the frequency" : "");
-    for (std::size_t j = 0; j < 3; ++j) {
-        if (a.form == Form::groups ||
-            (a.form == Form::flat && a.gyros[j].list.size() == 1 && a.gyros[j].log_odds == 0))
-            continue;
-        const Mixture& gyro = a.gyros[j];
-        if (!gyro.resonant()) {
-            text += gyro.log_odds < kExcluded
-                        ? line("gyro %s: no elastic part (log odds %.1f)", kGyros[j], gyro.log_odds)
-                        : line(
-                              "gyro %s: an elastic part is neither shown nor excluded (log odds "
-                              "%.1f)",
-                              kGyros[j], gyro.log_odds);
-            continue;
-        }
-        for (const Told& told : tell(gyro))
-            text += line(
-                "gyro %s: elastic part%s, resonance at %.2f (%.2f, %.2f) Hz, damping "
-                "%.4f (%.4f, %.4f)",
-                kGyros[j], gyro.named() ? "" : " (not named)", told.hz.mean, told.hz.low,
-                told.hz.high, told.damping.mean, told.damping.low, told.damping.high);
-    }
-    if (!a.model.refusal.empty()) text += "no prediction: " + a.model.refusal + "\n";
-    text += of.table.kinds().size() > 1
-                ? line(
-                      "An elastic part of 20 %% would have been seen up to %.4g Hz; beyond it "
-                      "nothing is known.",
-                      a.flat.highest_hz)
-                : std::string(
-                      "Whether they are flat was not tested: dwells at one frequency, and "
-                      "what the sweeps tell of a resonance.\n");
-    text += "Not told either:";
-    for (const char* one : not_told()) text += std::string("\n  ") + one;
-    return text + "\n";
-}
-
-Model read_model(const nlohmann::json& root, const std::string& path) {
-    if (!root.is_object())
-        throw std::runtime_error(path + ": expected the JSON of vibrig identify --json");
-    const nlohmann::json& spectrum = member(root, "spectrum", path + ": ");
-    const std::string place = path + ": spectrum.";
-    Model model;
-    const auto& mixture = member(spectrum, "mixture", place);
-    const auto& effects = member(spectrum, "effects", place);
-    try {
-        read_frame(member(spectrum, "platform", place), model.frame);
-        for (std::size_t j = 0; j < 3; ++j) {
-            for (const auto& one : mixture.at(j)) {
-                try {
-                    model.mixture[j].push_back(read_hypothesis(one));
-                } catch (const std::runtime_error& error) {
-                    throw std::runtime_error(place + "mixture[" + std::to_string(j) + "][" +
-                                             std::to_string(model.mixture[j].size()) +
-                                             "]: " + error.what());
-                }
-            }
-            if (model.mixture[j].empty())
-                throw std::runtime_error(place + "mixture[" + std::to_string(j) +
-                                         "]: found it empty, expected hypotheses");
-        }
-        for (const auto& one : effects) {
-            Effect effect{one.at("input").get<std::string>(), "", {}};
-            for (std::size_t j = 0; j < 3; ++j) {
-                effect.change[j] = read_vector(one.at("change").at(j));
-                const auto& heaviest = model.mixture[j].front();
-                if (effect.change[j].size() != heaviest.x.size())
-                    throw std::runtime_error(
-                        place + "effects: found " + std::to_string(effect.change[j].size()) +
-                        " numbers, expected " + std::to_string(heaviest.x.size()));
-            }
-            model.effects.push_back(std::move(effect));
-        }
-        model.lowest_hz = member(spectrum, "lowest_hz", place).get<double>();
-        model.highest_hz = member(spectrum, "highest_hz", place).get<double>();
-        const auto& refusal = member(spectrum, "refusal", place);
-        if (refusal.is_string()) model.refusal = refusal.get<std::string>();
-    } catch (const nlohmann::json::exception& error) {
-        throw std::runtime_error(place + "mixture: " + error.what() +
-                                 ", expected the result of vibrig identify --json");
-    }
-    return model;
-}
-
-nlohmann::json read_result(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
-    return root;
 }
 
 }  // namespace vibrig::tool

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,21 +58,5 @@ using PlayedBands = std::vector<std::vector<estimator::spectrum::Band>>;
 /// those of all dwells, and its verdict hears of what does not fit. With one nothing changes.
 void adopt(const SpectrumResult& spectrum, const estimator::Settings& settings,
            estimator::uncertainty::Assessment& assessed);
-
-/// Root `spectrum`, `at_hz` of the parameters and `lines` of the dwells' rates. Of the dwells that
-/// were held out it has what was measured beside what the others foretell.
-void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
-/// For people; empty with one frequency.
-[[nodiscard]] std::string spectrum_text(const SpectrumResult& spectrum);
-
-/// What a campaign of linear vibration does not tell, one statement each.
-[[nodiscard]] std::span<const char* const> not_told();
-
-/// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
-[[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
-                                                    const std::string& path);
-/// A file of vibrig identify --json, or a campaign's result.json, for read_model(). Throws
-/// std::runtime_error that names it.
-[[nodiscard]] nlohmann::json read_result(const std::string& path);
 
 }  // namespace vibrig::tool

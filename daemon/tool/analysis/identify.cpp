@@ -13,7 +13,7 @@
 #include "daemon/results/exit_status.hpp"
 #include "daemon/results/result_json.hpp"
 #include "daemon/results/result_table.hpp"
-#include "daemon/results/spectrum_result.hpp"
+#include "daemon/results/spectrum_text.hpp"
 #include "daemon/tool/analysis/spectrum_dwells.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"

@@ -15,7 +15,7 @@
 
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/results/assessment_json.hpp"
-#include "daemon/results/spectrum_result.hpp"
+#include "daemon/results/spectrum_json.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/commands.hpp"
 #include "daemon/tool/recordings/identified.hpp"

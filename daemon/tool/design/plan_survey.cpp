@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/results/spectrum_result.hpp"
+#include "daemon/results/spectrum_json.hpp"
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "daemon/tool/design/plan_study.hpp"
 #include "daemon/tool/design/plan_sweeps.hpp"

@@ -1,0 +1,22 @@
+// A campaign over frequency in a result's JSON, and the model for predictions back out of it.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "daemon/results/spectrum_result.hpp"
+
+namespace vibrig::tool {
+
+/// Root `spectrum`, `at_hz` of the parameters and `lines` of the dwells' rates. Of the dwells that
+/// were held out it has what was measured beside what the others foretell.
+void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
+
+/// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
+[[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
+                                                    const std::string& path);
+/// A file of vibrig identify --json, or a campaign's result.json, for read_model(). Throws
+/// std::runtime_error that names it.
+[[nodiscard]] nlohmann::json read_result(const std::string& path);
+
+}  // namespace vibrig::tool
