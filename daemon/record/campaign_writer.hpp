@@ -12,11 +12,7 @@ namespace vibrig::record {
 
 inline constexpr std::int64_t kFormatVersion = 2;
 
-/// Columns of the tables of a campaign's file, for writing and for mending.
-[[nodiscard]] std::vector<hdf5::ColumnSpec> sample_columns();
-[[nodiscard]] std::vector<hdf5::ColumnSpec> gap_columns();
-/// `rows`: of the interlock's table; none, no columns for them.
-[[nodiscard]] std::vector<hdf5::ColumnSpec> condition_columns(std::size_t rows);
+/// Rows, for writing and for mending.
 void put_sample(hdf5::Table& table, const drivers::Sample& sample);
 void put_gap(hdf5::Table& table, const Gap& gap);
 /// How a campaign, or this file of it, ended; but for its result. Of a closed file.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "daemon/record/campaign_columns.hpp"
 #include "daemon/record/campaign_file.hpp"
 #include "daemon/record/campaign_writer.hpp"
 #include "daemon/record/candump_campaign.hpp"
