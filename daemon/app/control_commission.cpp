@@ -35,11 +35,10 @@ bool real_wire(const drivers::CanPortSettings& can) {
            !std::filesystem::exists("/sys/devices/virtual/net/" + can.interface, error);
 }
 
-}  // namespace
-
-std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
+/// Signals as the configuration has them.
+commission::Names names_of(const configuration::Loaded& loaded, const proto::Dbc& dbc) {
     commission::Names names;
-    for (const auto& value : loaded_.effective) {
+    for (const auto& value : loaded.effective) {
         constexpr std::array<const char*, 6> kKeys{"can.signals.outer",   "can.signals.inner",
                                                    "can.signals.azimuth", "can.signals.accel_x",
                                                    "can.signals.accel_y", "can.signals.accel_z"};
@@ -52,15 +51,21 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     }
     for (const auto* const all : {&names.angle, &names.force})
         for (const auto& name : *all)
-            if (const int bits = commission::length_of(parts_.dbc, name);
-                bits > 0 && bits < kFineBits)
+            if (const int bits = commission::length_of(dbc, name); bits > 0 && bits < kFineBits)
                 names.coarse.push_back(fmt::format("{} has {} bits", name, bits));
-    for (const auto& value : loaded_.effective) {
+    for (const auto& value : loaded.effective) {
         if (value.key == "can.dbc") names.dbc = value.value;
         if (value.key == "can.sample_rate_hz") names.sample_rate = value.value;
     }
-    names.command = configuration_.gimbal.message;
-    names.torque = configuration_.campaign.level.torquer.message;
+    names.command = loaded.configuration.gimbal.message;
+    names.torque = loaded.configuration.campaign.level.torquer.message;
+    return names;
+}
+
+}  // namespace
+
+/// The rig, as the procedure may have it.
+commission::Ports ControlLoop::procedure_ports() {
     commission::Ports ports;
     ports.sample = [this] {
         const auto sample = acquisition_.view().sample;
@@ -72,12 +77,13 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
         return commission::Look{second.from, second.to, in_degrees(second.angle), second.force,
                                 second.good};
     };
-    ports.slew = [this](const commission::Vec3& deg, Time now) {
+    const auto slew = [this](const commission::Vec3& deg, Time now, bool counting) {
         // Where it stands and where it stops it is to stay, not to go by the middle of its travel.
         const auto sample = acquisition_.view().sample;
         if (sample.angles_good()) gimbal_.stands_at(in_degrees(sample.angle));
-        gimbal_.slew_to(deg, now);
+        gimbal_.slew_to(deg, now, counting);
     };
+    ports.slew = [slew](const commission::Vec3& deg, Time now) { slew(deg, now, false); };
     ports.release = [this](Time now) { gimbal_.release(now); };
     ports.gimbal = [this] { return gimbal_.state(); };
     if (parts_.torquer)
@@ -106,10 +112,8 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
             parts_.fitness.rate_misfit()};
     };
     if (configuration_.campaign.zeroing) {  // whose input they are
-        ports.slew_counting = [this](const commission::Vec3& deg, Time now) {
-            const auto sample = acquisition_.view().sample;
-            if (sample.angles_good()) gimbal_.stands_at(in_degrees(sample.angle));
-            gimbal_.slew_to(deg, now, true);
+        ports.slew_counting = [slew](const commission::Vec3& deg, Time now) {
+            slew(deg, now, true);
         };
         ports.count = [this] {
             counted_rad_ = {};
@@ -124,15 +128,19 @@ std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     ports.note = [this](const commission::Note& note) {
         keep_commissioned({note.part, note.step, note.by, {}, note.what, note.data.dump()});
     };
+    return ports;
+}
+
+std::unique_ptr<commission::Procedure> ControlLoop::make_procedure() {
     return std::make_unique<commission::Procedure>(
-        std::move(names),
+        names_of(loaded_, parts_.dbc),
         commission::Stated{
             configuration_.estimator.latitude_deg, configuration_.commission.linear_sigma,
             configuration_.simulated() && !real_wire(configuration_.can),
             parts_.torquer ? std::min(parts_.torquer->limit(),
                                       configuration_.campaign.level.torquer_limit_deg_h)
                            : 0},
-        std::move(ports));
+        procedure_ports());
 }
 
 /// `by` as the audit has it: the name, and who the socket says it was.

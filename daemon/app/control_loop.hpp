@@ -120,6 +120,7 @@ class ControlLoop {
     void end_procedure(drivers::Time now);
     [[nodiscard]] bool first_shaking() const;
     void take_increments();
+    [[nodiscard]] commission::Ports procedure_ports();
     [[nodiscard]] std::unique_ptr<commission::Procedure> make_procedure();
     /// Returns when to be called next at the latest.
     [[nodiscard]] drivers::Time step_commissioning(drivers::Time now);
