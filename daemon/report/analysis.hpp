@@ -14,6 +14,9 @@
 
 namespace vibrig::report {
 
+/// Standard deviations either way that hold 95 %.
+inline constexpr double k95 = 1.959963984540054;
+
 /// Drift of one gyro in a dwell on which the coefficients were not fitted.
 struct HeldOut {
     int run = 0, position = 0;

@@ -11,6 +11,7 @@
 #include "daemon/plot/chart.hpp"
 #include "daemon/record/digest.hpp"
 #include "daemon/report/conditions_section.hpp"
+#include "daemon/report/filter_section.hpp"
 #include "daemon/report/journal_section.hpp"
 #include "daemon/report/lead_section.hpp"
 #include "daemon/report/page.hpp"
@@ -35,11 +36,7 @@ using tool::plot::Look;
 
 namespace {
 
-constexpr double k95 = 1.959963984540054;
-constexpr std::array<const char*, 3> kGyro{"x", "y", "z"};
-constexpr std::array<Look, 3> kLooks{Look::line, Look::dashed, Look::dots};
-constexpr std::size_t kMostPoints = 300;
-constexpr std::size_t kApart = 24;  // dots that mark a curve
+constexpr std::size_t kMostShown = 600;
 
 std::string num(double value, int digits) {
     return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
@@ -223,168 +220,12 @@ void add_held_out(Page& page, const Analysis& a) {
         "covariance, the resolvers and the gyros' random walk.");
 }
 
-void add_convergence(Page& page, const Campaign& campaign, const Analysis& a) {
-    page.section("convergence", "Convergence");
-    const auto& rows = campaign.estimates;
-    if (rows.size() < 2) return page.paragraph("No estimates were recorded along the way.");
-    const double origin = drivers::to_seconds(campaign.samples.front().time);
-    const std::size_t every = std::max<std::size_t>(1, rows.size() / kMostPoints);
-    struct Group {
-        const char* title;
-        const char* unit;
-        std::vector<std::size_t> of;  ///< within a gyro
-    };
-    for (const Group& group :
-         {Group{"Biases", "deg/h", {0}}, Group{"Linear terms", "deg/h/g", {1, 2, 3}},
-          Group{"Quadratic terms", "deg/h/g^2", {4, 5, 6, 7, 8, 9}}}) {
-        Chart chart;
-        chart.title = std::string(group.title) + ": standard deviation";
-        chart.x = Axis("time, s");
-        chart.y = Axis(std::string("1 sigma, ") + group.unit, true);
-        for (std::size_t gyro = 0; gyro < 3; ++gyro) {
-            // The best and the worst of a gyro; all between them.
-            Curve curve;
-            curve.name = std::string("gyro ") + kGyro[gyro];
-            // One term each is the same for all three, often: none may hide another, and dots stand
-            // far enough apart for the lines between them.
-            if (group.of.size() == 1) curve.look = kLooks[gyro];
-            const std::size_t step =
-                curve.look == Look::dots ? std::max(every, rows.size() / kApart) : every;
-            for (std::size_t i = 0; i < rows.size(); i += step) {
-                double least = std::numeric_limits<double>::infinity(), most = 0, log_sum = 0;
-                for (const std::size_t k : group.of) {
-                    const double s = rows[i].sigma[gyro * estimator::kGroups + k];
-                    least = std::min(least, s);
-                    most = std::max(most, s);
-                    log_sum += std::log(std::max(s, 1e-300));
-                }
-                curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-                curve.y.push_back(std::exp(log_sum / static_cast<double>(group.of.size())));
-                if (group.of.size() == 1) continue;
-                curve.low.push_back(least);
-                curve.high.push_back(most);
-            }
-            chart.curves.push_back(std::move(curve));
-        }
-        page.figure(chart.svg(),
-                    group.of.size() > 1
-                        ? "Line: geometric mean of the gyro's terms; band: best to worst."
-                        : "");
-    }
-    Chart chart;
-    chart.title = "Estimates on the way to their final values";
-    chart.x = Axis("time, s");
-    chart.y = Axis("distance from the final value, final sigmas", true);
-    for (std::size_t gyro = 0; gyro < 3; ++gyro) {
-        Curve curve;
-        curve.name = std::string("gyro ") + kGyro[gyro];
-        for (std::size_t i = 0; i < rows.size(); i += every) {
-            double square = 0;
-            for (std::size_t k = 0; k < estimator::kGroups; ++k) {
-                const std::size_t p = gyro * estimator::kGroups + k;
-                const double d =
-                    (rows[i].value[p] - a.coefficients.value[p]) / a.coefficients.sigma[p];
-                square += d * d / estimator::kGroups;
-            }
-            curve.x.push_back(drivers::to_seconds(rows[i].time) - origin);
-            curve.y.push_back(std::sqrt(square));
-        }
-        chart.curves.push_back(std::move(curve));
-    }
-    page.figure(chart.svg(), "Root mean square over the ten coefficients of a gyro.");
-}
-
-void add_innovations(Page& page, const Analysis& a) {
-    page.section("innovations", "Innovations");
-    const Innovations& found = a.innovations;
-    if (found.count == 0) return page.paragraph("No sample came into the filter.");
-    constexpr std::array<const char*, 3> kAxis{"outer", "inner", "azimuth"};
-    Chart chart;
-    chart.title = "Innovations";
-    chart.x = Axis("time, s");
-    chart.y = Axis("arcsec");
-    for (std::size_t k = 0; k < 3; ++k) {
-        Curve curve;
-        curve.name = kAxis[k];
-        curve.look = Look::dots;
-        curve.x = found.time_s;
-        curve.y = found.arcsec[k];
-        chart.curves.push_back(std::move(curve));
-    }
-    const double band = 2 * std::max({found.deviation_arcsec[0], found.deviation_arcsec[1],
-                                      found.deviation_arcsec[2]});
-    for (const double sign : {-1.0, 1.0}) {
-        Curve curve;
-        curve.name = sign > 0 ? "2 sigma" : "";
-        curve.look = Look::dashed;
-        curve.x = {found.time_s.front(), found.time_s.back()};
-        curve.y = {sign * band, sign * band};
-        chart.curves.push_back(std::move(curve));
-    }
-    page.figure(
-        chart.svg(),
-        fmt::format("Every {}th of {} innovations.",
-                    std::max<std::size_t>(1, found.count / found.time_s.size()), found.count));
-    Chart white;
-    white.title = "Whiteness: autocorrelation of the innovations";
-    white.x = Axis("lag, samples");
-    white.y = Axis("correlation");
-    const double limit = k95 / std::sqrt(static_cast<double>(found.count));
-    std::size_t outside = 0, all = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-        Curve curve;
-        curve.name = kAxis[k];
-        for (std::size_t lag = 1; lag < found.correlation[k].size(); ++lag) {
-            curve.x.push_back(static_cast<double>(lag));
-            curve.y.push_back(found.correlation[k][lag]);
-            ++all;
-            if (std::abs(found.correlation[k][lag]) > limit) ++outside;
-        }
-        white.curves.push_back(std::move(curve));
-    }
-    for (const double sign : {-1.0, 1.0}) {
-        Curve curve;
-        curve.name = sign > 0 ? "95 % if white" : "";
-        curve.look = Look::dashed;
-        curve.x = {1,
-                   static_cast<double>(std::max<std::size_t>(2, found.correlation[0].size()) - 1)};
-        curve.y = {sign * limit, sign * limit};
-        white.curves.push_back(std::move(curve));
-    }
-    page.figure(white.svg(), fmt::format("{} of {} lie outside; 5 % are expected of white noise.",
-                                         outside, all));
-    Chart nis;
-    nis.title = "Normalised innovations squared, dwell by dwell";
-    nis.x = Axis("dwell");
-    nis.y = Axis("per degree of freedom");
-    Curve values, low, high;
-    values.look = Look::dots;
-    values.name = "dwell";
-    low.look = high.look = Look::dashed;
-    high.name = "95 % if consistent";
-    for (std::size_t i = 0; i < a.replayed.dwells.size(); ++i) {
-        const auto& s = a.replayed.dwells[i].summary;
-        if (s.used == 0) continue;
-        // chi-square with 3 n degrees of freedom: variance 2 / (3 n) of its mean.
-        const double spread = k95 * std::sqrt(2.0 / (3.0 * s.used));
-        const auto x = static_cast<double>(i + 1);
-        values.x.push_back(x);
-        values.y.push_back(s.nis_per_dof);
-        low.x.push_back(x);
-        low.y.push_back(1 - spread);
-        high.x.push_back(x);
-        high.y.push_back(1 + spread);
-    }
-    nis.curves = {values, low, high};
-    page.figure(nis.svg(), fmt::format("Over the campaign {:.4f}.", a.replayed.result.nis_per_dof));
-}
-
 void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
     page.section("vibration", "Vibration");
     const auto& rows = campaign.estimates;
     if (!rows.empty()) {
         const double origin = drivers::to_seconds(campaign.samples.front().time);
-        const std::size_t every = std::max<std::size_t>(1, rows.size() / (2 * kMostPoints));
+        const std::size_t every = std::max<std::size_t>(1, rows.size() / kMostShown);
         Curve amplitude, frequency;
         for (std::size_t i = 0; i < rows.size(); i += every) {
             amplitude.x.push_back(drivers::to_seconds(rows[i].time) - origin);
@@ -417,36 +258,6 @@ void add_vibration(Page& page, const Campaign& campaign, const Analysis& a) {
                          s.flagged ? "!" + a.replayed.dwells[i].reason : ""});
     }
     page.table(table);
-}
-
-void add_noise(Page& page, const Campaign& campaign, const Analysis& a) {
-    page.section("noise", "Gyro noise");
-    Chart chart;
-    chart.title = "Allan deviation of the residual rates";
-    chart.x = Axis("averaging time, s", true);
-    chart.y = Axis("deg/h", true);
-    for (std::size_t k = 0; k < 3; ++k) {
-        Curve curve;
-        curve.name = std::string("gyro ") + kGyro[k];
-        for (const auto& point : a.allan[k]) {
-            curve.x.push_back(point.tau);
-            curve.y.push_back(point.dev);
-            curve.low.push_back(point.lo);
-            curve.high.push_back(point.hi);
-        }
-        curve.look = Look::dots;
-        chart.curves.push_back(std::move(curve));
-    }
-    page.figure(chart.svg(),
-                "Measured, overlapping, of one-second means, from all dwells together, with 68 % "
-                "bars. At short times the resolvers, at long times the gyros.");
-    std::size_t alarms = 0;
-    for (const auto& event : campaign.events) {
-        if (event.source != "noise") continue;
-        page.paragraph(event.text);
-        if (event.severity != Severity::info) ++alarms;
-    }
-    page.paragraph(fmt::format("Alarms of the noise monitor: {}.", alarms));
 }
 
 void add_rest(Page& page, const Campaign& campaign, const Analysis& a,
