@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Fuzz targets side by side, each from its corpus.
 
-usage: fuzz_test.py PROGRAMS [--seconds N] [--seed N] [--soak]      30 s each; 600 s with --soak
+usage: fuzz_test.py PROGRAMS [--seconds N] [--seed N] [--soak]      8 s each; 600 s with --soak
 What breaks a target stays in build/tests/fuzz. Once mended it belongs into tests/fuzz/corpus.
 """
 import glob
@@ -37,7 +37,7 @@ def start(program, seconds, seed, folder):
 
 def main():
     programs = r.programs_from_command_line(__doc__)
-    seconds, seed = argument("--seconds", 600 if "--soak" in sys.argv else 30), argument("--seed", 1)
+    seconds, seed = argument("--seconds", 600 if "--soak" in sys.argv else 8), argument("--seed", 1)
     os.makedirs(KEPT, exist_ok=True)
     checks = r.Checks()
     checks.note(f"seed {seed}")

@@ -2,7 +2,7 @@
 """CAN ports under load: two vcan buses at the highest rate the kernel sustains, with vibrigd on one of them, a burst into a
 small receive buffer, and 9000 frames/s over a seqpacket socket. Nothing is lost that is not counted.
 
-usage: load_campaign.py PROGRAMS [--seconds N] [--soak]    each load for N seconds (60; 600 with --soak)
+usage: load_campaign.py PROGRAMS [--seconds N] [--soak]    each load for N seconds (20; 600 with --soak)
        load_campaign.py PROGRAMS --inside N                the vcan half, where vcan0 and vcan1 are
 """
 import os
@@ -49,7 +49,7 @@ def main():
     programs = r.programs_from_command_line(__doc__)
     if "--inside" in sys.argv:
         return inside(programs, int(sys.argv[sys.argv.index("--inside") + 1]))
-    seconds = 600 if "--soak" in sys.argv else 60
+    seconds = 600 if "--soak" in sys.argv else 20
     if "--seconds" in sys.argv:
         seconds = int(sys.argv[sys.argv.index("--seconds") + 1])
     checks = r.Checks()

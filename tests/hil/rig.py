@@ -6,6 +6,7 @@ import json
 import os
 import re
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -230,12 +231,27 @@ class Rig:
         return subprocess.run([self.program("vibrig"), *arguments, "--socket", self.socket], stdin=subprocess.DEVNULL,
                               capture_output=True, text=True, timeout=timeout)
 
-    def status(self):
-        """The status as a dictionary; None while the daemon does not answer."""
-        run = self.tool("status", "--json")
-        if run.returncode != 0:
+    def ask(self, path, body=None):
+        """The daemon's own interface; None while it does not answer."""
+        text = b"" if body is None else json.dumps(body).encode()
+        try:
+            with socket.socket(socket.AF_UNIX) as link_:
+                link_.settimeout(10)
+                link_.connect(self.socket)
+                link_.sendall(f"{'GET' if body is None else 'POST'} {path} HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n"
+                              f"Content-Type: application/json\r\nContent-Length: {len(text)}\r\n\r\n".encode() + text)
+                answer = b""
+                while more := link_.recv(65536):
+                    answer += more
+            return json.loads(answer.partition(b"\r\n\r\n")[2])
+        except (OSError, ValueError):
             return None
-        return json.loads(run.stdout)
+
+    def status(self):
+        """The status as a dictionary; None while the daemon does not answer. `vibrig status` says the same, and to start it for each
+        look takes a fifth of what a campaign takes."""
+        status = self.ask("/api/v1/status")
+        return status if status is not None and "campaign" in status else None   # or why not
 
     def wait_for(self, condition, timeout_s):
         """The first status that fulfils the condition; else the last one. The clock is the one all processes see."""

@@ -10,6 +10,7 @@
 #include <climits>
 #include <cstdlib>
 #include <filesystem>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -85,11 +86,10 @@ using drivers::kMillisecond;
 using drivers::kSecond;
 using drivers::Time;
 
-constexpr int kCommits = 12;
 constexpr int kSamplesEach = 200;  // more than a chunk of some tables comes together
 
 /// A campaign in a folder of its own; after each commit the writes so far and the samples told of.
-std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder) {
+std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder, int commits) {
     std::vector<std::pair<long, std::size_t>> told;
     Head head;
     head.name = "torn";
@@ -101,7 +101,7 @@ std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder)
         CampaignWriter writer((folder / "campaign.h5").string(), head);
         told.emplace_back(disk.taken, 0);
         std::size_t samples = 0;
-        for (int commit = 0; commit < kCommits; ++commit) {
+        for (int commit = 0; commit < commits; ++commit) {
             for (int i = 0; i < kSamplesEach; ++i, ++samples) {
                 drivers::Sample sample;
                 sample.time = kSecond + static_cast<Time>(samples) * 25 * kMillisecond;
@@ -134,7 +134,7 @@ std::vector<std::pair<long, std::size_t>> write_campaign(const fs::path& folder)
     return told;
 }
 
-class TornFile : public ::testing::TestWithParam<End> {
+class TornFile : public ::testing::TestWithParam<std::pair<End, int>> {
   protected:
     TornFile() {
         std::string name = (fs::temp_directory_path() / "vibrig-torn.XXXXXX").string();
@@ -149,12 +149,13 @@ class TornFile : public ::testing::TestWithParam<End> {
 };
 
 TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
+    const auto [how, commits] = GetParam();
     // GIVEN how many writes a campaign takes, and how far it is when
     const fs::path whole = folder_ / "whole";
     fs::create_directory(whole);
     disk = {};
-    const auto told = write_campaign(whole);
-    ASSERT_EQ(told.size(), kCommits + 1U);
+    const auto told = write_campaign(whole, commits);
+    ASSERT_EQ(told.size(), static_cast<std::size_t>(commits) + 1);
     const long first = told.front().first, last = disk.taken;
     ASSERT_GT(last, first + 100);
     int torn = 0;
@@ -162,8 +163,8 @@ TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
         // WHEN the writer ends at this one
         const fs::path folder = folder_ / std::to_string(end);
         fs::create_directory(folder);
-        disk = {end, 0, GetParam()};
-        static_cast<void>(write_campaign(folder));
+        disk = {end, 0, how};
+        static_cast<void>(write_campaign(folder, commits));
         disk = {};
         // THEN what was committed before is there once it is mended
         std::size_t committed = 0;
@@ -184,10 +185,17 @@ TEST_P(TornFile, IsMendedAndHasWhatWasCommitted) {
     RecordProperty("torn", torn);
 }
 
-INSTANTIATE_TEST_SUITE_P(Ends, TornFile, ::testing::Values(End::killed, End::disk),
-                         [](const auto& each) {
-                             return each.param == End::killed ? "Killed" : "Disk";
-                         });
+std::string name_of(const ::testing::TestParamInfo<std::pair<End, int>>& each) {
+    return each.param.first == End::killed ? "Killed" : "Disk";
+}
+
+// The time grows with the square of the commits; with six each table has been made and has grown.
+INSTANTIATE_TEST_SUITE_P(Ends, TornFile,
+                         ::testing::Values(std::pair(End::killed, 6), std::pair(End::disk, 6)),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(SoakEnds, TornFile,
+                         ::testing::Values(std::pair(End::killed, 12), std::pair(End::disk, 12)),
+                         name_of);
 
 }  // namespace
 }  // namespace vibrig::record
