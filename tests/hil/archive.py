@@ -37,7 +37,7 @@ def configure(rig, archive_folder, serial):
 
 def measure(checks, rig, seed, archive_folder, disk):
     """A whole campaign on the rig's clock, with an archive that is not there."""
-    rig.start_plant("--seed", str(seed))
+    rig.start_plant("--seed", str(seed), "--truth", rig.truth_file(r.QUICK))
     configure(rig, archive_folder, "0017")
     rig.daemon = r.Child("vibrigd", [rig.program("vibrigd"), "--config", rig.configuration], rig.folder, disk.environment())
     rig.wait_for(r.measuring, 60)
@@ -310,7 +310,7 @@ def hanging(checks, programs, folder, seed):
     server.start()
     lab = Archive(programs, os.path.join(folder, "standing-lab"), server.url)
     rig = r.Rig(programs, "seqpacket", "rig", os.path.join(folder, "beside-standing"))
-    rig.start_plant("--seed", str(seed))
+    rig.start_plant("--seed", str(seed), "--truth", rig.truth_file(r.QUICK))
     rig.configure(CAMPAIGN, unit={"type": "GP-3", "serial": "0020"},
                   archive={"folder": lab.folder, "index": server.url, "rig": "rig-8", "retry_max_s": 1.0})
     server.process.send_signal(signal.SIGSTOP)

@@ -24,7 +24,7 @@ class Run:
         try:
             # The filter's sigma leave out what the bias does between dwells (u has it): over 23 seeds the errors of a plan of 12 runs are
             # 1.05 of them, D_SSy's 1.7. When commands come moves them by tenths, on a busy machine: a seed well within the limit.
-            rig.start_plant("--seed", "5", *(["--truth", rig.truth_file(truth)] if truth else []))
+            rig.start_plant("--seed", "5", "--truth", rig.truth_file(truth or r.QUICK))
             rig.configure({"name": "planned", **campaign}, **tables)
             rig.start_daemon()
             rig.wait_for(r.measuring, 30)
@@ -86,7 +86,7 @@ def restarted(checks, programs, folder):
     targets = {"bias": 1e-4, "linear": 1e-4, "quadratic": 1e-5}   # out of reach: the time limit ends it
     rig = r.Rig(programs, "seqpacket", "rig", folder, poll_s=0.05)
     try:
-        rig.start_plant("--seed", "2", "--speed", "60")
+        rig.start_plant("--seed", "2", "--speed", "60", "--truth", rig.truth_file(r.QUICK))
         rig.configure(campaign, **{"campaign.targets": targets})
         rig.start_daemon()
         rig.wait_for(r.measuring, 30)
@@ -117,10 +117,13 @@ def restarted(checks, programs, folder):
 
 def at_other_rates(checks, programs, folder):
     """The rig samples at 100 Hz and at 1 kHz: what is promised before, and kept, is right there as it is at 40 Hz."""
-    for rate, campaign in ((100, {"dwell_s": 10.0, "zeroing": True}), (1000, {"dwell_s": 3.0})):
+    plan = os.path.join(folder, "plan.json")   # of 28 dwells they know no more
+    subprocess.run([os.path.join(programs, "vibrig"), "plan", "--levels", "0,6", "--runs", "12", "-o", plan],
+                   capture_output=True, timeout=120, check=True)
+    for rate, campaign, truth in ((100, {"dwell_s": 10.0, "zeroing": True}, {}), (1000, {"dwell_s": 3.0}, r.QUICK["platform"])):
         text = f"at {rate} samples a second"
         with tempfile.TemporaryDirectory() as place:
-            run = Run(programs, {"table_g": [9.0, 0.0], **campaign}, place, 300, {"platform": {"sample_rate_hz": rate}},
+            run = Run(programs, {"plan": plan, **campaign}, place, 300, {"platform": {"sample_rate_hz": rate, **truth}},
                       can={"sample_rate_hz": float(rate)})
         if not run.finished(checks, f"a campaign {text} finishes"):
             continue

@@ -20,7 +20,7 @@ import survey_campaign  # noqa: E402
 PSD = [[20, 0.02], [120, 0.02]]   # 1.41 g rms
 OTHER = [[30, 0.04], [80, 0.04]]  # the same rms
 NUMBER, LEVEL_DB = 4, -1.5
-TRUTH = {"isolator": {"hard": True},
+TRUTH = {**r.QUICK, "isolator": {"hard": True},
          "shaker": {"profiles": [{"number": NUMBER, "psd": PSD}, {"number": 5, "psd": OTHER}]}}
 POSITIONS = [[0, 0, 0], [45, 0, 90], [90, 0, 180], [180, 0, 45], [-45, 0, 90], [270, 0, 0]]
 HELD_OUT = [[30, 10, -20], [-50, 0, 70]]
@@ -196,7 +196,7 @@ def soft_isolators(checks, programs, folder):
     psd = [[15, density], [45, density * 3 ** 4]]  # behind the isolators nearly flat
     rig = r.Rig(programs, "seqpacket", "rig", folder)
     try:
-        truth = {"isolator": {"transmission": is_so}, "shaker": {"profiles": [{"number": NUMBER, "psd": psd}]}}
+        truth = {**r.QUICK, "isolator": {"transmission": is_so}, "shaker": {"profiles": [{"number": NUMBER, "psd": psd}]}}
         start(rig, csv_plan_of(folder, len(POSITIONS)), 100.0, truth=truth, begin=False, psd=psd, spectrum={"mount": "isolated"},
                          selftest={"required": True}, vibration={"transmission": stated})
         rig.wait_for(loop_check.ready, 60)

@@ -19,6 +19,9 @@ PR_SET_PDEATHSIG = 1
 PATIENT = {"can": {"stale_deadline_ms": 10000}, "gimbal": {"status_deadline_ms": 10000},
            "shaker": {"response_timeout_ms": 5000}}
 
+# Of a truth: gimbals that slew in a second or two. At 5 deg/s a campaign of short dwells takes most of its time to turn them.
+QUICK = {"platform": {"slew_deg_per_s": 60}}
+
 
 class Checks:
     """Numbers the checks and prints each as it comes: 'ok N - text' or 'not ok N - text'."""

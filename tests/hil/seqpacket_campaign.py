@@ -3,6 +3,7 @@
 
 usage: seqpacket_campaign.py PROGRAMS
 """
+import json
 import os
 import signal
 import sys
@@ -12,7 +13,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import rig as r  # noqa: E402
 
 SHORT = {"name": "sanitized", "identify": "what-it-can",
-         "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 20.0}
+         "positions_deg": [[0, 0, 0], [45, 0, 90]], "table_g": [9.0, 7.0], "dwell_s": 10.0}
 
 
 def campaign(checks, programs, folder):
@@ -24,6 +25,9 @@ def campaign(checks, programs, folder):
         checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
                      f"{r.state_of(last)} {[c.stderr for c in commands]}\n{rig.logs()}")
         r.check_balances(checks, rig)
+        told = rig.tool("status", "--json")
+        checks.equal(sorted(json.loads(told.stdout or "{}")), sorted(rig.status() or {"no": "answer"}),
+                     "vibrig status --json has what the daemon's own interface has")
         path, _ = rig.result()
         checks.check(path is not None, "there is a result.json")
         checks.equal(rig.daemon.end(signal.SIGTERM, timeout=30), 0, "SIGTERM ends vibrigd with status 0")
@@ -54,7 +58,7 @@ def end_without_rig(checks, programs, folder):
 
 
 def start(rig, **other):
-    rig.start_plant("--seed", "3")
+    rig.start_plant("--seed", "3", "--truth", rig.truth_file(r.QUICK))
     rig.configure({**SHORT, **other})
     rig.start_daemon()
     rig.wait_for(r.measuring, 30)

@@ -235,11 +235,12 @@ def effect(checks, programs, coefficients):
     zero_g = [0.005, 0.005, 0.005]
     noise = {"resolver_arcsec": 0.3, "gyro_random_walk_deg_per_rt_h": 1e-5, "accelerometer_g": 1e-4}
     ideal = {"noise": noise, "coefficients": large}
+    quick = {**ideal, **r.QUICK}   # zeroing wants the azimuth at its own rate
     zeros = {**ideal, "accelerometer": {"zero_g": zero_g}}
     tables = {"noise": noise, "estimator": {"gate_nis": 1e6},
               "estimator.prior_sigma": {"bias": 10.0, "linear": 10.0, "quadratic": 100.0}}
-    exact = Run(programs, campaign, ideal, **tables)
-    wrong = Run(programs, campaign, zeros, **tables)
+    exact = Run(programs, campaign, quick, **tables)
+    wrong = Run(programs, campaign, {**zeros, **r.QUICK}, **tables)
     right = Run(programs, {**campaign, "zeroing": True}, zeros, **tables)
     if not all([exact.ended(checks, "finished", "a campaign with exact accelerometers finishes"),
                 wrong.ended(checks, "finished", "one with 5 mg zeros and no zeroing finishes"),

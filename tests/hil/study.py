@@ -541,7 +541,7 @@ def recorded(b, dwell_s, drift_model):
     with tempfile.TemporaryDirectory(prefix="vibrig-study-rig-") as folder:
         rig = r.Rig(os.path.dirname(b.vibrig), "seqpacket", "rig", folder, poll_s=1)
         try:
-            rig.start_plant("--seed", str(b.random.randrange(1, 1000)))
+            rig.start_plant("--seed", str(b.random.randrange(1, 1000)), "--truth", rig.truth_file(r.QUICK))
             rig.configure({"name": "proof", "dwell_s": dwell_s, "table_g": [9.0, 7.0]}, drift={"model": drift_model}, **r.PATIENT)
             rig.start_daemon()
             rig.wait_for(r.measuring, 60)

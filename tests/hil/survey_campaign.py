@@ -15,7 +15,7 @@ import loop_check  # noqa: E402
 import rig as r  # noqa: E402
 
 # Half elastic, a resonance within the plan.
-TRUTH = {"isolator": {"hard": True},
+TRUTH = {**r.QUICK, "isolator": {"hard": True},
          "elastic": {"share": [0.5, 0.5, 0.5], "resonance_hz": [60.0, 60.0, 60.0], "damping": [0.05, 0.05, 0.05]}}
 HELD_OUT = [[30.0, 10.0, -20.0], [-50.0, 0.0, 70.0], [100.0, 15.0, 30.0], [20.0, 0.0, 130.0]]
 HELD_HZ, HELD_G = 55.1, 3.0

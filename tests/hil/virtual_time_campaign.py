@@ -51,7 +51,7 @@ def inside(programs, name, results):
         rig.results = results
         begin = time.monotonic()
         try:
-            rig.start_plant("--seed", "1")
+            rig.start_plant("--seed", "1", *(() if name == "whole" else ("--truth", rig.truth_file(r.QUICK))))
             rig.configure(CAMPAIGNS[name], shaker=SHAKER, threads=THREADS)
             rig.start_daemon()
             # Between the rig's ticks, and no looks at the daemon until its result is there: whoever asks at the moment

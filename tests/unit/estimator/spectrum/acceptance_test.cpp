@@ -85,7 +85,7 @@ void expect_survey_predicts(unsigned campaigns, double slack) {
 }
 
 TEST(SpectrumAcceptance, SurveyPredictsTheSixProfiles) {
-    constexpr unsigned kCampaigns = in_every_run(20, 3);
+    constexpr unsigned kCampaigns = 20;
     expect_survey_predicts(kCampaigns, kCampaigns < 20 ? 1.25 : 1);
 }
 
@@ -137,7 +137,7 @@ void expect_flat(unsigned campaigns) {
     EXPECT_LE(alarms, at_most(campaigns, kAlarm));
     EXPECT_EQ(named, 0U);
 }
-TEST(SpectrumAcceptance, FlatRigsRaiseNoAlarm) { expect_flat(in_every_run(20, 4)); }
+TEST(SpectrumAcceptance, FlatRigsRaiseNoAlarm) { expect_flat(20); }
 TEST(SpectrumAcceptance, SoakFlatRigsRaiseNoAlarm) { expect_flat(30); }
 
 /// Shares at 40, 60, 120, 300, 1000 Hz as they are published to two digits; 0: not there. They
@@ -216,18 +216,18 @@ unsigned alarms_of(const Truth& truth, const Settings& settings, double gain_sca
 }
 
 TEST(SpectrumAcceptance, GainScatterThatIsNotDeclaredAlarmsInAQuarterToSixInTen) {
-    constexpr unsigned kCampaigns = in_every_run(20, 2);
+    constexpr unsigned kCampaigns = 20;
     const unsigned alarms = alarms_of({}, undeclared(), 0.005, kCampaigns);
     std::printf("gain scatter not declared: %u of %u alarm\n", alarms, kCampaigns);
     EXPECT_GE(alarms, at_least(kCampaigns, 0.25));
     EXPECT_LE(alarms, at_most(kCampaigns, 0.60));
 }
 TEST(SpectrumAcceptance, GainScatterThatIsDeclaredRaisesNoAlarm) {
-    constexpr unsigned kCampaigns = in_every_run(20, 4);
+    constexpr unsigned kCampaigns = 20;
     EXPECT_LE(alarms_of({}, gain_declared(), 0.005, kCampaigns), at_most(kCampaigns, 1.0 / 30));
 }
 TEST(SpectrumAcceptance, AShareOfTwoPercentIsSeenWithTheGainDeclared) {
-    constexpr unsigned kCampaigns = in_every_run(20, 3);
+    constexpr unsigned kCampaigns = 20;
     EXPECT_GE(alarms_of(Truth::common(0.02, kSixty), gain_declared(), 0, kCampaigns),
               at_least(kCampaigns, 0.9));
 }
@@ -305,7 +305,7 @@ void expect_two_resonances(unsigned campaigns, double most) {
 }
 // All predictions of a campaign share a few coefficients: one campaign strays by a third.
 TEST(SpectrumAcceptance, TwoResonancesInsideThePlanAreFound) {
-    constexpr unsigned kCampaigns = in_every_run(6, 1);
+    constexpr unsigned kCampaigns = 6;
     expect_two_resonances(kCampaigns, 1.2 + 0.4 / kCampaigns);
 }
 TEST(SpectrumAcceptance, SoakTwoResonancesInsideThePlanAreFound) { expect_two_resonances(20, 1.2); }
@@ -314,7 +314,7 @@ TEST(SpectrumAcceptance, AThirdResonanceIsNotPredictedWith) {
     Truth truth = two_resonances_of(30, 0.4, 55, -0.4);
     for (std::size_t j = 0; j < 3; ++j)
         truth.elastic[j].push_back(Truth::common(0.4, {105, 0.05}).elastic[j][0]);
-    for (unsigned seed = 1; seed <= in_every_run(20, 1); ++seed) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
         const Analysis found = campaign(undeclared(), truth, survey(), seed);
         EXPECT_NE(found.model.refusal.find("more than two resonances"), std::string::npos)
             << "seed " << seed << ": " << found.model.refusal;
@@ -360,14 +360,12 @@ void expect_drift_is_no_spectrum(unsigned campaigns, bool mixed = true, bool see
                 << "drift " << kind;
     }
 }
-TEST(SpectrumAcceptance, MovingBiasIsNoSpectrum) {
-    expect_drift_is_no_spectrum(in_every_run(20, 2));
-}
+TEST(SpectrumAcceptance, MovingBiasIsNoSpectrum) { expect_drift_is_no_spectrum(20); }
 TEST(SpectrumAcceptance, MovingBiasIsNoSpectrumWithTheFrequenciesInOrder) {
-    expect_drift_is_no_spectrum(in_every_run(6, 1), false);
+    expect_drift_is_no_spectrum(6, false);
 }
 TEST(SpectrumAcceptance, AShareOfTwoPercentIsSeenWhileTheBiasMoves) {
-    expect_drift_is_no_spectrum(in_every_run(6, 1), true, true);
+    expect_drift_is_no_spectrum(6, true, true);
 }
 TEST(SpectrumAcceptance, SoakMovingBiasIsNoSpectrumWithTheFrequenciesInOrder) {
     expect_drift_is_no_spectrum(40, false);
@@ -393,9 +391,7 @@ void expect_beyond_is_not_covered(unsigned campaigns) {
     }
     std::printf("300 Hz beyond 125 Hz, %u campaigns: error/u %.2f\n", campaigns, all.rms_in_u());
 }
-TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) {
-    expect_beyond_is_not_covered(in_every_run(12, 3));
-}
+TEST(SpectrumAcceptance, ResonanceBeyondThePlanIsNotCovered) { expect_beyond_is_not_covered(12); }
 TEST(SpectrumAcceptance, SoakResonanceBeyondThePlanIsNotCovered) {
     expect_beyond_is_not_covered(20);
 }
@@ -458,11 +454,9 @@ void expect_coverage(unsigned campaigns, bool isolated = false) {
     EXPECT_GE(intervals.hz, at_least(intervals.all, 0.95));
     EXPECT_GE(intervals.damping, at_least(intervals.all, 0.95));
 }
-TEST(SpectrumAcceptance, PredictionsAndIntervalsCoverRandomRigs) {
-    expect_coverage(in_every_run(25, 5));
-}
+TEST(SpectrumAcceptance, PredictionsAndIntervalsCoverRandomRigs) { expect_coverage(25); }
 TEST(SpectrumAcceptance, PredictionsAndIntervalsCoverRandomRigsOnPads) {
-    expect_coverage(in_every_run(20, 4), true);
+    expect_coverage(20, true);
 }
 TEST(SpectrumAcceptance, SoakPredictionsAndIntervalsCoverRandomRigs) { expect_coverage(100); }
 TEST(SpectrumAcceptance, SoakPredictionsAndIntervalsCoverRandomRigsOnPads) {
