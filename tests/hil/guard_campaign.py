@@ -100,12 +100,12 @@ class Guarded(r.Rig):
 
     def measured_g(self):
         with self.modbus() as link:
-            return self.ask(link, struct.pack(">BHH", 4, 3, 2), ">I")[0] * 1e-4
+            return self.controller(link, struct.pack(">BHH", 4, 3, 2), ">I")[0] * 1e-4
 
     def modbus(self):
         return socket.create_connection(("127.0.0.1", self.modbus_port), timeout=20)
 
-    def ask(self, link, pdu, reply):
+    def controller(self, link, pdu, reply):
         link.sendall(struct.pack(">HHHB", 1, 0, len(pdu) + 1, 1) + pdu)
         head = self.take(link, 7)
         body = self.take(link, struct.unpack(">H", head[4:6])[0] - 1)
@@ -125,7 +125,7 @@ class Guarded(r.Rig):
         """As another master would, past any daemon: 15 Hz, ramp of 0.5 s, run."""
         with self.modbus() as link:
             words = struct.pack(">IIHH", 15000, int(amplitude_g * 1e4), 50, run)
-            self.ask(link, struct.pack(">BHHB", 16, 0, 6, len(words)) + words, None)
+            self.controller(link, struct.pack(">BHHB", 16, 0, 6, len(words)) + words, None)
 
     def shakes(self):
         return self.measured_g() > 4
