@@ -677,10 +677,12 @@ def each_key_is_caught_twice(checks, u, text):
             u.restart()
         forge(u, key)
         u.restart()
+        u.rig.wait_for(lambda s: s["shaker"].get("rest") == "at rest", 60)
         if u.rig.tool("arm", "--by", "Ada").returncode:
-            u.rig.tool("selftest", "--by", "Ada", timeout=120)   # its proof stands on some of the keys
+            proof = u.rig.tool("selftest", "--by", "Ada", timeout=120)   # it stands on some of the keys
             armed = u.rig.tool("arm", "--by", "Ada")
-            checks.check(armed.returncode == 0, f"{key} is wrong and the record forged: it is armed", armed.stderr)
+            checks.check(armed.returncode == 0, f"{key} is wrong and the record forged: it is armed",
+                         proof.stdout + proof.stderr + armed.stderr)
         u.rig.tool("start", "--by", "Ada")
         last = u.rig.wait_for(lambda s: s["campaign"]["state"] in ("finished", "aborted", "tripped", "paused"), 60)
         reason = r.state_of(last)
