@@ -194,7 +194,7 @@ class Tried:
         rig.modbus_port = 502 if line else int(controller.where.rpartition(":")[2])
         link = {"transport": "rtu", "device": controller.where, "baud": 115200} if line else {}
         stated = {**STATED, **other}
-        rig.configure({"name": "foreign"}, shaker=link, commission={"simulated": False, "folder": os.path.join(folder, "commission"), "buttons": buttons},
+        rig.configure({"name": "foreign"}, shaker={**link, "response_timeout_ms": 1500}, commission={"simulated": False, "folder": os.path.join(folder, "commission"), "buttons": buttons},
                       **{"shaker.registers." + role: keys for role, keys in stated.items()})
         self.controller, self.text, self.instead = controller, "", {}
         self.command = [os.path.join(programs, "vibrig"), "commission", "registers", "--by", "Ada", "--plate", "a plate", "--json", "--write",
@@ -249,6 +249,8 @@ def tried(checks, programs, line):
     before = list(controller.holding.values)
     with tempfile.TemporaryDirectory() as folder:
         code, found, text = Tried(programs, folder, controller, line, ["rack"]).all()
+        if not checks.check(code == 0, f"{name}: all of them pass", [code, found, text]):
+            return
         log = os.path.join(folder, "commission", "registers.jsonl")
         with open(log, encoding="utf-8") as file:
             lines = [json.loads(one) for one in file]
