@@ -27,7 +27,7 @@ CAMPAIGN = {"name": "killed", "identify": "what-it-can", "positions_deg": [[0, 0
             "table_g": [9.0, 7.0], "order": "sequential", "dwell_s": 2.0, "settle_s": 2.0, "ramp_s": 0.5, "temperature_window_s": 0.0}
 RECORD = {"segment_s": 2.0}   # logs are closed and compressed meanwhile
 LONGEST_S = 7.0               # after the start: some positions are done by then
-KEPT_S = 1.0                  # older than that must be there
+KEPT_S = 1.0                  # older than that must be there, on a disk and a machine that are not late themselves
 SYNC = 0x080
 WATCHDOG = 1                  # bit of the shaker's fault register
 
@@ -49,6 +49,30 @@ class Witness(threading.Thread):
 
     def between(self, begin, end):
         return {count for when, count in list(self.heard) if begin < when < end}
+
+
+class Disk(threading.Thread):
+    """Writes a little beside the daemons, through to the disk, every 50 ms: how late that is, they are without any fault of theirs."""
+
+    PERIOD_S = 0.05
+
+    def __init__(self, folder):
+        super().__init__(daemon=True)
+        self.file = os.open(os.path.join(folder, "beside"), os.O_WRONLY | os.O_CREAT)
+        self.turns = [time.monotonic()]   # when one began
+        self.start()
+
+    def run(self):
+        while True:
+            os.pwrite(self.file, b"x", 0)
+            os.fdatasync(self.file)
+            time.sleep(self.PERIOD_S)
+            self.turns.append(time.monotonic())
+
+    def late_s(self, begin, end):
+        """The longest turn that was going on between the two."""
+        turns = [*self.turns, time.monotonic()]
+        return max((b - a for a, b in zip(turns, turns[1:]) if b > begin and a < end), default=0.0) - self.PERIOD_S
 
 
 def lines_of(folder):
@@ -93,8 +117,8 @@ def mended(rig, folder):
 class Kill:
     """One of them: a campaign started or resumed, the kill, and what is left."""
 
-    def __init__(self, rig, witness, rng):
-        self.rig, self.witness, self.rng = rig, witness, rng
+    def __init__(self, rig, witness, disk, rng):
+        self.rig, self.witness, self.disk, self.rng = rig, witness, disk, rng
         self.results = []   # good, text, found
         self.done = []      # when seen, how many positions
         self.text = ""
@@ -121,6 +145,7 @@ class Kill:
         self.killed = time.monotonic()
         self.rig.daemon.process.kill()
         self.rig.daemon.process.wait()
+        self.kept_s = KEPT_S + max(0.0, self.disk.late_s(self.killed - 3, self.killed))
         self.text = f"killed {self.killed - self.begun:.2f} s after {self.how}, {self.state}"
         # Asked after the kill: before it, the daemon itself may be about to end the level.
         time.sleep(0.1)   # what it sent last arrives
@@ -161,21 +186,21 @@ class Kill:
                    f"state {state}, faults {faults}")
 
     def journal(self):
-        done = max((n for when, n in self.done if when < self.killed - KEPT_S), default=0)
+        done = max((n for when, n in self.done if when < self.killed - self.kept_s), default=0)
         path = os.path.join(self.rig.results, "journal.sqlite3")
         with sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=10) as database:
             sound = database.execute("PRAGMA integrity_check").fetchone()[0]
             dwells = database.execute("SELECT count(*) FROM dwell WHERE campaign = (SELECT max(id) FROM campaign)").fetchone()[0]
             last = database.execute("SELECT kind FROM command ORDER BY id DESC LIMIT 1").fetchone()
         database.close()
-        known = last is not None and last[0] == self.how or self.killed - self.begun < KEPT_S
+        known = last is not None and last[0] == self.how or self.killed - self.begun < self.kept_s
         self.check(sound == "ok" and dwells >= done and known, f"the journal is sound and knows {done} positions done",
                    f"{sound}, {dwells} positions, last command {last}")
 
     def recording(self, before):
         new = self.files() - before
         # It may have ended after the last look, and recording with it.
-        wanted = self.witness.between(self.begun, min(self.going_on, self.killed - KEPT_S))
+        wanted = self.witness.between(self.begun, min(self.going_on, self.killed - self.kept_s))
         if not new and not wanted:
             return
         if not self.check(len(new) == 1, f"the {self.how} has a recording", str(new)):
@@ -186,7 +211,7 @@ class Kill:
             # The recorder begins a moment after the answer to the command.
             wanted -= self.witness.between(0, self.begun + KEPT_S / 2)
             lost = wanted - there
-            self.check(not lost, f"its logs have all {len(wanted)} sync counts older than {KEPT_S:.0f} s",
+            self.check(not lost, f"its logs have all {len(wanted)} sync counts older than {self.kept_s:.1f} s",
                        f"lost {len(lost)}: {sorted(lost)[:3]}.. of {min(wanted, default=0)} to {max(wanted, default=0)}")
             lost = wanted - mended(self.rig, folder)
             self.check(not lost, "its HDF5 file opens once it is mended and has them too",
@@ -195,7 +220,7 @@ class Kill:
             self.check(False, "every file opens", f"{error}\n{sorted(os.listdir(folder))}")
 
 
-def one_rig(programs, folder, name, kills, rng, report):
+def one_rig(programs, folder, name, kills, rng, disk, report):
     rig = r.Rig(programs, "seqpacket", "real", folder, poll_s=0.1)
     try:
         rig.start_plant("--seed", str(rng.randrange(1000)), "--warm-up", "1", "--start-temperature", "45")
@@ -203,7 +228,7 @@ def one_rig(programs, folder, name, kills, rng, report):
         rig.configure(CAMPAIGN, record=RECORD, **r.PATIENT)
         witness = Witness(rig.path)
         for number in range(kills):
-            kill = Kill(rig, witness, rng)
+            kill = Kill(rig, witness, disk, rng)
             try:
                 kill.run()
             except Exception as error:   # of a thread: it has to be told
@@ -227,8 +252,9 @@ def main():
                 checks.check(good, f"{what}: {text}", "" if good else found)
 
     with tempfile.TemporaryDirectory() as folder:
+        disk = Disk(folder)
         threads = [threading.Thread(target=one_rig, args=(programs, os.path.join(folder, str(n)), n, kills // RIGS,
-                                                          random.Random(f"{seed}/{n}"), report)) for n in range(1, RIGS + 1)]
+                                                          random.Random(f"{seed}/{n}"), disk, report)) for n in range(1, RIGS + 1)]
         for thread in threads:
             thread.start()
         for thread in threads:
