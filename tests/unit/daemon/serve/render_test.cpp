@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "daemon/serve/page.hpp"
+#include "daemon/serve/status_message.hpp"
 #include "daemon/status/values.hpp"
 #include "proto/vibrig.pb.h"
 #include "tests/unit/daemon/serve/fake_source.hpp"

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimator/identification/dwell_row.hpp"
 #include "estimator/spectrum/profile.hpp"
 
 namespace vibrig::estimator::spectrum::testing {

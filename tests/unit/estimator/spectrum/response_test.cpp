@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/identification/dwell_row.hpp"
 #include "estimator/identification/identification.hpp"
 #include "estimator/spectrum/profile.hpp"
 #include "estimator/spectrum/seen.hpp"

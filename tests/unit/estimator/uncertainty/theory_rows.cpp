@@ -6,6 +6,8 @@
 #include "estimator/filter/drift_model.hpp"
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/second_moment.hpp"
+#include "estimator/identification/dwell_row.hpp"
+#include "estimator/identification/result.hpp"
 #include "tests/unit/estimator/rig_simulator.hpp"
 
 namespace vibrig::estimator::testing {
