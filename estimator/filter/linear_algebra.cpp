@@ -60,7 +60,7 @@ double squared_distance(MatrixIn covariance, const Vector& d) {
 }
 
 Matrix padded_root(MatrixIn a) {
-    return Eigen::LLT<Matrix>(Matrix(a + 1e-12 * Matrix(a.diagonal().asDiagonal()))).matrixL();
+    return Cholesky::or_nan(a + 1e-12 * Matrix(a.diagonal().asDiagonal())).lower();
 }
 
 Matrix semidefinite_root(MatrixIn a) {

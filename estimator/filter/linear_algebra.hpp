@@ -63,7 +63,7 @@ class Cholesky {
 [[nodiscard]] double squared_distance(MatrixIn covariance, const Vector& d);
 
 /// L with L L' = A, a variance to which a 1e-12th is added: of inputs that depend on each other
-/// wholly it is singular.
+/// wholly it is singular. NaN if A is no variance, or one of something certain.
 [[nodiscard]] Matrix padded_root(MatrixIn a);
 /// The same, no triangle, where some inputs may have no variance at all: their rows are zero.
 [[nodiscard]] Matrix semidefinite_root(MatrixIn a);
