@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include "proto/json_file.hpp"
 
 namespace vibrig::plan {
 
@@ -12,14 +13,6 @@ namespace {
 
 using estimator::spectrum::Breakpoints;
 using estimator::spectrum::Profile;
-
-nlohmann::json read_json(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
-    return root;
-}
 
 Breakpoints read_pairs(const nlohmann::json& root, const std::string& path, const char* key,
                        const char* form) {
@@ -97,7 +90,7 @@ void read_psd(const nlohmann::json& root, Profile& profile, const std::string& p
 }  // namespace
 
 StatedProfile read_profile(const std::string& path) {
-    const nlohmann::json root = read_json(path);
+    const nlohmann::json root = proto::read_json(path);
     if (!root.is_object())
         throw std::runtime_error(path + ": expected a JSON object with psd or sines");
     refuse_unknown(root, path);
@@ -137,7 +130,7 @@ StatedProfile read_profile(const std::string& path) {
 }
 
 std::vector<Profile> read_controller_psd(const std::string& path) {
-    const nlohmann::json root = read_json(path);
+    const nlohmann::json root = proto::read_json(path);
     constexpr const char* kForm = "[{\"profile\": NAME, \"psd\": [[hz, g2_hz], ..]}, ..]";
     if (!root.is_array())
         throw std::runtime_error(path + ": found " + root.dump().substr(0, 60) +

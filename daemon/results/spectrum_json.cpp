@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -340,14 +339,6 @@ Model read_model(const nlohmann::json& root, const std::string& path) {
                                  ", expected the result of vibrig identify --json");
     }
     return model;
-}
-
-nlohmann::json read_result(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-    if (root.is_discarded()) throw std::runtime_error(path + ": found no JSON, expected it");
-    return root;
 }
 
 }  // namespace vibrig::tool

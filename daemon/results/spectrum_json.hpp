@@ -12,11 +12,9 @@ namespace vibrig::tool {
 /// were held out it has what was measured beside what the others foretell.
 void add_spectrum(const SpectrumResult& spectrum, nlohmann::ordered_json& root);
 
-/// Of a root `spectrum` what a prediction needs. Throws with file, key and what was expected.
+/// Of the root `spectrum` of a file of vibrig identify --json, or of a campaign's result.json, what
+/// a prediction needs. Throws with file, key and what was expected.
 [[nodiscard]] estimator::spectrum::Model read_model(const nlohmann::json& root,
                                                     const std::string& path);
-/// A file of vibrig identify --json, or a campaign's result.json, for read_model(). Throws
-/// std::runtime_error that names it.
-[[nodiscard]] nlohmann::json read_result(const std::string& path);
 
 }  // namespace vibrig::tool

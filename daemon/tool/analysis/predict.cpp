@@ -22,6 +22,7 @@
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/spectrum/prediction.hpp"
 #include "estimator/spectrum/profile.hpp"
+#include "proto/json_file.hpp"
 #include "proto/option_value.hpp"
 
 namespace vibrig::tool {
@@ -277,7 +278,7 @@ Predicted predict_for(const PredictOptions& options) {
         throw std::runtime_error("found no --profile, expected a JSON file or a name of --list");
     if (options.attitudes.empty() && options.recording.empty())
         throw std::runtime_error("found no --attitude, expected one or more, or --verify");
-    const nlohmann::json result = read_result(options.result);
+    const nlohmann::json result = proto::read_json(options.result);
     const Model model = read_model(result, options.result);
     if (!model.refusal.empty() && !options.force)
         throw std::runtime_error(options.result + ": spectrum.refusal: found \"" + model.refusal +

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "daemon/tool/analysis/profile_options.hpp"
 #include "estimator/spectrum/profile.hpp"
+#include "proto/json_file.hpp"
 
 namespace vibrig::tool {
 
@@ -127,9 +127,7 @@ bool alike(const std::vector<Band>& a, const std::vector<Band>& b) {
 }  // namespace
 
 Spectra read_spectra(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error(path + ": cannot be read, expected a JSON file");
-    const SpectraJson root = SpectraJson::parse(file, nullptr, false);
+    const SpectraJson root = proto::read_json(path);
     if (!root.is_array())
         throw std::runtime_error(
             path + ": expected a JSON list of {run, position, lines | profile | psd}");

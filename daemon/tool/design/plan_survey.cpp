@@ -15,6 +15,7 @@
 #include "estimator/spectrum/sampling.hpp"
 #include "estimator/spectrum/survey.hpp"
 #include "estimator/uncertainty/balanced_order.hpp"
+#include "proto/json_file.hpp"
 
 namespace vibrig::tool::planner {
 
@@ -156,7 +157,7 @@ class SurveyPlan {
     void add_resonances(std::vector<double>& listed) {
         const std::string& path = request_.survey.about;
         if (path.empty()) return;
-        about_ = spectrum::about_resonances(read_model(read_result(path), path).mixture,
+        about_ = spectrum::about_resonances(read_model(proto::read_json(path), path).mixture,
                                             {1 / period(), c_.estimator.level_window_s}, listed);
         for (const double hz : spectrum::frequencies_of(about_)) {
             if (std::ranges::find(listed, hz) == listed.end()) listed.push_back(hz);
