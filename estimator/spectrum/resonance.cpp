@@ -1,5 +1,6 @@
 #include "estimator/spectrum/resonance.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,5 +1,6 @@
 #include "estimator/spectrum/sweep.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
