@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -24,6 +25,31 @@ STATUS_IDS = {0x210, 0x220, 0x221}
 COMMAND_IDS = {0x200}
 SEED = 7
 ROUNDS = 20  # of garbage
+ATTEMPTS = 3   # of a campaign that the machine itself holds up
+
+
+class Sleeper(threading.Thread):
+    """Only sleeps: how late it wakes, everything here does. A real rig does not wait meanwhile, so a campaign may end of it."""
+
+    TURN_S = 0.05
+    LONG_S = 0.3     # at once: less than any of the deadlines of SHORT
+    MUCH_S = 1.0     # in all: the machine is too slow for real time
+
+    def __init__(self):
+        super().__init__(daemon=True)
+        self.turns = [time.monotonic()]
+        self.start()
+
+    def run(self):
+        while True:
+            time.sleep(self.TURN_S)
+            self.turns.append(time.monotonic())
+
+    def late_s(self):
+        """The longest, and what is beyond a second turn in all."""
+        turns = [*self.turns, time.monotonic()]
+        late = [b - a - self.TURN_S for a, b in zip(turns, turns[1:])]
+        return max(late), sum(max(each - self.TURN_S, 0.0) for each in late)
 
 
 def send(*frames):
@@ -65,8 +91,8 @@ def counts_of(candump_log):
     return counts, syncs
 
 
-def campaign(checks, rig, folder):
-    """arm, start, finished; candump looks on."""
+def campaign(checks, rig, folder, may_repeat):
+    """arm, start, finished; candump looks on. False: the machine was to blame that it did not finish, and it may be repeated."""
     log = os.path.join(folder, "candump.log")
     with open(log, "wb") as file:
         candump = subprocess.Popen(["candump", "-L", BUS], stdin=subprocess.DEVNULL, stdout=file)
@@ -95,14 +121,19 @@ def campaign(checks, rig, folder):
             problems.append("recording without samples")
         return state in ("finished", "aborted", "tripped")
 
+    sleeper = Sleeper()
     last = rig.wait_for(watch, 150)
-    checks.check(last is not None and last["campaign"]["state"] == "finished", "the campaign finishes",
-                 f"{r.state_of(last)}\nstates seen: {' '.join(seen)}\n{rig.logs()}")
-    checks.check("recording" in seen and not problems, "status answers while it records", f"{seen} {problems}")
     for process in (strangers, candump):
         process.terminate()
         process.wait()
-
+    longest, much = sleeper.late_s()
+    finished = last is not None and last["campaign"]["state"] == "finished"
+    if not finished and may_repeat and (longest > Sleeper.LONG_S or much > Sleeper.MUCH_S):
+        checks.note(f"the machine held everything up, {longest:.2f} s at once, {much:.2f} s in all: {r.state_of(last)}; once more")
+        return False
+    checks.check(finished, "the campaign finishes",
+                 f"{r.state_of(last)}\nstates seen: {' '.join(seen)}\n{rig.logs()}")
+    checks.check("recording" in seen and not problems, "status answers while it records", f"{seen} {problems}")
     status = r.check_balances(checks, rig)
     if status is not None:
         checks.equal(len(status["campaign"]["dwells"]), 4, "four dwells are reported")
@@ -125,6 +156,7 @@ def campaign(checks, rig, folder):
     result = json.loads(text) if text else {}
     checks.equal(len(result.get("parameters", [])), 30, "result.json holds 30 parameters")
     checks.check(path is None or "NaN" not in text.decode(), "result.json holds no NaN")
+    return True
 
 
 def survives_garbage(checks, rig):
@@ -215,7 +247,6 @@ def dies_safely(checks, rig):
 
 def with_pymodbus(checks, programs, folder):
     """The daemon's Modbus side against an independent implementation, which drives the table of the simulated rig."""
-    os.makedirs(folder)
     rig = r.Rig(programs, BUS, "real", folder)
     rig.modbus_port = 1502
     rig.configure(SHORT, **r.PATIENT)
@@ -252,6 +283,25 @@ def sane_log(checks, rig):
     checks.check(lines and not bad, "the log holds sane lines", bad[:5] or "it is empty")
 
 
+def life(timed, checks, programs, folder, may_repeat):
+    """Of one daemon, from its first campaign to its end. False: to be repeated."""
+    rig = r.Rig(programs, BUS, "real", folder)
+    try:
+        rig.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
+        rig.configure(SHORT, **r.PATIENT)
+        rig.start_daemon()
+        if not timed(campaign, checks, rig, folder, may_repeat):
+            return False
+        timed(survives_garbage, checks, rig)
+        timed(recovers_from_interface_down, checks, rig)
+        timed(stops_on_sigterm, checks, rig)
+        sane_log(checks, rig)
+        timed(dies_safely, checks, rig)
+        return True
+    finally:
+        rig.stop()
+
+
 def main():
     programs = r.programs_from_command_line(__doc__)
     checks = r.Checks()
@@ -259,27 +309,19 @@ def main():
 
     def timed(function, *arguments):
         begin = time.monotonic()
-        function(*arguments)
+        returned = function(*arguments)
         checks.note(f"{function.__name__}: {time.monotonic() - begin:.1f} s")
+        return returned
 
     port_test = os.path.join(programs, "can_port_hil_test")
     if os.path.exists(port_test):
         timed(checks.gtest, port_test, 60)
+    for attempt in range(1, ATTEMPTS + 1):
+        with tempfile.TemporaryDirectory() as folder:
+            if life(timed, checks, programs, folder, attempt < ATTEMPTS):
+                break
     with tempfile.TemporaryDirectory() as folder:
-        rig = r.Rig(programs, BUS, "real", folder)
-        try:
-            rig.start_plant("--seed", str(SEED), "--warm-up", "1", "--start-temperature", "45")
-            rig.configure(SHORT, **r.PATIENT)
-            rig.start_daemon()
-            timed(campaign, checks, rig, folder)
-            timed(survives_garbage, checks, rig)
-            timed(recovers_from_interface_down, checks, rig)
-            timed(stops_on_sigterm, checks, rig)
-            sane_log(checks, rig)
-            timed(dies_safely, checks, rig)
-        finally:
-            rig.stop()
-        timed(with_pymodbus, checks, programs, os.path.join(folder, "pymodbus"))
+        timed(with_pymodbus, checks, programs, folder)
     checks.note(f"{time.monotonic() - start:.0f} s in {os.environ.get('RUN_IN_UML', 'this kernel')}")
     return checks.end()
 
