@@ -32,7 +32,7 @@ class Sleeper(threading.Thread):
     """Only sleeps: how late it wakes, everything here does. A real rig does not wait meanwhile, so a campaign may end of it."""
 
     TURN_S = 0.05
-    LONG_S = 0.3     # at once: less than any of the deadlines of SHORT
+    LONG_S = 0.3     # at once: a fifth of what the controller's watchdog waits before it stops the table
     MUCH_S = 1.0     # in all: the machine is too slow for real time
 
     def __init__(self):
