@@ -35,6 +35,7 @@ struct RtEvent {
     std::array<char, 16> source{};
     std::array<char, 128> text{};
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 
 /// What the daemon is made of, in the order in which it is made; what stands further down uses what

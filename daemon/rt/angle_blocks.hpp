@@ -21,6 +21,7 @@ struct BlockRecord {
     double time_s = 0;  ///< mean, from the beginning of the dwell
     std::array<double, 3> angle_rad{};
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 
 /// Averages the angles that the filter used, block by block, about a hundred blocks to a dwell:

@@ -21,6 +21,7 @@ struct DwellOrder {
     double level_sigma_g = 0;
     bool cancel = false;  ///< end the dwell in progress with what it has
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 
 /// A sample of a dwell as the filter takes it.
@@ -39,6 +40,7 @@ struct DwellOrder {
 struct DwellDone {
     estimator::DwellSummary summary;
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 
 }  // namespace vibrig::rt

@@ -12,6 +12,7 @@ struct Fed {
     int run = 0, position = 0;
     bool first = false;  ///< begins its dwell
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 
 }  // namespace vibrig::rt

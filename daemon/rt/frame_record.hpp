@@ -15,6 +15,7 @@ struct FrameRecord {
     bool fd = false;
     bool sent = false;  ///< by this daemon
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 
 }  // namespace vibrig::rt

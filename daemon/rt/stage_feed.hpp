@@ -23,7 +23,8 @@ struct Motion {
     std::array<double, 3> angle{};  ///< encoders, the last good ones, rad
     std::uint32_t generation = 0;   ///< of the order it belongs to
     std::uint32_t dropped_before = 0;
-    bool good = false;  ///< force and angles
+    std::uint64_t published_to = 0;  ///< the ring's own
+    bool good = false;               ///< force and angles
     bool increment = false;
     double table = 0;  ///< table accelerometer of a single sample, g
     bool table_good = false;

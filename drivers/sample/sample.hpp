@@ -31,6 +31,7 @@ struct alignas(64) Sample {
     Time time = 0;                     ///< device time fitted to kernel stamps, ns, whole us
     std::uint32_t sequence = 0;        ///< sync count, extended; wraps at 2^32
     std::uint32_t dropped_before = 0;  ///< records lost in the ring since the previous record
+    std::uint64_t published_to = 0;    ///< the ring's own
     std::array<double, 3> angle{};     ///< outer, inner, azimuth, rad, [0, 2 pi)
     std::array<double, 3> force{};     ///< specific force, accelerometer axes, g
     double table_accel = 0;            ///< table accelerometer along its axis, g

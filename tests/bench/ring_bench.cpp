@@ -22,8 +22,9 @@ using Clock = std::chrono::steady_clock;
 
 struct alignas(64) Record {
     std::uint64_t number = 0;
-    std::array<double, 6> value{};
+    std::array<double, 5> value{};
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 static_assert(sizeof(Record) == 64, "one cache line per record");
 

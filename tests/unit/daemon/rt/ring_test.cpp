@@ -14,6 +14,7 @@ struct alignas(64) Record {
     std::uint64_t number = 0;
     std::uint64_t check = 0;  ///< number ^ kMagic: torn records show
     std::uint32_t dropped_before = 0;
+    std::uint64_t published_to = 0;  ///< the ring's own
 };
 static_assert(sizeof(Record) == 64);
 constexpr std::uint64_t kMagic = 0x9e3779b97f4a7c15;
@@ -57,6 +58,46 @@ TEST(Ring, DropsTheNewestAndTheNextRecordCarriesTheCount) {
     EXPECT_EQ(counts.popped, 6U);
 }
 
+TEST(Ring, BelievesNothingThatARecordBroughtFromAnotherRing) {
+    // GIVEN records that say, as those of another ring do, that far more has been published
+    Ring<Record> ring(8);
+    const auto foreign = [](std::uint64_t number) {
+        Record r = record(number);
+        r.published_to = ~std::uint64_t{0} - number;
+        return r;
+    };
+    std::vector<std::uint64_t> seen;
+    const auto take = [&](const Record& r) { seen.push_back(r.number); };
+    std::uint64_t next = 0;
+    // WHEN they are pushed alone and together, all around the ring many times
+    for (std::size_t round = 0; round < 200; ++round) {
+        std::vector<Record> batch;
+        for (std::size_t i = 0; i < 1 + round % 8; ++i) batch.push_back(foreign(next++));
+        ASSERT_EQ(ring.push_n(batch), batch.size());
+        seen.clear();
+        // THEN what was pushed comes out, in parts or whole, and nothing after it
+        std::size_t looks = 0;
+        while (ring.consume(take, 1 + round % 5) > 0 && ++looks <= batch.size()) {
+        }
+        ASSERT_EQ(seen.size(), batch.size()) << "round " << round;
+        for (std::size_t i = 0; i < seen.size(); ++i) ASSERT_EQ(seen[i], batch[i].number);
+    }
+}
+
+TEST(Ring, GivesWhatCameAfterABatchThatWasTakenInPart) {
+    Ring<Record> ring(8);
+    std::vector<std::uint64_t> seen;
+    const auto take = [&](const Record& r) { seen.push_back(r.number); };
+    ring.push_n(std::vector<Record>{record(0), record(1), record(2)});
+    EXPECT_EQ(ring.consume(take, 2), 2U);
+    EXPECT_TRUE(ring.try_push(record(3)));
+    ring.push_n(std::vector<Record>{record(4), record(5)});
+    EXPECT_EQ(ring.consume(take, 0), 0U);
+    EXPECT_EQ(ring.consume(take), 4U);
+    EXPECT_EQ(seen, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 5}));
+    EXPECT_EQ(ring.counts().popped, 6U);
+}
+
 TEST(Ring, BehavesLikeTheReferenceQueueInRandomUse) {
     const unsigned seed = 20260721;
     SCOPED_TRACE(seed);
@@ -67,7 +108,10 @@ TEST(Ring, BehavesLikeTheReferenceQueueInRandomUse) {
     for (int step = 0; step < 200'000; ++step) {
         if (random() % 2 == 0) {
             std::vector<Record> batch(random() % 40);
-            for (auto& r : batch) r = record(next++);
+            for (auto& r : batch) {
+                r = record(next++);
+                r.published_to = random();
+            }
             const auto expected = reference.push(batch.data(), batch.size());
             ASSERT_EQ(ring.push_n(batch), expected);
             next -= batch.size() - expected;
@@ -96,7 +140,10 @@ TEST(Ring, LosesTearsAndReordersNothingBetweenTwoThreads) {
         // Longer where the consumer hardly gets a processor: else there was nothing to see.
         while (number < kRecords || ring.counts().popped < kRecords / 100) {
             const std::size_t n = 1 + static_cast<std::size_t>(round++ % batch.size());
-            for (std::size_t i = 0; i < n; ++i) batch[i] = record(number++);
+            for (std::size_t i = 0; i < n; ++i) {
+                batch[i] = record(number++);
+                batch[i].published_to = number % 3 == 0 ? ~number : 0;  // of another ring
+            }
             if (ring.push_n({batch.data(), n}) < n) std::this_thread::yield();
         }
         offered.store(number);
@@ -115,7 +162,7 @@ TEST(Ring, LosesTearsAndReordersNothingBetweenTwoThreads) {
     while (!finished.load()) {
         if (ring.consume(take) == 0) std::this_thread::yield();
     }
-    while (ring.consume(take) > 0) {
+    while (ring.consume(take) > 0 && good) {
     }
     producer.join();
     // THEN every record was either taken, whole and in order, or counted as dropped
