@@ -1,18 +1,12 @@
 #pragma once
 
-#include <array>
-#include <cstdio>
 #include <string>
+
+#include "proto/printed.hpp"
 
 namespace vibrig::tool {
 
-/// As printf has it; 319 characters at most.
-template <class... Values>
-[[nodiscard]] std::string printed(const char* format, Values... values) {
-    std::array<char, 320> text{};
-    std::snprintf(text.data(), text.size(), format, values...);
-    return text.data();
-}
+using proto::printed;
 
 /// The same, with the end of a line.
 template <class... Values>
