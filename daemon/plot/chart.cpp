@@ -300,12 +300,8 @@ std::string Chart::svg() const {
     Drawing drawing(*this);
     const double foot = Drawing::bottom() + drawing.below();
     const double height = foot + kNoteHeight * static_cast<double>(notes.size());
-    if (maps.empty()) {
-        drawing.grid();
-    } else {
-        drawing.grid();
-        drawing.map(maps.front());
-    }
+    drawing.grid();
+    if (!maps.empty()) drawing.map(maps.front());
     for (std::size_t i = 0; i < curves.size(); ++i) {
         drawing.curve(curves[i], i);
     }
@@ -341,6 +337,13 @@ void make_folder(const std::string& path) {
                                  (error ? error.message() : "it is something else") +
                                  "; expected a folder or a name that ends in .svg");
     }
+}
+
+void write_pictures(const std::string& path, const Pictures& pictures) {
+    const std::filesystem::path where(path);
+    if (where.extension() == ".svg") return write_file(path, pictures.front().second);
+    make_folder(path);
+    for (const auto& [name, svg] : pictures) write_file((where / (name + ".svg")).string(), svg);
 }
 
 }  // namespace vibrig::tool::plot
