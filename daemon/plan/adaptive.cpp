@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "daemon/plan/forecast.hpp"
 #include "estimator/filter/kinematics.hpp"
@@ -10,6 +9,7 @@
 #include "estimator/identification/crlb.hpp"
 #include "estimator/plan/positions.hpp"
 #include "estimator/uncertainty/assessment.hpp"
+#include "proto/printed.hpp"
 
 namespace vibrig::plan {
 
@@ -104,13 +104,9 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
     std::string state = "largest standard errors";
     std::string unmet;
     for (std::size_t k = 0; k < worst.size(); ++k) {
-        std::array<char, 80> text{};
-        std::snprintf(text.data(), text.size(), "%s %s %.3g", k == 0 ? "" : ",", kKinds[k],
-                      worst[k]);
-        state += text.data();
+        state += proto::printed("%s %s %.3g", k == 0 ? "" : ",", kKinds[k], worst[k]);
         if (!(adaptive_.target[k] > 0)) continue;
-        std::snprintf(text.data(), text.size(), " (target %.3g)", adaptive_.target[k]);
-        state += text.data();
+        state += proto::printed(" (target %.3g)", adaptive_.target[k]);
         if (worst[k] > adaptive_.target[k])
             unmet += (unmet.empty() ? "" : ", ") + std::string(kKinds[k]);
     }
@@ -135,10 +131,9 @@ AdaptivePlan::Decision AdaptivePlan::next(const std::vector<double>& covariance,
         decision.words = "the time limit has come; targets missed: " + unmet + "; " + state;
         return decision;
     }
-    std::array<char, 120> text{};
-    std::snprintf(text.data(), text.size(), "; %s%zu more dwells, %.0f s",
-                  plan.met ? "" : "more than ", decision.left, decision.left_s);
-    decision.words = state + text.data();
+    decision.words =
+        state + proto::printed("; %s%zu more dwells, %.0f s", plan.met ? "" : "more than ",
+                               decision.left, decision.left_s);
     if (too_few)
         decision.words += "; every target is met, but fewer than " + std::to_string(kFewestDwells) +
                           " dwells do not tell what the bias did";

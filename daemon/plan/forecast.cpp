@@ -2,29 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "estimator/filter/kinematics.hpp"
 #include "estimator/filter/parameters.hpp"
 #include "estimator/plan/evaluation.hpp"
 #include "estimator/plan/positions.hpp"
+#include "proto/printed.hpp"
 
 namespace vibrig::plan {
 
 namespace {
 
+using proto::printed;
+
 /// Levels closer than this, relative, in kappa, barely separate constant and squares.
 constexpr double kCloseLevels = 0.05;
 
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-    std::array<char, 300> out{};
-    std::snprintf(out.data(), out.size(), pattern, values...);
-    return out.data();
-}
-
 std::string describe(const planning::Vec3& position, double level_g) {
-    return format("(%g, %g, %g) deg at %g g", position[0], position[1], position[2], level_g);
+    return printed("(%g, %g, %g) deg at %g g", position[0], position[1], position[2], level_g);
 }
 
 /// One more level first: a static run costs least.
@@ -86,10 +81,10 @@ std::string close_levels(const std::vector<PlannedRun>& runs) {
     const double wanted = largest - 2 * (largest - least);
     const std::string halve =
         wanted >= 1
-            ? format("a lowest level of %.3g g would halve them", std::sqrt(2 * (wanted - 1)))
-            : format("a highest level of %.3g g would halve them",
-                     std::sqrt(2 * (least + 2 * (largest - least) - 1)));
-    return format(
+            ? printed("a lowest level of %.3g g would halve them", std::sqrt(2 * (wanted - 1)))
+            : printed("a highest level of %.3g g would halve them",
+                      std::sqrt(2 * (least + 2 * (largest - least) - 1)));
+    return printed(
                "the levels' kappa differ by %.2g %% only: constants and squares are told apart "
                "badly; ",
                100 * apart) +
@@ -147,8 +142,8 @@ Forecast forecast(const estimator::Settings& settings, const std::vector<Planned
     result.identifies_all = evaluation.identifies_all();
     result.sigma = estimator::predicted_sigma(settings, dwells, {}, period_s);
     if (!result.identifies_all) {
-        result.refusal = format("rank %zu of %zu: the plan does not determine ", evaluation.rank,
-                                evaluation.coefficients) +
+        result.refusal = printed("rank %zu of %zu: the plan does not determine ", evaluation.rank,
+                                 evaluation.coefficients) +
                          not_determined(settings, evaluation) + "; " +
                          remedy(settings, problem, effort, runs);
     } else {
@@ -163,10 +158,10 @@ std::string forecast_table(const Forecast& forecast) {
     for (std::size_t k = 0; k < estimator::kParameters / 3; ++k) {
         std::string name = names[k];
         name.pop_back();
-        text += format("  %-5s %-16s", name.c_str(), estimator::parameter_unit(k));
+        text += printed("  %-5s %-16s", name.c_str(), estimator::parameter_unit(k));
         for (std::size_t gyro = 0; gyro < 3; ++gyro) {
             const double sigma = forecast.sigma[10 * gyro + k];
-            text += std::isfinite(sigma) ? format("%12.3g", sigma) : format("%12s", "-");
+            text += std::isfinite(sigma) ? printed("%12.3g", sigma) : printed("%12s", "-");
         }
         text += '\n';
     }
